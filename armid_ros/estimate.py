@@ -1,0 +1,78 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What an identification says of its parameters: values, and how far to believe them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from armid_ros.errors import ModelError
+from armid_ros.motion import FloatArray, read_only
+
+
+@dataclass(frozen=True)
+class ParameterName:
+    """
+    One scalar parameter of a model.
+
+    Attributes
+    ----------
+    name : str
+        Its name; a grouping of rigid parameters reads as an expression, 'Izz1 + Iyy2'.
+    joint : str
+        The joint it belongs to; empty for a parameter of the whole arm.
+    unit : str
+        SI unit, such as 'kg m^2' or 'N m s/rad'.
+
+    """
+
+    name: str
+    joint: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """
+    Estimated parameters with their covariance.
+
+    Attributes
+    ----------
+    parameters : tuple of ParameterName
+        P names.
+    values : ndarray, shape (P,)
+        Values, in the unit of each.
+    covariance : ndarray, shape (P, P)
+        Covariance of the values, units multiplied.
+
+    """
+
+    parameters: tuple[ParameterName, ...]
+    values: FloatArray
+    covariance: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check their shapes."""
+        count = len(self.parameters)
+        object.__setattr__(self, 'values', read_only(self.values))
+        object.__setattr__(self, 'covariance', read_only(self.covariance))
+        if self.values.shape != (count,) or self.covariance.shape != (count, count):
+            raise ModelError(
+                f'estimate: {count} parameters, but values of shape {self.values.shape} '
+                f'and a covariance of shape {self.covariance.shape}'
+            )
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviations, shape (P,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    def index(self, name: str, joint: str = '') -> int:
+        """Return the position of a parameter; ModelError lists those that exist."""
+        for position, parameter in enumerate(self.parameters):
+            if parameter.name == name and parameter.joint == joint:
+                return position
+        known = ', '.join(f'{p.name} [{p.joint}]' if p.joint else p.name for p in self.parameters)
+        raise ModelError(f"no parameter '{name}' of joint '{joint}'; there are {known}")

@@ -1,0 +1,95 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The motion of an arm on one time base: what every model, effect and simulator speaks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from armid_ros.errors import RecordingError
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def read_only(values: npt.ArrayLike) -> FloatArray:
+    """
+    Return the values as a contiguous float64 array that cannot be written to.
+
+    An array that is already such a view of immutable memory is not copied.
+
+    """
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.flags.writeable:
+        array = array.view() if array is not values else array.copy()
+        array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True)
+class Motion:
+    """
+    Joint motion sampled on one time base, with or without measured torque.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        Joint names in column order, n of them.
+    t : ndarray, shape (N,)
+        Time [s], strictly increasing.
+    q, dq, ddq : ndarray, shape (N, n)
+        Position [rad or m], velocity, acceleration.
+    tau : ndarray, shape (N, n), or None
+        Actuator torque [N m] or force [N], positive along the URDF joint axis; None when the
+        motion is a reference that nobody measured.
+
+    """
+
+    joints: tuple[str, ...]
+    t: FloatArray
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+    tau: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check that their shapes agree."""
+        for name in ('t', 'q', 'dq', 'ddq', 'tau'):
+            values = getattr(self, name)
+            if values is not None:
+                object.__setattr__(self, name, read_only(values))
+        expected = (len(self.t), len(self.joints))
+        for name in ('q', 'dq', 'ddq', 'tau'):
+            values = getattr(self, name)
+            if values is not None and values.shape != expected:
+                raise RecordingError(
+                    f'motion: {name} has shape {values.shape}, but {expected[0]} time stamps of '
+                    f'{expected[1]} joints need {expected}'
+                )
+
+    def __len__(self) -> int:
+        """Return the number of samples N."""
+        return len(self.t)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints n."""
+        return len(self.joints)
+
+    def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Motion:
+        """Return the motion at some of its samples."""
+        tau = None if self.tau is None else self.tau[samples]
+        return replace(
+            self,
+            t=self.t[samples],
+            q=self.q[samples],
+            dq=self.dq[samples],
+            ddq=self.ddq[samples],
+            tau=tau,
+        )
+
+    def with_torque(self, tau: npt.ArrayLike | None) -> Motion:
+        """Return the same motion with another torque, shape (N, n) [N m]."""
+        return replace(self, tau=None if tau is None else read_only(tau))
