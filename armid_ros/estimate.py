@@ -6,10 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, read_only
+import numpy as np
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from armid_ros.errors import RecordingError
 import numpy as np
 import numpy.typing as npt
-
-from armid_ros.errors import RecordingError
 
 FloatArray = npt.NDArray[np.float64]
 
