@@ -1,0 +1,7 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The arm model: rigid body plus effects, and the file it is kept in."""
+
+from armid_ros.arm.arm_model import ArmModel
+
+__all__ = ['ArmModel']

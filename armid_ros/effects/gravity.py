@@ -1,0 +1,104 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Gravity that is not what the model says: its magnitude, or the tilt of the base.
+
+Joint torques are linear in the gravity vector, so both read off the same three exact columns.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from armid_ros.effects.base import Action, Effect, Quantity
+from armid_ros.errors import ModelError
+from armid_ros.model import gravity_sensitivity
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+if TYPE_CHECKING:
+    from armid_ros.arm import ArmModel
+
+
+class _GravityEffect(Effect):
+    """An effect of the whole arm."""
+
+    @classmethod
+    def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
+        return ()
+
+    def __post_init__(self) -> None:
+        """Refuse joints."""
+        if self.joints:
+            raise ModelError(f'{self.name} belongs to the whole arm, not to {self.joints[0]}')
+
+
+@dataclass(frozen=True)
+class GravityMagnitude(_GravityEffect):
+    """
+    Difference of the magnitude of gravity from the model's, |g| = |g_model| + dg.
+
+    After a fit of the base parameters only the part shows in which masses act by inertia as well;
+    moving fast makes it visible.
+
+    """
+
+    name = 'gravity_magnitude'
+    summary = 'gravity stronger or weaker than in the model'
+    quantities = (Quantity('gravity_difference', 'm/s^2'),)
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return dtau/dg along gravity [N m per m/s^2], shape (N, n, 1)."""
+        direction = _unit(arm.robot.gravity)[:, np.newaxis]
+        return np.asarray(gravity_sensitivity(arm.robot, motion.q) @ direction)
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the robot under the changed gravity."""
+        gravity = arm.robot.gravity
+        return Action(robot=arm.robot.with_gravity(gravity + values[0] * _unit(gravity)))
+
+
+@dataclass(frozen=True)
+class BaseTilt(_GravityEffect):
+    """
+    Rotation of the base against the world that the model does not know of.
+
+    The base is turned by the rotation vector (tilt_x, tilt_y) about two axes normal to gravity:
+    the base's own x and y for a base that the model has upright. Turning about gravity changes
+    nothing. Confounded with an encoder offset of the first joint when its axis is horizontal.
+
+    """
+
+    name = 'base_tilt'
+    summary = 'base mounted at an angle to gravity that the model does not have'
+    quantities = (Quantity('tilt_x', 'rad'), Quantity('tilt_y', 'rad'))
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return dtau/dtilt [N m/rad], shape (N, n, 2); first order."""
+        gravity = arm.robot.gravity
+        turned = np.cross(gravity, _horizontal_axes(gravity))
+        return np.asarray(gravity_sensitivity(arm.robot, motion.q) @ turned.T)
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the robot under gravity as the tilted base sees it."""
+        gravity = arm.robot.gravity
+        tilt = Rotation.from_rotvec(values @ _horizontal_axes(gravity))
+        return Action(robot=arm.robot.with_gravity(tilt.inv().apply(gravity)))
+
+
+def _unit(gravity: FloatArray) -> FloatArray:
+    length = np.linalg.norm(gravity)
+    if length == 0.0:
+        raise ModelError('an effect of gravity needs a model with gravity; its vector is zero')
+    return np.asarray(gravity / length)
+
+
+def _horizontal_axes(gravity: FloatArray) -> FloatArray:
+    """Return two unit vectors normal to gravity, rows; x and y when it points along -z."""
+    down = _unit(gravity)
+    upright, _ = Rotation.align_vectors([-down], [[0.0, 0.0, 1.0]])
+    return np.asarray(upright.apply(np.eye(3)[:2]))

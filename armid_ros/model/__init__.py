@@ -1,0 +1,31 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The rigid body: inverse dynamics, regressor, base parameters, gravity composites."""
+
+from armid_ros.model.base_parameters import (
+    BaseParameters,
+    gravity_composites,
+    group_columns,
+    rigid_base_parameters,
+)
+from armid_ros.model.rigid_body import (
+    gravity_sensitivity,
+    inverse_dynamics,
+    LINK_PARAMETERS,
+    random_motion,
+    regressor,
+    rigid_parameter_names,
+)
+
+__all__ = [
+    'BaseParameters',
+    'LINK_PARAMETERS',
+    'gravity_composites',
+    'gravity_sensitivity',
+    'group_columns',
+    'inverse_dynamics',
+    'random_motion',
+    'regressor',
+    'rigid_base_parameters',
+    'rigid_parameter_names',
+]

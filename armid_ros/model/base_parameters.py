@@ -1,0 +1,214 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Base parameters: the combinations of parameters that a motion can tell apart.
+
+The columns of a regressor depend on one another. Going through them from left to right, a column
+that the kept ones span is dropped and its parameter is grouped with theirs, which gives the
+groupings of Gautier (1991), 'Ixx2 - Iyy2', in an order that a person chose. The rank itself comes
+from a QR factorisation with column pivoting.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import ParameterName
+from armid_ros.model.rigid_body import (
+    LINK_PARAMETERS,
+    random_motion,
+    regressor,
+    rigid_parameter_names,
+)
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+
+#: Columns are scaled to unit norm; what the kept ones leave of a dependent column is rounding,
+#: 1e-15 to 1e-13, and what they leave of an independent one is rarely below 1e-5.
+RANK_TOLERANCE = 1e-9
+
+#: The order in which the parameters of a link are kept: inertia first, mass last, so that masses
+#: are grouped into moments and moments of later links into those of earlier ones.
+_KEEP_ORDER = ('Ixx', 'Ixy', 'Ixz', 'Iyy', 'Iyz', 'Izz', 'mx', 'my', 'mz', 'm')
+
+
+@dataclass(frozen=True)
+class BaseParameters:
+    """
+    Identifiable combinations of a list of standard parameters.
+
+    Attributes
+    ----------
+    standard : tuple of ParameterName
+        P standard parameters, the columns of the full regressor W.
+    parameters : tuple of ParameterName
+        r base parameters; the names are expressions such as 'Izz1 + Iyy2 + 0.12 (m3 + m4)'.
+    independent : ndarray of int, shape (r,)
+        Columns of W that are kept: W theta = W[:, independent] beta.
+    grouping : ndarray, shape (r, P)
+        beta = grouping @ theta.
+
+    """
+
+    standard: tuple[ParameterName, ...]
+    parameters: tuple[ParameterName, ...]
+    independent: npt.NDArray[np.intp]
+    grouping: FloatArray
+
+    @property
+    def rank(self) -> int:
+        """Number of base parameters r."""
+        return len(self.parameters)
+
+    def values(self, theta: npt.ArrayLike) -> FloatArray:
+        """Return the base parameters, shape (r,), of standard parameters, shape (P,)."""
+        return np.asarray(self.grouping @ np.asarray(theta, dtype=float))
+
+    def lift(self, beta: npt.ArrayLike, prior: npt.ArrayLike) -> FloatArray:
+        """
+        Return the standard parameters nearest to a prior that have given base parameters.
+
+        Parameters
+        ----------
+        beta : array_like, shape (r,)
+            Base parameters.
+        prior : array_like, shape (P,)
+            Standard parameters to stay near to, such as those of the URDF.
+
+        Returns
+        -------
+        ndarray, shape (P,)
+            The minimum-norm correction of the prior; grouping @ result = beta.
+
+        """
+        prior = np.asarray(prior, dtype=float)
+        correction = np.linalg.pinv(self.grouping) @ (np.asarray(beta) - self.values(prior))
+        return np.asarray(prior + correction)
+
+
+def group_columns(w: FloatArray, standard: tuple[ParameterName, ...]) -> BaseParameters:
+    """
+    Find the base parameters of a stacked regressor.
+
+    Parameters
+    ----------
+    w : ndarray, shape (M, P)
+        Regressor over states that excite everything, M >= P.
+    standard : tuple of ParameterName
+        Names of the P columns. Earlier columns are kept in preference to later ones, except that
+        those of one link go inertia first, mass last.
+
+    Returns
+    -------
+    BaseParameters
+        Identifiable combinations.
+
+    Raises
+    ------
+    IdentificationError
+        If the two ways to find the rank disagree, which is a sign of nearly dependent columns.
+
+    """
+    order = _keep_order(standard)
+    scale = np.linalg.norm(w, axis=0)
+    seen = scale > RANK_TOLERANCE * scale.max(initial=1e-300)
+    candidates = [j for j in order if seen[j]]
+    triangle = np.linalg.qr(w[:, candidates] / scale[candidates], mode='r')
+    pivots = np.abs(np.diag(scipy.linalg.qr(triangle, mode='r', pivoting=True)[0]))
+    rank = int(np.sum(pivots > RANK_TOLERANCE * pivots[0])) if len(pivots) else 0
+
+    basis = np.empty((len(triangle), 0))
+    kept: list[int] = []
+    for position in range(len(candidates)):
+        rest = triangle[:, position]
+        for _ in range(2):  # twice is enough to be orthogonal to rounding (Kahan, Parlett)
+            rest = rest - basis @ (basis.T @ rest)
+        length = np.linalg.norm(rest)
+        if length > RANK_TOLERANCE:
+            basis = np.column_stack([basis, rest / length])
+            kept.append(position)
+    if len(kept) != rank:
+        raise IdentificationError(
+            f'the regressor has rank {rank} by pivoted QR but {len(kept)} by elimination: '
+            'some parameters are nearly dependent; check the kinematics for tiny offsets'
+        )
+    dependent = [position for position in range(len(candidates)) if position not in kept]
+    grouping = np.zeros((rank, len(standard)))
+    independent = np.array([candidates[position] for position in kept], dtype=np.intp)
+    grouping[np.arange(rank), independent] = 1.0
+    if dependent and kept:
+        coefficients = np.linalg.lstsq(triangle[:, kept], triangle[:, dependent], rcond=None)[0]
+        columns = [candidates[position] for position in dependent]
+        coefficients *= scale[columns] / scale[independent][:, np.newaxis]
+        coefficients[np.abs(coefficients) < RANK_TOLERANCE] = 0.0
+        grouping[:, columns] = coefficients
+    parameters = tuple(
+        ParameterName(_expression(row, leader, standard), standard[leader].joint, unit)
+        for row, leader in zip(grouping, independent, strict=True)
+        for unit in [standard[leader].unit]
+    )
+    return BaseParameters(standard, parameters, independent, read_only(grouping))
+
+
+def rigid_base_parameters(robot: Robot, rng: np.random.Generator) -> BaseParameters:
+    """Find the base parameters of the rigid body for the gravity in use."""
+    w = _stack(regressor(robot, random_motion(robot, 40 * robot.n_joints, rng)))
+    return group_columns(w, rigid_parameter_names(robot))
+
+
+def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters:
+    """
+    Find the combinations of masses and first moments that an arm at rest can tell apart.
+
+    An arm with revolute joints only has an even number of them; multiplied by the magnitude of
+    gravity they are the composite gravity parameters of Table 5 of the humanoid-arm paper.
+
+    """
+    motion = random_motion(robot, 40 * robot.n_joints, rng)
+    rest = Motion(motion.joints, motion.t, motion.q, 0.0 * motion.dq, 0.0 * motion.ddq)
+    names = rigid_parameter_names(robot)
+    static = [j for j in range(len(names)) if j % len(LINK_PARAMETERS) < 4]
+    w = _stack(regressor(robot, rest))[:, static]
+    return group_columns(w, tuple(names[j] for j in static))
+
+
+def _stack(columns: FloatArray) -> FloatArray:
+    return columns.reshape(-1, columns.shape[-1])
+
+
+def _keep_order(standard: tuple[ParameterName, ...]) -> list[int]:
+    def key(position: int) -> tuple[int, int]:
+        name = standard[position].name.rstrip('0123456789')
+        number = standard[position].name[len(name) :]
+        if name in _KEEP_ORDER and number:
+            return int(number), _KEEP_ORDER.index(name)
+        return len(standard), position
+
+    return sorted(range(len(standard)), key=key)
+
+
+def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...]) -> str:
+    """Write a grouping as a person would: equal factors once, in front of their sum."""
+    text = standard[leader].name
+    factors: dict[float, list[tuple[float, str]]] = {}
+    for column in np.flatnonzero(row):
+        if column != leader:
+            factor = float(f'{abs(row[column]):.6g}')
+            sign = float(np.sign(row[column]))
+            factors.setdefault(factor, []).append((sign, standard[column].name))
+    for factor, terms in factors.items():
+        if factor == 1.0:
+            text += ''.join(f' {"+" if sign > 0 else "-"} {name}' for sign, name in terms)
+            continue
+        lead = terms[0][0]
+        inner = terms[0][1] + ''.join(
+            f' {"+" if sign * lead > 0 else "-"} {name}' for sign, name in terms[1:]
+        )
+        inner = f'({inner})' if len(terms) > 1 else inner
+        text += f' {"+" if lead > 0 else "-"} {factor:g} {inner}'
+    return text

@@ -1,0 +1,126 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Rigid-body quantities over whole motions.
+
+The only place that loops over samples: Pinocchio's algorithms take one configuration at a time.
+Everything here is linear in the gravity vector and in the inertial parameters of the robot.
+
+"""
+
+from __future__ import annotations
+
+from armid_ros.estimate import ParameterName
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+import pinocchio as pin
+
+#: Inertial parameters of one link in Pinocchio's order: mass, first moments, inertia about the
+#: origin of the joint frame.
+LINK_PARAMETERS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
+_LINK_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
+
+
+def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
+    """
+    Name the inertial parameters of a robot.
+
+    Returns
+    -------
+    tuple of ParameterName, length 10 n
+        'm1', 'mx1', ... 'Izz1', 'm2', ...: numbered by joint, from 1.
+
+    """
+    return tuple(
+        ParameterName(f'{name}{number}', joint, unit)
+        for number, joint in enumerate(robot.joints, start=1)
+        for name, unit in zip(LINK_PARAMETERS, _LINK_UNITS, strict=True)
+    )
+
+
+def inverse_dynamics(robot: Robot, motion: Motion) -> FloatArray:
+    """
+    Compute the joint torques that a motion takes, by recursive Newton-Euler.
+
+    Returns
+    -------
+    ndarray, shape (N, n)
+        Torque [N m] or force [N].
+
+    """
+    model = robot.model
+    data = model.createData()
+    tau = np.empty((len(motion), robot.n_joints))
+    for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
+        tau[k] = pin.rnea(model, data, q, dq, ddq)
+    return tau
+
+
+def regressor(robot: Robot, motion: Motion) -> FloatArray:
+    """
+    Compute the matrix Y of tau = Y pi for every sample of a motion.
+
+    Returns
+    -------
+    ndarray, shape (N, n, 10 n)
+        Rows: joints; columns: ``rigid_parameter_names``.
+
+    Notes
+    -----
+    Source: Atkeson, An and Hollerbach 1986; Pinocchio's computeJointTorqueRegressor.
+
+    """
+    model = robot.model
+    data = model.createData()
+    n = robot.n_joints
+    y = np.empty((len(motion), n, len(LINK_PARAMETERS) * n))
+    for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
+        y[k] = pin.computeJointTorqueRegressor(model, data, q, dq, ddq)
+    return y
+
+
+def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
+    """
+    Differentiate the joint torques by the gravity vector; exact, as they are linear in it.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm.
+    q : ndarray, shape (N, n)
+        Joint positions.
+
+    Returns
+    -------
+    ndarray, shape (N, n, 3)
+        dtau/dg [N m per m/s^2], g in the base frame.
+
+    """
+    columns = np.empty((len(q), robot.n_joints, 3))
+    for axis, unit_gravity in enumerate(np.eye(3)):
+        model = robot.with_gravity(unit_gravity).model
+        data = model.createData()
+        for k, position in enumerate(q):
+            columns[k, :, axis] = pin.computeGeneralizedGravity(model, data, position)
+    return columns
+
+
+def random_motion(robot: Robot, n_samples: int, rng: np.random.Generator) -> Motion:
+    """
+    Draw independent random states that excite every identifiable parameter.
+
+    Positions are uniform within the limits (one turn where there are none), velocities and
+    accelerations are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m).
+
+    """
+    n = robot.n_joints
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
+    return Motion(
+        joints=robot.joints,
+        t=np.arange(n_samples, dtype=float),
+        q=rng.uniform(lower, upper, (n_samples, n)),
+        dq=rng.normal(size=(n_samples, n)),
+        ddq=rng.normal(size=(n_samples, n)),
+    )
