@@ -1,0 +1,25 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Robots: what a URDF says of an arm, and the robots that come with the package.
+
+`load_robot` takes a shipped name, a URDF or xacro file, or the text of a URDF, and gives a
+`Robot`: the rigid model of its driven joints with their limits, in any gravity.
+`collision_model` adds how far its links are from each other.
+
+"""
+
+from armid_ros.robots.gravity import GRAVITIES, parse_gravity
+from armid_ros.robots.load import load_robot, robot_from_urdf
+from armid_ros.robots.robot import PARAMETERS_PER_BODY, Robot
+from armid_ros.robots.shipped import shipped_robots
+
+__all__ = [
+    'load_robot',
+    'robot_from_urdf',
+    'shipped_robots',
+    'Robot',
+    'PARAMETERS_PER_BODY',
+    'parse_gravity',
+    'GRAVITIES',
+]

@@ -1,0 +1,341 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The kinematic tree in a URDF, checked so that what is wrong is said by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+import math
+from xml.etree import ElementTree
+
+from armid_ros.errors import RobotError
+import numpy as np
+
+MOVABLE = ('revolute', 'continuous', 'prismatic')
+KNOWN = (*MOVABLE, 'fixed', 'floating', 'planar')
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Inertial:
+    """Mass [kg], placement of the centroid frame [m, rad], inertia Ixx Ixy Ixz Iyy Iyz Izz."""
+
+    mass: float
+    xyz: Vector
+    rpy: Vector
+    inertia: tuple[float, float, float, float, float, float]
+
+    def doubt(self) -> str | None:
+        """Say why no mass distribution has this inertia, or None when one has."""
+        ixx, ixy, ixz, iyy, iyz, izz = self.inertia
+        tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+        moments = np.linalg.eigvalsh(tensor)
+        tolerance = 1e-6 * float(np.abs(moments).max())
+        if self.mass < 0.0 or moments[0] < -tolerance:
+            return f'negative mass or inertia (m = {self.mass:g} kg, moments {moments})'
+        if moments[0] + moments[1] < moments[2] - tolerance:
+            return f'principal moments {moments} kg m^2 violate the triangle inequality'
+        if self.mass == 0.0 and moments[2] > 0.0:
+            return 'an inertia without a mass'
+        return None
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """A joint position that follows another one: multiplier * position + offset."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint as the URDF has it; a limit that is not given is infinite."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    xyz: Vector
+    rpy: Vector
+    axis: Vector
+    lower: float
+    upper: float
+    velocity: float
+    effort: float
+    damping: float
+    friction: float
+    mimic: Mimic | None
+
+    @property
+    def movable(self) -> bool:
+        """Whether it has a degree of freedom."""
+        return self.kind in MOVABLE
+
+
+@dataclass(frozen=True)
+class Description:
+    """Links (name to inertial) and joints of a URDF, in the order of the document."""
+
+    name: str
+    links: dict[str, Inertial | None]
+    joints: tuple[Joint, ...]
+    notes: tuple[str, ...]
+
+    def movable(self) -> tuple[Joint, ...]:
+        """Joints with a degree of freedom."""
+        return tuple(joint for joint in self.joints if joint.movable)
+
+    def beyond(self, joint: Joint) -> tuple[Joint, ...]:
+        """Joints that a joint carries, at any depth."""
+        found: list[Joint] = []
+        tips = [joint.child]
+        while tips:
+            carried = [other for other in self.joints if other.parent in tips]
+            found += carried
+            tips = [other.child for other in carried]
+        return tuple(found)
+
+
+def parse_xml(text: str, source: str) -> ElementTree.Element:
+    """Return the root element of a URDF; RobotError says the line where the XML is broken."""
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        line, column = error.position
+        reason = str(error).split(':')[0]
+        raise RobotError(
+            f'{source}: malformed XML at line {line}, column {column + 1}: {reason}'
+        ) from None
+    if root.tag != 'robot':
+        raise RobotError(f'{source}: not a URDF: its root element is <{root.tag}>, not <robot>')
+    return root
+
+
+def parse_description(root: ElementTree.Element, source: str) -> Description:
+    """
+    Return the kinematic tree of a URDF.
+
+    Raises
+    ------
+    RobotError
+        For what a URDF must not have (names used twice, links that do not exist, loops, more
+        than one root, numbers that are none) and what an arm cannot have (floating or planar
+        joints), with the name of the link or joint.
+
+    """
+    reader = _Reader(source)
+    links: dict[str, Inertial | None] = {}
+    for element in root.findall('link'):
+        name = reader.name(element, links)
+        links[name] = reader.inertial(element, name)
+    if not links:
+        raise RobotError(f'{source}: not a URDF: it has no links')
+    joints: dict[str, Joint] = {}
+    for element in root.findall('joint'):
+        name = reader.name(element, joints)
+        joints[name] = reader.joint(element, name)
+    _check_tree(source, links, joints.values())
+    return Description(
+        name=root.get('name') or 'robot',
+        links=links,
+        joints=tuple(joints.values()),
+        notes=tuple(reader.notes),
+    )
+
+
+def _check_tree(source: str, links: dict[str, Inertial | None], joints: Iterable[Joint]) -> None:
+    carriers: dict[str, Joint] = {}
+    for joint in joints:
+        for role, link in (('parent', joint.parent), ('child', joint.child)):
+            if link not in links:
+                raise RobotError(
+                    f"{source}: joint '{joint.name}' has the {role} link '{link}', which does "
+                    f'not exist; links: {", ".join(links)}'
+                )
+        if joint.child in carriers:
+            raise RobotError(
+                f"{source}: link '{joint.child}' is the child of two joints, "
+                f"'{carriers[joint.child].name}' and '{joint.name}'; a URDF is a tree"
+            )
+        carriers[joint.child] = joint
+    roots = [link for link in links if link not in carriers]
+    if len(roots) > 1:
+        raise RobotError(
+            f'{source}: {len(roots)} links have no parent ({", ".join(roots)}); only the base may'
+        )
+    for link in links:
+        seen = {link}
+        while link in carriers:
+            link = carriers[link].parent
+            if link in seen:
+                raise RobotError(f"{source}: link '{link}' is part of a closed loop of joints")
+            seen.add(link)
+
+
+class _Reader:
+    """Reads elements of one document; remembers its name and what it had to assume."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+        self.notes: list[str] = []
+
+    def name(self, element: ElementTree.Element, taken: Iterable[str]) -> str:
+        name = element.get('name')
+        if not name:
+            raise RobotError(f'{self.source}: a <{element.tag}> has no name')
+        if name in taken:
+            raise RobotError(f"{self.source}: two {element.tag}s are named '{name}'")
+        return name
+
+    def inertial(self, link: ElementTree.Element, name: str) -> Inertial | None:
+        element = link.find('inertial')
+        if element is None:
+            return None
+        where = f"link '{name}'"
+        mass, inertia = element.find('mass'), element.find('inertia')
+        if mass is None or inertia is None:
+            missing = 'mass' if mass is None else 'inertia'
+            raise RobotError(f'{self.source}: the <inertial> of {where} has no <{missing}>')
+        xyz, rpy = self.origin(element, where)
+        inertial = Inertial(
+            mass=self.number(mass, 'value', where),
+            xyz=xyz,
+            rpy=rpy,
+            inertia=(
+                self.number(inertia, 'ixx', where),
+                self.number(inertia, 'ixy', where, 0.0),
+                self.number(inertia, 'ixz', where, 0.0),
+                self.number(inertia, 'iyy', where),
+                self.number(inertia, 'iyz', where, 0.0),
+                self.number(inertia, 'izz', where),
+            ),
+        )
+        doubt = inertial.doubt()
+        if doubt:
+            self.notes.append(f'{where}: {doubt}')
+        return inertial
+
+    def joint(self, element: ElementTree.Element, name: str) -> Joint:
+        where = f"joint '{name}'"
+        kind = element.get('type', '')
+        if kind not in KNOWN:
+            raise RobotError(
+                f"{self.source}: {where} has the type '{kind}'; types are {', '.join(KNOWN)}"
+            )
+        if kind in ('floating', 'planar'):
+            raise RobotError(
+                f'{self.source}: {where} is {kind}, but the base of an arm is fixed: make it '
+                f"type='fixed', or take the arm's own description"
+            )
+        xyz, rpy = self.origin(element, where)
+        lower, upper, velocity, effort = self.limits(element, kind, where)
+        dynamics = element.find('dynamics')
+        return Joint(
+            name=name,
+            kind=kind,
+            parent=self.link(element, 'parent', where),
+            child=self.link(element, 'child', where),
+            xyz=xyz,
+            rpy=rpy,
+            axis=self.axis(element, where),
+            lower=lower,
+            upper=upper,
+            velocity=velocity,
+            effort=effort,
+            damping=0.0 if dynamics is None else self.number(dynamics, 'damping', where, 0.0),
+            friction=0.0 if dynamics is None else self.number(dynamics, 'friction', where, 0.0),
+            mimic=self.mimic(element, where),
+        )
+
+    def limits(
+        self, element: ElementTree.Element, kind: str, where: str
+    ) -> tuple[float, float, float, float]:
+        limit = element.find('limit')
+        if kind not in MOVABLE:
+            return -math.inf, math.inf, math.inf, math.inf
+        if limit is None:
+            if kind != 'continuous':
+                self.notes.append(f'{where}: no <limit>; taken as unlimited')
+            return -math.inf, math.inf, math.inf, math.inf
+        rates = []
+        for name in ('velocity', 'effort'):
+            rate = abs(self.number(limit, name, where, math.inf))
+            if rate == 0.0:
+                self.notes.append(f'{where}: {name} limit 0; taken as unlimited')
+                rate = math.inf
+            rates.append(rate)
+        if kind == 'continuous':
+            return -math.inf, math.inf, rates[0], rates[1]
+        lower = self.number(limit, 'lower', where, 0.0)
+        upper = self.number(limit, 'upper', where, 0.0)
+        if lower > upper:
+            raise RobotError(
+                f'{self.source}: {where} has its lower limit {lower:g} above the upper {upper:g}'
+            )
+        if lower == upper:
+            self.notes.append(f'{where}: no range of motion in <limit>; taken as unlimited')
+            lower, upper = -math.inf, math.inf
+        return lower, upper, rates[0], rates[1]
+
+    def mimic(self, element: ElementTree.Element, where: str) -> Mimic | None:
+        mimic = element.find('mimic')
+        if mimic is None:
+            return None
+        return Mimic(
+            joint=mimic.get('joint', ''),
+            multiplier=self.number(mimic, 'multiplier', where, 1.0),
+            offset=self.number(mimic, 'offset', where, 0.0),
+        )
+
+    def link(self, element: ElementTree.Element, role: str, where: str) -> str:
+        reference = element.find(role)
+        link = None if reference is None else reference.get('link')
+        if not link:
+            raise RobotError(f'{self.source}: {where} has no {role} link')
+        return link
+
+    def axis(self, element: ElementTree.Element, where: str) -> Vector:
+        axis = element.find('axis')
+        x, y, z = (1.0, 0.0, 0.0) if axis is None else self.vector(axis, 'xyz', where)
+        length = math.hypot(x, y, z)
+        if length == 0.0:
+            if element.get('type') in MOVABLE:
+                raise RobotError(f'{self.source}: the axis of {where} has no direction')
+            return (1.0, 0.0, 0.0)
+        return (x / length, y / length, z / length)
+
+    def origin(self, element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
+        origin = element.find('origin')
+        if origin is None:
+            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        return self.vector(origin, 'xyz', where), self.vector(origin, 'rpy', where)
+
+    def vector(self, element: ElementTree.Element, name: str, where: str) -> Vector:
+        text = element.get(name, '0 0 0')
+        try:
+            x, y, z = (float(number) for number in text.split())
+        except ValueError:
+            raise RobotError(
+                f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is not three numbers"
+            ) from None
+        return x, y, z
+
+    def number(
+        self, element: ElementTree.Element, name: str, where: str, default: float | None = None
+    ) -> float:
+        text = element.get(name)
+        if text is None and default is not None:
+            return default
+        try:
+            number = float(text or '')
+        except ValueError:
+            number = math.nan
+        if math.isnan(number):
+            raise RobotError(
+                f"{self.source}: {where}: {name}='{text or ''}' of <{element.tag}> is no number"
+            )
+        return number

@@ -1,0 +1,223 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Loading a robot: from a shipped name, a URDF or xacro file, or the text of a URDF."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+from armid_ros.errors import RobotError
+from armid_ros.motion import FloatArray
+from armid_ros.robots.description import Description, Joint, parse_description, parse_xml
+from armid_ros.robots.gravity import parse_gravity
+from armid_ros.robots.robot import Robot
+from armid_ros.robots.selection import driven_joints, standing_position
+from armid_ros.robots.shipped import shipped_path, shipped_robots
+import numpy as np
+import pinocchio as pin
+
+NO_INERTIA = 1e-12  # kg m^2 or kg; the smallest motor rotor is five orders above
+
+
+def load_robot(
+    source: str | Path,
+    *,
+    gravity: str | Sequence[float] | FloatArray = 'earth',
+    joints: Sequence[str] | None = None,
+    xacro_arguments: Mapping[str, str] | None = None,
+) -> Robot:
+    """
+    Load a robot.
+
+    Parameters
+    ----------
+    source : str or Path
+        A shipped name (see `shipped_robots`), the path of a URDF or xacro file, or the text of a
+        URDF, such as a /robot_description. Meshes need not exist.
+    gravity : str or array_like, shape (3,)
+        'earth', 'moon', 'x,y,z' or a vector [m/s^2], in the frame of the base link.
+    joints : sequence of str, optional
+        The driven joints, in any order; the robot has them in its own order. Without it, all
+        revolute, continuous and prismatic joints except those of a gripper (mimic joints, joints
+        they follow, names with finger or gripper). Other joints are locked at 0, or at their
+        limit nearest to it, and their links become part of the body that carries them.
+    xacro_arguments : mapping of str to str, optional
+        Values of <xacro:arg>.
+
+    Raises
+    ------
+    RobotError
+        If there is no such robot or it cannot be used; the message names the file and the line,
+        link or joint.
+
+    Examples
+    --------
+    >>> robot = load_robot('humanoid_arm', gravity='moon')
+    >>> robot.joints[0]
+    'shoulder_pitch'
+
+    """
+    if isinstance(source, str) and source.lstrip().startswith('<'):
+        return robot_from_urdf(source, gravity=gravity, joints=joints)
+    shipped = isinstance(source, str) and source in shipped_robots()
+    path = shipped_path(str(source)) if shipped else Path(source).expanduser()
+    if not path.is_file():
+        raise RobotError(
+            f'{source}: neither a file nor a shipped robot; shipped are '
+            f'{", ".join(shipped_robots())}'
+        )
+    try:
+        text = path.read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        raise RobotError(f'{path}: cannot be read as text: {error}') from None
+    if path.suffix == '.xacro' or 'xmlns:xacro' in text:
+        text = _expand_xacro(path, xacro_arguments or {})
+    elif xacro_arguments:
+        raise RobotError(f'{path}: not a xacro file, so it takes no arguments')
+    return robot_from_urdf(text, gravity=gravity, joints=joints, source=str(source), path=path)
+
+
+def robot_from_urdf(
+    text: str,
+    *,
+    gravity: str | Sequence[float] | FloatArray = 'earth',
+    joints: Sequence[str] | None = None,
+    source: str = 'robot description',
+    path: Path | None = None,
+) -> Robot:
+    """
+    Make a robot of the text of a URDF; see `load_robot`.
+
+    Parameters
+    ----------
+    text : str
+        The URDF.
+    gravity, joints
+        As for `load_robot`.
+    source : str
+        What error messages call the text.
+    path : Path, optional
+        File it was read from, from where meshes and the SRDF are looked for.
+
+    Raises
+    ------
+    RobotError
+        If the description cannot be used.
+
+    """
+    description = parse_description(parse_xml(text, source), source)
+    driven = driven_joints(description, joints, source)
+    model, locked = _reduced_model(description, driven)
+    model.gravity = pin.Motion(parse_gravity(gravity), np.zeros(3))
+    by_name = {joint.name: joint for joint in driven}
+    driven = tuple(by_name[name] for name in list(model.names)[1:])
+    model.lowerPositionLimit = np.array([joint.lower for joint in driven])
+    model.upperPositionLimit = np.array([joint.upper for joint in driven])
+    robot = Robot(
+        name=description.name,
+        model=model,
+        joints=tuple(joint.name for joint in driven),
+        links=tuple(joint.child for joint in driven),
+        lower=np.array([joint.lower for joint in driven]),
+        upper=np.array([joint.upper for joint in driven]),
+        velocity_limit=np.array([joint.velocity for joint in driven]),
+        torque_limit=np.array([joint.effort for joint in driven]),
+        prismatic=np.array([joint.kind == 'prismatic' for joint in driven]),
+        urdf=text,
+        urdf_damping=np.array([joint.damping for joint in driven]),
+        urdf_friction=np.array([joint.friction for joint in driven]),
+        notes=description.notes + locked,
+        path=path,
+    )
+    _require_inertia(robot, source)
+    return robot
+
+
+def _expand_xacro(path: Path, arguments: Mapping[str, str]) -> str:
+    try:
+        import xacro
+    except ImportError:
+        raise RobotError(f'{path}: a xacro file needs the Python package xacro') from None
+    try:
+        return str(xacro.process_file(str(path), mappings=dict(arguments)).toxml())
+    except Exception as error:  # xacro evaluates Python expressions: anything can come out
+        reason = ' '.join(str(error).split()) or type(error).__name__
+        raise RobotError(f'{path}: xacro: {reason}') from None
+
+
+def _reduced_model(
+    description: Description, driven: Sequence[Joint]
+) -> tuple[pin.Model, tuple[str, ...]]:
+    """Build the model of the driven joints; also say where the others were locked."""
+    model = pin.buildModelFromXML(_kinematic_urdf(description))
+    position = np.zeros(model.nq)
+    locked, notes = [], []
+    for joint in description.movable():
+        if joint in driven:
+            continue
+        index = model.getJointId(joint.name)
+        position[model.joints[index].idx_q] = standing_position(description, joint)
+        locked.append(index)
+        unit = 'm' if joint.kind == 'prismatic' else 'rad'
+        notes.append(
+            f"joint '{joint.name}': not driven, locked at "
+            f'{position[model.joints[index].idx_q]:g} {unit}'
+        )
+    if locked:
+        model = pin.buildReducedModel(model, locked, position)
+    return model, tuple(notes)
+
+
+def _kinematic_urdf(description: Description) -> str:
+    """
+    Write the description as Pinocchio is to see it.
+
+    Continuous joints become revolute ones, so that nq == nv; limits, meshes, friction and
+    whatever else a URDF may hold stay out: the model has none, or they are read elsewhere.
+
+    """
+    root = ElementTree.Element('robot', name=description.name)
+    for name, inertial in description.links.items():
+        link = ElementTree.SubElement(root, 'link', name=name)
+        if inertial is None:
+            continue
+        element = ElementTree.SubElement(link, 'inertial')
+        ElementTree.SubElement(element, 'origin', xyz=_join(inertial.xyz), rpy=_join(inertial.rpy))
+        ElementTree.SubElement(element, 'mass', value=repr(inertial.mass))
+        components = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+        values = dict(zip(components, map(repr, inertial.inertia), strict=True))
+        ElementTree.SubElement(element, 'inertia', values)
+    for joint in description.joints:
+        kind = 'revolute' if joint.kind == 'continuous' else joint.kind
+        element = ElementTree.SubElement(root, 'joint', name=joint.name, type=kind)
+        ElementTree.SubElement(element, 'origin', xyz=_join(joint.xyz), rpy=_join(joint.rpy))
+        ElementTree.SubElement(element, 'parent', link=joint.parent)
+        ElementTree.SubElement(element, 'child', link=joint.child)
+        ElementTree.SubElement(element, 'axis', xyz=_join(joint.axis))
+        ElementTree.SubElement(element, 'limit', lower='-1', upper='1', effort='1', velocity='1')
+    return ElementTree.tostring(root, encoding='unicode')
+
+
+def _join(numbers: Sequence[float]) -> str:
+    return ' '.join(map(repr, numbers))
+
+
+def _require_inertia(robot: Robot, source: str) -> None:
+    """Refuse a joint that moves no mass, in any of several poses: nothing can simulate it."""
+    data = robot.model.createData()
+    generator = np.random.default_rng(0)
+    moved = np.zeros(robot.n_joints)
+    for _ in range(4):
+        q = generator.uniform(-math.pi, math.pi, robot.n_joints)
+        mass_matrix = pin.crba(robot.model, data, q)
+        moved = np.maximum(moved, np.abs(np.diag(mass_matrix)))
+    for joint, link, inertia in zip(robot.joints, robot.links, moved, strict=True):
+        if inertia < NO_INERTIA:
+            raise RobotError(
+                f"{source}: link '{link}', moved by joint '{joint}', has no <inertial>, nor has "
+                f"any link beyond it: give it a rough one, or leave '{joint}' out of the driven "
+                f'joints'
+            )

@@ -1,0 +1,189 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A robot as everything above sees it: the rigid model of its driven joints, and their limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from armid_ros.errors import RobotError
+from armid_ros.motion import FloatArray, read_only
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+PARAMETERS_PER_BODY = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """
+    A fixed-base robot with n driven joints, each revolute or prismatic.
+
+    The model is never changed; `with_gravity` and `with_inertias` return a robot with a copy of
+    it. Friction, damping and rotor inertia do not act in the model: they are effects, with
+    parameters of their own.
+
+    Attributes
+    ----------
+    name : str
+        Name in the description, or the shipped name.
+    model : pinocchio.Model
+        Rigid bodies of the driven joints, nq == nv == n. What hangs on joints that are not
+        driven is part of the body that carries them.
+    joints : tuple of str
+        Driven joints in velocity order.
+    links : tuple of str
+        Child link of each driven joint.
+    lower, upper : ndarray, shape (n,)
+        Position limits [rad or m]; infinite where the description gives none.
+    velocity_limit : ndarray, shape (n,)
+        [rad/s or m/s], infinite where unlimited.
+    torque_limit : ndarray, shape (n,)
+        [N m or N], infinite where unlimited.
+    prismatic : ndarray of bool, shape (n,)
+        True where a joint slides.
+    urdf : str
+        The description, xacro expanded.
+    urdf_damping, urdf_friction : ndarray, shape (n,)
+        What the description says in <dynamics> [N m s/rad, N m]; zero where it says nothing.
+    notes : tuple of str
+        What was assumed or is doubtful in the description, for a person to read.
+    path : Path or None
+        The file that was loaded; meshes and collision exceptions (SRDF) are looked for from here.
+
+    """
+
+    name: str
+    model: pin.Model = field(repr=False)
+    joints: tuple[str, ...]
+    links: tuple[str, ...]
+    lower: FloatArray
+    upper: FloatArray
+    velocity_limit: FloatArray
+    torque_limit: FloatArray
+    prismatic: npt.NDArray[np.bool_]
+    urdf: str = field(repr=False)
+    urdf_damping: FloatArray = field(repr=False)
+    urdf_friction: FloatArray = field(repr=False)
+    notes: tuple[str, ...] = ()
+    path: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check that model and names agree."""
+        for name in (
+            'lower',
+            'upper',
+            'velocity_limit',
+            'torque_limit',
+            'urdf_damping',
+            'urdf_friction',
+        ):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+            if getattr(self, name).shape != (len(self.joints),):
+                raise RobotError(
+                    f'{self.name}: {name} has shape {getattr(self, name).shape}, '
+                    f'but there are {len(self.joints)} driven joints'
+                )
+        prismatic = np.array(self.prismatic, dtype=np.bool_)
+        prismatic.setflags(write=False)
+        object.__setattr__(self, 'prismatic', prismatic)
+        if not self.model.nq == self.model.nv == len(self.joints):
+            raise RobotError(
+                f'{self.name}: the model has nq = {self.model.nq} and nv = {self.model.nv}, '
+                f'but there are {len(self.joints)} driven joints'
+            )
+
+    @property
+    def n_joints(self) -> int:
+        """Number of driven joints n."""
+        return len(self.joints)
+
+    @property
+    def gravity(self) -> FloatArray:
+        """Acceleration of gravity in the base frame, shape (3,) [m/s^2]."""
+        return read_only(np.array(self.model.gravity.linear))
+
+    @property
+    def rigid_parameters(self) -> FloatArray:
+        """
+        Rigid-body parameters of the driven bodies, shape (10 n,).
+
+        Body by body m, m cx, m cy, m cz [kg, kg m] and Ixx, Ixy, Iyy, Ixz, Iyz, Izz [kg m^2]
+        about the joint frame, which is the column order of pinocchio's
+        computeJointTorqueRegressor.
+
+        """
+        bodies = list(self.model.inertias)[1:]
+        return read_only(np.concatenate([body.toDynamicParameters() for body in bodies]))
+
+    @property
+    def position_units(self) -> tuple[str, ...]:
+        """Unit of each joint position: 'rad' or 'm'."""
+        return tuple('m' if slides else 'rad' for slides in self.prismatic)
+
+    @property
+    def torque_units(self) -> tuple[str, ...]:
+        """Unit of each joint torque or force: 'N m' or 'N'."""
+        return tuple('N' if slides else 'N m' for slides in self.prismatic)
+
+    def index(self, joint: str) -> int:
+        """Return the position of a driven joint; RobotError lists those that exist."""
+        try:
+            return self.joints.index(joint)
+        except ValueError:
+            raise RobotError(
+                f"{self.name} has no driven joint '{joint}'; its driven joints are "
+                f'{", ".join(self.joints)}'
+            ) from None
+
+    def with_gravity(self, vector: Sequence[float] | FloatArray) -> Robot:
+        """Return the robot in another gravity, shape (3,) [m/s^2] in the base frame."""
+        gravity = np.asarray(vector, dtype=np.float64)
+        if gravity.shape != (3,) or not np.all(np.isfinite(gravity)):
+            raise RobotError(f'gravity has to be three finite numbers [m/s^2], not {vector!r}')
+        model = self.model.copy()
+        model.gravity = pin.Motion(gravity, np.zeros(3))
+        return replace(self, model=model)
+
+    def with_inertias(self, parameters: npt.ArrayLike) -> Robot:
+        """
+        Return the robot with other rigid-body parameters.
+
+        Parameters
+        ----------
+        parameters : array_like, shape (10 n,)
+            In the order of `rigid_parameters`. They need not be physically consistent, but a
+            body without mass must not have a first moment.
+
+        Raises
+        ------
+        RobotError
+            If the shape is wrong, a number is not finite, or a first moment has no mass.
+
+        """
+        pi = np.asarray(parameters, dtype=np.float64)
+        expected = (PARAMETERS_PER_BODY * self.n_joints,)
+        if pi.shape != expected or not np.all(np.isfinite(pi)):
+            raise RobotError(
+                f'{self.name}: rigid parameters have to be {expected[0]} finite numbers, '
+                f'not an array of shape {pi.shape}'
+            )
+        model = self.model.copy()
+        for body, values in enumerate(pi.reshape(self.n_joints, PARAMETERS_PER_BODY)):
+            model.inertias[body + 1] = _inertia(self.links[body], values)
+        return replace(self, model=model)
+
+
+def _inertia(link: str, values: FloatArray) -> pin.Inertia:
+    """Spatial inertia of the ten parameters; pinocchio's own conversion divides by the mass."""
+    mass, moment, about_origin = values[0], values[1:4], values[4:]
+    if mass == 0.0:
+        if np.any(moment != 0.0):
+            raise RobotError(f"link '{link}': a first moment {moment} kg m needs a mass")
+        ixx, ixy, iyy, ixz, iyz, izz = about_origin
+        rotational = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+        return pin.Inertia(0.0, np.zeros(3), rotational)
+    return pin.Inertia.FromDynamicParameters(values)

@@ -1,0 +1,29 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robots that come with the package."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+_SHIPPED = {
+    'humanoid_arm': (
+        'humanoid_arm/humanoid_arm.urdf',
+        '6-DOF humanoid arm, 2.8 kg, 0.6 m from shoulder to wrist',
+    ),
+    'humanoid_arm_loaded': (
+        'humanoid_arm/humanoid_arm_loaded.urdf.xacro',
+        'the humanoid arm with 0.3 kg in its hand',
+    ),
+}
+
+
+def shipped_robots() -> dict[str, str]:
+    """Return the names of the robots that come with the package, each with one line on it."""
+    return {name: description for name, (_, description) in _SHIPPED.items()}
+
+
+def shipped_path(name: str) -> Path:
+    """Return the file of a shipped robot."""
+    return Path(str(resources.files('armid_ros.robots').joinpath(_SHIPPED[name][0])))
