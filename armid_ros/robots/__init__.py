@@ -9,6 +9,7 @@ Robots: what a URDF says of an arm, and the robots that come with the package.
 
 """
 
+from armid_ros.robots.collision import Clearance, collision_model, CollisionModel
 from armid_ros.robots.gravity import GRAVITIES, parse_gravity
 from armid_ros.robots.load import load_robot, robot_from_urdf
 from armid_ros.robots.robot import PARAMETERS_PER_BODY, Robot
@@ -22,4 +23,7 @@ __all__ = [
     'PARAMETERS_PER_BODY',
     'parse_gravity',
     'GRAVITIES',
+    'collision_model',
+    'CollisionModel',
+    'Clearance',
 ]

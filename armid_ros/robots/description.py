@@ -15,6 +15,9 @@ import numpy as np
 MOVABLE = ('revolute', 'continuous', 'prismatic')
 KNOWN = (*MOVABLE, 'fixed', 'floating', 'planar')
 
+ROUNDING = 1e-6  # relative; descriptions print six digits
+NEGLIGIBLE = 1e-12  # kg m^2
+
 Vector = tuple[float, float, float]
 
 
@@ -32,13 +35,14 @@ class Inertial:
         ixx, ixy, ixz, iyy, iyz, izz = self.inertia
         tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
         moments = np.linalg.eigvalsh(tensor)
-        tolerance = 1e-6 * float(np.abs(moments).max())
+        tolerance = max(ROUNDING * float(np.abs(moments).max()), NEGLIGIBLE)
+        said = ', '.join(f'{moment:.3g}' for moment in moments)
         if self.mass < 0.0 or moments[0] < -tolerance:
-            return f'negative mass or inertia (m = {self.mass:g} kg, moments {moments})'
+            return f'negative mass or inertia (m = {self.mass:g} kg, moments {said} kg m^2)'
         if moments[0] + moments[1] < moments[2] - tolerance:
-            return f'principal moments {moments} kg m^2 violate the triangle inequality'
+            return f'principal moments {said} kg m^2 violate the triangle inequality'
         if self.mass == 0.0 and moments[2] > 0.0:
-            return 'an inertia without a mass'
+            return f'an inertia without a mass (moments {said} kg m^2)'
         return None
 
 

@@ -11,7 +11,13 @@ from xml.etree import ElementTree
 
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray
-from armid_ros.robots.description import Description, Joint, parse_description, parse_xml
+from armid_ros.robots.description import (
+    Description,
+    Joint,
+    parse_description,
+    parse_xml,
+    Vector,
+)
 from armid_ros.robots.gravity import parse_gravity
 from armid_ros.robots.robot import Robot
 from armid_ros.robots.selection import driven_joints, standing_position
@@ -42,7 +48,7 @@ def load_robot(
     joints : sequence of str, optional
         The driven joints, in any order; the robot has them in its own order. Without it, all
         revolute, continuous and prismatic joints except those of a gripper (mimic joints, joints
-        they follow, names with finger or gripper). Other joints are locked at 0, or at their
+        they follow, names with finger, gripper or jaw). Other joints are locked at 0, or at their
         limit nearest to it, and their links become part of the body that carries them.
     xacro_arguments : mapping of str to str, optional
         Values of <xacro:arg>.
@@ -73,7 +79,7 @@ def load_robot(
         text = path.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as error:
         raise RobotError(f'{path}: cannot be read as text: {error}') from None
-    if path.suffix == '.xacro' or 'xmlns:xacro' in text:
+    if path.suffix == '.xacro' or '<xacro:' in text:
         text = _expand_xacro(path, xacro_arguments or {})
     elif xacro_arguments:
         raise RobotError(f'{path}: not a xacro file, so it takes no arguments')
@@ -110,7 +116,7 @@ def robot_from_urdf(
     """
     description = parse_description(parse_xml(text, source), source)
     driven = driven_joints(description, joints, source)
-    model, locked = _reduced_model(description, driven)
+    model, locked = _kinematic_model(description, driven)
     model.gravity = pin.Motion(parse_gravity(gravity), np.zeros(3))
     by_name = {joint.name: joint for joint in driven}
     driven = tuple(by_name[name] for name in list(model.names)[1:])
@@ -148,32 +154,29 @@ def _expand_xacro(path: Path, arguments: Mapping[str, str]) -> str:
         raise RobotError(f'{path}: xacro: {reason}') from None
 
 
-def _reduced_model(
+def _kinematic_model(
     description: Description, driven: Sequence[Joint]
 ) -> tuple[pin.Model, tuple[str, ...]]:
-    """Build the model of the driven joints; also say where the others were locked."""
-    model = pin.buildModelFromXML(_kinematic_urdf(description))
-    position = np.zeros(model.nq)
-    locked, notes = [], []
-    for joint in description.movable():
-        if joint in driven:
-            continue
-        index = model.getJointId(joint.name)
-        position[model.joints[index].idx_q] = standing_position(description, joint)
-        locked.append(index)
-        unit = 'm' if joint.kind == 'prismatic' else 'rad'
-        notes.append(
-            f"joint '{joint.name}': not driven, locked at "
-            f'{position[model.joints[index].idx_q]:g} {unit}'
-        )
-    if locked:
-        model = pin.buildReducedModel(model, locked, position)
-    return model, tuple(notes)
+    """Build the model of the driven joints; also say where the others are locked."""
+    positions = {
+        joint.name: standing_position(description, joint)
+        for joint in description.movable()
+        if joint not in driven
+    }
+    model = pin.buildModelFromXML(_kinematic_urdf(description, positions))
+    units = {
+        joint.name: 'm' if joint.kind == 'prismatic' else 'rad' for joint in description.joints
+    }
+    notes = tuple(
+        f"joint '{name}': not driven, locked at {position:g} {units[name]}"
+        for name, position in positions.items()
+    )
+    return model, notes
 
 
-def _kinematic_urdf(description: Description) -> str:
+def _kinematic_urdf(description: Description, positions: Mapping[str, float]) -> str:
     """
-    Write the description as Pinocchio is to see it.
+    Write the description as Pinocchio is to see it, some joints locked at given positions.
 
     Continuous joints become revolute ones, so that nq == nv; limits, meshes, friction and
     whatever else a URDF may hold stay out: the model has none, or they are read elsewhere.
@@ -191,14 +194,31 @@ def _kinematic_urdf(description: Description) -> str:
         values = dict(zip(components, map(repr, inertial.inertia), strict=True))
         ElementTree.SubElement(element, 'inertia', values)
     for joint in description.joints:
-        kind = 'revolute' if joint.kind == 'continuous' else joint.kind
-        element = ElementTree.SubElement(root, 'joint', name=joint.name, type=kind)
-        ElementTree.SubElement(element, 'origin', xyz=_join(joint.xyz), rpy=_join(joint.rpy))
+        driven = joint.movable and joint.name not in positions
+        kind = 'prismatic' if joint.kind == 'prismatic' else 'revolute'
+        xyz, rpy = _placement(joint, positions.get(joint.name, 0.0))
+        element = ElementTree.SubElement(
+            root, 'joint', name=joint.name, type=kind if driven else 'fixed'
+        )
+        ElementTree.SubElement(element, 'origin', xyz=_join(xyz), rpy=_join(rpy))
         ElementTree.SubElement(element, 'parent', link=joint.parent)
         ElementTree.SubElement(element, 'child', link=joint.child)
         ElementTree.SubElement(element, 'axis', xyz=_join(joint.axis))
         ElementTree.SubElement(element, 'limit', lower='-1', upper='1', effort='1', velocity='1')
     return ElementTree.tostring(root, encoding='unicode')
+
+
+def _placement(joint: Joint, position: float) -> tuple[Vector, Vector]:
+    """Placement of the child link in the parent link with the joint at a position."""
+    if position == 0.0:
+        return joint.xyz, joint.rpy
+    rotation = pin.rpy.rpyToMatrix(*joint.rpy)
+    axis = np.array(joint.axis)
+    if joint.kind == 'prismatic':
+        x, y, z = np.array(joint.xyz) + rotation @ axis * position
+        return (float(x), float(y), float(z)), joint.rpy
+    roll, pitch, yaw = pin.rpy.matrixToRpy(rotation @ pin.exp3(axis * position))
+    return joint.xyz, (float(roll), float(pitch), float(yaw))
 
 
 def _join(numbers: Sequence[float]) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from armid_ros.errors import RobotError
 from armid_ros.robots.description import Description, Joint
 
-GRIPPER_WORDS = ('finger', 'gripper')
+GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
 
 
 def driven_joints(
@@ -19,8 +19,8 @@ def driven_joints(
     Return the driven joints: those named, or all but the gripper's.
 
     A joint that mimics another one is never driven. By default neither is a joint that opens and
-    closes a gripper: one that a mimic joint follows, or whose name or link says finger or
-    gripper, as long as it carries no joint of the arm.
+    closes a gripper: one that a mimic joint follows, or whose name says finger, gripper
+    or jaw, as long as it carries no joint of the arm.
 
     Raises
     ------
@@ -84,4 +84,4 @@ def _by_default(description: Description) -> tuple[Joint, ...]:
 
 
 def _says_gripper(joint: Joint) -> bool:
-    return any(word in f'{joint.name} {joint.child}'.lower() for word in GRIPPER_WORDS)
+    return any(word in joint.name.lower() for word in GRIPPER_WORDS)

@@ -1,0 +1,219 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How far the links of a robot are from each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import combinations
+from pathlib import Path
+
+from armid_ros.errors import RobotError
+from armid_ros.motion import FloatArray, read_only
+from armid_ros.robots.description import parse_description, parse_xml
+from armid_ros.robots.geometry import collision_geometry
+from armid_ros.robots.robot import Robot
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """
+    The smallest distance between two links that may touch.
+
+    Attributes
+    ----------
+    distance : float
+        [m]; negative is the depth of penetration; infinite when no pair of links is checked.
+    links : tuple of str
+        The two links; empty when no pair is checked.
+
+    """
+
+    distance: float
+    links: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionModel:
+    """
+    The collision bodies of a robot and the pairs of them that are checked.
+
+    Attributes
+    ----------
+    robot : Robot
+        The robot.
+    geometry : pinocchio.GeometryModel
+        Collision bodies and pairs; never changed.
+    notes : tuple of str
+        Bodies left out and pairs not checked, for a person to read.
+
+    """
+
+    robot: Robot
+    geometry: pin.GeometryModel = field(repr=False)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of links that are checked, each once, in alphabetical order."""
+        links = {
+            tuple(sorted(self._links(number)))
+            for number in range(len(self.geometry.collisionPairs))
+        }
+        return tuple((first, second) for first, second in sorted(links))
+
+    def distance(self, q: npt.ArrayLike) -> Clearance:
+        """
+        Return the smallest clearance in one pose, q of shape (n,) [rad or m].
+
+        Raises
+        ------
+        RobotError
+            If q does not have a position for each driven joint.
+
+        """
+        clearances, closest = self._check(np.asarray(q, dtype=np.float64)[None])
+        links = () if closest[0] < 0 else self._links(int(closest[0]))
+        return Clearance(float(clearances[0]), links)
+
+    def path_clearance(self, q: npt.ArrayLike) -> FloatArray:
+        """
+        Return the smallest clearance in each pose of a path.
+
+        Parameters
+        ----------
+        q : array_like, shape (N, n)
+            Poses [rad or m].
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Clearances [m]; negative in collision.
+
+        Raises
+        ------
+        RobotError
+            If the poses do not have a position for each driven joint.
+
+        """
+        return self._check(np.asarray(q, dtype=np.float64))[0]
+
+    def closest(self, q: npt.ArrayLike) -> tuple[int, Clearance]:
+        """Return the sample of a path, shape (N, n), where links come closest, and how close."""
+        sample = int(np.argmin(self.path_clearance(q)))
+        return sample, self.distance(np.asarray(q, dtype=np.float64)[sample])
+
+    def _check(self, q: FloatArray) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+        """Clearance of each pose and the number of its closest pair, -1 without pairs."""
+        model = self.robot.model
+        if q.ndim != 2 or q.shape[1] != model.nq:
+            raise RobotError(
+                f'{self.robot.name}: poses of shape {q.shape} do not fit {model.nq} driven joints'
+            )
+        clearances = np.full(len(q), np.inf)
+        closest = np.full(len(q), -1, dtype=np.intp)
+        if len(self.geometry.collisionPairs) > 0:
+            data, placed = model.createData(), self.geometry.createData()
+            for sample, pose in enumerate(q):
+                closest[sample] = pin.computeDistances(model, data, self.geometry, placed, pose)
+                result = placed.distanceResults[int(closest[sample])]
+                clearances[sample] = result.min_distance
+        return read_only(clearances), closest
+
+    def _links(self, pair: int) -> tuple[str, str]:
+        collision_pair = self.geometry.collisionPairs[pair]
+        return (
+            _link(self.robot, self.geometry.geometryObjects[collision_pair.first]),
+            _link(self.robot, self.geometry.geometryObjects[collision_pair.second]),
+        )
+
+
+def collision_model(robot: Robot, *, srdf: str | Path | None = None) -> CollisionModel:
+    """
+    Return the collision bodies of a robot and the pairs of links that may touch.
+
+    Links that cannot move against each other and links joined by a joint are not checked, nor
+    are pairs that the SRDF disables. Without an SRDF, pairs that touch when the robot stands at
+    zero (or its limits nearest to it) are left out and noted: they are bodies drawn too large.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    srdf : str or Path, optional
+        File with <disable_collisions>. By default the one with the URDF's or the robot's name
+        (or the only one) beside the URDF or in ../srdf.
+
+    Raises
+    ------
+    RobotError
+        If a file cannot be read or a collision body is not valid.
+
+    """
+    geometry, notes = collision_geometry(robot)
+    disabled = _disabled_pairs(robot, Path(srdf) if srdf is not None else _find_srdf(robot))
+    description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
+    joined = {frozenset((joint.parent, joint.child)) for joint in description.joints}
+    bodies = list(geometry.geometryObjects)
+    for (i, first), (j, second) in combinations(enumerate(bodies), 2):
+        links = frozenset((_link(robot, first), _link(robot, second)))
+        if first.parentJoint != second.parentJoint and links not in joined | disabled:
+            geometry.addCollisionPair(pin.CollisionPair(i, j))
+    if not disabled:
+        notes += _leave_out_touching(robot, geometry)
+    return CollisionModel(robot=robot, geometry=geometry, notes=notes)
+
+
+def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[str, ...]:
+    """Remove the pairs of links that touch at zero; say which."""
+    data, placed = robot.model.createData(), geometry.createData()
+    pose = np.clip(np.zeros(robot.n_joints), robot.lower, robot.upper)
+    pin.computeDistances(robot.model, data, geometry, placed, pose)
+    bodies = geometry.geometryObjects
+    pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
+    links = [frozenset((_link(robot, bodies[i]), _link(robot, bodies[j]))) for i, j in pairs]
+    touching = {
+        names
+        for names, result in zip(links, placed.distanceResults, strict=True)
+        if result.min_distance <= 0.0
+    }
+    geometry.removeAllCollisionPairs()
+    for (i, j), names in zip(pairs, links, strict=True):
+        if names not in touching:
+            geometry.addCollisionPair(pin.CollisionPair(i, j))
+    return tuple(
+        f"links '{first}' and '{second}' touch at zero and there is no SRDF; not checked"
+        for first, second in sorted(sorted(names) for names in touching)
+    )
+
+
+def _link(robot: Robot, body: pin.GeometryObject) -> str:
+    return str(robot.model.frames[body.parentFrame].name)
+
+
+def _find_srdf(robot: Robot) -> Path | None:
+    if robot.path is None:
+        return None
+    stem = robot.path.name.removesuffix('.xacro').removesuffix('.urdf')
+    for directory in (robot.path.parent, robot.path.parent.parent / 'srdf'):
+        present = sorted(directory.glob('*.srdf'))
+        for path in present:
+            if path.stem in (stem, robot.name):
+                return path
+        if len(present) == 1:
+            return present[0]
+    return None
+
+
+def _disabled_pairs(robot: Robot, path: Path | None) -> set[frozenset[str]]:
+    if path is None:
+        return set()
+    try:
+        text = path.read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        raise RobotError(f'{path}: cannot be read as text: {error}') from None
+    elements = parse_xml(text, str(path)).iter('disable_collisions')
+    return {frozenset((e.get('link1', ''), e.get('link2', ''))) for e in elements}
