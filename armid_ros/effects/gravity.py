@@ -87,7 +87,7 @@ class BaseTilt(_GravityEffect):
         """Return the robot under gravity as the tilted base sees it."""
         gravity = arm.robot.gravity
         tilt = Rotation.from_rotvec(values @ _horizontal_axes(gravity))
-        return Action(robot=arm.robot.with_gravity(tilt.inv().apply(gravity)))
+        return Action(robot=arm.robot.with_gravity(tilt.inv().apply(np.array(gravity))))
 
 
 def _unit(gravity: FloatArray) -> FloatArray:

@@ -192,6 +192,12 @@ def _keep_order(standard: tuple[ParameterName, ...]) -> list[int]:
     return sorted(range(len(standard)), key=key)
 
 
+def _symbol(parameter: ParameterName) -> str:
+    """Name a grouped parameter; a rigid one carries the number of its joint already."""
+    numbered = parameter.name[-1:].isdigit() or not parameter.joint
+    return parameter.name if numbered else f'{parameter.name}[{parameter.joint}]'
+
+
 def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...]) -> str:
     """Write a grouping as a person would: equal factors once, in front of their sum."""
     text = standard[leader].name
@@ -200,7 +206,7 @@ def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...
         if column != leader:
             factor = float(f'{abs(row[column]):.6g}')
             sign = float(np.sign(row[column]))
-            factors.setdefault(factor, []).append((sign, standard[column].name))
+            factors.setdefault(factor, []).append((sign, _symbol(standard[column])))
     for factor, terms in factors.items():
         if factor == 1.0:
             text += ''.join(f' {"+" if sign > 0 else "-"} {name}' for sign, name in terms)

@@ -1,0 +1,113 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+from armid_ros.model import (
+    gravity_composites,
+    group_columns,
+    random_motion,
+    regressor,
+    rigid_base_parameters,
+    rigid_parameter_names,
+)
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+#: The composites of the humanoid-arm paper (its Table 5, completed), lunar gravity [N mm]:
+#: expression, without load, with 0.3 kg at the centroid of link 6.
+COMPOSITES = [
+    ('mx1', 0.648, 0.648),
+    ('my1 + mz2', 10.206, 10.206),
+    ('mx2', 1.701, 1.701),
+    ('my2 + 0.35 (m3 + m4 + m5 + m6) - mz3', 620.136, 790.236),
+    ('mx3', 4.455, 4.455),
+    ('my3 + mz4', 12.717, 12.717),
+    ('mx4', 3.645, 3.645),
+    ('my4 + 0.25 (m5 + m6) - mz5', 139.320, 260.820),
+    ('mx5', 1.701, 1.701),
+    ('my5 + mz6', 6.318, 7.776),
+    ('mx6', 0.648, 1.620),
+    ('my6', 1.782, 4.455),
+]
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(3)
+
+
+@pytest.mark.parametrize(('name', 'column'), [('humanoid_arm', 1), ('humanoid_arm_loaded', 2)])
+def test_gravity_composites_are_the_papers(name, column, rng):
+    robot = load_robot(name, gravity='moon')
+    base = gravity_composites(robot, rng)
+    static = robot.rigid_parameters.reshape(-1, 10)[:, :4].ravel()
+    values = 1e3 * 1.62 * base.values(static)
+    assert [p.name for p in base.parameters] == [row[0] for row in COMPOSITES]
+    expected = np.array([row[column] for row in COMPOSITES])
+    np.testing.assert_allclose(values, expected, rtol=1e-12)
+
+
+def test_composites_read_as_published_masses_and_centroids(rng):
+    """p4 and p8 spelled out from the masses and centroids of Table 2, in earth gravity."""
+    base = gravity_composites(load_robot('humanoid_arm'), rng)
+    m = np.array([0.8, 0.7, 0.5, 0.3, 0.3, 0.2])
+    c = 1e-3 * np.array(
+        [
+            [0.5, 3.5, -70],
+            [1.5, 4, 5],
+            [5.5, 13, 150],
+            [7.5, -30, 4.5],
+            [3.5, 11, 100],
+            [2, 5.5, 3],
+        ]
+    )
+    theta = np.column_stack([m, m[:, None] * c]).ravel()
+    p4 = 0.35 * m[2:].sum() + m[1] * c[1, 1] - m[2] * c[2, 2]
+    p8 = 0.25 * m[4:].sum() + m[3] * c[3, 1] - m[4] * c[4, 2]
+    np.testing.assert_allclose(base.values(theta)[[3, 7]], [p4, p8], rtol=1e-12)
+    np.testing.assert_allclose(9.81 * p4, 3.75527, rtol=1e-5)
+
+
+def test_two_composites_less_when_the_first_axis_is_vertical(rng):
+    """Turning about a vertical axis lifts nothing: joint 1 sees no gravity and frees no pair."""
+    robot = load_robot('humanoid_arm')
+    assert gravity_composites(robot, rng).rank == 12
+    assert gravity_composites(robot.with_gravity([0.0, -9.81, 0.0]), rng).rank == 10
+    assert gravity_composites(robot.with_gravity([0.0, -6.0, -6.0]), rng).rank == 12
+
+
+def test_no_gravity_needs_no_composites(rng):
+    assert gravity_composites(load_robot('humanoid_arm').with_gravity(np.zeros(3)), rng).rank == 0
+
+
+def test_base_regressor_predicts_the_same_torque(rng):
+    robot = load_robot('humanoid_arm')
+    base = rigid_base_parameters(robot, rng)
+    y = regressor(robot, random_motion(robot, 20, rng))
+    beta = base.values(robot.rigid_parameters)
+    full = y @ robot.rigid_parameters
+    np.testing.assert_allclose(y[:, :, base.independent] @ beta, full, atol=1e-9)
+
+
+def test_rank_agrees_with_the_singular_values(rng):
+    robot = load_robot('humanoid_arm')
+    y = regressor(robot, random_motion(robot, 200, rng)).reshape(-1, 60)
+    s = np.linalg.svd(y, compute_uv=False)
+    assert rigid_base_parameters(robot, rng).rank == int(np.sum(s > 1e-9 * s[0]))
+
+
+def test_lift_has_the_base_parameters_asked_for_and_stays_near(rng):
+    robot = load_robot('humanoid_arm')
+    base = rigid_base_parameters(robot, rng)
+    prior = robot.rigid_parameters
+    np.testing.assert_allclose(base.lift(base.values(prior), prior), prior, atol=1e-12)
+    beta = base.values(prior) + rng.normal(size=base.rank)
+    np.testing.assert_allclose(base.values(base.lift(beta, prior)), beta, atol=1e-10)
+
+
+def test_grouping_names_the_dependence_it_was_given():
+    """Column 2 = 2 x column 0 - column 1, by construction."""
+    rng = np.random.default_rng(0)
+    names = rigid_parameter_names(load_robot('humanoid_arm'))[4:7]  # Ixx1, Ixy1, Iyy1
+    w = rng.normal(size=(50, 2))
+    base = group_columns(np.column_stack([w, 2 * w[:, 0] - w[:, 1]]), names)
+    assert [p.name for p in base.parameters] == ['Ixx1 + 2 Iyy1', 'Ixy1 - Iyy1']
