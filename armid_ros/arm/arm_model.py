@@ -151,6 +151,7 @@ def _merge(elements: Sequence[DryFriction]) -> DryFriction | None:
     upper = np.concatenate([e.upper for e in elements])
     unique, inverse = np.unique(directions, axis=0, return_inverse=True)
     sums = np.zeros((2, len(unique)))
-    np.add.at(sums, (slice(None), inverse.reshape(-1)), np.stack([lower, upper]))
+    np.add.at(sums[0], inverse.ravel(), lower)
+    np.add.at(sums[1], inverse.ravel(), upper)
     active = np.any(sums != 0.0, axis=0)
     return DryFriction(unique[active], sums[0, active], sums[1, active])

@@ -118,7 +118,7 @@ def group_columns(w: FloatArray, standard: tuple[ParameterName, ...]) -> BasePar
     scale = np.linalg.norm(w, axis=0)
     seen = scale > RANK_TOLERANCE * scale.max(initial=1e-300)
     candidates = [j for j in order if seen[j]]
-    triangle = np.linalg.qr(w[:, candidates] / scale[candidates], mode='r')
+    triangle = np.asarray(np.linalg.qr(w[:, candidates] / scale[candidates], mode='r'))
     pivots = np.abs(np.diag(scipy.linalg.qr(triangle, mode='r', pivoting=True)[0]))
     rank = int(np.sum(pivots > RANK_TOLERANCE * pivots[0])) if len(pivots) else 0
 
