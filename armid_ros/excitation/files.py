@@ -1,0 +1,152 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Excitations as files: coefficients as YAML or CSV.
+
+YAML holds the whole run; CSV holds the trajectory, a row per joint and coefficient, and the run
+in comment lines, so that a spreadsheet opens it.
+
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.schedule import Excitation
+import numpy as np
+import yaml
+
+SCHEMA = 'armid/excitation/1'
+
+
+def save_excitation(excitation: Excitation, path: str | Path) -> None:
+    """Write an excitation; the suffix, .yaml, .yml or .csv, says how."""
+    path = Path(path)
+    writer = {'.yaml': _to_yaml, '.yml': _to_yaml, '.csv': _to_csv}.get(path.suffix)
+    if writer is None:
+        raise TrajectoryError(f'{path}: an excitation is written as .yaml or .csv')
+    beside = path.with_name(path.name + '.part')
+    beside.write_text(writer(excitation), encoding='utf-8')
+    beside.replace(path)
+
+
+def load_excitation(path: str | Path) -> Excitation:
+    """
+    Read an excitation from a YAML or CSV file.
+
+    Raises
+    ------
+    TrajectoryError
+        If the file cannot be read or is not an excitation; names the file and what is wrong.
+
+    """
+    path = Path(path)
+    reader = {'.yaml': _from_yaml, '.yml': _from_yaml, '.csv': _from_csv}.get(path.suffix)
+    if reader is None:
+        raise TrajectoryError(f'{path}: an excitation is a .yaml or a .csv file')
+    try:
+        return reader(path.read_text(encoding='utf-8'))
+    except OSError as error:
+        raise TrajectoryError(f'{path}: cannot be read: {error.strerror}') from error
+    except TrajectoryError as error:
+        raise TrajectoryError(f'{path}: {error}') from error
+    except KeyError as error:
+        raise TrajectoryError(f'{path}: no {error.args[0]}') from error
+    except (TypeError, ValueError, yaml.YAMLError) as error:
+        raise TrajectoryError(f'{path}: {error}') from error
+
+
+def _to_yaml(excitation: Excitation) -> str:
+    trajectory = excitation.trajectory
+    joints = [
+        {
+            'name': joint,
+            'q0': float(trajectory.q0[j]),
+            'a': trajectory.a[j].tolist(),
+            'b': trajectory.b[j].tolist(),
+        }
+        for j, joint in enumerate(trajectory.joints)
+    ]
+    content = {
+        'schema': SCHEMA,
+        'period': trajectory.period,
+        'n_periods': excitation.n_periods,
+        'run_in': excitation.run_in,
+        'start': None if excitation.start is None else excitation.start.tolist(),
+        'joints': joints,
+    }
+    head = (
+        '# Positions q0 + sum_k (a_k sin(k w t) - b_k cos(k w t)) / (k w), w = 2 pi / period.\n'
+        '# SI units: rad or m, s; a and b are velocity amplitudes.\n'
+    )
+    return head + yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=99)
+
+
+def _from_yaml(text: str) -> Excitation:
+    content: Any = yaml.safe_load(text)
+    if not isinstance(content, dict) or content.get('schema') != SCHEMA:
+        raise TrajectoryError(f'not an excitation: it has to say schema: {SCHEMA}')
+    joints = content['joints']
+    trajectory = FourierTrajectory(
+        tuple(str(joint['name']) for joint in joints),
+        float(content['period']),
+        np.array([joint['q0'] for joint in joints], dtype=float),
+        np.array([joint['a'] for joint in joints], dtype=float),
+        np.array([joint['b'] for joint in joints], dtype=float),
+    )
+    start = content.get('start')
+    return Excitation(
+        trajectory,
+        int(content['n_periods']),
+        float(content['run_in']),
+        None if start is None else np.array(start, dtype=float),
+    )
+
+
+def _to_csv(excitation: Excitation) -> str:
+    trajectory = excitation.trajectory
+    text = io.StringIO()
+    text.write(f'# {SCHEMA}\n')
+    text.write(f'# period [s],{trajectory.period!r}\n')
+    text.write(f'# n_periods,{excitation.n_periods}\n')
+    text.write(f'# run_in [s],{excitation.run_in!r}\n')
+    numbers = range(1, trajectory.harmonics + 1)
+    writer = csv.writer(text, lineterminator='\n')
+    head = ['joint', 'q0', *(f'a{k}' for k in numbers), *(f'b{k}' for k in numbers)]
+    writer.writerow([*head, 'start'])
+    for j, joint in enumerate(trajectory.joints):
+        values = [trajectory.q0[j], *trajectory.a[j], *trajectory.b[j]]
+        start = '' if excitation.start is None else repr(float(excitation.start[j]))
+        writer.writerow([joint, *(repr(float(value)) for value in values), start])
+    return text.getvalue()
+
+
+def _from_csv(text: str) -> Excitation:
+    lines = text.splitlines()
+    if not lines or lines[0].lstrip('# ').strip() != SCHEMA:
+        raise TrajectoryError(f"not an excitation: its first line has to be '# {SCHEMA}'")
+    run = dict(
+        line.lstrip('# ').rsplit(',', 1) for line in lines if line.startswith('#') and ',' in line
+    )
+    rows = list(csv.DictReader(line for line in lines if not line.startswith('#')))
+    harmonics = max((int(key[1:]) for key in rows[0] if key[0] == 'a'), default=0) if rows else 0
+
+    def column(key: str) -> list[float]:
+        return [float(row[key]) for row in rows]
+
+    starts = [float(row['start']) if row['start'] else math.nan for row in rows]
+    trajectory = FourierTrajectory(
+        tuple(row['joint'] for row in rows),
+        float(run['period [s]']),
+        np.array(column('q0')),
+        np.array([column(f'a{k}') for k in range(1, harmonics + 1)]).T,
+        np.array([column(f'b{k}') for k in range(1, harmonics + 1)]).T,
+    )
+    start = None if all(map(math.isnan, starts)) else np.array(starts)
+    return Excitation(trajectory, int(run['n_periods']), float(run['run_in [s]']), start)

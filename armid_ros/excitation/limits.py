@@ -1,0 +1,246 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the joints may do, and where a motion does more."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+
+#: URDF has no acceleration limit; without a better number a joint may reach its top speed in this
+#: time [s], which is 8.7 rad/s^2 for the first joint of a Panda (its data sheet says 15).
+TIME_TO_TOP_SPEED = 0.25
+
+#: Share of the velocity and acceleration limits that a run of each speed class may use.
+SPEED_CLASSES = {'slow': 0.15, 'medium': 0.4, 'fast': 0.9}
+
+#: Positions and rates are compared with this relative slack, which is rounding.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Limits:
+    """
+    Bounds on position, velocity, acceleration and torque of every joint, each of shape (n,).
+
+    Attributes
+    ----------
+    joints : tuple of str
+        n joint names.
+    lower, upper : ndarray
+        Position [rad or m]; may be infinite.
+    velocity, acceleration, torque : ndarray
+        Largest absolute value [rad/s, rad/s^2, N m, or m/s, m/s^2, N]; may be infinite.
+    prismatic : ndarray of bool
+        True where a joint slides; for the units in messages.
+
+    """
+
+    joints: tuple[str, ...]
+    lower: FloatArray
+    upper: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    torque: FloatArray
+    prismatic: npt.NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and refuse empty ranges, with the joint's name."""
+        n = len(self.joints)
+        for name in ('lower', 'upper', 'velocity', 'acceleration', 'torque'):
+            values = read_only(getattr(self, name))
+            object.__setattr__(self, name, values)
+            if values.shape != (n,):
+                raise TrajectoryError(f'limits: {name} has shape {values.shape}, expected ({n},)')
+        for j, joint in enumerate(self.joints):
+            if not self.lower[j] < self.upper[j]:
+                raise TrajectoryError(
+                    f'joint {joint}: no room between its position limits, '
+                    f'{self.lower[j]:.6g} and {self.upper[j]:.6g} {self.unit("position", j)}'
+                )
+            for name in ('velocity', 'acceleration', 'torque'):
+                if not getattr(self, name)[j] > 0.0:
+                    raise TrajectoryError(
+                        f'joint {joint}: its {name} limit is {getattr(self, name)[j]:g}; '
+                        'it cannot move'
+                    )
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        *,
+        speed: str | float = 'fast',
+        torque_fraction: float = 0.9,
+        position_margin: float = 0.02,
+        acceleration: npt.ArrayLike | None = None,
+    ) -> Limits:
+        """
+        Take the limits of a robot, with room to spare.
+
+        Parameters
+        ----------
+        robot : Robot
+            Gives position, velocity and torque limits.
+        speed : str or float
+            'slow', 'medium' or 'fast', or the share of the velocity and acceleration limits that
+            may be used.
+        torque_fraction : float
+            Share of the torque limits that may be used; the prior model is not exact.
+        position_margin : float
+            Distance to keep from every position limit, as a share of the joint's range.
+        acceleration : array_like, shape (n,), optional
+            Acceleration limits [rad/s^2 or m/s^2]. By default a joint reaches its top speed in
+            0.25 s.
+
+        Raises
+        ------
+        TrajectoryError
+            If there is no such speed class, or a limit leaves no room.
+
+        """
+        if isinstance(speed, str) and speed not in SPEED_CLASSES:
+            raise TrajectoryError(
+                f"no speed class '{speed}'; there are {', '.join(SPEED_CLASSES)}, "
+                'or a share of the limits such as 0.6'
+            )
+        share = SPEED_CLASSES[speed] if isinstance(speed, str) else float(speed)
+        if not 0.0 < share <= 1.0:
+            raise TrajectoryError(f'speed: a share of the limits in (0, 1], not {share:g}')
+        span = robot.upper - robot.lower
+        margin = np.where(np.isfinite(span), position_margin * span, 0.0)
+        if acceleration is None:
+            acceleration = robot.velocity_limit / TIME_TO_TOP_SPEED
+        return cls(
+            joints=robot.joints,
+            lower=robot.lower + margin,
+            upper=robot.upper - margin,
+            velocity=share * robot.velocity_limit,
+            acceleration=share * np.asarray(acceleration, dtype=float),
+            torque=torque_fraction * robot.torque_limit,
+            prismatic=robot.prismatic,
+        )
+
+    def unit(self, quantity: str, joint: int) -> str:
+        """Return the unit of 'position', 'velocity', 'acceleration' or 'torque' of a joint."""
+        slides = bool(self.prismatic[joint])
+        length = 'm' if slides else 'rad'
+        return {
+            'position': length,
+            'velocity': f'{length}/s',
+            'acceleration': f'{length}/s^2',
+            'torque': 'N' if slides else 'N m',
+        }[quantity]
+
+
+@dataclass(frozen=True)
+class Violation:
+    """
+    One limit of one joint, exceeded; where it is worst.
+
+    Attributes
+    ----------
+    joint : str
+        Joint name.
+    limit : str
+        'lower position', 'upper position', 'velocity', 'acceleration' or 'torque'.
+    time : float
+        When the excess is largest [s].
+    value, bound : float
+        What the motion does then and what is allowed, in ``unit``.
+    samples : int
+        Number of samples beyond the limit.
+    unit : str
+        Unit of value and bound.
+
+    """
+
+    joint: str
+    limit: str
+    time: float
+    value: float
+    bound: float
+    samples: int
+    unit: str
+
+    def __str__(self) -> str:
+        """Say it in a line."""
+        return (
+            f'joint {self.joint}: {self.limit} {self.value:.4g} {self.unit} at {self.time:.3f} s, '
+            f'limit {self.bound:.4g} {self.unit} ({self.samples} samples beyond it)'
+        )
+
+
+def check_limits(
+    limits: Limits, motion: Motion, torque: FloatArray | None = None
+) -> tuple[Violation, ...]:
+    """
+    Compare a motion with the limits.
+
+    Parameters
+    ----------
+    limits : Limits
+        What is allowed.
+    motion : Motion
+        What is done.
+    torque : ndarray, shape (N, n), optional
+        Joint torques the motion takes, such as ``arm.torque(motion)``; by default those of the
+        motion, and no check of the torque where it has none.
+
+    Returns
+    -------
+    tuple of Violation
+        Empty if the motion keeps all limits; otherwise one for every limit exceeded.
+
+    Raises
+    ------
+    TrajectoryError
+        If the motion is not one of these joints.
+
+    """
+    if motion.joints != limits.joints:
+        raise TrajectoryError(
+            f'the motion has joints {", ".join(motion.joints)}, '
+            f'but the limits are for {", ".join(limits.joints)}'
+        )
+    torque = motion.tau if torque is None else torque
+    return tuple(_violations(limits, motion, torque))
+
+
+def require_within(limits: Limits, motion: Motion, torque: FloatArray | None = None) -> None:
+    """Raise a TrajectoryError that lists every limit the motion exceeds."""
+    violations = check_limits(limits, motion, torque)
+    if violations:
+        raise TrajectoryError('; '.join(str(violation) for violation in violations))
+
+
+def _violations(limits: Limits, motion: Motion, torque: FloatArray | None) -> Iterator[Violation]:
+    slack = _ROUNDING * np.where(np.isfinite(limits.upper), np.abs(limits.upper) + 1.0, 1.0)
+    checks: list[tuple[str, str, FloatArray, FloatArray, FloatArray]] = [
+        ('lower position', 'position', motion.q, limits.lower, limits.lower - slack - motion.q),
+        ('upper position', 'position', motion.q, limits.upper, motion.q - limits.upper - slack),
+    ]
+    rates = [('velocity', motion.dq, limits.velocity)]
+    rates.append(('acceleration', motion.ddq, limits.acceleration))
+    if torque is not None:
+        rates.append(('torque', torque, limits.torque))
+    for name, values, bound in rates:
+        checks.append((name, name, values, bound, np.abs(values) - (1.0 + _ROUNDING) * bound))
+    for name, quantity, values, bound, excess in checks:
+        for j in np.flatnonzero((excess > 0.0).any(axis=0)):
+            worst = int(excess[:, j].argmax())
+            yield Violation(
+                joint=limits.joints[j],
+                limit=name,
+                time=float(motion.t[worst]),
+                value=float(values[worst, j]),
+                bound=float(bound[j]),
+                samples=int(np.count_nonzero(excess[:, j] > 0.0)),
+                unit=limits.unit(quantity, int(j)),
+            )

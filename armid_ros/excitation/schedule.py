@@ -1,0 +1,193 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+A whole excitation run: from rest into a periodic trajectory, through it, and back to rest.
+
+Without a start pose the arm speeds up and slows down along the trajectory's own path, so the runs
+in and out visit no pose that the periods do not visit. With one, it leaves that pose and blends
+into the trajectory, staying between the two, joint by joint.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.motion import FloatArray, Motion, read_only
+import numpy as np
+import numpy.typing as npt
+
+#: How far period * rate may be from a whole number for the periods to count as identical.
+_WHOLE_SAMPLES = 1e-6
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """
+    Rest, run-in, identical periods, run-out, rest.
+
+    Attributes
+    ----------
+    trajectory : FourierTrajectory
+        What is repeated.
+    n_periods : int
+        Number of identical periods; from two on their difference shows the noise floor.
+    run_in : float
+        Duration of the run-in, and of the run-out [s].
+    start : ndarray, shape (n,), or None
+        Pose to leave from and to return to [rad or m]; None: poses on the trajectory itself.
+
+    """
+
+    trajectory: FourierTrajectory
+    n_periods: int = 2
+    run_in: float = 2.0
+    start: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        """Check the numbers and freeze the start pose."""
+        if self.n_periods < 1:
+            raise TrajectoryError(f'excitation: {self.n_periods} periods; at least one is needed')
+        if not (np.isfinite(self.run_in) and self.run_in > 0.0):
+            raise TrajectoryError(f'excitation: a run-in of {self.run_in} s')
+        if self.start is not None:
+            start = read_only(self.start)
+            object.__setattr__(self, 'start', start)
+            if start.shape != (self.trajectory.n_joints,) or not np.isfinite(start).all():
+                raise TrajectoryError(
+                    f'excitation: the start pose has to be {self.trajectory.n_joints} finite '
+                    f'numbers, for {", ".join(self.joints)}; got {start}'
+                )
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joint names."""
+        return self.trajectory.joints
+
+    @property
+    def duration(self) -> float:
+        """Duration from rest to rest [s]."""
+        return self.n_periods * self.trajectory.period + 2.0 * self.run_in
+
+    def at(self, t: npt.ArrayLike) -> Motion:
+        """
+        Evaluate the run and its exact derivatives.
+
+        Parameters
+        ----------
+        t : array_like, shape (N,)
+            Time since the start [s]; at rest before 0 and after the duration.
+
+        """
+        time = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
+        before = np.maximum(self.run_in - time, 0.0) / self.run_in
+        after = np.maximum(time - (self.duration - self.run_in), 0.0) / self.run_in
+        if self.start is None:
+            return self._along_orbit(time, before, after)
+        return self._blended(time, before, after, self.start)
+
+    def motion(self, rate: float) -> Motion:
+        """
+        Sample the run.
+
+        Parameters
+        ----------
+        rate : float
+            Samples per second [Hz]; a period has to be a whole number of samples, so that the
+            periods are identical sample by sample.
+
+        Returns
+        -------
+        Motion
+            With tau None; t starts at 0 and is k / rate.
+
+        Raises
+        ------
+        TrajectoryError
+            If a period is not a whole number of samples; names the nearest rate that fits.
+
+        """
+        lead = self._run_in_samples(rate)
+        count = 2 * lead + self.n_periods * self._period_samples(rate) + 1
+        t = np.arange(count) / rate
+        run = self.at(t - lead / rate + self.run_in)
+        return Motion(run.joints, t, run.q, run.dq, run.ddq)
+
+    def period_slices(self, rate: float) -> tuple[slice, ...]:
+        """Return which samples of ``motion(rate)`` belong to each period."""
+        lead, length = self._run_in_samples(rate), self._period_samples(rate)
+        return tuple(
+            slice(lead + k * length, lead + (k + 1) * length) for k in range(self.n_periods)
+        )
+
+    def _run_in_samples(self, rate: float) -> int:
+        return int(np.ceil(self.run_in * rate - _WHOLE_SAMPLES))
+
+    def _period_samples(self, rate: float) -> int:
+        samples = self.trajectory.period * rate
+        whole = max(round(samples), 1)
+        if abs(samples - whole) > _WHOLE_SAMPLES * whole:
+            raise TrajectoryError(
+                f'a period of {self.trajectory.period:g} s is {samples:g} samples at {rate:g} Hz; '
+                f'it has to be a whole number: take {whole / self.trajectory.period:.9g} Hz'
+            )
+        return whole
+
+    def _along_orbit(self, t: FloatArray, before: FloatArray, after: FloatArray) -> Motion:
+        """Run through the orbit with a phase that starts and ends at rest."""
+        phase = t - self.run_in
+        # 1 - before is the share of the run-in done, x; the phase rate is _step(x), and the phase
+        # that is still to come before the first period is run_in * integral of _step from x to 1.
+        lead = self.run_in * (_STEP_AREA - _step_integral(1.0 - before))
+        lag = self.run_in * (_STEP_AREA - _step_integral(1.0 - after))
+        end = self.n_periods * self.trajectory.period
+        phase = np.where(before > 0.0, -lead, np.where(after > 0.0, end + lag, phase))
+        speed = _step(1.0 - before) * _step(1.0 - after)
+        change = (_step_slope(1.0 - before) - _step_slope(1.0 - after)) / self.run_in
+        orbit = self.trajectory.motion(phase)
+        speed, change = speed[:, np.newaxis], change[:, np.newaxis]
+        return Motion(
+            self.joints, t, orbit.q, orbit.dq * speed, orbit.ddq * speed**2 + orbit.dq * change
+        )
+
+    def _blended(
+        self, t: FloatArray, before: FloatArray, after: FloatArray, start: FloatArray
+    ) -> Motion:
+        """Mix the start pose and the orbit with a weight that rises smoothly from 0 to 1."""
+        orbit = self.trajectory.motion(t - self.run_in)
+        sign = np.where(after > 0.0, -1.0, 1.0)
+        share = 1.0 - np.maximum(before, after)
+        weight = _step(share)[:, np.newaxis]
+        slope = (sign * _step_slope(share) / self.run_in)[:, np.newaxis]
+        bend = (_step_bend(share) / self.run_in**2)[:, np.newaxis]
+        away = orbit.q - start
+        return Motion(
+            self.joints,
+            t,
+            start + weight * away,
+            weight * orbit.dq + slope * away,
+            weight * orbit.ddq + 2.0 * slope * orbit.dq + bend * away,
+        )
+
+
+#: Integral of _step from 0 to 1.
+_STEP_AREA = 0.5
+
+
+def _step(x: FloatArray) -> FloatArray:
+    """Rise from 0 to 1 with zero slope and curvature at both ends (quintic)."""
+    return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
+
+
+def _step_slope(x: FloatArray) -> FloatArray:
+    return np.asarray(30.0 * x**2 * (1.0 - x) ** 2)
+
+
+def _step_bend(x: FloatArray) -> FloatArray:
+    return np.asarray(60.0 * x * (1.0 - x) * (1.0 - 2.0 * x))
+
+
+def _step_integral(x: FloatArray) -> FloatArray:
+    return np.asarray(x**4 * (2.5 - 3.0 * x + x**2))

@@ -1,0 +1,134 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trajectories, runs and their files."""
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation import (
+    Excitation,
+    FourierTrajectory,
+    load_excitation,
+    save_excitation,
+)
+import numpy as np
+import pytest
+
+STARTS = pytest.mark.parametrize('start', [None, np.array([3.0, -1.0])], ids=['orbit', 'pose'])
+
+
+@pytest.fixture
+def trajectory():
+    rng = np.random.default_rng(7)
+    return FourierTrajectory(
+        ('a', 'b'), 10.0, rng.normal(size=2), rng.normal(size=(2, 3)), rng.normal(size=(2, 3))
+    )
+
+
+def test_trajectory_is_periodic_about_its_centre(trajectory):
+    motion = trajectory.one_period(60)
+    np.testing.assert_allclose(motion.q.mean(axis=0), trajectory.q0, atol=1e-12)
+    np.testing.assert_allclose(
+        trajectory.motion(motion.t + 10.0).q, trajectory.motion(motion.t).q, atol=1e-12
+    )
+
+
+def test_shifted_trajectory_enters_the_same_orbit_later(trajectory):
+    t = np.linspace(0.0, 10.0, 31)
+    later = trajectory.shifted(1.3).motion(t)
+    np.testing.assert_allclose(later.q, trajectory.motion(t + 1.3).q, atol=1e-12)
+    np.testing.assert_allclose(later.ddq, trajectory.motion(t + 1.3).ddq, atol=1e-12)
+
+
+def test_stretched_trajectory_takes_the_same_path(trajectory):
+    slow, t = trajectory.stretched(25.0), np.linspace(0.0, 10.0, 31)
+    np.testing.assert_allclose(slow.motion(2.5 * t).q, trajectory.motion(t).q, atol=1e-12)
+    np.testing.assert_allclose(slow.motion(2.5 * t).dq, trajectory.motion(t).dq / 2.5, atol=1e-12)
+
+
+def test_bounds_hold_for_every_sample(trajectory):
+    motion = trajectory.one_period(2000)
+    speed, acceleration, _ = trajectory.bounds()
+    assert np.all(np.abs(motion.dq).max(axis=0) <= speed)
+    assert np.all(np.abs(motion.ddq).max(axis=0) <= acceleration)
+
+
+@STARTS
+def test_run_starts_and_ends_at_rest(trajectory, start):
+    motion = Excitation(trajectory, 2, 2.0, start).motion(100.0)
+    for rates in (motion.dq, motion.ddq):
+        np.testing.assert_allclose(rates[[0, -1]], 0.0, atol=1e-12)
+    if start is not None:
+        np.testing.assert_allclose(motion.q[[0, -1]], [start, start], atol=1e-12)
+
+
+@STARTS
+def test_velocity_and_acceleration_are_the_derivatives_of_position(trajectory, start):
+    motion = Excitation(trajectory, 2, 2.0, start).motion(1000.0)
+    inner = slice(2, -2)
+    dq = np.gradient(motion.q, motion.t, axis=0)
+    ddq = np.gradient(motion.dq, motion.t, axis=0)
+    np.testing.assert_allclose(dq[inner], motion.dq[inner], atol=2e-5)
+    np.testing.assert_allclose(ddq[inner], motion.ddq[inner], atol=5e-4 if start is None else 0.02)
+
+
+@STARTS
+def test_periods_are_identical_sample_by_sample(trajectory, start):
+    run = Excitation(trajectory, 3, 1.7, start)
+    motion = run.motion(100.0)
+    periods = [motion.select(samples) for samples in run.period_slices(100.0)]
+    assert [len(period) for period in periods] == [1000] * 3
+    for period in periods[1:]:
+        np.testing.assert_allclose(period.q, periods[0].q, atol=1e-12)
+    np.testing.assert_allclose(periods[0].q, trajectory.one_period(1000).q, atol=1e-12)
+
+
+def test_run_along_the_orbit_visits_no_new_pose(trajectory):
+    run = Excitation(trajectory, 1, 2.0).motion(50.0).q
+    orbit = trajectory.one_period(4000).q
+    nearest = [np.abs(orbit - q).max(axis=1).min() for q in run]
+    assert max(nearest) < 0.01
+
+
+def test_run_from_a_pose_stays_between_pose_and_orbit(trajectory):
+    start = np.array([3.0, -1.0])
+    q, orbit = Excitation(trajectory, 1, 2.0, start).motion(50.0).q, trajectory.one_period(999).q
+    assert np.all(q <= np.maximum(orbit.max(axis=0), start) + 1e-3)
+    assert np.all(q >= np.minimum(orbit.min(axis=0), start) - 1e-3)
+
+
+def test_rate_that_does_not_fit_the_period_is_refused_with_one_that_does(trajectory):
+    with pytest.raises(TrajectoryError, match=r'10 s is 3.3 samples .* take 0.3 Hz'):
+        Excitation(trajectory).motion(0.33)
+
+
+@pytest.mark.parametrize('name', ['run.yaml', 'run.csv'])
+@STARTS
+def test_file_holds_the_run_to_the_last_bit(trajectory, start, name, tmp_path):
+    run = Excitation(trajectory, 3, 1.5, start)
+    save_excitation(run, tmp_path / name)
+    back = load_excitation(tmp_path / name)
+    motion, read = run.motion(10.0), back.motion(10.0)
+    assert back.joints == run.joints
+    np.testing.assert_array_equal(read.q, motion.q)
+    np.testing.assert_array_equal(read.ddq, motion.ddq)
+
+
+@pytest.mark.parametrize(
+    ('name', 'text', 'message'),
+    [
+        ('run.yaml', 'a: 1', 'schema: armid/excitation/1'),
+        ('run.yaml', 'schema: armid/excitation/1\nperiod: 3', 'no joints'),
+        ('run.csv', 'joint,q0', 'first line'),
+        ('run.txt', '', '.yaml'),
+    ],
+)
+def test_bad_file_is_refused_with_its_name(name, text, message, tmp_path):
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(TrajectoryError, match=message) as error:
+        load_excitation(path)
+    assert name in str(error.value)
+
+
+def test_coefficients_that_are_no_numbers_are_refused_with_the_joint():
+    with pytest.raises(TrajectoryError, match='a of joint elbow'):
+        FourierTrajectory(('elbow',), 1.0, np.zeros(1), np.full((1, 2), np.nan), np.zeros((1, 2)))
