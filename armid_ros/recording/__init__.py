@@ -1,0 +1,42 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Recordings of joints, and the rosbag2 bags they are kept in.
+
+Nothing else in the package knows a file format. ``read_recording`` takes any bag with JointState
+messages apart, ``write_recording`` makes one; ``BagWriter`` and ``iter_raw`` carry raw messages for
+the nodes; none of it needs ROS.
+
+"""
+
+from armid_ros.recording.bag import iter_raw, topics
+from armid_ros.recording.joint_state_encoder import (
+    joint_state_cdr,
+    write_joint_states,
+    write_recording,
+)
+from armid_ros.recording.qos import LATCHED, QosProfile
+from armid_ros.recording.reader import read_recording
+from armid_ros.recording.recording import Gap, ReadReport, Recording
+from armid_ros.recording.source import RawMessage, Topic
+from armid_ros.recording.string_message import read_robot_description, string_cdr
+from armid_ros.recording.writer import BagWriter
+
+__all__ = [
+    'Recording',
+    'ReadReport',
+    'Gap',
+    'read_recording',
+    'read_robot_description',
+    'write_recording',
+    'BagWriter',
+    'QosProfile',
+    'LATCHED',
+    'write_joint_states',
+    'joint_state_cdr',
+    'string_cdr',
+    'Topic',
+    'RawMessage',
+    'topics',
+    'iter_raw',
+]

@@ -1,0 +1,129 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Definitions and hashes of ROS 2 message types, without ROS.
+
+The standard packages are known by heart (rosbags' store of Jazzy); others are looked up where an
+installed workspace keeps them, share/PACKAGE/msg/TYPE.msg below AMENT_PREFIX_PATH, or given as
+text.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import os
+from pathlib import Path
+
+from armid_ros.errors import RecordingError
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import get_types_from_idl, get_types_from_msg, get_typestore, Stores
+from rosbags.typesys.base import TypesysError
+from rosbags.typesys.store import Typestore
+
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+STRING = 'std_msgs/msg/String'
+
+
+@dataclass(frozen=True)
+class MessageType:
+    """
+    A message type as a bag describes it.
+
+    Attributes
+    ----------
+    name : str
+        Such as 'sensor_msgs/msg/JointState'.
+    definition : str
+        Its definition followed by those of the types it contains; empty when the bag has none.
+    encoding : str
+        Language of the definition: 'ros2msg', 'ros2idl', or empty.
+    type_hash : str
+        RIHS01 hash of the type; empty when unknown.
+
+    """
+
+    name: str
+    definition: str = ''
+    encoding: str = 'ros2msg'
+    type_hash: str = ''
+
+
+def message_type(name: str, definition: str | None = None) -> MessageType:
+    """
+    Describe a message type completely, definition with dependencies and hash.
+
+    Parameters
+    ----------
+    name : str
+        Such as 'sensor_msgs/msg/JointState'.
+    definition : str, optional
+        Text of its .msg file, alone or followed by its dependencies in the way of rosbag2. Without
+        it the type is looked up.
+
+    Raises
+    ------
+    RecordingError
+        The type is not known, or the text is no message definition.
+
+    """
+    store = get_typestore(Stores.ROS2_JAZZY)
+    if definition is not None or name not in store.fielddefs:
+        store = Typestore()
+        _register(store, name, definition, os.environ)
+    text, _ = store.generate_msgdef(name, ros_version=2)
+    return MessageType(name, text, 'ros2msg', store.hash_rihs01(name))
+
+
+def store_for(described: MessageType) -> Typestore:
+    """Return a type store that can decode messages of a type as its bag describes it."""
+    if not described.definition:
+        store = get_typestore(Stores.ROS2_JAZZY)
+        if described.name not in store.fielddefs:
+            raise RecordingError(f'type {described.name}: the bag does not hold its definition')
+        return store
+    store = Typestore()
+    if described.encoding == 'ros2idl':
+        store.register(get_types_from_idl(described.definition))
+    else:
+        _register(store, described.name, described.definition, os.environ)
+    return store
+
+
+def _register(
+    store: Typestore, name: str, definition: str | None, environment: Mapping[str, str]
+) -> None:
+    """Register a type and, recursively, those it contains."""
+    known = get_typestore(Stores.ROS2_JAZZY).fielddefs
+    if definition is None and name in known:
+        types = {name: known[name]}
+    else:
+        text = definition if definition is not None else _installed(name, environment)
+        try:
+            types = dict(get_types_from_msg(text, name))
+        except (TypesysError, ValueError) as error:
+            raise RecordingError(f'type {name}: no valid message definition: {error}') from error
+    store.register(types)
+    for _, fields in types.values():
+        for _, description in fields:
+            kind, content = description
+            if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+                kind, content = content[0]
+            if kind == Nodetype.NAME and content not in store.fielddefs:
+                _register(store, str(content), None, environment)
+
+
+def _installed(name: str, environment: Mapping[str, str]) -> str:
+    """Return the text of an installed .msg file."""
+    prefixes = [p for p in environment.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if p]
+    package, _, rest = name.partition('/')
+    for prefix in prefixes:
+        path = Path(prefix, 'share', package, rest + '.msg')
+        if path.is_file():
+            return path.read_text(encoding='utf-8')
+    raise RecordingError(
+        f'type {name} is not known: give its definition, or source the workspace that has '
+        f'{package} (looked below {", ".join(prefixes) or "an empty AMENT_PREFIX_PATH"})'
+    )

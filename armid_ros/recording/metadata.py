@@ -1,0 +1,149 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The metadata.yaml of a rosbag2 directory: written in version 9, read in all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import os
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.qos import dump_qos
+from armid_ros.recording.source import Topic
+import yaml
+
+FILE_NAME = 'metadata.yaml'
+VERSION = 9
+# rosbag2 writes this as the start of a bag without messages.
+_NO_TIME = 2**63 - 1
+
+
+@dataclass(frozen=True)
+class BagMetadata:
+    """
+    What a reader needs of metadata.yaml.
+
+    Attributes
+    ----------
+    files : tuple of Path
+        The files of the bag, in order.
+    compression_mode : {'', 'file', 'message', 'storage'}
+        What was compressed by rosbag2 itself.
+
+    """
+
+    files: tuple[Path, ...]
+    compression_mode: str = ''
+
+
+def bag_information(
+    topics: Sequence[Topic], file_name: str | None, start_ns: int, end_ns: int
+) -> dict[str, Any]:
+    """
+    Return the inner map of metadata.yaml.
+
+    Parameters
+    ----------
+    topics : sequence of Topic
+        Topics with their counts.
+    file_name : str or None
+        The only file of the bag; None while it is being written.
+    start_ns, end_ns : int
+        Log time of the first and the last message [ns]; ignored when there is none.
+
+    """
+    count = sum(topic.count for topic in topics)
+    start = {'nanoseconds_since_epoch': start_ns if count else _NO_TIME}
+    duration = {'nanoseconds': end_ns - start_ns if count else 0}
+    files = [] if file_name is None else [file_name]
+    return {
+        'version': VERSION,
+        'storage_identifier': 'mcap',
+        'duration': duration,
+        'starting_time': start,
+        'message_count': count,
+        'topics_with_message_count': [
+            {
+                'topic_metadata': {
+                    'name': topic.name,
+                    'type': topic.type_name,
+                    'serialization_format': topic.encoding,
+                    'offered_qos_profiles': dump_qos(topic.qos),
+                    'type_description_hash': topic.message_type.type_hash,
+                },
+                'message_count': topic.count,
+            }
+            for topic in topics
+        ],
+        'compression_format': '',
+        'compression_mode': '',
+        'relative_file_paths': files,
+        'files': [
+            {
+                'path': name,
+                'starting_time': dict(start),
+                'duration': dict(duration),
+                'message_count': count,
+            }
+            for name in files
+        ],
+        'custom_data': None,
+        'ros_distro': 'jazzy',
+    }
+
+
+def dump(information: Mapping[str, Any]) -> str:
+    """Return a map as YAML without aliases, which rosbag2 does not read."""
+
+    class Dumper(yaml.SafeDumper):
+        def ignore_aliases(self, data: Any) -> bool:
+            return True
+
+    return yaml.dump(information, Dumper=Dumper, sort_keys=False, allow_unicode=True)
+
+
+def write_metadata(bag: Path, information: Mapping[str, Any]) -> None:
+    """Write metadata.yaml beside its place and move it there, so that it is whole or absent."""
+    beside = bag / (FILE_NAME + '.part')
+    with beside.open('w', encoding='utf-8') as stream:
+        stream.write(dump({'rosbag2_bagfile_information': information}))
+        stream.flush()
+        os.fsync(stream.fileno())
+    beside.replace(bag / FILE_NAME)
+
+
+def read_metadata(bag: Path) -> BagMetadata:
+    """
+    Read metadata.yaml of any version.
+
+    Raises
+    ------
+    RecordingError
+        It is not valid, or a file it names does not exist.
+
+    """
+    path = bag / FILE_NAME
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+        information = content['rosbag2_bagfile_information']
+        names = [str(name) for name in information['relative_file_paths']]
+        mode = str(information.get('compression_mode') or '').lower()
+    except OSError as error:
+        raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error
+    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, AttributeError) as error:
+        raise RecordingError(
+            f'{path}: no valid description of a bag ({error}); move it away, and the files beside '
+            'it will be read without it'
+        ) from error
+    # Up to version 3 the paths began with the name of the directory.
+    files = tuple(bag / Path(name).name for name in names)
+    missing = [file.name for file in files if not file.exists()]
+    if missing:
+        present = ', '.join(sorted(entry.name for entry in bag.iterdir()))
+        raise RecordingError(
+            f'{path}: names {", ".join(missing)}, which the bag does not have; it has {present}'
+        )
+    return BagMetadata(files, '' if mode == 'none' else mode)

@@ -1,0 +1,136 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Quality of service of a topic, in the two notations rosbag2 has written it in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+INFINITE_NS = 9223372036 * 10**9 + 854775807
+
+# Positions are the integers of rmw/types.h, which metadata.yaml up to version 8 holds.
+_HISTORY = ('system_default', 'keep_last', 'keep_all', 'unknown')
+_RELIABILITY = ('system_default', 'reliable', 'best_effort', 'unknown', 'best_available')
+_DURABILITY = ('system_default', 'transient_local', 'volatile', 'unknown', 'best_available')
+_LIVELINESS = (
+    'system_default',
+    'automatic',
+    'manual_by_node',
+    'manual_by_topic',
+    'unknown',
+    'best_available',
+)
+
+
+@dataclass(frozen=True)
+class QosProfile:
+    """
+    What a publisher of a topic offered.
+
+    Attributes
+    ----------
+    history : {'unknown', 'keep_last', 'keep_all', 'system_default'}
+        The middleware does not tell a recorder, hence 'unknown'.
+    depth : int
+        Queue length; 0 when unknown.
+    reliability : {'reliable', 'best_effort', ...}
+        Whether lost messages are sent again.
+    durability : {'volatile', 'transient_local', ...}
+        Whether late subscribers get the last messages.
+    deadline_ns, lifespan_ns, lease_ns : int
+        Durations [ns]; INFINITE_NS when unlimited.
+    liveliness : str
+        How a publisher proves that it lives.
+    avoid_ros_namespace_conventions : bool
+        Whether the topic has no ROS prefix in the middleware.
+
+    """
+
+    history: str = 'unknown'
+    depth: int = 0
+    reliability: str = 'reliable'
+    durability: str = 'volatile'
+    deadline_ns: int = INFINITE_NS
+    lifespan_ns: int = INFINITE_NS
+    liveliness: str = 'automatic'
+    lease_ns: int = INFINITE_NS
+    avoid_ros_namespace_conventions: bool = False
+
+    @property
+    def latched(self) -> bool:
+        """Whether late subscribers get the last messages."""
+        return self.durability == 'transient_local'
+
+
+LATCHED = QosProfile(durability='transient_local')
+
+
+def dump_qos(profiles: Iterable[QosProfile]) -> list[dict[str, Any]]:
+    """Return profiles in the notation of metadata.yaml, version 9."""
+    return [
+        {
+            'history': profile.history,
+            'depth': profile.depth,
+            'reliability': profile.reliability,
+            'durability': profile.durability,
+            'deadline': _dump_duration(profile.deadline_ns),
+            'lifespan': _dump_duration(profile.lifespan_ns),
+            'liveliness': profile.liveliness,
+            'liveliness_lease_duration': _dump_duration(profile.lease_ns),
+            'avoid_ros_namespace_conventions': profile.avoid_ros_namespace_conventions,
+        }
+        for profile in profiles
+    ]
+
+
+def dump_qos_text(profiles: Iterable[QosProfile]) -> str:
+    """Return profiles as the YAML text of an MCAP channel."""
+    listed = dump_qos(profiles)
+    return str(yaml.safe_dump(listed, sort_keys=False)).strip() if listed else ''
+
+
+def parse_qos(profiles: str | Iterable[Mapping[str, Any]] | None) -> tuple[QosProfile, ...]:
+    """Return profiles from either notation; what cannot be understood counts as unknown."""
+    if isinstance(profiles, str):
+        try:
+            profiles = yaml.safe_load(profiles)
+        except yaml.YAMLError:
+            return ()
+    if not isinstance(profiles, (list, tuple)):
+        return ()
+    return tuple(_parse_profile(profile) for profile in profiles if isinstance(profile, Mapping))
+
+
+def _parse_profile(profile: Mapping[str, Any]) -> QosProfile:
+    return QosProfile(
+        history=_parse_choice(profile.get('history'), _HISTORY),
+        depth=int(profile.get('depth', 0)),
+        reliability=_parse_choice(profile.get('reliability'), _RELIABILITY),
+        durability=_parse_choice(profile.get('durability'), _DURABILITY),
+        deadline_ns=_parse_duration(profile.get('deadline')),
+        lifespan_ns=_parse_duration(profile.get('lifespan')),
+        liveliness=_parse_choice(profile.get('liveliness'), _LIVELINESS),
+        lease_ns=_parse_duration(profile.get('liveliness_lease_duration')),
+        avoid_ros_namespace_conventions=bool(profile.get('avoid_ros_namespace_conventions')),
+    )
+
+
+def _parse_choice(value: object, choices: tuple[str, ...]) -> str:
+    if isinstance(value, int) and 0 <= value < len(choices):
+        return choices[value]
+    return value if isinstance(value, str) and value in choices else 'unknown'
+
+
+def _dump_duration(nanoseconds: int) -> dict[str, int]:
+    seconds, rest = divmod(nanoseconds, 10**9)
+    return {'sec': seconds, 'nsec': rest}
+
+
+def _parse_duration(value: object) -> int:
+    if not isinstance(value, Mapping):
+        return INFINITE_NS
+    return int(value.get('sec', 0)) * 10**9 + int(value.get('nsec', 0))

@@ -1,0 +1,301 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Reads the joint measurements of a bag."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from armid_ros.errors import RecordingError
+from armid_ros.motion import FloatArray
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state_decoder import JointStateDecoder, JointStates
+from armid_ros.recording.message_types import JOINT_STATE
+from armid_ros.recording.recording import Clock, Gap, ReadReport, Recording
+from armid_ros.recording.series import (
+    choose_clock,
+    clock_problem,
+    GAP_PERIODS,
+    gather,
+    merged,
+    ordered,
+    Series,
+)
+from armid_ros.recording.source import IntArray, Topic
+import numpy as np
+
+# More samples than this part being not finite is no glitch but a fault of the recording.
+MAX_NOT_FINITE = 0.2
+# This many messages tell which joints a topic names.
+_PEEK_MESSAGES = 1000
+
+
+def read_recording(
+    path: str | Path, *, joints: Sequence[str], topic: str | None = None
+) -> Recording:
+    """
+    Read the measurements of some joints from a bag.
+
+    Parameters
+    ----------
+    path : str or Path
+        A rosbag2 directory (MCAP or SQLite, split, compressed, with or without metadata.yaml), or
+        a file .mcap or .db3. A file cut off by a crash is read as far as it goes.
+    joints : sequence of str
+        The joints wanted, in this order; others in the messages (a gripper's) are passed over.
+    topic : str, optional
+        Topic of sensor_msgs/JointState; by default the only one, or the only one that names all
+        the joints, or of several such the only one called 'joint_states'.
+
+    Returns
+    -------
+    Recording
+        Samples in order of time, without repeated stamps and values that are not finite; its
+        report says what was done to get them. Time is that of the message headers, unless their
+        stamps are zero, stand still or jump: then the time of reception, and ``clock`` says so.
+
+    Raises
+    ------
+    RecordingError
+        There is no such bag or topic, the topic does not name a joint, or nothing usable is left.
+
+    """
+    joints = tuple(joints)
+    if not joints or len(set(joints)) != len(joints):
+        raise RecordingError(f'{path}: joints wanted must differ and not be none, got {joints}')
+    with Bag(path) as bag:
+        chosen = _choose_topic(bag, joints, topic)
+        decoder = JointStateDecoder(joints)
+        pieces = [states for block in bag.blocks(chosen.name) for states in decoder.decode(block)]
+        damage = bag.damage
+    where = f'{path}: {chosen.name}'
+    _check_joints(where, decoder, joints)
+    return _assemble(str(path), chosen.name, joints, pieces, decoder, damage)
+
+
+def _assemble(
+    path: str,
+    topic: str,
+    joints: tuple[str, ...],
+    pieces: list[JointStates],
+    decoder: JointStateDecoder,
+    damage: str,
+) -> Recording:
+    """Make one recording of all messages."""
+    where = f'{path}: {topic}'
+    counts: Counter[str] = Counter()
+    gathered = gather(pieces)
+    pieces.clear()
+    clock, note = choose_clock(gathered)
+    if clock == 'receive':
+        _check_receive_clock(where, gathered, note)
+    series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)
+    q, dq, tau, absent = _measured_quantities(where, series)
+    q, dq, tau, stamps = _finite(where, joints, series.stamps, (q, dq, tau), counts)
+    if len(stamps) < 2:
+        raise RecordingError(
+            f'{where}: {len(stamps)} samples are left of {decoder.messages} messages '
+            f'({_counted(counts) or "the bag is too short"})'
+        )
+    t = (stamps - stamps[0]) * 1e-9
+    report = ReadReport(
+        messages=decoder.messages,
+        samples=len(stamps),
+        malformed=decoder.malformed,
+        gaps=_gaps(t),
+        absent=absent,
+        clock_note=note,
+        damage=damage,
+        **counts,
+    )
+    return _recording(path, topic, joints, int(stamps[0]), t, (q, dq, tau), clock, report)
+
+
+def _recording(
+    path: str,
+    topic: str,
+    joints: tuple[str, ...],
+    start_ns: int,
+    t: FloatArray,
+    values: tuple[FloatArray, FloatArray | None, FloatArray | None],
+    clock: Clock,
+    report: ReadReport,
+) -> Recording:
+    q, dq, tau = values
+    return Recording(
+        joints=joints,
+        t=t,
+        q=q,
+        dq=dq,
+        tau=tau,
+        start_ns=start_ns,
+        source=path,
+        topic=topic,
+        clock=clock,
+        report=report,
+    )
+
+
+def _choose_topic(bag: Bag, joints: Sequence[str], wanted: str | None) -> Topic:
+    """Return the topic to read."""
+    topics = bag.topics()
+    candidates = [topic for topic in topics if topic.type_name == JOINT_STATE]
+    available = ', '.join(f'{topic.name} ({topic.count} messages)' for topic in candidates)
+    if wanted is not None:
+        name = '/' + wanted.lstrip('/')
+        for topic in topics:
+            if '/' + topic.name.lstrip('/') != name:
+                continue
+            if topic.type_name != JOINT_STATE:
+                raise RecordingError(
+                    f'{bag.path}: {topic.name} is a topic of {topic.type_name}, not of '
+                    f'{JOINT_STATE}; of that type there are: {available or "none"}'
+                )
+            return _checked(bag, topic)
+        raise RecordingError(
+            f'{bag.path}: there is no topic {wanted}; topics of {JOINT_STATE}: '
+            f'{available or "none"}'
+        )
+    if not candidates:
+        others = ', '.join(f'{topic.name} ({topic.type_name})' for topic in topics)
+        damage = f' ({bag.damage})' if bag.damage else ''
+        raise RecordingError(
+            f'{bag.path}: no topic of {JOINT_STATE}; the bag has {others or "no topics"}{damage}'
+        )
+    if len(candidates) == 1:
+        return _checked(bag, candidates[0])
+    named = {topic.name: _named_joints(bag, topic) for topic in candidates}
+    complete = [topic for topic in candidates if set(joints) <= set(named[topic.name])]
+    if len(complete) > 1:
+        plain = [topic for topic in complete if topic.name.split('/')[-1] == 'joint_states']
+        complete = plain if len(plain) == 1 else complete
+    if len(complete) == 1:
+        return _checked(bag, complete[0])
+    listed = '; '.join(f'{name} names {", ".join(n) or "none"}' for name, n in named.items())
+    which = 'several topics name' if complete else 'no topic names'
+    raise RecordingError(
+        f'{bag.path}: {which} all of {", ".join(joints)}; say which topic to read: {listed}'
+    )
+
+
+def _checked(bag: Bag, topic: Topic) -> Topic:
+    """Refuse what is not CDR."""
+    if topic.encoding != 'cdr':
+        raise RecordingError(
+            f"{bag.path}: {topic.name} is serialised as '{topic.encoding}'; only CDR, "
+            'the form of ROS 2, can be read'
+        )
+    return topic
+
+
+def _named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
+    """Return the joints the first messages of a topic name."""
+    decoder = JointStateDecoder(())
+    for block in bag.blocks(topic.name):
+        for _ in decoder.decode(block):
+            pass
+        if decoder.messages >= _PEEK_MESSAGES:
+            break
+    return decoder.names_seen
+
+
+def _check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) -> None:
+    """Refuse a topic that does not name all joints, or nothing at all."""
+    if not decoder.messages:
+        raise RecordingError(f'{where} has no messages')
+    missing = [joint for joint in joints if joint not in decoder.names_seen]
+    if not missing:
+        return
+    if not decoder.names_seen:
+        raise RecordingError(
+            f'{where}: none of {decoder.messages} messages names a joint; '
+            f'{decoder.first_problem or "the names are empty"}'
+        )
+    raise RecordingError(
+        f'{where} does not name {_joint_list(missing)}; '
+        f'its joints are {", ".join(decoder.names_seen)}'
+    )
+
+
+def _check_receive_clock(where: str, gathered: Sequence[JointStates], note: str) -> None:
+    """Refuse a recording without a time."""
+    for states in gathered:
+        problem = clock_problem(states.receive, states.position)
+        if problem:
+            raise RecordingError(
+                f'{where} has no usable time: {note}, and receive times {problem}'
+            )
+
+
+def _measured_quantities(
+    where: str, series: Series
+) -> tuple[FloatArray, FloatArray | None, FloatArray | None, tuple[str, ...]]:
+    """Tell quantities that were measured from those never filled in."""
+    absent: list[str] = []
+    kept: list[FloatArray | None] = []
+    for name, values in zip(('position', 'velocity', 'effort'), series.values, strict=True):
+        if values is None:
+            lacking = list(series.joints)
+        else:
+            # NaN in the first sample of a joint is a matter of its column, and rare.
+            suspect = np.flatnonzero(np.isnan(values[:1]).any(axis=0))
+            lacking = [series.joints[j] for j in suspect if np.isnan(values[:, j]).all()]
+        if lacking:
+            everyone = len(lacking) == len(series.joints)
+            absent.append(name if everyone else f'{name} of {", ".join(lacking)}')
+        kept.append(None if lacking else values)
+    q, dq, tau = kept
+    if q is None:
+        raise RecordingError(f'{where} has no {absent[0]}')
+    return q, dq, tau, tuple(absent)
+
+
+def _finite(
+    where: str,
+    joints: Sequence[str],
+    stamps: IntArray,
+    values: tuple[FloatArray, FloatArray | None, FloatArray | None],
+    counts: Counter[str],
+) -> tuple[FloatArray, FloatArray | None, FloatArray | None, IntArray]:
+    """Drop samples with a value that is not finite; refuse when they are many."""
+    bad = np.zeros(len(stamps), np.bool_)
+    culprits = []
+    for name, array in zip(('position', 'velocity', 'effort'), values, strict=True):
+        if array is None:
+            continue
+        wrong = ~np.isfinite(array)
+        if wrong.any():
+            bad |= wrong.any(axis=1)
+            named = [joints[j] for j in np.flatnonzero(wrong.any(axis=0))]
+            culprits.append(f'{name} of {", ".join(named)}')
+    if not culprits:
+        return (*values, stamps)
+    dropped = int(bad.sum())
+    if dropped > MAX_NOT_FINITE * len(stamps):
+        raise RecordingError(
+            f'{where}: {dropped} of {len(stamps)} samples are not finite ({"; ".join(culprits)})'
+        )
+    counts['nan'] += dropped
+    q, dq, tau = (None if array is None else array[~bad] for array in values)
+    assert q is not None
+    return q, dq, tau, stamps[~bad]
+
+
+def _gaps(t: FloatArray) -> tuple[Gap, ...]:
+    """Return the stretches without samples."""
+    steps = np.diff(t)
+    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
+    return tuple(Gap(float(t[i]), float(steps[i])) for i in at)
+
+
+def _counted(counts: Counter[str]) -> str:
+    return ', '.join(
+        f'{count} {name.replace("_", " ")}' for name, count in counts.items() if count
+    )
+
+
+def _joint_list(names: Sequence[str]) -> str:
+    quoted = ', '.join(f"'{name}'" for name in names)
+    return f'joint {quoted}' if len(names) == 1 else f'joints {quoted}'

@@ -1,0 +1,208 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What was measured: joint positions, velocities and torques, as a bag holds them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from armid_ros.errors import RecordingError
+from armid_ros.motion import FloatArray, read_only
+import numpy as np
+import numpy.typing as npt
+
+Clock = Literal['header', 'receive']
+
+
+@dataclass(frozen=True)
+class Gap:
+    """
+    A stretch without samples.
+
+    Attributes
+    ----------
+    t : float
+        Time of the last sample before it [s], on the time base of the recording.
+    length : float
+        How long nothing was measured [s].
+
+    """
+
+    t: float
+    length: float
+
+
+@dataclass(frozen=True)
+class ReadReport:
+    """
+    What reading a recording met on the way, by count.
+
+    Attributes
+    ----------
+    messages : int
+        JointState messages on the topic.
+    samples : int
+        Samples of the recording.
+    merged : int
+        Samples put together from messages that carry a part of the joints each.
+    interpolated : int
+        Merged samples of which a part was interpolated in time, as its stamps differ.
+    incomplete : int
+        Samples dropped since a part of the joints was not measured around their time.
+    duplicates : int
+        Messages dropped since they repeat the stamp of an earlier one.
+    out_of_order : int
+        Messages older than one before them; they are sorted in.
+    restarted : int
+        Messages dropped since the clock jumped back: the longest run between jumps is kept.
+    nan : int
+        Samples dropped since a position, velocity or torque is not finite.
+    malformed : int
+        Messages dropped since they cannot be decoded, or have arrays of the wrong length.
+    unstamped : int
+        Messages dropped since their header stamp is zero.
+    gaps : tuple of Gap
+        Stretches of more than five sampling periods without a sample.
+    absent : tuple of str
+        Quantities some or all joints lack, in words: 'effort of wrist'.
+    clock_note : str
+        Why the receive time was used; empty when the header's was.
+    damage : str
+        What is wrong with the file itself; empty for a whole file.
+
+    """
+
+    messages: int = 0
+    samples: int = 0
+    merged: int = 0
+    interpolated: int = 0
+    incomplete: int = 0
+    duplicates: int = 0
+    out_of_order: int = 0
+    restarted: int = 0
+    nan: int = 0
+    malformed: int = 0
+    unstamped: int = 0
+    gaps: tuple[Gap, ...] = ()
+    absent: tuple[str, ...] = ()
+    clock_note: str = ''
+    damage: str = ''
+
+    @property
+    def clean(self) -> bool:
+        """Whether every message became a sample and nothing is missing."""
+        return self == ReadReport(messages=self.messages, samples=self.samples)
+
+    def describe(self) -> str:
+        """Return the report as one or a few sentences."""
+        sentences = [f'{self.samples} samples from {self.messages} messages']
+        counted = (
+            (self.merged, 'put together from messages with a part of the joints each'),
+            (self.interpolated, 'of them interpolated in time'),
+            (self.incomplete, 'dropped where a part of the joints was not measured'),
+            (self.duplicates, 'with a repeated stamp dropped'),
+            (self.out_of_order, 'out of order sorted in'),
+            (self.restarted, 'dropped as the clock jumped back'),
+            (self.nan, 'dropped for values that are not finite'),
+            (self.malformed, 'malformed dropped'),
+            (self.unstamped, 'without a stamp dropped'),
+        )
+        sentences += [f'{count} {what}' for count, what in counted if count]
+        text = ', '.join(sentences) + '.'
+        if self.gaps:
+            longest = max(self.gaps, key=lambda gap: gap.length)
+            number = f'{len(self.gaps)} gaps' if len(self.gaps) > 1 else '1 gap'
+            text += f' {number}, the longest {longest.length:.3g} s at {longest.t:.3f} s.'
+        if self.absent:
+            text += f' Not recorded: {", ".join(self.absent)}.'
+        if self.clock_note:
+            text += f' Time is that of reception: {self.clock_note}.'
+        if self.damage:
+            text += f' {self.damage[0].upper()}{self.damage[1:]}.'
+        return text
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """
+    Joint measurements of one arm, as recorded.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        Joint names in column order, n of them.
+    t : ndarray, shape (N,)
+        Time since the first sample [s], strictly increasing.
+    q : ndarray, shape (N, n)
+        Positions [rad or m].
+    dq, tau : ndarray, shape (N, n), or None
+        Velocities and actuator torques [N m] or forces [N]; None when not every joint has them.
+    start_ns : int
+        Stamp of the first sample [ns since the epoch of the clock].
+    source : str
+        The bag it was read from; empty when it was made in memory.
+    topic : str
+        Name of the JointState topic.
+    clock : {'header', 'receive'}
+        Whose time the stamps are: the sender's header, or the recorder's reception.
+    report : ReadReport
+        What was repaired or dropped on the way.
+
+    """
+
+    joints: tuple[str, ...]
+    t: FloatArray
+    q: FloatArray
+    dq: FloatArray | None = None
+    tau: FloatArray | None = None
+    start_ns: int = 0
+    source: str = ''
+    topic: str = '/joint_states'
+    clock: Clock = 'header'
+    report: ReadReport = field(default_factory=ReadReport)
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check their shapes."""
+        object.__setattr__(self, 'joints', tuple(self.joints))
+        for name in ('t', 'q', 'dq', 'tau'):
+            values = getattr(self, name)
+            if values is not None:
+                object.__setattr__(self, name, read_only(values))
+        expected = (len(self.t), len(self.joints))
+        for name in ('q', 'dq', 'tau'):
+            values = getattr(self, name)
+            if values is not None and values.shape != expected:
+                raise RecordingError(
+                    f'{self.source or "recording"}: {name} has shape {values.shape}, but '
+                    f'{expected[0]} time stamps of {expected[1]} joints need {expected}'
+                )
+
+    def __len__(self) -> int:
+        """Return the number of samples N."""
+        return len(self.t)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints n."""
+        return len(self.joints)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample [s]."""
+        return float(self.t[-1] - self.t[0]) if len(self.t) else 0.0
+
+    @property
+    def period(self) -> float:
+        """Median time between samples [s]."""
+        return float(np.median(np.diff(self.t))) if len(self.t) > 1 else 0.0
+
+    def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Recording:
+        """Return the recording at some of its samples, on the same time base."""
+        return replace(
+            self,
+            t=self.t[samples],
+            q=self.q[samples],
+            dq=None if self.dq is None else self.dq[samples],
+            tau=None if self.tau is None else self.tau[samples],
+        )

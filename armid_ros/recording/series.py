@@ -1,0 +1,290 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+From decoded messages to samples on one time base.
+
+Messages that name the same joints are a series. A series is put in order: messages without a stamp
+dropped, the longest run kept where the clock was set back, late messages sorted in, repeated stamps
+dropped. When joints are spread over several series (one driver an arm half, say), the series with
+the most samples gives the time base; the others contribute their values at equal stamps exactly and
+are interpolated linearly between stamps, but not over their gaps.
+
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.motion import FloatArray
+from armid_ros.recording.joint_state_decoder import JointStates
+from armid_ros.recording.recording import Clock
+from armid_ros.recording.source import IntArray
+import numpy as np
+import numpy.typing as npt
+
+# A backward step of the clock of more than this is a restart (a simulation reset, a bag played in a
+# loop), not a late message.
+RESTART_NS = 10**9
+# A stretch without samples is a gap when it is longer than this many sampling periods.
+GAP_PERIODS = 5.0
+# Beyond these fractions of the messages the header's clock is not believed.
+_MAX_ZERO = 0.01
+_MAX_REPEATED = 0.5
+_MAX_BACKWARD = 0.1
+_MAX_SPAN_RATIO = 1000.0
+
+
+@dataclass(frozen=True)
+class Series:
+    """
+    Samples of some joints; arrays of shape (N,) and (N, k), NaN where nothing was measured.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        k names.
+    stamps : ndarray, shape (N,)
+        Time stamps [ns].
+    values : ndarray, shape (3, N, k), as a tuple of three
+        Positions, velocities, efforts; None for a quantity no message has.
+
+    """
+
+    joints: tuple[str, ...]
+    stamps: IntArray
+    values: tuple[FloatArray | None, FloatArray | None, FloatArray | None]
+
+    def __len__(self) -> int:
+        """Return the number of samples N."""
+        return len(self.stamps)
+
+    def select(self, samples: npt.NDArray[np.intp] | npt.NDArray[np.bool_] | slice) -> Series:
+        """Return some of the samples."""
+        q, dq, tau = (None if v is None else v[samples] for v in self.values)
+        return Series(self.joints, self.stamps[samples], (q, dq, tau))
+
+    def columns(self, joints: Sequence[str]) -> Series:
+        """Return some of the joints."""
+        if tuple(joints) == self.joints:
+            return self
+        chosen = [self.joints.index(joint) for joint in joints]
+        q, dq, tau = (None if v is None else v[:, chosen] for v in self.values)
+        return Series(tuple(joints), self.stamps, (q, dq, tau))
+
+
+def gather(pieces: Sequence[JointStates]) -> list[JointStates]:
+    """Put pieces that name the same joints together, each in the order of storage."""
+    by_joints: dict[tuple[str, ...], list[JointStates]] = {}
+    for piece in pieces:
+        by_joints.setdefault(piece.joints, []).append(piece)
+    return [_concatenated(joints, parts) for joints, parts in by_joints.items()]
+
+
+def choose_clock(gathered: Sequence[JointStates]) -> tuple[Clock, str]:
+    """
+    Decide whose time to use.
+
+    Returns
+    -------
+    clock : {'header', 'receive'}
+        Whose.
+    note : str
+        Why not the header's; empty for the header's.
+
+    """
+    for states in gathered:
+        problem = clock_problem(states.header, states.position, states.receive)
+        if problem:
+            return 'receive', f'header stamps {problem}'
+    return 'header', ''
+
+
+def clock_problem(
+    stamps: IntArray, position: FloatArray | None, receive: IntArray | None = None
+) -> str:
+    """Say why stamps cannot be believed; nothing if they can."""
+    zero = int((stamps == 0).sum())
+    if zero > _MAX_ZERO * len(stamps):
+        return 'are zero' if zero == len(stamps) else f'are zero in {zero} of {len(stamps)}'
+    steps = np.diff(stamps[stamps != 0] if zero else stamps)
+    if len(steps) == 0:
+        return ''
+    repeated = steps == 0
+    if position is not None and not zero and repeated.any():
+        # A message recorded twice repeats its values too; that speaks not against the clock.
+        at = np.flatnonzero(repeated)
+        repeated[at] = (position[at] != position[at + 1]).any(axis=1)
+    if repeated.mean() > _MAX_REPEATED:
+        return 'do not advance'
+    if (steps < 0).mean() > _MAX_BACKWARD:
+        return 'jump back and forth'
+    if receive is not None and len(receive) > 2:
+        span, received = float(np.ptp(stamps[stamps != 0])), float(np.ptp(receive))
+        if received > 0 and not received / _MAX_SPAN_RATIO < span < received * _MAX_SPAN_RATIO:
+            return f'span {span * 1e-9:.3g} s where reception took {received * 1e-9:.3g} s'
+    return ''
+
+
+def ordered(states: JointStates, clock: Clock, counts: Counter[str]) -> Series:
+    """Return the messages as samples in order of time, counting what had to be done for it."""
+    stamps = states.header if clock == 'header' else states.receive
+    series = Series(states.joints, stamps, (states.position, states.velocity, states.effort))
+    stamped = stamps != 0
+    if not stamped.all():
+        counts['unstamped'] += int((~stamped).sum())
+        series = series.select(stamped)
+    run = _longest_run(series.stamps)
+    if run is not None:
+        counts['restarted'] += len(series) - (run.stop - run.start)
+        series = series.select(run)
+    return _sorted(series, counts)
+
+
+def merged(series: Sequence[Series], joints: Sequence[str], counts: Counter[str]) -> Series:
+    """Put the joints of several series on one time base."""
+    holders: dict[tuple[int, ...], list[str]] = {}
+    for joint in joints:
+        key = tuple(i for i, one in enumerate(series) if joint in one.joints)
+        holders.setdefault(key, []).append(joint)
+    groups = [
+        _union([series[i].columns(names) for i in key], counts) for key, names in holders.items()
+    ]
+    groups = [group for group in groups if len(group)]
+    if len(groups) == 1 and len(groups[0].joints) == len(joints):
+        return groups[0].columns(joints)
+    base = max(groups, key=len)
+    known = np.ones(len(base), np.bool_)
+    exact = np.ones(len(base), np.bool_)
+    parts = []
+    for group in groups:
+        part, valid, equal = _resampled(group, base.stamps)
+        known &= valid
+        exact &= equal
+        parts.append(part)
+    counts['incomplete'] += int((~known).sum())
+    counts['merged'] += int(known.sum())
+    counts['interpolated'] += int((known & ~exact).sum())
+    q, dq, tau = (
+        _side_by_side([part.values[field] for part in parts], parts) for field in range(3)
+    )
+    together = Series(tuple(n for part in parts for n in part.joints), base.stamps, (q, dq, tau))
+    return together.columns(joints).select(known)
+
+
+def _concatenated(joints: tuple[str, ...], parts: Sequence[JointStates]) -> JointStates:
+    if len(parts) == 1:
+        return parts[0]
+    number = np.concatenate([part.number for part in parts])
+    whole = JointStates(
+        joints,
+        number,
+        np.concatenate([part.header for part in parts]),
+        np.concatenate([part.receive for part in parts]),
+        _stacked([part.position for part in parts], parts, len(joints)),
+        _stacked([part.velocity for part in parts], parts, len(joints)),
+        _stacked([part.effort for part in parts], parts, len(joints)),
+    )
+    if (np.diff(number) > 0).all():
+        return whole
+    order = np.argsort(number, kind='stable')
+    q, dq, tau = (
+        None if v is None else v[order] for v in (whole.position, whole.velocity, whole.effort)
+    )
+    return JointStates(
+        joints, number[order], whole.header[order], whole.receive[order], q, dq, tau
+    )
+
+
+def _stacked(
+    arrays: Sequence[FloatArray | None], parts: Sequence[JointStates] | Sequence[Series], k: int
+) -> FloatArray | None:
+    """Concatenate along time, NaN for what is missing."""
+    if all(values is None for values in arrays):
+        return None
+    return np.concatenate(
+        [
+            np.full((len(part), k), np.nan) if values is None else values
+            for values, part in zip(arrays, parts, strict=True)
+        ]
+    )
+
+
+def _side_by_side(
+    arrays: Sequence[FloatArray | None], parts: Sequence[Series]
+) -> FloatArray | None:
+    """Concatenate along joints, NaN for what is missing."""
+    if all(values is None for values in arrays):
+        return None
+    return np.concatenate(
+        [
+            np.full((len(part), len(part.joints)), np.nan) if values is None else values
+            for values, part in zip(arrays, parts, strict=True)
+        ],
+        axis=1,
+    )
+
+
+def _longest_run(stamps: IntArray) -> slice | None:
+    """Return the longest stretch between restarts of the clock, None if it never restarted."""
+    if len(stamps) < 3:
+        return None
+    down = np.diff(stamps) < -RESTART_NS
+    # The message after the step must be early as well; otherwise one message was late.
+    down[:-1] &= stamps[2:] - stamps[:-2] < -RESTART_NS
+    if not down.any():
+        return None
+    bounds = [0, *(np.flatnonzero(down) + 1).tolist(), len(stamps)]
+    begin = max(range(len(bounds) - 1), key=lambda i: bounds[i + 1] - bounds[i])
+    return slice(bounds[begin], bounds[begin + 1])
+
+
+def _sorted(series: Series, counts: Counter[str]) -> Series:
+    """Sort by time and drop repeated stamps; of equal ones the first stays."""
+    steps = np.diff(series.stamps)
+    if (steps > 0).all():
+        return series
+    latest = np.maximum.accumulate(series.stamps)
+    late = int((series.stamps[1:] < latest[:-1]).sum())
+    if late:
+        counts['out_of_order'] += late
+        series = series.select(np.argsort(series.stamps, kind='stable'))
+    first = np.concatenate([[True], np.diff(series.stamps) > 0])
+    counts['duplicates'] += int((~first).sum())
+    return series if first.all() else series.select(first)
+
+
+def _union(parts: Sequence[Series], counts: Counter[str]) -> Series:
+    """Put series of the same joints together."""
+    if len(parts) == 1:
+        return parts[0]
+    joints = parts[0].joints
+    q, dq, tau = (
+        _stacked([part.values[field] for part in parts], parts, len(joints)) for field in range(3)
+    )
+    together = Series(joints, np.concatenate([part.stamps for part in parts]), (q, dq, tau))
+    order = np.argsort(together.stamps, kind='stable')
+    return _sorted(together.select(order), counts)
+
+
+def _resampled(
+    series: Series, stamps: IntArray
+) -> tuple[Series, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """Return a series at other stamps, where that is possible, and where it is exact."""
+    if len(series) == len(stamps) and np.array_equal(series.stamps, stamps):
+        everywhere = np.ones(len(stamps), np.bool_)
+        return series, everywhere, everywhere
+    own = series.stamps
+    after = np.clip(np.searchsorted(own, stamps), 0, len(own) - 1)
+    equal = own[after] == stamps
+    before = np.where(equal, after, np.maximum(after - 1, 0))
+    width = own[after] - own[before]
+    period = float(np.median(np.diff(own))) if len(own) > 1 else 0.0
+    inside = (own[before] <= stamps) & (own[after] >= stamps)
+    valid = equal | (inside & (width <= GAP_PERIODS * period))
+    weight = np.where(equal, 0.0, (stamps - own[before]) / np.maximum(width, 1))[:, np.newaxis]
+    q, dq, tau = (
+        None if v is None else v[before] + weight * (v[after] - v[before]) for v in series.values
+    )
+    return Series(series.joints, stamps, (q, dq, tau)), valid, equal

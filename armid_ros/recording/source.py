@@ -1,0 +1,151 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What every storage of messages offers: its topics, and their messages as raw CDR.
+
+Messages come in two ways: in blocks of many for array code, in the order of storage, and one by
+one in the order of time, for playing them.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+import mmap
+from typing import NamedTuple, Protocol
+
+from armid_ros.recording.message_types import MessageType
+from armid_ros.recording.qos import QosProfile
+import numpy as np
+import numpy.typing as npt
+
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Topic:
+    """
+    A topic of a bag.
+
+    Attributes
+    ----------
+    name : str
+        Such as '/joint_states'.
+    message_type : MessageType
+        Its type, as the bag describes it.
+    qos : tuple of QosProfile
+        What its publishers offered; empty when unknown.
+    count : int
+        Number of messages.
+    encoding : str
+        How messages are serialised: 'cdr' in ROS 2.
+
+    """
+
+    name: str
+    message_type: MessageType
+    qos: tuple[QosProfile, ...] = ()
+    count: int = 0
+    encoding: str = 'cdr'
+
+    @property
+    def type_name(self) -> str:
+        """Name of the message type."""
+        return self.message_type.name
+
+
+@dataclass(frozen=True)
+class Block:
+    """
+    Many messages of one topic, in one buffer.
+
+    Attributes
+    ----------
+    data : bytes or mmap
+        The buffer.
+    start, length : ndarray, shape (N,)
+        Where the CDR of each message begins, and its number of bytes.
+    log_time, publish_time : ndarray, shape (N,)
+        When it was recorded, and when sent [ns].
+
+    """
+
+    data: bytes | mmap.mmap
+    start: IntArray
+    length: IntArray
+    log_time: IntArray
+    publish_time: IntArray
+
+    def __len__(self) -> int:
+        """Return the number of messages."""
+        return len(self.start)
+
+    def message(self, index: int) -> bytes:
+        """Return the CDR of one message."""
+        start = int(self.start[index])
+        return self.data[start : start + int(self.length[index])]
+
+
+class RawMessage(NamedTuple):
+    """One message as recorded; times in ns."""
+
+    topic: str
+    log_time_ns: int
+    publish_time_ns: int
+    cdr: bytes
+
+
+class Source(Protocol):
+    """
+    A storage of messages: one file, or the files of one bag.
+
+    ``damage`` says what is wrong with it, as far as was read; it is empty for a whole storage.
+
+    """
+
+    @property
+    def damage(self) -> str:
+        """Return what is wrong with the storage; empty for a whole one."""
+
+    def topics(self) -> tuple[Topic, ...]:
+        """Return the topics, in order of appearance."""
+
+    def blocks(self, topic: str) -> Iterator[Block]:
+        """Yield the messages of a topic, in the order they are stored."""
+
+    def messages(self) -> Iterator[RawMessage]:
+        """Yield all messages in the order they were logged."""
+
+    def close(self) -> None:
+        """Let go of the files."""
+
+
+def records_at(data: bytes | mmap.mmap, start: IntArray, length: int) -> npt.NDArray[np.void]:
+    """
+    Return pieces of a buffer, without a copy where they are evenly spaced.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        The buffer; the pieces lie within it.
+    start : ndarray, shape (N,)
+        Where they begin.
+    length : int
+        Number of bytes of each.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        Void records, to be viewed as structured ones.
+
+    """
+    record = np.dtype((np.void, length))
+    if not len(start):
+        return np.empty(0, record)
+    steps = np.diff(start)
+    if not len(steps) or (steps == steps[0]).all():
+        stride = int(steps[0]) if len(steps) else length
+        return np.ndarray((len(start),), record, data, int(start[0]), (stride,))
+    everywhere = np.ndarray((len(data) - length + 1,), record, data, 0, (1,))
+    return everywhere[start]

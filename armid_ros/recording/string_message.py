@@ -1,0 +1,69 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""std_msgs/String as CDR, and the robot description that travels in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import struct
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.message_types import STRING
+
+_ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
+
+
+def string_cdr(text: str) -> bytes:
+    """Serialise a std_msgs/String."""
+    content = text.encode() + b'\0'
+    return b'\x00\x01\x00\x00' + struct.pack('<I', len(content)) + content
+
+
+def parse_string(cdr: bytes) -> str | None:
+    """Return the text of a std_msgs/String; None if the bytes are none."""
+    order = _ORDERS.get(cdr[:2])
+    if order is None or len(cdr) < 8:
+        return None
+    (length,) = struct.unpack_from(order + 'I', cdr, 4)
+    if length > len(cdr) - 8:
+        return None
+    return cdr[8 : 8 + length].rstrip(b'\0').decode('utf-8', 'replace')
+
+
+def read_robot_description(path: str | Path) -> str | None:
+    """
+    Return the robot description a bag holds.
+
+    Parameters
+    ----------
+    path : str or Path
+        A rosbag2 directory, or a bare file.
+
+    Returns
+    -------
+    str or None
+        The last one published on a std_msgs/String topic whose name ends in 'robot_description';
+        None when there is none.
+
+    Raises
+    ------
+    RecordingError
+        The bag cannot be read, or holds several descriptions on topics of several robots.
+
+    """
+    with Bag(path) as bag:
+        texts: dict[str, str] = {}
+        for topic in bag.topics():
+            if topic.type_name != STRING or not topic.name.endswith('robot_description'):
+                continue
+            for block in bag.blocks(topic.name):
+                text = parse_string(block.message(len(block) - 1))
+                if text:
+                    texts[topic.name] = text
+    if len(set(texts.values())) > 1:
+        raise RecordingError(
+            f'{path}: holds the descriptions of several robots ({", ".join(texts)}); '
+            'save the one meant as a URDF file'
+        )
+    return next(iter(texts.values()), None)
