@@ -1,0 +1,130 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+# `make help` lists what there is to do. Every target sets up what it needs first.
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMPS := $(VENV)/.stamps
+OUT ?= demo
+
+# The newest supported Python on the path, else whichever there is, for the check to name it.
+SUPPORTED = import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))
+PYTHON ?= $(or $(shell for python in python3.12 python3.11 python3 python; do \
+	$$python -c '$(SUPPORTED)' >/dev/null 2>&1 && echo $$python && break; done),python3)
+
+# Recordings of real machines; the tests that need them are skipped without.
+ARMID_DATA ?= $(abspath $(wildcard ../shared/data))
+export ARMID_DATA
+
+# Only what is in the environment counts, whatever ROS the shell has sourced.
+export AMENT_PREFIX_PATH := $(abspath $(VENV))
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+unexport CMAKE_PREFIX_PATH PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
+ifdef ROS_DISTRO
+unexport LD_LIBRARY_PATH
+endif
+
+PIP := $(BIN)/python -m pip install -qq
+LOCKED := $(PIP) --require-hashes --no-build-isolation
+TREE := $(shell find armid_ros scripts launch config resource -name __pycache__ -prune \
+	-o -print 2>/dev/null)
+MESSAGES := $(shell find msg_schemas -type f)
+
+.DEFAULT_GOAL := all
+.PHONY: all demo test lint bench lock clean help check
+.DELETE_ON_ERROR:
+
+all: $(STAMPS)/armid_ros $(VENV)/setup.bash  ## set up .venv: ROS 2, armid_msgs, armid_ros
+	@echo 'armid_ros is in $(VENV); to use it in a shell:  . $(VENV)/setup.bash'
+
+demo: $(STAMPS)/armid_ros $(VENV)/setup.bash  ## identify the shipped arm on the moon, from excitation to figures in OUT
+	$(BIN)/armid demo --out $(OUT)
+
+test: lint  ## lint, types, layers, and every test with coverage
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --cov=armid_ros --cov-report=term \
+		--durations=15 $(PYTEST)
+
+lint: $(STAMPS)/armid_ros $(STAMPS)/test  ## format, lint, layers, types
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/lint-imports
+	$(BIN)/mypy
+
+bench: $(STAMPS)/armid_ros $(STAMPS)/bench  ## speed and accuracy, side by side with the peers
+	$(BIN)/python -m benchmarks $(BENCH)
+
+# make lock UPGRADE=1 takes the newest of everything; without, what is locked stays if it can.
+UV = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest \
+	--generate-hashes --no-emit-index-url --no-emit-find-links \
+	--custom-compile-command 'make lock'
+lock: $(STAMPS)/test  ## pin the requirements anew, with hashes, for Python 3.11 and 3.12
+	cd requirements && ../$(UV) $(if $(UPGRADE),--upgrade) bench.in -o bench.txt
+	cd requirements && ../$(UV) -c bench.txt test.in -o test.txt
+	cd requirements && ../$(UV) -c bench.txt run.in ros.in -o run.txt
+	cd requirements && ../$(UV) -c bench.txt build.in -o build.txt
+
+clean:  ## remove the environment and everything built
+	rm -rf $(VENV) build install log dist *.egg-info .coverage .coverage.* .mypy_cache \
+		.ruff_cache .pytest_cache .import_linter_cache
+
+help:
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+CHECK = command -v $(firstword $(PYTHON)) >/dev/null || { echo 'armid_ros: there is no' \
+	'$(PYTHON): Python 3.11 or 3.12 is needed, as in `make PYTHON=/path/to/python3.12`' >&2; \
+	exit 1; }; $(PYTHON) requirements/check_host.py
+
+check:
+	@$(CHECK)
+
+# A Python that was asked for is checked even where the environment exists already.
+$(STAMPS)/venv: | $(if $(filter file,$(origin PYTHON)),,check)
+	@$(CHECK)
+	$(PYTHON) -m venv $(VENV)
+	mkdir -p $(STAMPS)
+	touch $@
+
+$(STAMPS)/run: requirements/run.txt requirements/build.txt $(STAMPS)/venv
+	@echo 'installing ROS 2 Jazzy and the libraries (a minute or two, once)'
+	$(PIP) --require-hashes -r requirements/build.txt
+	$(LOCKED) -r requirements/run.txt
+	touch $@
+
+$(STAMPS)/test: requirements/test.txt $(STAMPS)/run
+	$(LOCKED) -r $<
+	touch $@
+
+$(STAMPS)/bench: requirements/bench.txt $(STAMPS)/run
+	$(LOCKED) -r $<
+	touch $@
+
+MESSAGES_BUILD := $(VENV)/build/armid_msgs
+$(STAMPS)/armid_msgs: $(MESSAGES) $(STAMPS)/run
+	@echo 'compiling armid_msgs'
+	rm -rf $(MESSAGES_BUILD) && mkdir -p $(MESSAGES_BUILD)
+	( PATH="$(abspath $(BIN)):$$PATH" && \
+	cmake -S msg_schemas -B $(MESSAGES_BUILD) -G Ninja -DCMAKE_BUILD_TYPE=Release \
+		-DBUILD_TESTING=OFF -DCMAKE_INSTALL_PREFIX=$(abspath $(VENV)) \
+		-DCMAKE_PREFIX_PATH=$(abspath $(VENV)) \
+		-DPython3_EXECUTABLE=$(abspath $(BIN))/python && \
+	cmake --build $(MESSAGES_BUILD) && cmake --install $(MESSAGES_BUILD) \
+	) >$(MESSAGES_BUILD)/log 2>&1 || { cat $(MESSAGES_BUILD)/log; exit 1; }
+	touch $@
+
+# Not editable, for pip then leaves out the files that ROS 2 looks for. What a build left behind
+# would be installed again, files that are gone included.
+$(STAMPS)/armid_ros: $(TREE) setup.py setup.cfg package.xml requirements/run.in requirements/ros.in \
+		requirements/test.in $(STAMPS)/armid_msgs
+	rm -rf build/lib build/bdist.*
+	$(PIP) --no-deps --no-build-isolation --force-reinstall .
+	touch $@
+
+define SETUP_BASH
+# Source this to use armid_ros and its ROS 2 in a shell.
+. '$(abspath $(BIN))/activate'
+export AMENT_PREFIX_PATH='$(abspath $(VENV))'$${AMENT_PREFIX_PATH:+":$$AMENT_PREFIX_PATH"}
+export ROS_DISTRO=jazzy ROS_VERSION=2 ROS_PYTHON_VERSION=3
+endef
+
+$(VENV)/setup.bash: Makefile $(STAMPS)/venv
+	$(file >$@,$(SETUP_BASH))@:

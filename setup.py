@@ -1,0 +1,60 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Package armid_ros for pip and for colcon alike."""
+
+from glob import glob
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = 'armid_ros'
+NODES = ('bag_player', 'excitation_publisher', 'online_identifier', 'recorder', 'simulated_arm')
+
+
+def requirements(group):
+    """Read requirements/<group>.in: one requirement a line, after a '#' a comment."""
+    lines = Path('requirements', f'{group}.in').read_text(encoding='utf-8').splitlines()
+    names = (line.split('#')[0].strip() for line in lines)
+    return [name for name in names if name and not name.startswith('-')]
+
+
+def package_data():
+    """List what lies in the package's tree and is not Python."""
+    files = (path for path in Path(NAME).rglob('*') if path.is_file())
+    return [str(path.relative_to(NAME)) for path in files if path.suffix not in ('.py', '.pyc')]
+
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    description='Dynamic identification of robot arms: excite, record, identify, and find what '
+    'the model lacks.',
+    author='The armid_ros developers',
+    author_email='armid_ros@example.org',
+    maintainer='The armid_ros developers',
+    maintainer_email='armid_ros@example.org',
+    license='Apache-2.0',
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={NAME: package_data()},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+        (f'share/{NAME}/launch', sorted(glob('launch/*.launch.py'))),
+        (f'share/{NAME}/config', sorted(glob('config/*'))),
+        # pip puts console_scripts into bin/, where `ros2 run` does not look
+        (f'lib/{NAME}', sorted(glob('scripts/*'))),
+    ],
+    python_requires='>=3.11',
+    install_requires=requirements('run'),
+    extras_require={
+        'ros': requirements('ros'),
+        'test': requirements('test'),
+    },
+    zip_safe=False,
+    entry_points={
+        'console_scripts': [
+            f'armid = {NAME}.cli:main',
+            *(f'{node} = {NAME}.nodes.{node}:main' for node in NODES),
+        ]
+    },
+)

@@ -1,0 +1,70 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The tree is a pair of packages that colcon finds, builds and installs for `ros2 run`."""
+
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip('colcon_core', reason='colcon is not installed: run make test')
+LEFT_BEHIND = shutil.ignore_patterns(
+    '.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'dist', 'demo', 'out', 'bags'
+)
+
+
+def run(command, folder):
+    """Run a command as in a sourced workspace; return what it prints."""
+    env = dict(os.environ)
+    env.pop('PYTHONPATH', None)
+    env['PATH'] = os.pathsep.join([str(Path(sys.prefix, 'bin')), env['PATH']])
+    env['AMENT_PREFIX_PATH'] = sys.prefix
+    env['COLCON_HOME'] = str(folder / '.colcon')
+    result = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
+
+
+@pytest.fixture(scope='module')
+def workspace(root, tmp_path_factory):
+    """Lay out a workspace as the README says: the clone, and a link to the package within it."""
+    folder = tmp_path_factory.mktemp('workspace')
+    shutil.copytree(root, folder / 'src' / 'armid_ros', ignore=LEFT_BEHIND)
+    (folder / 'src' / 'armid_msgs').symlink_to('armid_ros/msg_schemas')
+    return folder
+
+
+@pytest.fixture(scope='module')
+def install(workspace):
+    """Build the workspace."""
+    run(['colcon', 'build', '--event-handlers', 'console_direct+'], workspace)
+    return workspace / 'install'
+
+
+def test_both_packages_are_found_messages_first(workspace):
+    """In a workspace above the clone, and in the clone itself without any option."""
+    listed = ['colcon', 'list', '--topological-order', '--names-only']
+    assert run(listed, workspace).split() == ['armid_msgs', 'armid_ros']
+    assert run(listed, workspace / 'src' / 'armid_ros').split() == ['armid_msgs', 'armid_ros']
+
+
+def test_build_installs_what_ros2_looks_for(install, root):
+    """Marker, manifest and executables, without one of the scripts being lost or added."""
+    share = install / 'armid_ros' / 'share'
+    assert (share / 'ament_index' / 'resource_index' / 'packages' / 'armid_ros').is_file()
+    assert (share / 'armid_ros' / 'package.xml').is_file()
+    libexec = install / 'armid_ros' / 'lib' / 'armid_ros'
+    executables = {path.name for path in libexec.iterdir() if os.access(path, os.X_OK)}
+    assert executables == {path.name for path in (root / 'scripts').iterdir()}
+
+
+def test_sourced_workspace_is_what_python_imports(install):
+    """Package and compiled messages come from the workspace, not from the environment."""
+    code = 'import armid_ros, armid_msgs.msg as m; print(armid_ros.__file__, m.__file__)'
+    use = 'from rclpy.serialization import serialize_message as s; s(m.ParameterEstimate())'
+    output = run(['sh', '-c', f'. install/setup.sh && python -c "{code}; {use}"'], install.parent)
+    for path in output.split():
+        assert Path(path).is_relative_to(install)

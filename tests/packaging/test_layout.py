@@ -1,0 +1,152 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where `ros2 pkg`, `ros2 run` and `ros2 interface` look, something is to be found."""
+
+from importlib import metadata
+import os
+from pathlib import Path
+import re
+import stat
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+from ament_index_python import get_package_prefix, get_package_share_directory, get_resource
+import armid_ros
+import pytest
+
+NODES = {'bag_player', 'excitation_publisher', 'online_identifier', 'recorder', 'simulated_arm'}
+
+
+@pytest.fixture(autouse=True)
+def index(prefix, monkeypatch):
+    """Let the ament index be that of the environment alone."""
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
+
+
+def executables(prefix, package):
+    """List what `ros2 pkg executables` lists: executable regular files in lib/<package>."""
+    paths = Path(prefix, 'lib', package).rglob('*')
+    return {path.name for path in paths if path.is_file() and os.access(path, os.X_OK)}
+
+
+def console_scripts():
+    """Return the console scripts of the installed package, name to 'module:function'."""
+    entries = metadata.distribution('armid_ros').entry_points
+    return {entry.name: entry.value for entry in entries if entry.group == 'console_scripts'}
+
+
+@pytest.mark.parametrize('package', ['armid_ros', 'armid_msgs'])
+def test_index_finds_the_package_and_its_manifest(prefix, package):
+    """As `ros2 pkg prefix` and `ros2 pkg xml` do."""
+    assert Path(get_package_prefix(package)) == prefix
+    manifest = Path(get_package_share_directory(package), 'package.xml')
+    assert ElementTree.parse(manifest).findtext('name') == package
+
+
+def test_executables_are_the_scripts_and_the_console_scripts(prefix, root):
+    """Pip and colcon fill lib/armid_ros from different lists, which must not differ."""
+    scripts = {path.name for path in (root / 'scripts').iterdir()}
+    assert scripts == executables(prefix, 'armid_ros') == set(console_scripts())
+    assert scripts == NODES | {'armid'}
+
+
+def test_scripts_are_executable_in_the_source_tree(root):
+    """Pip keeps the mode that a file has here."""
+    for path in (root / 'scripts').iterdir():
+        assert stat.S_IMODE(path.stat().st_mode) & 0o111 == 0o111, path
+
+
+def test_console_scripts_name_the_module_like_the_node():
+    """The scripts rely on it: they import the module named like themselves."""
+    expected = {node: f'armid_ros.nodes.{node}:main' for node in NODES}
+    assert console_scripts() == expected | {'armid': 'armid_ros.cli:main'}
+
+
+def test_nodes_are_those_that_are_installed(root):
+    """A node without an executable cannot be run, an executable without a node does not run."""
+    folder = root / 'armid_ros' / 'nodes'
+    if not folder.is_dir():
+        pytest.skip('there are no nodes yet')
+    mains = {path.stem for path in folder.glob('*.py') if '\ndef main(' in path.read_text()}
+    assert mains == NODES
+
+
+@pytest.mark.parametrize('name', sorted(NODES | {'armid'}))
+def test_script_runs_its_module_with_the_python_of_its_prefix(prefix, tmp_path, name):
+    """Also where no environment is active, with the exit code and the arguments passed on."""
+    script = tmp_path / 'lib' / 'armid_ros' / name
+    script.parent.mkdir(parents=True)
+    script.write_bytes((prefix / 'lib' / 'armid_ros' / name).read_bytes())
+    script.chmod(0o755)
+    module = 'cli' if name == 'armid' else f'nodes.{name}'
+    python = tmp_path / 'bin' / 'python3'
+    python.parent.mkdir()
+    python.write_text(
+        f'#!{sys.executable}\n'
+        'import sys, types\n'
+        f"parents = ('armid_ros', 'armid_ros.nodes', 'armid_ros.{module}')\n"
+        'sys.modules.update({name: types.ModuleType(name) for name in parents})\n'
+        "sys.modules['armid_ros'].__path__ = sys.modules['armid_ros.nodes'].__path__ = []\n"
+        f"sys.modules['armid_ros.{module}'].main = lambda: print(sys.argv[4:]) or 3\n"
+        'exec(sys.argv[2])\n'
+    )
+    python.chmod(0o755)
+    result = subprocess.run([script, 'x', '--ros-args', 'a b'], capture_output=True, text=True)
+    assert (result.returncode, result.stdout) == (3, "['--ros-args', 'a b']\n"), result.stderr
+
+
+def test_interface_show_finds_the_definition(prefix, root):
+    """As `ros2 interface show armid_msgs/msg/ParameterEstimate` does, by index and share."""
+    listed, where = get_resource('rosidl_interfaces', 'armid_msgs')
+    assert Path(where) == prefix
+    assert 'msg/ParameterEstimate.msg' in listed.splitlines()
+    share = Path(get_package_share_directory('armid_msgs'))
+    installed = (share / 'msg' / 'ParameterEstimate.msg').read_text()
+    assert installed == (root / 'msg_schemas' / 'msg' / 'ParameterEstimate.msg').read_text()
+
+
+def test_data_of_the_package_is_installed(root):
+    """What is not Python in the package's tree, robots and templates, travels with it."""
+    installed = {str(path) for path in metadata.files('armid_ros')}
+    package = root / 'armid_ros'
+    wanted = {
+        str(path.relative_to(root))
+        for path in package.rglob('*')
+        if path.is_file() and path.suffix != '.pyc'
+    }
+    assert wanted <= installed
+    assert f'{package.name}/py.typed' in wanted
+
+
+def test_launch_and_config_files_are_in_share(prefix, root):
+    """Where `ros2 launch armid_ros` and the launch files themselves look."""
+    for folder in ('launch', 'config'):
+        for path in (root / folder).glob('*'):
+            if path.is_file():
+                assert (prefix / 'share' / 'armid_ros' / folder / path.name).is_file()
+
+
+def test_all_say_one_version(root):
+    """Manifests, setup.py, the package and the changelog."""
+    manifests = (root / 'package.xml', root / 'msg_schemas' / 'package.xml')
+    versions = {ElementTree.parse(path).findtext('version') for path in manifests}
+    setup = (root / 'setup.py').read_text()
+    changelog = (root / 'CHANGELOG.md').read_text()
+    versions.add(re.search(r"version='([^']+)'", setup).group(1))
+    versions.add(re.search(r'^## (\S+)', changelog, re.MULTILINE).group(1))
+    versions.add(metadata.version('armid_ros'))
+    versions.add(armid_ros.__version__)
+    assert versions == {armid_ros.__version__}
+
+
+def test_manifest_names_what_the_code_imports(root):
+    """Every ROS 2 package that the nodes import is a dependency in package.xml."""
+    manifest = ElementTree.parse(root / 'package.xml').getroot()
+    declared = {element.text for element in manifest if element.tag.endswith('depend')}
+    known = {'ament_index_python', 'launch', 'launch_ros', 'rclpy', 'rcl_interfaces'}
+    pattern = re.compile(r'^\s*(?:from|import) (\w+)', re.MULTILINE)
+    sources = [*(root / 'armid_ros').rglob('*.py'), *(root / 'launch').glob('*.py')]
+    imported = {name for path in sources for name in pattern.findall(path.read_text())}
+    used = {name for name in imported if name in known or name.endswith(('_msgs', '_srvs'))}
+    assert used <= declared

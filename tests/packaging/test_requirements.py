@@ -1,0 +1,117 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The lock files pin all that is asked for, and the check names what a machine lacks."""
+
+import importlib.util
+import re
+import shutil
+import sys
+import sysconfig
+
+import pytest
+
+LOCKS = {
+    'build': ['build'],
+    'run': ['run', 'ros'],
+    'test': ['test', 'run', 'ros'],
+    'bench': ['bench', 'test', 'run', 'ros'],
+}
+
+
+def normal(name):
+    """Return a project name as PyPI compares it."""
+    return re.sub(r'[-_.]+', '-', name).lower()
+
+
+def wanted(root, group):
+    """Return the names in requirements/<group>.in."""
+    lines = (root / 'requirements' / f'{group}.in').read_text().splitlines()
+    names = (re.match(r'[A-Za-z][\w.-]*', line) for line in lines)
+    return {normal(name.group()) for name in names if name}
+
+
+def pinned(root, lock):
+    """Return name to version in requirements/<lock>.txt; each must have a hash."""
+    text = (root / 'requirements' / f'{lock}.txt').read_text()
+    pins = {}
+    for entry in re.findall(r'^[a-z].*(?:\n    .*)*', text, re.MULTILINE):
+        name, version = re.match(r'([\w.-]+)(?:\[.*\])?==([^ ]+)', entry).groups()
+        assert re.search(r'--hash=sha256:[0-9a-f]{64}\b', entry), name
+        pins[normal(name)] = version
+    return pins
+
+
+@pytest.mark.parametrize('lock', LOCKS)
+def test_lock_pins_all_that_is_asked_for(root, lock):
+    """With `make lock` forgotten after a change of an .in file, this fails."""
+    asked = set().union(*(wanted(root, group) for group in LOCKS[lock]))
+    assert asked <= set(pinned(root, lock))
+
+
+@pytest.mark.parametrize('lock', LOCKS)
+def test_locks_agree(root, lock):
+    """What two of them pin, they pin to one version."""
+    assert pinned(root, lock).items() <= pinned(root, 'bench').items()
+
+
+@pytest.mark.parametrize('lock', LOCKS)
+def test_lock_names_no_registry(root, lock):
+    """Where packages come from is the user's to say."""
+    text = (root / 'requirements' / f'{lock}.txt').read_text()
+    assert '://' not in text
+    assert not re.search(r'--(extra-)?index-url|--find-links', text)
+
+
+@pytest.fixture
+def host(root, monkeypatch, tmp_path):
+    """Load the check, in a folder without an environment."""
+    path = root / 'requirements' / 'check_host.py'
+    spec = importlib.util.spec_from_file_location('check_host', path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    monkeypatch.chdir(tmp_path)
+    for variable in ('CC', 'CXX'):
+        monkeypatch.delenv(variable, raising=False)
+    return module
+
+
+def test_this_machine_lacks_nothing(host):
+    """The tests run on a supported Python, with a compiler."""
+    assert host.missing() is None
+
+
+@pytest.mark.parametrize('version', [(2, 7, 18), (3, 10, 13), (3, 13, 0)])
+def test_unsupported_python_is_named(host, monkeypatch, version):
+    """The line says which are supported, which this is, and how to name another."""
+    monkeypatch.setattr(sys, 'version_info', version)
+    message = host.missing()
+    assert 'Python 3.11 or 3.12' in message
+    assert '.'.join(map(str, version)) in message
+    assert 'make PYTHON=' in message
+
+
+def test_missing_venv_module_is_named(host, monkeypatch):
+    """Debian ships Python without it."""
+    monkeypatch.setitem(sys.modules, 'ensurepip', None)
+    assert 'python3-venv' in host.missing()
+
+
+def test_missing_headers_are_named(host, monkeypatch, tmp_path):
+    """Debian ships Python without them too."""
+    monkeypatch.setattr(sysconfig, 'get_path', lambda name: str(tmp_path))
+    assert 'python3-dev' in host.missing()
+
+
+def test_missing_compiler_is_named(host, monkeypatch):
+    """Either on the path, or as CC and CXX name it."""
+    monkeypatch.setattr(shutil, 'which', lambda name: None if '+' in name else name)
+    assert 'no C++ compiler (c++, g++, clang++)' in host.missing()
+    monkeypatch.setenv('CXX', 'mine++ -O2')
+    assert 'no C++ compiler (mine++ -O2)' in host.missing()
+
+
+def test_environment_of_another_python_is_not_mixed_with(host, tmp_path):
+    """`make PYTHON=...` does not quietly use the environment that is there."""
+    (tmp_path / '.venv').mkdir()
+    (tmp_path / '.venv' / 'pyvenv.cfg').write_text('home = /usr/bin\nversion = 3.9.1\n')
+    assert '.venv was made with Python 3.9' in host.missing()
