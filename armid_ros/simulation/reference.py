@@ -1,0 +1,270 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What an arm is told to do: waypoints in time, and the smooth curve through them.
+
+The curve is what ROS 2's joint_trajectory_controller makes of a JointTrajectory: a line through
+waypoints that have positions only, a cubic with velocities, a quintic with accelerations. Before
+its first waypoint and after its last one the arm is to hold still.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.robots import Robot
+import numpy as np
+
+#: How far beyond a limit is rounding, as a share of the limit's range.
+LIMIT_TOLERANCE = 1e-6
+
+#: Samples looked at in one go when a reference is compared with the limits.
+_BLOCK = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """
+    Waypoints of a joint trajectory.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        Joint names in column order.
+    t : ndarray, shape (K,)
+        Time from the start [s], strictly increasing, not negative.
+    q : ndarray, shape (K, n)
+        Position [rad or m].
+    dq, ddq : ndarray, shape (K, n), or None
+        Velocity and acceleration; an acceleration needs a velocity.
+
+    """
+
+    joints: tuple[str, ...]
+    t: FloatArray
+    q: FloatArray
+    dq: FloatArray | None = None
+    ddq: FloatArray | None = None
+    _coefficients: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Freeze the waypoints, check them, and find the polynomials between them."""
+        names = [name for name in ('t', 'q', 'dq', 'ddq') if getattr(self, name) is not None]
+        for name in names:
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        if self.t.ndim != 1 or not len(self.t):
+            raise TrajectoryError('trajectory: it has no points')
+        if len(set(self.joints)) != len(self.joints):
+            raise TrajectoryError(f'trajectory: a joint is named twice: {", ".join(self.joints)}')
+        expected = (len(self.t), len(self.joints))
+        for name in names[1:]:
+            values = getattr(self, name)
+            if values.shape != expected:
+                raise TrajectoryError(
+                    f'trajectory: {name} has shape {values.shape}, but {expected[0]} points of '
+                    f'{expected[1]} joints need {expected}'
+                )
+            bad = np.argwhere(~np.isfinite(values))
+            if len(bad):
+                point, joint = bad[0]
+                raise TrajectoryError(
+                    f"trajectory: {name} of joint '{self.joints[joint]}' at point {point} is "
+                    f'{values[point, joint]}'
+                )
+        if not np.all(np.isfinite(self.t)) or self.t[0] < 0.0:
+            raise TrajectoryError(f'trajectory: its first time is {self.t[0]} s; 0 or later it is')
+        late = np.flatnonzero(np.diff(self.t) <= 0.0)
+        if len(late):
+            point = int(late[0]) + 1
+            raise TrajectoryError(
+                f'trajectory: time has to increase, but point {point} is at {self.t[point]} s and '
+                f'the one before it at {self.t[point - 1]} s'
+            )
+        if self.ddq is not None and self.dq is None:
+            raise TrajectoryError('trajectory: it has accelerations but no velocities')
+        object.__setattr__(self, '_coefficients', _polynomials(self.t, self.q, self.dq, self.ddq))
+
+    @classmethod
+    def of(cls, motion: Motion) -> Reference:
+        """Return the reference that passes through every sample of a motion, from time zero."""
+        return cls(motion.joints, motion.t - motion.t[0], motion.q, motion.dq, motion.ddq)
+
+    @property
+    def duration(self) -> float:
+        """Time of the last point [s]."""
+        return float(self.t[-1])
+
+    def sample(self, t: FloatArray) -> Motion:
+        """
+        Evaluate the curve.
+
+        Parameters
+        ----------
+        t : ndarray, shape (N,)
+            Time from the start [s]; at any time outside the waypoints the arm holds still.
+
+        Returns
+        -------
+        Motion
+            Position, velocity and acceleration, without torque.
+
+        """
+        if len(self.t) == 1:
+            q = np.broadcast_to(self.q[0], (len(t), len(self.joints)))
+            return Motion(self.joints, t, q, np.zeros_like(q), np.zeros_like(q))
+        segment = np.clip(np.searchsorted(self.t, t, side='right') - 1, 0, len(self.t) - 2)
+        span = (self.t[segment + 1] - self.t[segment])[:, np.newaxis]
+        outside = ((t < self.t[0]) | (t > self.t[-1]))[:, np.newaxis]
+        u = np.clip((t - self.t[segment])[:, np.newaxis] / span, 0.0, 1.0)
+        q, dq, ddq = (np.zeros((len(t), len(self.joints))) for _ in range(3))
+        for c in self._coefficients[::-1]:
+            ddq = ddq * u + 2.0 * dq
+            dq = dq * u + q
+            q = q * u + c[segment]
+        dq, ddq = dq / span, ddq / span**2
+        return Motion(self.joints, t, q, np.where(outside, 0.0, dq), np.where(outside, 0.0, ddq))
+
+    def for_robot(self, robot: Robot) -> Reference:
+        """
+        Return the reference with its joints in the order of the robot.
+
+        Raises
+        ------
+        TrajectoryError
+            If a joint is unknown or missing.
+
+        """
+        listed = ', '.join(robot.joints)
+        for joint in self.joints:
+            if joint not in robot.joints:
+                raise TrajectoryError(
+                    f"trajectory: joint '{joint}' is not one of {robot.name}; its driven joints "
+                    f'are {listed}'
+                )
+        for joint in robot.joints:
+            if joint not in self.joints:
+                raise TrajectoryError(
+                    f"trajectory: joint '{joint}' is missing; {robot.name} needs {listed}"
+                )
+        if self.joints == robot.joints:
+            return self
+        order = [self.joints.index(joint) for joint in robot.joints]
+        dq = None if self.dq is None else self.dq[:, order]
+        ddq = None if self.ddq is None else self.ddq[:, order]
+        return Reference(robot.joints, self.t, self.q[:, order], dq, ddq)
+
+    def after(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Reference:
+        """
+        Return the reference with the way to its first point, from where the arm is at time zero.
+
+        The first point has to be later than time zero.
+
+        """
+        first_dq = np.zeros_like(self.q) if self.dq is None else self.dq
+        first_ddq = np.zeros_like(self.q) if self.ddq is None else self.ddq
+        way = _polynomials(
+            np.array([0.0, self.t[0]]),
+            np.stack([q, self.q[0]]),
+            np.stack([dq, first_dq[0]]),
+            np.stack([ddq, first_ddq[0]]),
+        )
+        return _joined(self, q, way)
+
+    def require_limits(self, robot: Robot, dt: float) -> None:
+        """
+        Compare the curve with the position and velocity limits of a robot.
+
+        Parameters
+        ----------
+        robot : Robot
+            Gives the limits, in the joint order of this reference.
+        dt : float
+            Time between the points that are looked at [s].
+
+        Raises
+        ------
+        TrajectoryError
+            If a limit is passed; the message names the joint, the time, the value and the limit.
+
+        """
+        span = robot.upper - robot.lower
+        slack = LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0)
+        fastest = robot.velocity_limit * (1.0 + LIMIT_TOLERANCE)
+        for motion in self._blocks(dt):
+            for beyond, values, kind, unit in (
+                (motion.q < robot.lower - slack, motion.q, 'lower', ''),
+                (motion.q > robot.upper + slack, motion.q, 'upper', ''),
+                (np.abs(motion.dq) > fastest, motion.dq, 'velocity', '/s'),
+            ):
+                hits = np.argwhere(beyond)
+                if not len(hits):
+                    continue
+                sample, joint = hits[0]
+                limit = {
+                    'lower': robot.lower,
+                    'upper': robot.upper,
+                    'velocity': robot.velocity_limit,
+                }[kind][joint]
+                what = f'{robot.position_units[joint]}{unit}'
+                raise TrajectoryError(
+                    f"trajectory: joint '{robot.joints[joint]}' reaches "
+                    f'{values[sample, joint]:.4g} {what} at {motion.t[sample]:.3f} s, beyond its '
+                    f'{kind} limit of {limit:.4g} {what}'
+                )
+
+    def _blocks(self, dt: float) -> Iterator[Motion]:
+        """Sample the curve every dt, and at its waypoints, in pieces."""
+        steps = int(np.ceil(self.duration / dt)) + 1
+        yield self.sample(self.t)
+        for first in range(0, steps, _BLOCK):
+            t = dt * np.arange(first, min(first + _BLOCK, steps))
+            yield self.sample(np.minimum(t, self.duration))
+
+
+def _joined(reference: Reference, q: FloatArray, way: FloatArray) -> Reference:
+    """Return a reference with one more segment in front, its polynomial given."""
+    joined = Reference(
+        reference.joints,
+        np.append(0.0, reference.t),
+        np.vstack([q, reference.q]),
+    )
+    coefficients = np.concatenate([way, reference._coefficients], axis=1)
+    object.__setattr__(joined, '_coefficients', coefficients)
+    return joined
+
+
+def _polynomials(
+    t: FloatArray, q: FloatArray, dq: FloatArray | None, ddq: FloatArray | None
+) -> FloatArray:
+    """
+    Find the polynomials between waypoints, in u = (t - t_k) / (t_k+1 - t_k).
+
+    Returns
+    -------
+    ndarray, shape (6, K - 1, n)
+        Coefficients of u^0 to u^5.
+
+    """
+    c = np.zeros((6, len(t) - 1, q.shape[1]))
+    span = np.diff(t)[:, np.newaxis]
+    way = np.diff(q, axis=0)
+    c[0] = q[:-1]
+    if dq is None:
+        c[1] = way
+        return c
+    v0, v1 = span * dq[:-1], span * dq[1:]
+    c[1] = v0
+    if ddq is None:
+        c[2] = 3.0 * way - 2.0 * v0 - v1
+        c[3] = -2.0 * way + v0 + v1
+        return c
+    a0, a1 = span**2 * ddq[:-1] / 2.0, span**2 * ddq[1:] / 2.0
+    c[2] = a0
+    c[3] = 10.0 * way - 6.0 * v0 - 4.0 * v1 - 3.0 * a0 + a1
+    c[4] = -15.0 * way + 8.0 * v0 + 7.0 * v1 + 3.0 * a0 - 2.0 * a1
+    c[5] = 6.0 * way - 3.0 * (v0 + v1) - a0 + a1
+    return c

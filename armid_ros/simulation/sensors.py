@@ -1,0 +1,97 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the sensors of an arm make of its motion: noise, encoder steps, delay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.errors import ModelError
+from armid_ros.motion import FloatArray
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Sensors:
+    """
+    Encoders and torque sensors of an arm; perfect unless told otherwise.
+
+    Attributes
+    ----------
+    torque_noise : float or ndarray, shape (n,)
+        Standard deviation of the torque [N m].
+    position_noise : float or ndarray, shape (n,)
+        Standard deviation of the position, before quantisation [rad or m].
+    velocity_noise : float or ndarray, shape (n,)
+        Standard deviation of the velocity [rad/s or m/s].
+    resolution : float or ndarray, shape (n,)
+        Step of the encoder [rad or m]; 0 for none.
+    velocity_from_encoder : bool
+        Whether the velocity is the difference of the last two positions as measured, divided by
+        the time between them, instead of the true one; the noise comes on top.
+    torque_delay : int
+        Steps of the plant by which the torque reading is older than the position reading.
+
+    """
+
+    torque_noise: float | FloatArray = 0.0
+    position_noise: float | FloatArray = 0.0
+    velocity_noise: float | FloatArray = 0.0
+    resolution: float | FloatArray = 0.0
+    velocity_from_encoder: bool = False
+    torque_delay: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse negative values."""
+        for name in ('torque_noise', 'position_noise', 'velocity_noise', 'resolution'):
+            value = np.asarray(getattr(self, name), dtype=float)
+            if not np.all(np.isfinite(value)) or np.any(value < 0.0):
+                raise ModelError(f'sensors: {name} has to be 0 or more, not {value.tolist()}')
+        if self.torque_delay < 0 or int(self.torque_delay) != self.torque_delay:
+            raise ModelError(
+                f'sensors: torque_delay is a whole number of steps, not {self.torque_delay}'
+            )
+
+    def measure(
+        self,
+        q: FloatArray,
+        dq: FloatArray,
+        tau: FloatArray,
+        dt: float,
+        rng: np.random.Generator,
+        previous: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """
+        Read successive samples of an arm; the delay is the caller's, who knows the past.
+
+        Parameters
+        ----------
+        q, dq, tau : ndarray, shape (N, n)
+            The truth.
+        dt : float
+            Time between samples [s].
+        rng : numpy.random.Generator
+            Source of the noise; N samples at once draw what N times one sample draw.
+        previous : ndarray, shape (n,), or None
+            Measured position one sample earlier; None at the beginning, where the arm is taken
+            to have come with its true velocity.
+
+        Returns
+        -------
+        q, dq, tau : ndarray, shape (N, n)
+            The readings.
+
+        """
+        noise = rng.standard_normal((len(q), 3, q.shape[1]))
+        position = self._quantise(q + noise[:, 0] * self.position_noise)
+        if self.velocity_from_encoder:
+            before = self._quantise(q[:1] - dt * dq[:1]) if previous is None else previous[None]
+            dq = np.diff(np.concatenate([before, position]), axis=0) / dt
+        velocity = dq + noise[:, 1] * self.velocity_noise
+        return position, velocity, tau + noise[:, 2] * self.torque_noise
+
+    def _quantise(self, q: FloatArray) -> FloatArray:
+        resolution = np.broadcast_to(self.resolution, q.shape[-1:])
+        counted = resolution > 0.0
+        size = np.where(counted, resolution, 1.0)
+        return np.where(counted, np.round(q / size) * size, q)
