@@ -17,6 +17,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+RANGE_SAMPLES = 73  # every 5 deg of a full turn
+
 
 @dataclass(frozen=True)
 class Clearance:
@@ -59,11 +61,8 @@ class CollisionModel:
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
         """Pairs of links that are checked, each once, in alphabetical order."""
-        links = {
-            tuple(sorted(self._links(number)))
-            for number in range(len(self.geometry.collisionPairs))
-        }
-        return tuple((first, second) for first, second in sorted(links))
+        numbers = range(len(self.geometry.collisionPairs))
+        return tuple(sorted({_links(self.robot, self.geometry, number) for number in numbers}))
 
     def distance(self, q: npt.ArrayLike) -> Clearance:
         """
@@ -76,7 +75,7 @@ class CollisionModel:
 
         """
         clearances, closest = self._check(np.asarray(q, dtype=np.float64)[None])
-        links = () if closest[0] < 0 else self._links(int(closest[0]))
+        links = () if closest[0] < 0 else _links(self.robot, self.geometry, int(closest[0]))
         return Clearance(float(clearances[0]), links)
 
     def path_clearance(self, q: npt.ArrayLike) -> FloatArray:
@@ -123,20 +122,14 @@ class CollisionModel:
                 clearances[sample] = result.min_distance
         return read_only(clearances), closest
 
-    def _links(self, pair: int) -> tuple[str, str]:
-        collision_pair = self.geometry.collisionPairs[pair]
-        return (
-            _link(self.robot, self.geometry.geometryObjects[collision_pair.first]),
-            _link(self.robot, self.geometry.geometryObjects[collision_pair.second]),
-        )
-
 
 def collision_model(robot: Robot, *, srdf: str | Path | None = None) -> CollisionModel:
     """
     Return the collision bodies of a robot and the pairs of links that may touch.
 
-    Links that cannot move against each other and links joined by a joint are not checked, nor
-    are pairs that the SRDF disables. Without an SRDF, pairs that touch when the robot stands at
+    Not checked are links that cannot move against each other, links joined by a joint, pairs that
+    one joint moves and that do not touch anywhere in its range, and pairs that the SRDF
+    disables. Without an SRDF, pairs that touch when the robot stands at
     zero (or its limits nearest to it) are left out and noted: they are bodies drawn too large.
 
     Parameters
@@ -164,30 +157,82 @@ def collision_model(robot: Robot, *, srdf: str | Path | None = None) -> Collisio
             geometry.addCollisionPair(pin.CollisionPair(i, j))
     if not disabled:
         notes += _leave_out_touching(robot, geometry)
+    _leave_out_separate(robot, geometry)
     return CollisionModel(robot=robot, geometry=geometry, notes=notes)
 
 
 def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[str, ...]:
     """Remove the pairs of links that touch at zero; say which."""
     data, placed = robot.model.createData(), geometry.createData()
-    pose = np.clip(np.zeros(robot.n_joints), robot.lower, robot.upper)
-    pin.computeDistances(robot.model, data, geometry, placed, pose)
-    bodies = geometry.geometryObjects
-    pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
-    links = [frozenset((_link(robot, bodies[i]), _link(robot, bodies[j]))) for i, j in pairs]
+    pin.computeDistances(robot.model, data, geometry, placed, _zero(robot))
     touching = {
-        names
-        for names, result in zip(links, placed.distanceResults, strict=True)
+        _links(robot, geometry, number)
+        for number, result in enumerate(placed.distanceResults)
         if result.min_distance <= 0.0
     }
-    geometry.removeAllCollisionPairs()
-    for (i, j), names in zip(pairs, links, strict=True):
-        if names not in touching:
-            geometry.addCollisionPair(pin.CollisionPair(i, j))
+    _keep(
+        geometry,
+        [
+            number
+            for number in range(len(geometry.collisionPairs))
+            if _links(robot, geometry, number) not in touching
+        ],
+    )
     return tuple(
         f"links '{first}' and '{second}' touch at zero and there is no SRDF; not checked"
-        for first, second in sorted(sorted(names) for names in touching)
+        for first, second in sorted(touching)
     )
+
+
+def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
+    """
+    Remove pairs that only one joint moves and that do not touch anywhere in its range.
+
+    A flange keeps the same small distance to the wrist that turns it, which would hide what
+    matters.
+
+    """
+    data, placed = robot.model.createData(), geometry.createData()
+    by_joint: dict[int, list[int]] = {}
+    for number, pair in enumerate(geometry.collisionPairs):
+        bodies = (geometry.geometryObjects[pair.first], geometry.geometryObjects[pair.second])
+        inner, outer = sorted(body.parentJoint for body in bodies)
+        if robot.model.parents[outer] == inner:
+            by_joint.setdefault(outer, []).append(number)
+    separate = set()
+    for joint, numbers in by_joint.items():
+        closest = np.full(len(numbers), np.inf)
+        span = 1.0 if robot.prismatic[joint - 1] else np.pi
+        first, last = np.clip((robot.lower[joint - 1], robot.upper[joint - 1]), -span, span)
+        for position in np.linspace(first, last, RANGE_SAMPLES):
+            pose = _zero(robot)
+            pose[joint - 1] = position
+            pin.updateGeometryPlacements(robot.model, data, geometry, placed, pose)
+            distances = [pin.computeDistance(geometry, placed, n).min_distance for n in numbers]
+            closest = np.minimum(closest, distances)
+        separate |= {n for n, distance in zip(numbers, closest, strict=True) if distance > 0.0}
+    _keep(geometry, [n for n in range(len(geometry.collisionPairs)) if n not in separate])
+
+
+def _keep(geometry: pin.GeometryModel, numbers: list[int]) -> None:
+    kept = [geometry.collisionPairs[number] for number in numbers]
+    pairs = [pin.CollisionPair(pair.first, pair.second) for pair in kept]
+    geometry.removeAllCollisionPairs()
+    for pair in pairs:
+        geometry.addCollisionPair(pair)
+
+
+def _zero(robot: Robot) -> FloatArray:
+    return np.clip(np.zeros(robot.n_joints), robot.lower, robot.upper)
+
+
+def _links(robot: Robot, geometry: pin.GeometryModel, pair: int) -> tuple[str, str]:
+    """Links of a pair, in alphabetical order."""
+    bodies = geometry.collisionPairs[pair]
+    first, second = sorted(
+        _link(robot, geometry.geometryObjects[number]) for number in (bodies.first, bodies.second)
+    )
+    return first, second
 
 
 def _link(robot: Robot, body: pin.GeometryObject) -> str:

@@ -1,0 +1,159 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Collision meshes as a few convex bodies.
+
+Distances between convex bodies take microseconds, between meshes milliseconds. But the convex
+hull of a forearm with a housing at each end fills the gap between them and collides with a wrist
+that is free. So a mesh is cut into slabs across the axis that suits it best, each slab is
+replaced by its hull, and neighbours are joined as long as their common hull is not much larger.
+The bodies together contain the mesh: a clearance never looks larger than it is.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+import os
+from pathlib import Path
+
+from armid_ros.errors import RobotError
+from armid_ros.motion import FloatArray
+import coal
+import numpy as np
+
+SLABS = 12
+GROWTH = 1.1  # volume of a hull over what it stands for: less is close enough
+
+
+def find_mesh(name: str, urdf: Path | None) -> Path | None:
+    """
+    Return the file a URDF's mesh name means, or None when it is nowhere.
+
+    'package://NAME/...' is looked for in AMENT_PREFIX_PATH and ROS_PACKAGE_PATH, and beside the
+    directories that hold the URDF; a relative path starts at the URDF.
+
+    """
+    if name.startswith('package://'):
+        inside = name.removeprefix('package://').lstrip('/')
+        candidates = [root / inside for root in _package_roots(urdf)]
+    else:
+        beside = Path() if urdf is None else urdf.resolve().parent
+        candidates = [beside / name.removeprefix('file://')]
+    return next((path for path in candidates if path.is_file()), None)
+
+
+def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.ConvexBase, ...]:
+    """
+    Return convex bodies that together contain a mesh and little else.
+
+    Parameters
+    ----------
+    path : Path
+        A mesh file of a format that assimp reads.
+    scale : ndarray, shape (3,)
+        Factors along the axes of the file.
+
+    Raises
+    ------
+    RobotError
+        If the file is no mesh, or the mesh is flat.
+
+    """
+    try:
+        mesh = coal.MeshLoader().load(str(path), scale)
+    except (RuntimeError, ValueError) as error:
+        raise RobotError(f'{path}: cannot be read as a mesh: {error}') from None
+    vertices = np.array(mesh.vertices())
+    try:
+        whole = _hull(vertices)
+    except RuntimeError:
+        raise RobotError(f'{path}: the mesh is flat; a collision body needs a volume') from None
+    if whole.computeVolume() < GROWTH * abs(mesh.computeVolume()):
+        return (whole,)
+    faces = [mesh.tri_indices(number) for number in range(mesh.num_tris)]
+    triangles = vertices[np.array([[face[0], face[1], face[2]] for face in faces])]
+    _, axes = np.linalg.eigh(np.cov(np.array(whole.points()).T))
+    best = min((_slabs(triangles, axis) for axis in axes.T), key=_volume)
+    bodies = _join(best)
+    return bodies if _volume(bodies) * GROWTH < whole.computeVolume() else (whole,)
+
+
+def _slabs(triangles: FloatArray, axis: FloatArray) -> tuple[coal.ConvexBase, ...]:
+    """Hulls of slabs across an axis; a slab too thin for a hull goes with the one before it."""
+    along = triangles @ axis
+    hulls: list[coal.ConvexBase] = []
+    thin = np.empty((0, 3))
+    for low, high in pairwise(np.linspace(along.min(), along.max(), SLABS + 1)):
+        points = np.vstack([thin, _slab(triangles, along, low, high)])
+        try:
+            hulls.append(_hull(points))
+            thin = np.empty((0, 3))
+        except RuntimeError:
+            thin = points
+    if len(thin) > 0:
+        hulls.append(_hull(np.vstack([hulls.pop().points(), thin])))
+    return tuple(hulls)
+
+
+def _join(slabs: Sequence[coal.ConvexBase]) -> tuple[coal.ConvexBase, ...]:
+    """Join neighbours, those first whose common hull grows least."""
+    bodies = list(slabs)
+    apart = [body.computeVolume() for body in bodies]
+    common = [_common_hull(*pair) for pair in pairwise(bodies)]
+    while common:
+        growth = [
+            body.computeVolume() / sum(volumes)
+            for body, volumes in zip(common, pairwise(apart), strict=True)
+        ]
+        tightest = int(np.argmin(growth))
+        if growth[tightest] > GROWTH:
+            break
+        bodies[tightest : tightest + 2] = [common[tightest]]
+        apart[tightest : tightest + 2] = [sum(apart[tightest : tightest + 2])]
+        around = bodies[max(tightest - 1, 0) : tightest + 2]
+        common[max(tightest - 1, 0) : tightest + 2] = [
+            _common_hull(*pair) for pair in pairwise(around)
+        ]
+    return tuple(bodies)
+
+
+def _common_hull(first: coal.ConvexBase, second: coal.ConvexBase) -> coal.ConvexBase:
+    return _hull(np.vstack([first.points(), second.points()]))
+
+
+def _volume(bodies: Sequence[coal.ConvexBase]) -> float:
+    return sum(float(body.computeVolume()) for body in bodies)
+
+
+def _slab(triangles: FloatArray, along: FloatArray, low: float, high: float) -> FloatArray:
+    """Corners of the triangles within a slab, and where their edges cross its two planes."""
+    points = [triangles[(along >= low) & (along <= high)]]
+    for first, second in ((0, 1), (1, 2), (2, 0)):
+        start, end = along[:, first], along[:, second]
+        for plane in (low, high):
+            crosses = (start - plane) * (end - plane) < 0.0
+            share = ((plane - start[crosses]) / (end[crosses] - start[crosses]))[:, None]
+            points.append(
+                (1.0 - share) * triangles[crosses, first] + share * triangles[crosses, second]
+            )
+    return np.vstack(points)
+
+
+def _hull(points: FloatArray) -> coal.ConvexBase:
+    """Convex hull of points, shape (k, 3); RuntimeError when they have none."""
+    corners = coal.StdVec_Vec3s()
+    corners.extend(list(np.unique(points, axis=0)))
+    return coal.Convex.convexHull(corners, True, 'Qt')
+
+
+def _package_roots(urdf: Path | None) -> Iterator[Path]:
+    """Directories that may hold a package."""
+    for prefix in filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)):
+        yield Path(prefix) / 'share'
+    for directory in filter(None, os.environ.get('ROS_PACKAGE_PATH', '').split(os.pathsep)):
+        yield Path(directory)
+        yield Path(directory).parent
+    if urdf is not None:
+        yield from urdf.resolve().parents
