@@ -3,5 +3,6 @@
 """The arm model: rigid body plus effects, and the file it is kept in."""
 
 from armid_ros.arm.arm_model import ArmModel
+from armid_ros.arm.model_file import load_model, model_document, parameter_table, save_model
 
-__all__ = ['ArmModel']
+__all__ = ['ArmModel', 'load_model', 'model_document', 'parameter_table', 'save_model']

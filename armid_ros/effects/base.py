@@ -135,6 +135,8 @@ class Effect(ABC):
     name: ClassVar[str]
     summary: ClassVar[str]
     quantities: ClassVar[tuple[Quantity, ...]]
+    #: Whether the torque of a joint at rest is anything between two levels, and so says nothing.
+    holds_at_rest: ClassVar[bool] = False
 
     @classmethod
     def on(cls, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:

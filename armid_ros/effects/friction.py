@@ -55,6 +55,7 @@ class CoulombFriction(Effect):
     name = 'coulomb_friction'
     summary = 'constant torque against the direction of motion; holds at rest'
     quantities = (Quantity('coulomb_torque', 'N m', lower=0.0),)
+    holds_at_rest = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/dFc = sign(dq) [-], shape (N, n, P)."""
@@ -83,6 +84,7 @@ class AsymmetricFriction(Effect):
         Quantity('coulomb_asymmetry', 'N m'),
         Quantity('viscous_asymmetry', 'N m s/rad'),
     )
+    holds_at_rest = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/d(dFc, dFv) = (|sign(dq)|, |dq|), shape (N, n, P)."""
@@ -122,6 +124,7 @@ class CoupledJointFriction(Effect):
         Quantity('coupled_viscous_coefficient', 'N m s/rad'),
         Quantity('coupled_coulomb_torque', 'N m', lower=0.0),
     )
+    holds_at_rest = True
 
     def __post_init__(self) -> None:
         """Check that the joints are pairs."""

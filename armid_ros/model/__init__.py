@@ -6,6 +6,7 @@ from armid_ros.model.base_parameters import (
     BaseParameters,
     gravity_composites,
     group_columns,
+    regroup,
     rigid_base_parameters,
 )
 from armid_ros.model.rigid_body import (
@@ -26,6 +27,7 @@ __all__ = [
     'inverse_dynamics',
     'random_motion',
     'regressor',
+    'regroup',
     'rigid_base_parameters',
     'rigid_parameter_names',
 ]

@@ -5,8 +5,8 @@ Base parameters: the combinations of parameters that a motion can tell apart.
 
 The columns of a regressor depend on one another. Going through them from left to right, a column
 that the kept ones span is dropped and its parameter is grouped with theirs, which gives the
-groupings of Gautier (1991), 'Ixx2 - Iyy2', in an order that a person chose. The rank itself comes
-from a QR factorisation with column pivoting.
+groupings of Gautier (1991), 'Ixx2 - Iyy2', in an order that a person chose. This is a QR
+factorisation in which the length that is left of each column reveals the rank.
 
 """
 
@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.errors import IdentificationError
 from armid_ros.estimate import ParameterName
 from armid_ros.model.rigid_body import (
     LINK_PARAMETERS,
@@ -26,7 +25,6 @@ from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 
 #: Columns are scaled to unit norm; what the kept ones leave of a dependent column is rounding,
 #: 1e-15 to 1e-13, and what they leave of an independent one is rarely below 1e-5.
@@ -91,7 +89,9 @@ class BaseParameters:
         return np.asarray(prior + correction)
 
 
-def group_columns(w: FloatArray, standard: tuple[ParameterName, ...]) -> BaseParameters:
+def group_columns(
+    w: FloatArray, standard: tuple[ParameterName, ...], tolerance: float = RANK_TOLERANCE
+) -> BaseParameters:
     """
     Find the base parameters of a stacked regressor.
 
@@ -102,16 +102,13 @@ def group_columns(w: FloatArray, standard: tuple[ParameterName, ...]) -> BasePar
     standard : tuple of ParameterName
         Names of the P columns. Earlier columns are kept in preference to later ones, except that
         those of one link go inertia first, mass last.
+    tolerance : float
+        A column of which the kept ones leave less than this share of its length is grouped.
 
     Returns
     -------
     BaseParameters
         Identifiable combinations.
-
-    Raises
-    ------
-    IdentificationError
-        If the two ways to find the rank disagree, which is a sign of nearly dependent columns.
 
     """
     order = _keep_order(standard)
@@ -119,8 +116,6 @@ def group_columns(w: FloatArray, standard: tuple[ParameterName, ...]) -> BasePar
     seen = scale > RANK_TOLERANCE * scale.max(initial=1e-300)
     candidates = [j for j in order if seen[j]]
     triangle = np.asarray(np.linalg.qr(w[:, candidates] / scale[candidates], mode='r'))
-    pivots = np.abs(np.diag(scipy.linalg.qr(triangle, mode='r', pivoting=True)[0]))
-    rank = int(np.sum(pivots > RANK_TOLERANCE * pivots[0])) if len(pivots) else 0
 
     basis = np.empty((len(triangle), 0))
     kept: list[int] = []
@@ -129,14 +124,10 @@ def group_columns(w: FloatArray, standard: tuple[ParameterName, ...]) -> BasePar
         for _ in range(2):  # twice is enough to be orthogonal to rounding (Kahan, Parlett)
             rest = rest - basis @ (basis.T @ rest)
         length = np.linalg.norm(rest)
-        if length > RANK_TOLERANCE:
+        if length > tolerance:
             basis = np.column_stack([basis, rest / length])
             kept.append(position)
-    if len(kept) != rank:
-        raise IdentificationError(
-            f'the regressor has rank {rank} by pivoted QR but {len(kept)} by elimination: '
-            'some parameters are nearly dependent; check the kinematics for tiny offsets'
-        )
+    rank = len(kept)
     dependent = [position for position in range(len(candidates)) if position not in kept]
     grouping = np.zeros((rank, len(standard)))
     independent = np.array([candidates[position] for position in kept], dtype=np.intp)
@@ -147,10 +138,33 @@ def group_columns(w: FloatArray, standard: tuple[ParameterName, ...]) -> BasePar
         coefficients *= scale[columns] / scale[independent][:, np.newaxis]
         coefficients[np.abs(coefficients) < RANK_TOLERANCE] = 0.0
         grouping[:, columns] = coefficients
+    return _named(standard, independent, grouping)
+
+
+def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
+    """
+    Join two steps of grouping: of all parameters, and of the base parameters in certain data.
+
+    Parameters
+    ----------
+    theory : BaseParameters
+        What any motion can tell apart.
+    data : BaseParameters
+        What some data tell apart of it; its standard parameters are those that theory keeps.
+
+    """
+    independent = theory.independent[data.independent]
+    return _named(theory.standard, independent, data.grouping @ theory.grouping)
+
+
+def _named(
+    standard: tuple[ParameterName, ...], independent: npt.NDArray[np.intp], grouping: FloatArray
+) -> BaseParameters:
     parameters = tuple(
-        ParameterName(_expression(row, leader, standard), standard[leader].joint, unit)
+        ParameterName(
+            _expression(row, leader, standard), standard[leader].joint, standard[leader].unit
+        )
         for row, leader in zip(grouping, independent, strict=True)
-        for unit in [standard[leader].unit]
     )
     return BaseParameters(standard, parameters, independent, read_only(grouping))
 

@@ -1,0 +1,152 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+model.yaml: an arm model as a file that a person can read and a simulator can load.
+
+Schema armid/model/1: ``robot`` (shipped name or path of the description), ``gravity`` [m/s^2],
+``rigid_parameters`` and ``effects``, each a list of parameters with name, joint, value, std, unit.
+A std of null says that the data did not determine the parameter on its own.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from armid_ros.arm.arm_model import ArmModel
+from armid_ros.effects import CATALOGUE
+from armid_ros.errors import ModelError
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.motion import FloatArray
+from armid_ros.robots import load_robot, Robot
+import numpy as np
+import yaml
+
+SCHEMA = 'armid/model/1'
+
+
+def parameter_table(
+    names: Sequence[ParameterName], values: FloatArray, std: Sequence[float | None]
+) -> list[dict[str, Any]]:
+    """Return parameters as rows of name, joint, value, std, unit, ready for YAML or JSON."""
+    return [
+        {
+            'name': name.name,
+            'joint': name.joint,
+            'value': float(value),
+            'std': None if s is None else float(s),
+            'unit': name.unit,
+        }
+        for name, value, s in zip(names, values, std, strict=True)
+    ]
+
+
+def model_document(arm: ArmModel, robot: str, estimate: Estimate | None = None) -> dict[str, Any]:
+    """
+    Return an arm model as the document that model.yaml holds.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The model.
+    robot : str
+        Shipped name or path of the description it belongs to.
+    estimate : Estimate, optional
+        Where the standard deviations come from; a parameter has one if it was estimated by itself
+        and not in a group.
+
+    """
+    known: dict[tuple[str, str], float] = {}
+    if estimate is not None:
+        for name, std in zip(estimate.parameters, estimate.std, strict=True):
+            known[name.name, name.joint] = float(std)
+    std = [known.get((name.name, name.joint)) for name in arm.parameters]
+    table = parameter_table(arm.parameters, arm.theta, std)
+    size = len(arm.robot.rigid_parameters)
+    effects, start = [], size
+    for effect, values in zip(arm.effects, arm.values, strict=True):
+        rows = table[start : start + len(values)]
+        effects.append({'name': effect.name, 'joints': list(effect.joints), 'parameters': rows})
+        start += len(values)
+    return {
+        'schema': SCHEMA,
+        'robot': robot,
+        'gravity': [float(g) for g in arm.robot.gravity],
+        'rigid_parameters': table[:size],
+        'effects': effects,
+    }
+
+
+def save_model(
+    path: str | Path, arm: ArmModel, robot: str, estimate: Estimate | None = None
+) -> None:
+    """Write model.yaml; a relative path of the description is taken from the file's own folder."""
+    document = model_document(arm, robot, estimate)
+    text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=99)
+    Path(path).write_text(text, encoding='utf-8')
+
+
+def load_model(path: str | Path, robot: Robot | None = None) -> ArmModel:
+    """
+    Read model.yaml.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    robot : Robot, optional
+        The description, where the one that the file names is not to be used; its inertial
+        parameters and gravity are replaced by the file's.
+
+    Raises
+    ------
+    ModelError
+        Naming the file and what is wrong in it.
+
+    """
+    path = Path(path)
+    try:
+        document = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except OSError as error:
+        raise ModelError(f'{path}: {error.strerror}') from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ModelError(f'{path}: not YAML: {error}') from error
+    if not isinstance(document, dict) or document.get('schema') != SCHEMA:
+        raise ModelError(f"{path}: not an arm model; its 'schema' has to be {SCHEMA}")
+    try:
+        return _arm(document, robot or _described(path, str(document['robot'])))
+    except (KeyError, TypeError, ValueError) as error:
+        raise ModelError(f'{path}: {type(error).__name__} {error} is missing or wrong') from error
+    except ModelError as error:
+        raise ModelError(f'{path}: {error}') from error
+
+
+def _described(path: Path, source: str) -> Robot:
+    beside = path.parent / source
+    return load_robot(str(beside) if beside.is_file() else source)
+
+
+def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
+    arm = ArmModel(robot.with_gravity(np.array(document['gravity'], dtype=float)))
+    arm = arm.with_theta(_values(document['rigid_parameters'], arm.parameters))
+    for entry in document['effects']:
+        if entry['name'] not in CATALOGUE:
+            raise ModelError(
+                f"no effect '{entry['name']}'; the catalogue has {', '.join(CATALOGUE)}"
+            )
+        effect = CATALOGUE[entry['name']].on(robot, tuple(entry['joints']))
+        arm = arm.with_effect(effect, _values(entry['parameters'], effect.parameters(robot)))
+    return arm
+
+
+def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> FloatArray:
+    table = {(row['name'], row['joint']): float(row['value']) for row in rows}
+    missing = [name for name in names if (name.name, name.joint) not in table]
+    if missing:
+        raise ModelError(
+            f"parameter '{missing[0].name}' of joint '{missing[0].joint}' is missing; "
+            'is the file of another robot?'
+        )
+    return np.array([table[name.name, name.joint] for name in names])

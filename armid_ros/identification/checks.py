@@ -1,0 +1,146 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What data must be like to identify anything, and what to do when they are not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.regression import Regression
+from armid_ros.identification.signals import Conditioning, segments
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+
+#: A joint that stays within this range is at rest [rad or m].
+REST_RANGE = 1e-3
+#: Positions further out of the limits than this [rad or m] are not in the unit of the description.
+LIMIT_EXCESS = 1.0
+#: A recording shorter than this holds less than a movement [s].
+SHORTEST = 1.0
+
+
+def check_motion(
+    robot: Robot, recordings: Sequence[Recording], used: Conditioning
+) -> tuple[str, ...]:
+    """
+    Refuse recordings without usable motion.
+
+    Returns
+    -------
+    tuple of str
+        Notes, such as joints that are at rest throughout.
+
+    Raises
+    ------
+    IdentificationError
+        Naming the recording, the joint and the remedy.
+
+    """
+    for recording in recordings:
+        if recording.duration < SHORTEST or not any(True for _ in segments(recording, used)):
+            raise IdentificationError(
+                f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
+                f'too short; record a movement of several seconds'
+            )
+        _check_positions(robot, recording)
+    ranges = np.max([np.ptp(recording.q, axis=0) for recording in recordings], axis=0)
+    resting = [name for name, size in zip(robot.joints, ranges, strict=True) if size < REST_RANGE]
+    if len(resting) == robot.n_joints:
+        raise IdentificationError(
+            f'{recordings[0].source}: no motion, every joint stays within {REST_RANGE} rad; '
+            'record the arm while it follows an excitation'
+        )
+    if resting:
+        return (f'at rest throughout: {", ".join(resting)}; nothing of their own is identified',)
+    return ()
+
+
+def check_torque(
+    arm: ArmModel, recordings: Sequence[Recording], problem: Sequence[Regression]
+) -> tuple[str, ...]:
+    """
+    Refuse torques that are absent, of the wrong sign or in another unit than N m.
+
+    The sign shows in the power: over a recording an arm takes in energy and dissipates it. The
+    unit shows against the rigid body of the description, if all the joints that follow it agree
+    on the same power of ten.
+
+    Raises
+    ------
+    IdentificationError
+        Naming the joints and the remedy.
+
+    """
+    robot = arm.robot
+    tau = np.concatenate([part.tau for part in problem])
+    silent = [name for name, y in zip(robot.joints, tau.T, strict=True) if np.ptp(y) == 0.0]
+    source = recordings[0].source
+    if len(silent) == robot.n_joints:
+        raise IdentificationError(
+            f'{source}: the torque of every joint is constant; is effort filled in?'
+        )
+    slope, correlation = _slope_on_description(robot, problem)
+    clear = np.abs(correlation) > 0.9
+    if np.sum(clear) >= min(2, robot.n_joints):
+        factors = slope[clear]
+        joints = ', '.join(np.array(robot.joints)[clear])
+        if np.all(factors < 0.0):
+            raise IdentificationError(
+                f'{source}: torques of {joints} have the opposite sign of what the description '
+                'takes; effort has to be positive along the URDF joint axis: negate it'
+            )
+        for unit, factor in (('N mm', 1e3), ('kN m', 1e-3)):
+            if np.all((factors > 0.5 * factor) & (factors < 2.0 * factor)):
+                raise IdentificationError(
+                    f'{source}: torques of {joints} are {factor:g} times what the description '
+                    f'takes; they seem to be in {unit}: convert them to N m'
+                )
+    power = sum(float(np.sum(part.tau * part.motion.dq)) for part in problem)
+    activity = sum(float(np.sum(np.abs(part.tau * part.motion.dq))) for part in problem)
+    if power < -0.2 * activity:
+        raise IdentificationError(
+            f'{source}: the arm gives out energy throughout, so the torques have the wrong sign; '
+            'effort has to be positive along the URDF joint axis: negate it'
+        )
+    if silent:
+        return (f'torque constant throughout: {", ".join(silent)}',)
+    return ()
+
+
+def _check_positions(robot: Robot, recording: Recording) -> None:
+    excess = np.maximum(
+        robot.lower - recording.q.min(axis=0), recording.q.max(axis=0) - robot.upper
+    )
+    worst = int(np.argmax(excess))
+    if excess[worst] > LIMIT_EXCESS:
+        reach = np.abs(recording.q[:, worst]).max()
+        hint = ' (degrees?)' if not robot.prismatic[worst] and reach > 2 * np.pi else ''
+        raise IdentificationError(
+            f'{recording.source}: {robot.joints[worst]} reaches {reach:.4g}{hint}, its limits are '
+            f'{robot.lower[worst]:.4g} to {robot.upper[worst]:.4g}; positions have to be in rad '
+            'or m, with the zero of the description'
+        )
+
+
+def _slope_on_description(
+    robot: Robot, problem: Sequence[Regression]
+) -> tuple[FloatArray, FloatArray]:
+    """Regress measured torques on the description's, friction and offset taken out first."""
+    slope, correlation = np.zeros((2, robot.n_joints))
+    predicted = np.concatenate([inverse_dynamics(robot, part.motion) for part in problem])
+    measured = np.concatenate([part.tau for part in problem])
+    dq = np.concatenate([part.motion.dq for part in problem])
+    for joint in range(robot.n_joints):
+        nuisance = np.column_stack([np.ones(len(dq)), dq[:, joint], np.sign(dq[:, joint])])
+        pair = np.column_stack([predicted[:, joint], measured[:, joint]])
+        rest = pair - nuisance @ np.linalg.lstsq(nuisance, pair, rcond=None)[0]
+        product, own = rest[:, 0] @ rest[:, 1], rest[:, 0] @ rest[:, 0]
+        if own > 0.0 and rest[:, 1] @ rest[:, 1] > 0.0:
+            slope[joint] = product / own
+            correlation[joint] = product / np.sqrt(own * (rest[:, 1] @ rest[:, 1]))
+    return slope, correlation

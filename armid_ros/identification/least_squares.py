@@ -1,0 +1,195 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Linear least squares with joint weights, outliers and coloured residuals.
+
+The standard deviations come from the spectrum of the actual residuals: with filtered, over-sampled
+or badly modelled torque neighbouring residuals are alike, and counting samples would promise far
+too much.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from armid_ros.identification.regression import Regression
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+
+Method = Literal['ols', 'wls', 'irls']
+
+#: Residuals beyond this many robust standard deviations lose weight (Huber 1981: 95 % efficiency).
+_HUBER = 1.345
+#: Rounds of reweighting; the weights of both schemes settle in three to ten.
+_ROUNDS = 20
+
+
+@dataclass(frozen=True)
+class Solution:
+    """
+    A least-squares fit.
+
+    Attributes
+    ----------
+    values : ndarray, shape (r,)
+        Parameters.
+    covariance : ndarray, shape (r, r)
+        Their covariance, correlation of the residuals included.
+    joint_std : ndarray, shape (n,)
+        Standard deviation of the residual of every joint [N m].
+    condition_number : float
+        Of the weighted regressor.
+    outliers : int
+        Samples whose weight was reduced below one half.
+
+    """
+
+    values: FloatArray
+    covariance: FloatArray
+    joint_std: FloatArray
+    condition_number: float
+    outliers: int
+
+
+def solve(problem: Sequence[Regression], method: Method = 'wls') -> Solution:
+    """
+    Fit parameters to one or more stretches of motion.
+
+    Parameters
+    ----------
+    problem : sequence of Regression
+        Stretches with the same columns.
+    method : {'ols', 'wls', 'irls'}
+        All joints alike; every joint by its own residual; that, with outliers weighted down
+        (Huber's function).
+
+    Returns
+    -------
+    Solution
+        Parameters with covariance.
+
+    """
+    w = np.concatenate([part.columns for part in problem])
+    y = np.concatenate([part.tau for part in problem])
+    used = np.concatenate([part.informative for part in problem])
+    counts = np.maximum(used.sum(axis=0), 1)
+    rank = w.shape[2]
+    freedom = counts.sum() / max(1.0, counts.sum() - rank)
+    weights = used.astype(float)
+    values, triangle = _weighted(w, y, weights)
+    for _ in range(0 if method == 'ols' else _ROUNDS):
+        residual = y - w @ values
+        if method == 'wls':
+            scale = np.sqrt(freedom * np.sum(residual**2, axis=0, where=used) / counts)
+            new = used / _positive(scale)
+        else:
+            scale = _robust_scale(residual, used)
+            size = np.abs(residual) / _positive(scale)
+            huber = np.sqrt(np.minimum(1.0, _HUBER / np.maximum(size, 1e-12)))
+            new = used * huber / _positive(scale)
+        settled = np.allclose(new, weights, rtol=1e-6)
+        weights = new
+        values, triangle = _weighted(w, y, weights)
+        if settled:
+            break
+    residual = y - w @ values
+    joint_std = np.sqrt(freedom * np.sum(residual**2, axis=0, where=used) / counts)
+    relative = np.where(used, weights / np.max(weights, axis=0).clip(1e-300), 1.0)
+    return Solution(
+        values=values,
+        covariance=_covariance(problem, values, weights, triangle, freedom),
+        joint_std=joint_std,
+        condition_number=float(np.linalg.cond(triangle)),
+        outliers=int(np.sum(relative**2 < 0.5)),
+    )
+
+
+def _robust_scale(residual: FloatArray, used: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return the standard deviation that the middle half of each joint's residual suggests."""
+    masked = np.where(used, residual, np.nan)
+    spread = np.nanmedian(np.abs(masked - np.nanmedian(masked, axis=0)), axis=0)
+    return np.asarray(1.4826 * np.nan_to_num(spread))
+
+
+def _positive(scale: FloatArray) -> FloatArray:
+    """Keep a joint that is fitted exactly from taking all the weight."""
+    floor = 1e-9 * max(float(np.max(scale)), 1e-300)
+    return np.maximum(scale, floor)
+
+
+def _weighted(w: FloatArray, y: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Solve by QR with scaled columns; return the values and the triangular factor."""
+    rank = w.shape[2]
+    stacked = np.empty((w.shape[0] * w.shape[1], rank + 1))
+    np.multiply(w, weights[:, :, np.newaxis], out=stacked[:, :rank].reshape(w.shape))
+    stacked[:, rank] = (y * weights).ravel()
+    scale = np.linalg.norm(stacked, axis=0)
+    scale[scale == 0.0] = 1.0
+    stacked /= scale
+    factor = scipy.linalg.qr(stacked, mode='r', overwrite_a=True, check_finite=False)[0]
+    triangle = factor[:rank, :rank]
+    values = scipy.linalg.solve_triangular(triangle, factor[:rank, rank]) * scale[rank]
+    return values / scale[:rank], triangle * scale[:rank]
+
+
+def _covariance(
+    problem: Sequence[Regression],
+    values: FloatArray,
+    weights: FloatArray,
+    triangle: FloatArray,
+    freedom: float,
+) -> FloatArray:
+    """
+    Propagate coloured residuals through the fit: H^-1 (sum over f of W^H Phi W) H^-1.
+
+    Phi is the spectrum of each joint's residual, smoothed by a Parzen window over lags; residuals
+    of different joints are taken as independent, those of different stretches too.
+
+    """
+    rank = len(values)
+    meat = np.zeros((rank, rank))
+    start = 0
+    for part in problem:
+        count = len(part.tau)
+        scaled = weights[start : start + count]
+        start += count
+        residual = (part.tau - part.columns @ values) * scaled
+        size = 2 * count
+        for joint in range(part.tau.shape[1]):
+            spectrum = _smooth_spectrum(residual[:, joint], size) * freedom
+            columns = part.columns[:, joint] * scaled[:, joint, np.newaxis]
+            active = np.flatnonzero(np.any(columns != 0.0, axis=0))
+            transformed = np.fft.rfft(columns[:, active], size, axis=0)
+            bins = np.full(len(transformed), 2.0)
+            bins[[0, -1]] = 1.0  # the constant and the Nyquist bin have no mirror image
+            power = (transformed.conj().T * (bins * spectrum / size)) @ transformed
+            meat[np.ix_(active, active)] += power.real
+    inverse = scipy.linalg.solve_triangular(triangle, np.eye(rank))
+    bread = inverse @ inverse.T
+    return np.asarray(bread @ meat @ bread)
+
+
+def _smooth_spectrum(residual: FloatArray, size: int) -> FloatArray:
+    """Return the power spectrum on the bins of an rfft of an even size, shape (size / 2 + 1,)."""
+    count = len(residual)
+    power = np.abs(np.fft.rfft(residual, size)) ** 2 / count
+    lags = np.fft.irfft(power, size)[: count // 2]
+    reach = _correlation_reach(lags, count)
+    x = np.arange(reach) / reach
+    parzen = np.where(x < 0.5, 1 - 6 * x**2 + 6 * x**3, 2 * (1 - x) ** 3)
+    tapered = np.zeros(size)
+    tapered[:reach] = lags[:reach] * parzen
+    tapered[size - reach + 1 :] = tapered[1:reach][::-1]
+    return np.maximum(np.fft.rfft(tapered).real, 0.0)
+
+
+def _correlation_reach(lags: FloatArray, count: int) -> int:
+    """Return how many lags matter: four times the first at which the correlation is noise."""
+    quiet = np.abs(lags) < 2.0 / np.sqrt(count) * max(lags[0], 1e-300)
+    first = int(np.argmax(quiet)) if np.any(quiet) else len(lags)
+    return int(np.clip(4 * first, min(10, len(lags)), len(lags)))

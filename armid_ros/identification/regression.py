@@ -1,0 +1,137 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The linear problem of an identification: decimated torques and base columns, joint by joint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.identification.signals import (
+    Conditioning,
+    decimate,
+    decimated_samples,
+    segments,
+)
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.recording import Recording
+import numpy as np
+import numpy.typing as npt
+
+#: Full-rate samples whose regressor is in memory at once; 7 joints of 70 columns are 80 MB.
+_CHUNK = 20_000
+#: A joint is at rest while it is slower than this share of its own top speed ...
+REST_SPEED = 0.02
+#: ... for at least this long [s]; a reversal of direction is shorter.
+REST_TIME = 0.2
+
+
+@dataclass(frozen=True)
+class Regression:
+    """
+    One unbroken stretch of motion as a linear problem, filtered and decimated on both sides.
+
+    Attributes
+    ----------
+    motion : Motion
+        Decimated motion of M samples with the filtered torque.
+    columns : ndarray, shape (M, n, r)
+        Filtered columns of the chosen parameters.
+    informative : ndarray of bool, shape (M, n)
+        False where a joint that dry friction may hold is at rest: its torque says nothing.
+    source : str
+        The recording it comes from.
+
+    """
+
+    motion: Motion
+    columns: FloatArray
+    informative: npt.NDArray[np.bool_]
+    source: str
+
+    def __post_init__(self) -> None:
+        """Freeze the columns."""
+        object.__setattr__(self, 'columns', read_only(self.columns))
+
+    @property
+    def tau(self) -> FloatArray:
+        """Filtered measured torque, shape (M, n)."""
+        assert self.motion.tau is not None
+        return self.motion.tau
+
+    def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> Regression:
+        """Return the problem in some of its columns."""
+        return replace(self, columns=self.columns[:, :, columns])
+
+
+def regressions(
+    arm: ArmModel,
+    columns: npt.NDArray[np.intp],
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    progress: Callable[[float], None] | None = None,
+) -> list[Regression]:
+    """
+    Set up the linear problem of some columns of an arm's regressor on recordings.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Rigid body and effects.
+    columns : ndarray of int, shape (r,)
+        Which of ``arm.parameters`` to keep, such as the independent ones.
+    recordings : sequence of Recording
+        Data with torques.
+    used : Conditioning
+        Filters.
+    progress : callable, optional
+        Told the share that is done, 0 to 1.
+
+    Returns
+    -------
+    list of Regression
+        One per unbroken stretch.
+
+    """
+    total = sum(len(recording.t) for recording in recordings)
+    done = 0
+    result = []
+    for recording in recordings:
+        for motion in segments(recording, used):
+            blocks = []
+            for samples in _overlapping(len(motion), used):
+                part = motion.select(samples)
+                blocks.append(decimate(arm.columns(part)[:, :, columns], used))
+                done += len(part)
+                if progress is not None:
+                    progress(min(1.0, done / total))
+            kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
+            assert motion.tau is not None
+            decimated = motion.select(kept).with_torque(decimate(motion.tau, used))
+            informative = ~_at_rest(arm, motion)[kept]
+            stacked = np.concatenate(blocks)
+            result.append(Regression(decimated, stacked, informative, recording.source))
+    return result
+
+
+def _at_rest(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
+    """Return where joints stand still that dry friction may hold, shape (N, n)."""
+    held = {joint for effect in arm.effects if effect.holds_at_rest for joint in effect.joints}
+    rest = np.zeros(motion.q.shape, dtype=bool)
+    shortest = REST_TIME / float(motion.t[1] - motion.t[0])
+    for joint in [motion.joints.index(name) for name in held]:
+        speed = np.abs(motion.dq[:, joint])
+        slow = np.concatenate([[False], speed < REST_SPEED * speed.max(), [False]])
+        edges = np.flatnonzero(np.diff(slow.astype(int))).reshape(-1, 2)
+        for start, stop in edges[np.diff(edges, axis=1)[:, 0] >= shortest]:
+            rest[start:stop, joint] = True
+    return rest
+
+
+def _overlapping(n_samples: int, used: Conditioning) -> list[slice]:
+    """Cut samples into chunks that overlap by the filter, so that their outputs join."""
+    overlap = len(used.taps()) - 1
+    step = max(used.decimation, _CHUNK // used.decimation * used.decimation)
+    starts = range(0, max(1, n_samples - overlap), step)
+    return [slice(start, min(n_samples, start + step + overlap)) for start in starts]

@@ -1,0 +1,241 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+From what was recorded to what a model can be fitted to.
+
+Positions are low-passed without phase (Butterworth of order 4, forwards and backwards) and
+differentiated by central differences. Torque and regressor then go through one and the same
+low-pass and are decimated together, so that what the filter does to one side of the equation it
+does to the other (parallel filtering; Gautier 1997).
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from armid_ros.errors import IdentificationError
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+import numpy as np
+from scipy import signal
+from scipy.interpolate import CubicSpline
+
+#: A step of this many nominal periods is a hole that interpolation must not bridge.
+GAP_PERIODS = 5.0
+#: Stamps within this share of a period of an even grid are taken as even.
+JITTER_TOLERANCE = 0.05
+#: Torque and regressor keep this many times the band of the motion (Gautier 1997: two to five).
+MODEL_BANDS = 5.0
+#: The positions' spectrum ends where it is less than this many times the noise.
+NOISE_MARGIN = 10.0
+#: Half length of the decimation filter in output samples; its edges are cut off.
+_HALF_TAPS = 4
+
+
+@dataclass(frozen=True)
+class SignalSettings:
+    """
+    How signals are conditioned; what is None is chosen from the recording.
+
+    Attributes
+    ----------
+    cutoff_hz : float or None
+        Cut-off of the position filter [Hz].
+    decimation : int or None
+        Keep one sample of this many; the filter before it passes 0.4 of the new rate.
+
+    """
+
+    cutoff_hz: float | None = None
+    decimation: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot filter."""
+        if self.cutoff_hz is not None and not self.cutoff_hz > 0.0:
+            raise IdentificationError(f'cut-off {self.cutoff_hz} Hz: it has to be positive')
+        if self.decimation is not None and self.decimation < 1:
+            raise IdentificationError(f'decimation {self.decimation}: it has to be 1 or more')
+
+
+@dataclass(frozen=True)
+class Conditioning:
+    """
+    Settings as they are used on recordings of one rate.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Sampling rate of the signals [Hz].
+    cutoff_hz : float
+        Cut-off of the position filter [Hz].
+    decimation : int
+        Factor of the decimation.
+
+    """
+
+    rate_hz: float
+    cutoff_hz: float
+    decimation: int
+
+    def taps(self) -> FloatArray:
+        """Return the symmetric decimation filter; a single 1 where nothing is decimated."""
+        if self.decimation == 1:
+            return np.ones(1)
+        count = 2 * _HALF_TAPS * self.decimation + 1
+        return np.asarray(signal.firwin(count, 0.8 / self.decimation, window=('kaiser', 5.0)))
+
+
+def conditioning(recordings: list[Recording], settings: SignalSettings) -> Conditioning:
+    """
+    Choose the cut-off and the decimation for recordings of one kind.
+
+    The positions keep what stands out of their noise: the cut-off is where their spectrum meets
+    it, at most a fifth of the rate, for beyond it there is nothing to differentiate but noise.
+    Torque and regressor keep five times the band of the motion, the frequency below which 99 % of
+    the velocities' power lies, and are decimated to 2.5 samples per period of that.
+
+    """
+    rate = float(np.median([sampling_rate(recording) for recording in recordings]))
+    band = MODEL_BANDS * max(_motion_band(recording) for recording in recordings)
+    decimation = settings.decimation or max(1, int(rate / (2.5 * band)))
+    cutoff = settings.cutoff_hz
+    if cutoff is None:
+        noise = max(_noise_crossing(recording) for recording in recordings)
+        cutoff = min(max(noise, band), 0.2 * rate)
+    if cutoff >= 0.5 * rate:
+        raise IdentificationError(
+            f'{recordings[0].source}: a cut-off of {cutoff:g} Hz needs more than '
+            f'{2 * cutoff:g} samples/s; the recording has {rate:g}'
+        )
+    return Conditioning(rate, cutoff, decimation)
+
+
+def sampling_rate(recording: Recording) -> float:
+    """Return the rate of a recording, from the median time between samples [Hz]."""
+    return float(1.0 / np.median(np.diff(recording.t)))
+
+
+def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
+    """
+    Yield the unbroken stretches of a recording as filtered motions on even time bases.
+
+    Each has the recorded torque as it is; the position is filtered and differentiated. Stretches
+    too short for the filters are left out.
+
+    """
+    if recording.tau is None:
+        raise IdentificationError(
+            f'{recording.source}: {recording.topic} has no effort; identification needs '
+            'the joint torques in JointState.effort'
+        )
+    period = 1.0 / used.rate_hz
+    shortest = 2 * _HALF_TAPS * used.decimation + 10 * used.rate_hz / used.cutoff_hz
+    breaks = np.flatnonzero(np.diff(recording.t) > GAP_PERIODS * period) + 1
+    for part in np.split(np.arange(len(recording.t)), breaks):
+        if len(part) > shortest:
+            t, q, tau = _even(recording.t[part], recording.q[part], recording.tau[part], period)
+            yield _differentiated(recording.joints, t, q, tau, used)
+
+
+def decimate(values: FloatArray, used: Conditioning) -> FloatArray:
+    """
+    Low-pass and decimate along the first axis.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N, ...)
+        Samples at the full rate.
+    used : Conditioning
+        The filter.
+
+    Returns
+    -------
+    ndarray, shape (M, ...)
+        Sample m belongs to input ``decimated_samples(N, used)[m]``.
+
+    """
+    taps, factor = used.taps(), used.decimation
+    count = len(decimated_samples(len(values), used))
+    flat = np.ascontiguousarray(values).reshape(len(values), -1)
+    result = np.empty((count, flat.shape[1]))
+    block = 32
+    band = np.zeros((block, (block - 1) * factor + len(taps)))
+    for row in range(block):
+        band[row, row * factor : row * factor + len(taps)] = taps
+    for start in range(0, count, block):
+        rows = min(block, count - start)
+        width = (rows - 1) * factor + len(taps)
+        window = flat[start * factor : start * factor + width]
+        np.matmul(band[:rows, :width], window, out=result[start : start + rows])
+    return result.reshape((count, *values.shape[1:]))
+
+
+def decimated_samples(n_samples: int, used: Conditioning) -> range:
+    """Return which full-rate samples the decimated ones sit on."""
+    half = (len(used.taps()) - 1) // 2
+    return range(half, max(half, n_samples - half), used.decimation)
+
+
+def _even(
+    t: FloatArray, q: FloatArray, tau: FloatArray, period: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Bring signals onto an even time base; a cubic through the stamps where they jitter."""
+    grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
+    if len(grid) == len(t) and np.max(np.abs(grid - t)) < JITTER_TOLERANCE * period:
+        return grid, q, tau
+    return grid, CubicSpline(t, q)(grid), CubicSpline(t, tau)(grid)
+
+
+def _differentiated(
+    joints: tuple[str, ...], t: FloatArray, q: FloatArray, tau: FloatArray, used: Conditioning
+) -> Motion:
+    sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
+    smooth = signal.sosfiltfilt(sections, q, axis=0)
+    dq = _central_difference(smooth, t[1] - t[0])
+    ddq = _central_difference(dq, t[1] - t[0])
+    edge = int(np.ceil(used.rate_hz / used.cutoff_hz)) + 4
+    inner = slice(edge, len(t) - edge)
+    return Motion(joints, t[inner], smooth[inner], dq[inner], ddq[inner], tau[inner])
+
+
+def _central_difference(x: FloatArray, step: float) -> FloatArray:
+    """Differentiate along the first axis: five points, error of the fourth order in the step."""
+    return np.asarray(
+        signal.convolve(
+            np.pad(x, ((2, 2), (0, 0)), mode='edge'),
+            np.array([[-1.0, 8.0, 0.0, -8.0, 1.0]]).T / (12.0 * step),
+            mode='valid',
+            method='direct',
+        )
+    )
+
+
+def _motion_band(recording: Recording) -> float:
+    """Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint."""
+    rate = sampling_rate(recording)
+    band = 1.0 / recording.duration
+    for position in recording.q.T:
+        if np.ptp(position) > 0.0:
+            frequency, power = signal.periodogram(np.diff(position), fs=rate)
+            share = np.cumsum(power) / np.sum(power)
+            band = max(band, float(frequency[np.searchsorted(share, 0.99)]))
+    return band
+
+
+def _noise_crossing(recording: Recording) -> float:
+    """
+    Return where the spectrum of the positions meets their noise [Hz], the widest joint counting.
+
+    The noise is white at the sensor; its level is the median of the upper two fifths.
+
+    """
+    rate = sampling_rate(recording)
+    length = min(len(recording), int(8.0 * rate))
+    frequency, power = signal.welch(
+        recording.q, fs=rate, window='blackmanharris', nperseg=length, detrend='linear', axis=0
+    )
+    floor = np.median(power[frequency > 0.3 * rate], axis=0)
+    above = power > NOISE_MARGIN * floor
+    return float(max(frequency[np.argmin(column)] for column in above.T))
