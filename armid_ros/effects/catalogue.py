@@ -19,7 +19,9 @@ from armid_ros.effects.gravity import BaseTilt, GravityMagnitude
 from armid_ros.effects.load import Payload
 from armid_ros.effects.sensing import TorqueOffset
 from armid_ros.errors import ModelError
+from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
+import numpy as np
 
 _EFFECTS: tuple[type[Effect], ...] = (
     ViscousFriction,
@@ -57,3 +59,38 @@ def make_effect(text: str, robot: Robot) -> Effect:
     if name not in CATALOGUE:
         raise ModelError(f"no effect '{name}'; the catalogue has {', '.join(CATALOGUE)}")
     return CATALOGUE[name].on(robot, tuple(joints.split('+')) if joints else None)
+
+
+def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
+    """
+    Make an effect and its values from one line of text.
+
+    Parameters
+    ----------
+    text : str
+        'coulomb_friction:coulomb_torque=0.2', or 'payload@wrist:payload_m=0.3,payload_mz=0.01'.
+        Every joint of the effect gets the values; what is not given is zero.
+    robot : Robot
+        The arm it acts on.
+
+    Raises
+    ------
+    ModelError
+        If effect, joint or quantity do not exist or a value is not a number.
+
+    """
+    head, _, assignments = text.partition(':')
+    effect = make_effect(head, robot)
+    known = [quantity.name for quantity in effect.quantities]
+    values = np.zeros((len(effect.owners), len(known)))
+    for assignment in filter(None, assignments.split(',')):
+        key, _, number = assignment.partition('=')
+        if key.strip() not in known:
+            raise ModelError(f"{effect.name} has no '{key.strip()}'; it has {', '.join(known)}")
+        try:
+            values[:, known.index(key.strip())] = float(number)
+        except ValueError:
+            raise ModelError(
+                f"{text}: '{number}' is not a number; write {effect.name}:{key.strip()}=0.1"
+            ) from None
+    return effect, values.ravel()

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""identification.json: what an identification found, for programs (schema armid/identification/1)."""
+"""identification.json: what an identification found, for programs to read."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 from armid_ros.arm import ArmModel
-from armid_ros.effects import CATALOGUE, make_effect
+from armid_ros.effects import CATALOGUE, make_effect, parse_effect
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics, random_motion
 from armid_ros.robots import load_robot
@@ -152,3 +152,21 @@ def test_names_joints_and_units():
 def test_errors_hold_the_answer(robot, text, message):
     with pytest.raises(ModelError, match=message):
         make_effect(text, robot)
+
+
+def test_values_are_parsed_for_every_joint(robot):
+    effect, values = parse_effect('asymmetric_friction:viscous_asymmetry=0.25', robot)
+    np.testing.assert_array_equal(values.reshape(6, 2), np.tile([0.0, 0.25], (6, 1)))
+    assert effect.joints == robot.joints
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('viscous_friction:fv=1', 'it has viscous_coefficient'),
+        ('viscous_friction:viscous_coefficient=much', 'not a number'),
+    ],
+)
+def test_wrong_values_are_named(robot, text, message):
+    with pytest.raises(ModelError, match=message):
+        parse_effect(text, robot)
