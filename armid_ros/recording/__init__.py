@@ -4,8 +4,8 @@
 Recordings of joints, and the rosbag2 bags they are kept in.
 
 Nothing else in the package knows a file format. ``read_recording`` takes any bag with JointState
-messages apart, ``write_recording`` makes one; ``BagWriter`` and ``iter_raw`` carry raw messages for
-the nodes; none of it needs ROS.
+messages apart, ``write_recording`` makes one; ``BagWriter`` and ``iter_raw`` carry raw messages
+for the nodes; none of it needs ROS.
 
 """
 

@@ -10,7 +10,7 @@ message.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 from dataclasses import dataclass, replace
 import heapq
@@ -29,7 +29,7 @@ from armid_ros.recording.sqlite_source import SqliteSource
 import numpy as np
 import zstandard
 
-_STORAGES = {'.mcap': McapSource, '.db3': SqliteSource}
+_STORAGES: dict[str, Callable[[Path], Source]] = {'.mcap': McapSource, '.db3': SqliteSource}
 _COMPRESSED = '.zstd'
 
 
@@ -142,7 +142,7 @@ class Bag:
     def _open(self, file: Path) -> Source:
         """Open one file."""
         storage = _STORAGES[_storage_suffix(file)]
-        source = storage(self._unpacked(file) if file.suffix == _COMPRESSED else file)
+        source: Source = storage(self._unpacked(file) if file.suffix == _COMPRESSED else file)
         self._stack.callback(source.close)
         return source
 

@@ -11,17 +11,16 @@ from typing import Protocol
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state_layout import JointStateLayout
+from armid_ros.recording.mcap_writer import Compression
 from armid_ros.recording.message_types import JOINT_STATE, STRING
 from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.string_message import string_cdr
-from armid_ros.recording.writer import BagWriter, Compression, DEFAULT_CHUNK_SIZE
+from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE
 import numpy as np
 import numpy.typing as npt
 
 _BATCH = 4096
-# A writer fed from memory need not fear to be killed, and large chunks compress better.
-_OFFLINE_CHUNK_AGE = 60.0
 
 
 class Measured(Protocol):
@@ -104,9 +103,11 @@ def write_joint_states(
     """
     stamps = np.asarray(stamps_ns, np.int64)
     writer.add_topic(topic, JOINT_STATE)
-    messages = joint_state_cdr(joints, stamps, q, dq, tau, frame_id=frame_id)
-    for stamp, message in zip(stamps.tolist(), messages, strict=True):
-        writer.write(topic, message, stamp)
+    fields = [None if v is None else np.asarray(v, np.float64) for v in (q, dq, tau)]
+    at = 0
+    for rows in _encoded(tuple(joints), stamps, fields, frame_id):
+        writer.write_many(topic, rows, stamps[at : at + len(rows)])
+        at += len(rows)
 
 
 def write_recording(
@@ -162,9 +163,7 @@ def write_recording(
         raise RecordingError(
             f'{path}: the first stamp is {stamps.min() * 1e-9:g} s; ROS time cannot be negative'
         )
-    with BagWriter(
-        path, compression=compression, chunk_size=chunk_size, chunk_age=_OFFLINE_CHUNK_AGE
-    ) as writer:
+    with BagWriter(path, compression=compression, chunk_size=chunk_size) as writer:
         if robot_description is not None:
             first = int(stamps[0]) if len(stamps) else start_ns
             writer.add_topic('/robot_description', STRING, qos=[LATCHED])

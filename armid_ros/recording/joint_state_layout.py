@@ -3,8 +3,8 @@
 """
 Where the fields of a serialised sensor_msgs/JointState are.
 
-CDR: four bytes of encapsulation, then fields aligned to their size counted from byte 4; a string is
-a 4-byte length with the terminating zero counted, a sequence a 4-byte count. Messages of one
+CDR: four bytes of encapsulation, then fields aligned to their size counted from byte 4; a string
+is a 4-byte length with the terminating zero counted, a sequence a 4-byte count. Messages of one
 publisher have the same layout, so it is found once and thousands of messages are then read as one
 numpy record array. What a layout assumes of a message - lengths, counts, names - is compared for
 every message; bytes of padding are not, since writers leave rubbish in them.
@@ -199,7 +199,7 @@ class JointStateLayout:
         same &= rows['frame_length'] == self.frame_length
         for field, name in enumerate(('n_position', 'n_velocity', 'n_effort')):
             same &= rows[name] == self.counts[field]
-        return same
+        return np.asarray(same)
 
 
 def _read_names(cdr: bytes, order: str, position: int) -> tuple[tuple[str, ...], int]:

@@ -3,9 +3,9 @@
 """
 The records of an MCAP file, found without its index.
 
-An MCAP file is a sequence of records, each an opcode, a length and a content; messages are as a rule
-inside chunks, and after each chunk come the offsets of its messages. Walking from the start finds
-everything, whether or not the writer lived to write the summary at the end.
+An MCAP file is a sequence of records, each an opcode, a length and a content; messages are as a
+rule inside chunks, and after each chunk come the offsets of its messages. Walking from the start
+finds everything, whether or not the writer lived to write the summary at the end.
 Specification: https://mcap.dev/spec
 
 """
@@ -24,11 +24,20 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema, Statistics
+import numpy as np
 import zstandard
 
 MAGIC = b'\x89MCAP0\r\n'
-MESSAGE_HEADER = 22
 RECORD_HEADER = 9
+# A message record up to its data.
+MESSAGE = np.dtype(
+    {
+        'names': ['opcode', 'length', 'channel', 'log_time', 'publish_time'],
+        'formats': ['u1', '<u8', '<u2', '<i8', '<i8'],
+        'offsets': [0, 1, 9, 15, 23],
+        'itemsize': 31,
+    }
+)
 _CHUNK_HEADER = struct.Struct('<QQQII')
 
 

@@ -18,7 +18,7 @@ from armid_ros.recording.mcap_records import (
     chunk_content,
     FileMap,
     map_file,
-    MESSAGE_HEADER,
+    MESSAGE,
     RECORD_HEADER,
 )
 from armid_ros.recording.message_types import MessageType
@@ -34,14 +34,7 @@ import numpy.typing as npt
 _BLOCK_BYTES = 1 << 20
 _BLOCK_MESSAGES = 4096
 
-_MESSAGE = np.dtype(
-    {
-        'names': ['opcode', 'length', 'channel', 'log_time', 'publish_time'],
-        'formats': ['u1', '<u8', '<u2', '<i8', '<i8'],
-        'offsets': [0, 1, 9, 15, 23],
-        'itemsize': RECORD_HEADER + MESSAGE_HEADER,
-    }
-)
+_MESSAGE_HEADER = MESSAGE.itemsize - RECORD_HEADER
 
 
 class McapSource:
@@ -104,7 +97,7 @@ class McapSource:
                 yield from gathered.add(content, self._offsets(content, chunk, wanted, 0))
         loose = self._loose()
         if len(loose):
-            channels = records_at(self._found.data, loose, _MESSAGE.itemsize).view(_MESSAGE)
+            channels = records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)
             loose = loose[np.isin(channels['channel'], wanted)]
             for at in range(0, len(loose), _BLOCK_MESSAGES):
                 yield from gathered.add_in_place(loose[at : at + _BLOCK_MESSAGES])
@@ -140,17 +133,17 @@ class McapSource:
             content = self._content(chunk)
             offsets = _walk(content)[0]
             if len(offsets):
-                rows = records_at(content, offsets, _MESSAGE.itemsize).view(_MESSAGE)
+                rows = records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
                 yield chunk.start_time, _block(content, offsets), rows['channel']
         loose = self._loose()
         if len(loose):
             data = self._found.data
-            rows = records_at(data, loose, _MESSAGE.itemsize).view(_MESSAGE)
+            rows = records_at(data, loose, MESSAGE.itemsize).view(MESSAGE)
             loose = loose[np.argsort(rows['log_time'], kind='stable')]
             for at in range(0, len(loose), _BLOCK_MESSAGES):
                 block = _block(data, loose[at : at + _BLOCK_MESSAGES])
-                rows = records_at(data, loose[at : at + _BLOCK_MESSAGES], _MESSAGE.itemsize)
-                yield int(block.log_time[0]), block, rows.view(_MESSAGE)['channel']
+                rows = records_at(data, loose[at : at + _BLOCK_MESSAGES], MESSAGE.itemsize)
+                yield int(block.log_time[0]), block, rows.view(MESSAGE)['channel']
 
     def _survey(self) -> dict[int, int]:
         """Make sure all channels are known, and return the number of messages of each."""
@@ -166,7 +159,7 @@ class McapSource:
             offsets, definitions = _walk(content)
             for opcode, begin, end in definitions:
                 add_definition(found, opcode, content[begin:end])
-            rows = records_at(content, offsets, _MESSAGE.itemsize).view(_MESSAGE)
+            rows = records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
             ids += rows['channel'].tolist()
         channels, counts = np.unique(np.array(ids, np.int64), return_counts=True)
         self._counts = dict(zip(channels.tolist(), counts.tolist(), strict=True))
@@ -216,7 +209,7 @@ class McapSource:
             offsets = _walk(bytes(memoryview(data)[begin:end]))[0] + begin
         else:
             offsets = _walk(data)[0]
-        rows = records_at(data, offsets, _MESSAGE.itemsize).view(_MESSAGE)
+        rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
         return offsets[np.isin(rows['channel'], wanted)]
 
     def _loose(self) -> IntArray:
@@ -224,7 +217,7 @@ class McapSource:
         return np.array([begin - RECORD_HEADER for begin, _ in self._found.loose], np.int64)
 
     def _loose_channels(self) -> npt.NDArray[np.uint16]:
-        rows = records_at(self._found.data, self._loose(), _MESSAGE.itemsize).view(_MESSAGE)
+        rows = records_at(self._found.data, self._loose(), MESSAGE.itemsize).view(MESSAGE)
         return np.asarray(rows['channel'])
 
 
@@ -267,11 +260,11 @@ class _Gathered:
 
 def _block(data: bytes | mmap.mmap, offsets: IntArray) -> Block:
     """Return the messages whose records begin there."""
-    rows = records_at(data, offsets, _MESSAGE.itemsize).view(_MESSAGE)
+    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
     return Block(
         data,
-        offsets + _MESSAGE.itemsize,
-        rows['length'].astype(np.int64) - MESSAGE_HEADER,
+        offsets + MESSAGE.itemsize,
+        rows['length'].astype(np.int64) - _MESSAGE_HEADER,
         rows['log_time'].astype(np.int64),
         rows['publish_time'].astype(np.int64),
     )
@@ -283,9 +276,9 @@ def _are_messages(
     """Tell whether the index of a chunk is to be trusted."""
     if not len(offsets):
         return True
-    if offsets[0] < begin or offsets[-1] + _MESSAGE.itemsize > end:
+    if offsets[0] < begin or offsets[-1] + MESSAGE.itemsize > end:
         return False
-    rows = records_at(data, offsets, _MESSAGE.itemsize).view(_MESSAGE)
+    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
     lengths = rows['length'].astype(np.int64)
     ends = offsets + RECORD_HEADER + lengths
     if len(channels) == 1:
@@ -295,7 +288,7 @@ def _are_messages(
     return bool(
         (rows['opcode'] == Opcode.MESSAGE).all()
         and known.all()
-        and (lengths >= MESSAGE_HEADER).all()
+        and (lengths >= _MESSAGE_HEADER).all()
         and (ends <= end).all()
     )
 
@@ -311,7 +304,7 @@ def _walk(content: bytes | mmap.mmap) -> tuple[IntArray, list[tuple[int, int, in
         end = position + RECORD_HEADER + length
         if end > size:
             break
-        if opcode == Opcode.MESSAGE and length >= MESSAGE_HEADER:
+        if opcode == Opcode.MESSAGE and length >= _MESSAGE_HEADER:
             offsets.append(position)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             definitions.append((opcode, position + RECORD_HEADER, end))

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import os
 from pathlib import Path
+from typing import Any
 
 from armid_ros.errors import RecordingError
 from rosbags.interfaces import Nodetype
@@ -108,11 +109,11 @@ def _register(
     store.register(types)
     for _, fields in types.values():
         for _, description in fields:
-            kind, content = description
-            if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
-                kind, content = content[0]
-            if kind == Nodetype.NAME and content not in store.fielddefs:
-                _register(store, str(content), None, environment)
+            part: Any = description
+            if part[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+                part = part[1][0]
+            if part[0] == Nodetype.NAME and part[1] not in store.fielddefs:
+                _register(store, part[1], None, environment)
 
 
 def _installed(name: str, environment: Mapping[str, str]) -> str:

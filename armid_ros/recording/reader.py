@@ -268,7 +268,7 @@ def _finite(
         wrong = ~np.isfinite(array)
         if wrong.any():
             bad |= wrong.any(axis=1)
-            named = [joints[j] for j in np.flatnonzero(wrong.any(axis=0))]
+            named = [joints[j] for j in np.flatnonzero(wrong.any(axis=0)).tolist()]
             culprits.append(f'{name} of {", ".join(named)}')
     if not culprits:
         return (*values, stamps)

@@ -3,18 +3,18 @@
 """
 From decoded messages to samples on one time base.
 
-Messages that name the same joints are a series. A series is put in order: messages without a stamp
-dropped, the longest run kept where the clock was set back, late messages sorted in, repeated stamps
-dropped. When joints are spread over several series (one driver an arm half, say), the series with
-the most samples gives the time base; the others contribute their values at equal stamps exactly and
-are interpolated linearly between stamps, but not over their gaps.
+Messages that name the same joints are a series. A series is put in order: messages without a
+stamp dropped, the longest run kept where the clock was set back, late messages sorted in, repeated
+stamps dropped. When joints are spread over several series (one driver an arm half, say), the
+series with the most samples gives the time base; the others contribute their values at equal
+stamps exactly and are interpolated linearly between stamps, but not over their gaps.
 
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 
 from armid_ros.motion import FloatArray
@@ -24,8 +24,8 @@ from armid_ros.recording.source import IntArray
 import numpy as np
 import numpy.typing as npt
 
-# A backward step of the clock of more than this is a restart (a simulation reset, a bag played in a
-# loop), not a late message.
+# A backward step of the clock of more than this is a restart (a simulation reset, a bag played in
+# a loop), not a late message.
 RESTART_NS = 10**9
 # A stretch without samples is a gap when it is longer than this many sampling periods.
 GAP_PERIODS = 5.0
@@ -198,7 +198,7 @@ def _concatenated(joints: tuple[str, ...], parts: Sequence[JointStates]) -> Join
 
 
 def _stacked(
-    arrays: Sequence[FloatArray | None], parts: Sequence[JointStates] | Sequence[Series], k: int
+    arrays: Sequence[FloatArray | None], parts: Sequence[Sized], k: int
 ) -> FloatArray | None:
     """Concatenate along time, NaN for what is missing."""
     if all(values is None for values in arrays):

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 import sqlite3
+from typing import Any
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.message_types import MessageType
@@ -117,9 +118,7 @@ class SqliteSource:
             for name, time, data in rows:
                 yield RawMessage(name, time, time, bytes(data))
 
-    def _fetch(
-        self, query: str, parameters: tuple[str, ...]
-    ) -> Iterator[list[tuple[str | int | bytes, ...]]]:
+    def _fetch(self, query: str, parameters: tuple[str, ...]) -> Iterator[list[tuple[Any, ...]]]:
         """Yield rows by the thousand, up to where the database is damaged."""
         try:
             cursor = self._database.execute(query, parameters)

@@ -15,29 +15,31 @@ from dataclasses import replace
 from pathlib import Path
 import time
 from types import TracebackType
-from typing import Literal, Self
+from typing import NamedTuple, Self
 
 from armid_ros import __version__
 from armid_ros.errors import RecordingError
+from armid_ros.recording.mcap_records import MESSAGE, RECORD_HEADER
+from armid_ros.recording.mcap_writer import Compression, McapWriter, message_record
 from armid_ros.recording.message_types import message_type, MessageType
 from armid_ros.recording.metadata import bag_information, dump, write_metadata
 from armid_ros.recording.qos import dump_qos_text, QosProfile
-from armid_ros.recording.source import Topic
-from mcap.writer import CompressionType, IndexType, Writer
+from armid_ros.recording.source import IntArray, Topic
+from mcap.opcode import Opcode
+import numpy as np
+import numpy.typing as npt
 
-Compression = Literal['zstd', 'lz4', 'none']
-
-_COMPRESSIONS = {
-    'zstd': CompressionType.ZSTD,
-    'lz4': CompressionType.LZ4,
-    'none': CompressionType.NONE,
-}
 # At 3 kHz of JointState, 1 MB/s, the age of a chunk closes it, not its size.
 DEFAULT_CHUNK_SIZE = 512 * 1024
 # Together with the time to write it out this keeps what a kill can lose below 0.3 s.
 DEFAULT_CHUNK_AGE = 0.2
-# An index of attachments would be empty, and mcap's checkers call that an error.
-_INDEXES = IndexType.CHUNK | IndexType.MESSAGE | IndexType.METADATA
+
+
+class _OpenChunk(NamedTuple):
+    """The records of a chunk that is not written yet."""
+
+    number: int
+    records: list[bytes]
 
 
 class BagWriter:
@@ -81,10 +83,6 @@ class BagWriter:
 
         """
         self.path = Path(path)
-        if compression not in _COMPRESSIONS:
-            raise RecordingError(
-                f"compression '{compression}' is not known; there are {', '.join(_COMPRESSIONS)}"
-            )
         try:
             self.path.mkdir(parents=True)
         except FileExistsError as error:
@@ -97,25 +95,16 @@ class BagWriter:
         self._chunk_size = chunk_size
         self._chunk_age = chunk_age
         self._clock = clock
-        # Chunks are closed here, by flush(); mcap's own limit only guards against a huge message.
-        self._stream = self.file.open('wb')
-        self._mcap = Writer(
-            self._stream,
-            chunk_size=1 << 31,
-            compression=_COMPRESSIONS[compression],
-            index_types=_INDEXES,
-        )
-        self._mcap.start(profile='ros2', library=f'armid_ros {__version__}')
+        library = f'armid_ros {__version__}'
+        self._mcap = McapWriter(self.file, compression=compression, library=library)
         self._topics: dict[str, Topic] = {}
         self._schemas: dict[MessageType, int] = {}
         self._channels: dict[str, int] = {}
-        self._counts: dict[int, int] = {}
-        self._pending = 0
+        self._open = _OpenChunk(0, [])
+        self._size = 0
         self._opened = clock()
-        self._start_ns, self._end_ns = 2**63 - 1, 0
         self._closed = False
         self._write_information(None)
-        self.flush()
 
     def __enter__(self) -> Self:
         """Return the writer."""
@@ -129,11 +118,6 @@ class BagWriter:
     ) -> None:
         """Complete the bag."""
         self.close()
-
-    @property
-    def message_count(self) -> int:
-        """Number of messages written."""
-        return sum(self._counts.values())
 
     def add_topic(
         self,
@@ -185,23 +169,24 @@ class BagWriter:
             described = message_type(type_name, definition)
         topic = Topic(name, described, tuple(qos) or (QosProfile(),))
         if described not in self._schemas:
-            self._schemas[described] = self._mcap.register_schema(
+            number, record = self._mcap.add_schema(
                 described.name,
                 described.encoding if described.definition else '',
                 described.definition.encode(),
             )
-        channel = self._mcap.register_channel(
+            self._open_records().append(record)
+            self._schemas[described] = number
+        channel, record = self._mcap.add_channel(
             name,
-            'cdr',
             self._schemas[described],
             {
                 'offered_qos_profiles': dump_qos_text(topic.qos),
                 'topic_type_hash': described.type_hash,
             },
         )
+        self._open_records().append(record)
         self._topics[name] = topic
         self._channels[name] = channel
-        self._counts[channel] = 0
 
     def write(
         self,
@@ -232,56 +217,106 @@ class BagWriter:
         """
         channel = self._channels.get(topic)
         if channel is None or self._closed:
-            self._refuse(topic)
-            return
+            raise self._refusal(topic)
         published = log_time_ns if publish_time_ns is None else publish_time_ns
-        self._mcap.add_message(channel, log_time_ns, cdr, published)  # type: ignore[arg-type]
-        self._counts[channel] += 1
-        if log_time_ns < self._start_ns:
-            self._start_ns = log_time_ns
-        if log_time_ns > self._end_ns:
-            self._end_ns = log_time_ns
+        record = message_record(channel, cdr, log_time_ns, published)
         now = self._clock()
-        if not self._pending:
-            self._opened = now
-        self._pending += len(cdr) + 31
-        if self._pending >= self._chunk_size or now - self._opened >= self._chunk_age:
+        records = self._open_records()
+        if not records:
+            self._opened, self._size = now, 0
+        records.append(record)
+        self._size += len(record)
+        if self._size >= self._chunk_size or now - self._opened >= self._chunk_age:
             self.flush()
+
+    def write_many(
+        self, topic: str, messages: npt.NDArray[np.void], log_times_ns: IntArray
+    ) -> None:
+        """
+        Write many messages of equal length, without a Python object for each.
+
+        Parameters
+        ----------
+        topic : str
+            A topic announced before.
+        messages : ndarray of void, shape (N,)
+            The messages, serialised.
+        log_times_ns : ndarray, shape (N,)
+            When they were received, and sent [ns].
+
+        Raises
+        ------
+        RecordingError
+            The topic was not announced, or the bag is closed.
+
+        """
+        channel = self._channels.get(topic)
+        if channel is None or self._closed:
+            raise self._refusal(topic)
+        self.flush()
+        length = messages.dtype.itemsize
+        record = np.dtype([('head', MESSAGE), ('cdr', np.void, length)])
+        at_once = max(1, self._chunk_size // record.itemsize)
+        for at in range(0, len(messages), at_once):
+            some = messages[at : at + at_once]
+            # The sequence number between the fields stays zero.
+            records = np.zeros(len(some), record)
+            head = records['head']
+            head['opcode'] = Opcode.MESSAGE
+            head['length'] = record.itemsize - RECORD_HEADER
+            head['channel'] = channel
+            head['log_time'] = head['publish_time'] = log_times_ns[at : at + at_once]
+            records['cdr'] = some
+            offsets = np.arange(len(some), dtype=np.int64) * record.itemsize
+            self._mcap.write_chunk(records.tobytes(), offsets)
 
     def flush(self) -> None:
         """Write out what is in memory; for a timer, should messages stop coming."""
         self._check_open()
-        self._mcap.flush()
-        self._pending = 0
+        records = self._open_records()
+        if not records:
+            return
+        lengths = np.array([len(record) for record in records], np.int64)
+        is_message = np.array([record[0] == Opcode.MESSAGE for record in records])
+        offsets = np.cumsum(lengths) - lengths
+        self._mcap.write_chunk(b''.join(records), offsets[is_message])
 
     def close(self) -> None:
         """Complete the file, and write metadata.yaml; a closed bag stays as it is."""
         if self._closed:
             return
-        self._mcap.flush()
+        self.flush()
         self._write_information(self.file.name)
         self._mcap.finish()
-        self._stream.close()
-        self._closed = True
         write_metadata(self.path, self._information(self.file.name))
+        self._closed = True
+
+    def _open_records(self) -> list[bytes]:
+        """Return the records of the chunk to come."""
+        # Not emptied by flush(), which may be interrupted between writing and emptying: records
+        # belong to a chunk by its number, and are over with once it is in the file.
+        if self._open.number != self._mcap.chunk_count:
+            self._open = _OpenChunk(self._mcap.chunk_count, [])
+        return self._open.records
 
     def _information(self, file_name: str | None) -> dict[str, object]:
+        counts = self._mcap.counts
         counted = [
-            replace(topic, count=self._counts[self._channels[topic.name]])
+            replace(topic, count=counts[self._channels[topic.name]])
             for topic in self._topics.values()
         ]
-        return bag_information(counted, file_name, self._start_ns, self._end_ns)
+        return bag_information(counted, file_name, *self._mcap.time_range)
 
     def _write_information(self, file_name: str | None) -> None:
         """Put into the file what rosbag2 puts there at its beginning and end."""
         text = dump(self._information(file_name))
-        self._mcap.add_metadata('rosbag2', {'serialized_metadata': text})
+        self._mcap.write_metadata('rosbag2', {'serialized_metadata': text})
 
     def _check_open(self) -> None:
         if self._closed:
             raise RecordingError(f'{self.path}: the bag is closed')
 
-    def _refuse(self, topic: str) -> None:
+    def _refusal(self, topic: str) -> RecordingError:
         self._check_open()
         known = ', '.join(self._topics) or 'none'
-        raise RecordingError(f"{self.path}: topic '{topic}' was not announced; there are {known}")
+        return RecordingError(f"{self.path}: topic '{topic}' was not announced; there are {known}")
