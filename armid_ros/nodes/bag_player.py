@@ -1,0 +1,194 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The bag player node: what a bag holds, at a rate or in lock step with /clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+import time
+from typing import Any
+
+from armid_ros.errors import RecordingError
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.message_classes import message_class
+from armid_ros.nodes.parameters import names, NodeParameter
+from armid_ros.nodes.process import run
+from armid_ros.nodes.qos import offered
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.source import RawMessage
+from rclpy.clock import Clock, ClockType
+from rclpy.publisher import Publisher
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock as ClockMessage
+
+#: How often due messages are published [s].
+TICK = 0.001
+#: Messages published in one go; services are answered between.
+_BURST = 1000
+
+
+class BagPlayerNode(ArmidNode):
+    """
+    Publishes the messages of a bag, serialised as they were recorded.
+
+    With use_sim_time it keeps step with /clock: a message is due when as much time has passed
+    since the first /clock as passed since the first message of the bag.
+
+    """
+
+    table = (
+        NodeParameter('bag', '', 'Bag to play: a rosbag2 directory, or a .mcap or .db3 file.'),
+        NodeParameter('topics', [''], 'Topics to play; without names, all.'),
+        NodeParameter(
+            'rate',
+            1.0,
+            'Bag time per real time; of no effect in lock step.',
+            lower=0.001,
+            upper=1000.0,
+            read_only=False,
+        ),
+        NodeParameter('loop', False, 'Begin again at the end.', read_only=False),
+        NodeParameter('start_offset', 0.0, 'Bag time to leave out.', 's', lower=0.0, upper=1e9),
+        NodeParameter(
+            'clock_rate',
+            0.0,
+            'How often bag time is published on /clock; 0 for not at all.',
+            'Hz',
+            lower=0.0,
+            upper=10000.0,
+        ),
+        NodeParameter(
+            'subscriber_timeout',
+            2.0,
+            'How long to wait for every topic to have a subscriber.',
+            's',
+            lower=0.0,
+            upper=3600.0,
+        ),
+    )
+
+    def __init__(self, bag: Bag | None = None, **kwargs: Any) -> None:
+        """Take the bag; by default the one the parameter names."""
+        super().__init__('bag_player', **kwargs)
+        if bag is None and not self.value('bag'):
+            raise RecordingError("parameter 'bag' is empty: give a bag, -p bag:=PATH")
+        self._bag = bag or Bag(self.value('bag'))
+        self._lock_step = bool(self.value('use_sim_time'))
+        if self._lock_step and self.value('clock_rate'):
+            raise RecordingError(
+                'use_sim_time follows /clock; it cannot publish it too: clock_rate'
+            )
+        self._wanted = {self.resolve_topic_name(name) for name in names(self, 'topics')}
+        self._topics = self._make_publishers()
+        self._messages = self._from_start()
+        self._next: RawMessage | None = next(self._messages, None)
+        self._first = self._next.log_time_ns if self._next else 0
+        self._begin = self._first + int(self.value('start_offset') * 1e9)
+        self._position = self._begin
+        self._anchor: int | None = None
+        self._deadline = time.monotonic() + self.value('subscriber_timeout')
+        self.played = 0
+        clock_rate = self.value('clock_rate')
+        self._clock_period = int(1e9 / clock_rate) if clock_rate else 0
+        self._clock_due = self._begin
+        self._clock_publisher = (
+            self.create_publisher(ClockMessage, '/clock', 10) if clock_rate else None
+        )
+        pace = self.get_clock() if self._lock_step else Clock(clock_type=ClockType.STEADY_TIME)
+        self._pace = pace
+        self._timer = self.create_timer(TICK, self.play, clock=pace)
+
+    @property
+    def finished(self) -> bool:
+        """Whether all was played."""
+        return self._next is None
+
+    def play(self) -> None:
+        """Publish what is due."""
+        now = self._pace.now().nanoseconds
+        if self._anchor is None:
+            if (self._lock_step and now == 0) or not self._ready():
+                return
+            self._anchor = now
+        rate = 1.0 if self._lock_step else self.value('rate')
+        if now < self._anchor:  # the clock was set back
+            self._anchor = now
+        self._position += round((now - self._anchor) * rate)
+        self._anchor = now
+        for _ in range(_BURST):
+            if self._next is None or self._next.log_time_ns > self._position:
+                break
+            self._publish(self._next)
+            self._advance()
+        self._publish_clock()
+
+    def condition(self) -> tuple[str, Mapping[str, object]]:
+        """Say how far it has played."""
+        waiting = self._anchor is None and not self.finished
+        values = {
+            'messages': self.played,
+            'position': (self._position - self._first) * 1e-9,
+        }
+        return ('waiting for subscribers' if waiting else ''), values
+
+    def close(self) -> None:
+        """Let go of the bag."""
+        self._bag.close()
+
+    def _make_publishers(self) -> dict[str, Publisher]:
+        topics = {self.resolve_topic_name(t.name): t for t in self._bag.topics()}
+        unknown = self._wanted - set(topics)
+        if unknown:
+            raise RecordingError(
+                f'{self._bag.path}: no topic {", ".join(sorted(unknown))}; '
+                f'there are {", ".join(sorted(topics))}'
+            )
+        publishers = {}
+        for name, topic in topics.items():
+            if (self._wanted and name not in self._wanted) or name == '/clock':
+                continue
+            try:
+                publishers[topic.name] = self.create_publisher(
+                    message_class(topic.type_name), topic.name, offered(topic.qos)
+                )
+            except RecordingError as error:
+                self.complaints.say('topic', f'{name} is not played: {error}')
+        if not publishers:
+            raise RecordingError(f'{self._bag.path}: nothing to play')
+        return publishers
+
+    def _from_start(self) -> Iterator[RawMessage]:
+        return (m for m in self._bag.messages() if m.topic in self._topics)
+
+    def _ready(self) -> bool:
+        everyone = all(p.get_subscription_count() for p in self._topics.values())
+        return everyone or time.monotonic() > self._deadline
+
+    def _publish(self, message: RawMessage) -> None:
+        topic = self._topics[message.topic]
+        self.played += 1
+        if message.log_time_ns >= self._begin:
+            topic.publish(message.cdr)
+
+    def _advance(self) -> None:
+        self._next = next(self._messages, None)
+        if self._next is None and self.value('loop'):
+            self._messages = self._from_start()
+            self._next = next(self._messages, None)
+            self._position = self._clock_due = self._begin
+
+    def _publish_clock(self) -> None:
+        if self._clock_publisher is None or self._position < self._clock_due:
+            return
+        stamp = Time(nanoseconds=self._position).to_msg()
+        self._clock_publisher.publish(ClockMessage(clock=stamp))
+        self._clock_due = self._position + self._clock_period
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    run(BagPlayerNode, args)
+
+
+if __name__ == '__main__':
+    main()

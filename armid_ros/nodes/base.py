@@ -1,0 +1,142 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the nodes share: a table of parameters, complaints, and diagnostics once a second."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+from armid_ros.errors import ArmidError
+from armid_ros.nodes.complaints import Complaints
+from armid_ros.nodes.parameters import declare, NodeParameter
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
+
+EXECUTOR = NodeParameter(
+    name='executor',
+    default='single',
+    description='Executor when the node is a process of its own; events takes less processor time '
+    'at 1 kHz, but is experimental in Jazzy.',
+    choices=('single', 'events'),
+)
+
+
+class ArmidNode(Node):
+    """
+    A node with parameters from a table, that says on /diagnostics what it does and what it missed.
+
+    Attributes
+    ----------
+    table : tuple of NodeParameter
+        The parameters of the node.
+    complaints : Complaints
+        What the node was given and could not use.
+
+    """
+
+    table: ClassVar[tuple[NodeParameter, ...]]
+
+    def __init__(self, name: str, **kwargs: Any) -> None:
+        """Take the keyword arguments of rclpy's Node: context, namespace, overrides and others."""
+        super().__init__(name, **kwargs)
+        self.complaints = Complaints(self.get_logger())
+        declare(self, (*self.table, EXECUTOR))
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.create_timer(1.0, self.publish_diagnostics)
+
+    @property
+    def finished(self) -> bool:
+        """Whether there is nothing left to do, so that the process may end."""
+        return False
+
+    @property
+    def hardware(self) -> str:
+        """Name of the robot, for diagnostics."""
+        return ''
+
+    @abstractmethod
+    def condition(self) -> tuple[str, Mapping[str, object]]:
+        """
+        Say how the node is.
+
+        Returns
+        -------
+        trouble : str
+            What keeps it from its work; empty when all is well.
+        values : mapping of str to number or str
+            What diagnostics shows; plotters draw the numbers.
+
+        """
+
+    def close(self) -> None:
+        """Finish what must not be lost."""
+
+    def value(self, parameter: str) -> Any:
+        """Return the value of a parameter."""
+        return self.get_parameter(parameter).value
+
+    def offer(self, service: str, action: Callable[[], str]) -> None:
+        """
+        Offer a std_srvs/Trigger service.
+
+        Parameters
+        ----------
+        service : str
+            Its name, such as '~/reset'.
+        action : callable
+            Does the work and says what it did; an ArmidError it raises is the answer.
+
+        """
+
+        def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            try:
+                response.message = action()
+                response.success = True
+            except ArmidError as error:
+                response.message = str(error)
+            return response
+
+        self.create_service(Trigger, service, answer)
+
+    def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
+        """Set parameters as rclpy does, and complain of those that are refused."""
+        results = super().set_parameters(parameter_list)
+        for parameter, result in zip(parameter_list, results, strict=True):
+            self._note_refusal(parameter.name, result)
+        return results
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set parameters as rclpy does, and complain when they are refused."""
+        result = super().set_parameters_atomically(parameter_list)
+        self._note_refusal(', '.join(p.name for p in parameter_list), result)
+        return result
+
+    def publish_diagnostics(self) -> None:
+        """Publish the condition of the node, and what it complained of."""
+        trouble, values = self.condition()
+        status = DiagnosticStatus(
+            name=f'{self.get_fully_qualified_name()[1:]}: state', hardware_id=self.hardware
+        )
+        troubled = bool(trouble) or self.complaints.fresh
+        status.level = DiagnosticStatus.WARN if troubled else DiagnosticStatus.OK
+        status.message = trouble or (self.complaints.latest if troubled else 'running')
+        rejected = {f'rejected {kind}': n for kind, n in self.complaints.counts.items()}
+        for key, value in {**values, **rejected}.items():
+            status.values.append(KeyValue(key=key, value=_text(value)))
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+        self.complaints.settle()
+
+    def _note_refusal(self, name: str, result: SetParametersResult) -> None:
+        if not result.successful:
+            self.complaints.say('parameter', f"parameter '{name}' refused: {result.reason}")
+
+
+def _text(value: object) -> str:
+    return f'{value:.9g}' if isinstance(value, float) else str(value)

@@ -1,0 +1,57 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Input that cannot be used is said once, counted always."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from rclpy.impl.rcutils_logger import RcutilsLogger
+
+#: Different texts said of one kind; a sender of random rubbish must not fill the log.
+_TEXTS_PER_KIND = 10
+
+
+class Complaints:
+    """
+    What a node rejected, by kind.
+
+    Attributes
+    ----------
+    counts : mapping of str to int
+        How often each kind was rejected.
+    latest : str
+        Text of the last complaint; empty when there was none.
+    fresh : bool
+        Whether something was rejected since the last `settle`.
+
+    """
+
+    def __init__(self, logger: RcutilsLogger) -> None:
+        """Say things on the logger of a node, which is also /rosout."""
+        self._logger = logger
+        self._counts: Counter[str] = Counter()
+        self._said: dict[str, set[str]] = {}
+        self.latest = ''
+        self.fresh = False
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Return how often each kind was rejected."""
+        return MappingProxyType(self._counts)
+
+    def say(self, kind: str, text: str) -> None:
+        """Count a rejected input, and log it unless the same was said before."""
+        self._counts[kind] += 1
+        self.latest = text
+        self.fresh = True
+        said = self._said.setdefault(kind, set())
+        if text not in said and len(said) < _TEXTS_PER_KIND:
+            said.add(text)
+            self._logger.warning(text)
+
+    def settle(self) -> None:
+        """Begin a new period of reporting."""
+        self.fresh = False

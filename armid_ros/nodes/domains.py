@@ -1,0 +1,52 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""ROS domains for runs that must neither hear other robots nor be heard by them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+import socket
+
+from armid_ros.errors import ArmidError
+from rclpy.context import Context
+
+#: Domains whose ports Linux does not hand out otherwise; 0 is everybody's.
+_DOMAINS = range(1, 102)
+
+
+@contextmanager
+def private_context() -> Iterator[Context]:
+    """
+    Open a ROS context on a domain of this machine that no other private context is on.
+
+    Raises
+    ------
+    ArmidError
+        If all domains are taken.
+
+    """
+    with _reserved_domain() as domain:
+        context = Context()
+        context.init(args=[], domain_id=domain)
+        try:
+            yield context
+        finally:
+            context.try_shutdown()
+
+
+@contextmanager
+def _reserved_domain() -> Iterator[int]:
+    first = os.getpid() % len(_DOMAINS)
+    for shift in range(len(_DOMAINS)):
+        domain = _DOMAINS[(first + shift) % len(_DOMAINS)]
+        # An abstract socket is a name that vanishes with its process: no port, no file.
+        with socket.socket(socket.AF_UNIX) as reservation:
+            try:
+                reservation.bind(f'\0armid_ros/domain/{domain}')
+            except OSError:
+                continue
+            yield domain
+            return
+    raise ArmidError(f'all {len(_DOMAINS)} private ROS domains of this machine are in use')

@@ -1,0 +1,44 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Message types by name: the class to subscribe with, and the definition a bag needs."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+import sys
+from typing import Any
+
+from armid_ros.errors import RecordingError
+
+
+def message_class(type_name: str) -> type[Any]:
+    """
+    Return the Python class of a message type.
+
+    Raises
+    ------
+    RecordingError
+        Its package is not installed, or has no such message.
+
+    """
+    package, _, name = type_name.partition('/msg/')
+    try:
+        return getattr(import_module(f'{package}.msg'), name)  # type: ignore[no-any-return]
+    except (ImportError, AttributeError) as error:
+        raise RecordingError(
+            f"type {type_name} is not available: install or source the package '{package}'"
+        ) from error
+
+
+def is_stamped(message_type: type[Any]) -> bool:
+    """Whether messages begin with a std_msgs/Header, and so with a stamp."""
+    fields: dict[str, str] = message_type.get_fields_and_field_types()
+    return next(iter(fields.items()), None) == ('header', 'std_msgs/Header')
+
+
+def installed_definition(type_name: str) -> str | None:
+    """Return the text of a .msg file installed beside this Python; None when there is none."""
+    package, _, name = type_name.partition('/msg/')
+    path = Path(sys.prefix, 'share', package, 'msg', f'{name}.msg')
+    return path.read_text(encoding='utf-8') if path.is_file() else None

@@ -1,0 +1,167 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Node parameters as one table per node.
+
+The table makes the descriptors that `ros2 param describe` shows, the checks of what is set, and
+the page of the documentation.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+import math
+import re
+from typing import Any
+
+from armid_ros.errors import ArmidError
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+Value = bool | int | float | str | list[str] | list[float]
+
+
+@dataclass(frozen=True)
+class NodeParameter:
+    """
+    One parameter of a node.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    default : bool, int, float, str, list of str or list of float
+        Value when nothing else is said; it fixes the type. A list must not be empty, since ROS
+        cannot tell the type of an empty one: [''] stands for no names.
+    description : str
+        What it does, in one sentence.
+    unit : str
+        SI unit of a number.
+    lower, upper : float, or None
+        Range of a number, both or none.
+    choices : tuple of str
+        What a text may be; empty for any text.
+    read_only : bool
+        Whether it is fixed once the node runs.
+    check : callable, or None
+        Raises ArmidError for a value that no range can exclude.
+
+    """
+
+    name: str
+    default: Value
+    description: str
+    unit: str = ''
+    lower: float | None = None
+    upper: float | None = None
+    choices: tuple[str, ...] = ()
+    read_only: bool = True
+    check: Callable[[Any], object] | None = None
+
+    def descriptor(self) -> ParameterDescriptor:
+        """Return the descriptor that ROS shows and checks."""
+        descriptor = ParameterDescriptor(description=self.text(), read_only=self.read_only)
+        if self.lower is not None and self.upper is not None:
+            if isinstance(self.default, float):
+                descriptor.floating_point_range = [
+                    FloatingPointRange(from_value=self.lower, to_value=self.upper)
+                ]
+            else:
+                descriptor.integer_range = [
+                    IntegerRange(from_value=int(self.lower), to_value=int(self.upper))
+                ]
+        return descriptor
+
+    def text(self) -> str:
+        """Return the description with unit and choices."""
+        unit = f' [{self.unit}]' if self.unit else ''
+        choices = f' One of: {", ".join(self.choices)}.' if self.choices else ''
+        return f'{self.description}{unit}{choices}'
+
+    def objection(self, value: object) -> str:
+        """Say why a value of the right type and range cannot be; empty when it can."""
+        if isinstance(value, float) and not math.isfinite(value):
+            return f"parameter '{self.name}' must be a finite number"
+        if self.choices and value not in self.choices:
+            return f"parameter '{self.name}' is '{value}', not one of {', '.join(self.choices)}"
+        if self.check is not None:
+            try:
+                self.check(value)
+            except ArmidError as error:
+                return f"parameter '{self.name}': {error}"
+        return ''
+
+
+class ParameterError(ArmidError):
+    """A node was started with a parameter it cannot have."""
+
+
+def declare(node: Node, table: Iterable[NodeParameter]) -> None:
+    """
+    Declare the parameters of a table on a node, and check all that is set later.
+
+    Raises
+    ------
+    ParameterError
+        For an override of the wrong type, out of range or otherwise impossible, with what to
+        write instead.
+
+    """
+    entries = {entry.name: entry for entry in table}
+
+    def validate(parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name in entries:
+                reason = entries[parameter.name].objection(parameter.value)
+                if reason:
+                    return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(validate)
+    for entry in entries.values():
+        try:
+            node.declare_parameter(entry.name, entry.default, entry.descriptor())
+        except InvalidParameterTypeException as error:
+            raise ParameterError(_explain_type(entry, str(error))) from error
+        except InvalidParameterValueException as error:
+            raise ParameterError(_explain_value(entry, str(error))) from error
+
+
+def names(node: Node, parameter: str) -> tuple[str, ...]:
+    """Return a list of names, without the empty one that stands for none."""
+    values: list[str] = node.get_parameter(parameter).value
+    return tuple(name for name in values if name)
+
+
+def _explain_type(entry: NodeParameter, text: str) -> str:
+    """Say what to write instead, for the mistake everybody makes: 100 for 100.0."""
+    found = re.search(r"to '(.*)' of type '(\w+)'", text, re.DOTALL)
+    value, given = found.groups() if found else ('?', '?')
+    if isinstance(entry.default, float):
+        instead = f'use {value}.0' if given == 'INTEGER' else f'use a number: {entry.default}'
+    elif isinstance(entry.default, str):
+        instead = f'quote it twice: -p {entry.name}:="\'{value}\'"'
+    else:
+        example = str(entry.default).lower() if isinstance(entry.default, bool) else entry.default
+        instead = f'use a value such as {example}'
+    return f"parameter '{entry.name}' cannot be {value} of type {given}; {instead}"
+
+
+def _explain_value(entry: NodeParameter, text: str) -> str:
+    found = re.search(r'value \((.*?)\) for parameter', text, re.DOTALL)
+    if found and entry.lower is not None and 'out of range' in text:
+        unit = f' {entry.unit}' if entry.unit else ''
+        return (
+            f"parameter '{entry.name}' is {found[1]}, outside its range "
+            f'{entry.lower:g} to {entry.upper:g}{unit}'
+        )
+    return text.partition('Reason: ')[2].removesuffix(f': {entry.name}') or text

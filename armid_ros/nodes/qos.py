@@ -1,0 +1,123 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Quality of service: what the nodes offer, and how they match what others offer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from armid_ros.recording.qos import QosProfile
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+#: Joint states, commands and diagnostics.
+STREAM = QoSProfile(depth=10)
+#: The latest value, also for those who come late: descriptions, trajectories, estimates.
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+#: Messages a subscription holds while its node is busy: 1 s at 1 kHz.
+DEPTH = 1000
+
+
+def matching(publishers: Sequence[TopicEndpointInfo], depth: int = DEPTH) -> QoSProfile:
+    """
+    Return the strictest profile that all publishers of a topic satisfy, as rosbag2 does.
+
+    Reliable when all are reliable, transient local when all are; otherwise the lesser one, which
+    matches every publisher.
+
+    """
+    profiles = [publisher.qos_profile for publisher in publishers]
+    reliable = all(p.reliability == ReliabilityPolicy.RELIABLE for p in profiles)
+    latched = all(p.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in profiles)
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE),
+    )
+
+
+def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[QosProfile, ...]:
+    """Return what the publishers of a topic offer, as a bag keeps it."""
+    return tuple(
+        QosProfile(
+            reliability=_name(publisher.qos_profile.reliability),
+            durability=_name(publisher.qos_profile.durability),
+        )
+        for publisher in publishers
+    )
+
+
+def offered(profiles: Sequence[QosProfile], depth: int = DEPTH) -> QoSProfile:
+    """Return the profile to publish a recorded topic with: the least that all recorded offer."""
+    best_effort = any(p.reliability == 'best_effort' for p in profiles)
+    latched = bool(profiles) and all(p.latched for p in profiles)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
+        durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE),
+    )
+
+
+class MatchedSubscription:
+    """
+    A subscription that begins when its topic has a publisher, with the QoS of the publishers.
+
+    A reliable subscription does not match a best-effort publisher, and a best-effort one loses
+    messages that a reliable publisher would send again; so neither can be chosen beforehand.
+
+    Attributes
+    ----------
+    topic : str
+        Full name of the topic, remapped.
+    subscription : Subscription, or None
+        None while nobody publishes.
+
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        message_type: type,
+        topic: str,
+        callback: Callable[[Any], None],
+        *,
+        raw: bool = False,
+    ) -> None:
+        """Subscribe at once if the topic has publishers; otherwise `match` does when it has."""
+        self._node = node
+        self._message_type = message_type
+        self._callback = callback
+        self._raw = raw
+        self._profile: QoSProfile | None = None
+        self.topic = node.resolve_topic_name(topic)
+        self.subscription: Subscription | None = None
+        self.match()
+
+    def match(self) -> None:
+        """Look at the publishers, and subscribe anew where they offer something else."""
+        publishers = self._node.get_publishers_info_by_topic(self.topic)
+        if not publishers:
+            return
+        profile = matching(publishers)
+        if profile == self._profile:
+            return
+        self.close()
+        self._profile = profile
+        self.subscription = self._node.create_subscription(
+            self._message_type, self.topic, self._callback, profile, raw=self._raw
+        )
+
+    def close(self) -> None:
+        """End the subscription."""
+        if self.subscription is not None:
+            self._node.destroy_subscription(self.subscription)
+        self.subscription = None
+        self._profile = None
+
+
+def _name(policy: ReliabilityPolicy | DurabilityPolicy) -> str:
+    return str(policy.name).lower()

@@ -1,0 +1,229 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The recorder node: topics as they come, undecoded, into a bag that survives a kill."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+import struct
+from typing import Any
+
+from armid_ros.errors import ArmidError, RecordingError
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.message_classes import installed_definition, is_stamped, message_class
+from armid_ros.nodes.parameters import names, NodeParameter
+from armid_ros.nodes.process import run
+from armid_ros.nodes.qos import MatchedSubscription, recorded
+from armid_ros.recording import BagWriter
+from rclpy.clock import Clock, ClockType
+
+OpenBag = Callable[[Path], BagWriter]
+
+#: How often new topics and publishers are looked for [s].
+LOOK_PERIOD = 0.1
+#: How often what waits in memory is written out [s]; bounds what a kill loses.
+FLUSH_PERIOD = 0.1
+#: Messages kept while simulated time has not begun.
+_HELD = 1000
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A recorded topic: its subscription, and whether its messages carry a stamp."""
+
+    topic: str
+    stamped: bool
+
+
+class RecorderNode(ArmidNode):
+    """Records topics into a rosbag2 MCAP directory."""
+
+    table = (
+        NodeParameter(
+            'bag', '', 'Directory to write; empty: armid_<date>_<time> in the current directory.'
+        ),
+        NodeParameter('topics', [''], 'Topics to record; without names, all that are published.'),
+        NodeParameter('record', True, 'Record from the start, without waiting for ~/start.'),
+        NodeParameter(
+            'compression', 'zstd', 'Compression of the chunks.', choices=('zstd', 'lz4', 'none')
+        ),
+        NodeParameter(
+            'chunk_age', 0.2, 'Age at which a chunk is written out.', 's', lower=0.01, upper=60.0
+        ),
+    )
+
+    def __init__(self, open_bag: OpenBag | None = None, **kwargs: Any) -> None:
+        """Take what opens a bag; by default a BagWriter with the parameters of the node."""
+        super().__init__('recorder', **kwargs)
+        self._open_bag = open_bag or self._default_bag
+        self._wanted = {self.resolve_topic_name(name) for name in names(self, 'topics')}
+        self._writer: BagWriter | None = None
+        self._subscriptions_by_topic: dict[str, MatchedSubscription] = {}
+        self._held: list[tuple[Channel, bytes]] = []
+        self._bags = 0
+        self._count = 0
+        self.offer('~/start', self.start)
+        self.offer('~/stop', self.stop)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(LOOK_PERIOD, self.look, clock=steady)
+        self.create_timer(FLUSH_PERIOD, self._flush, clock=steady)
+        if self.value('record'):
+            self.start()
+
+    @property
+    def recording(self) -> bool:
+        """Whether a bag is open."""
+        return self._writer is not None
+
+    @property
+    def message_count(self) -> int:
+        """Number of messages in the bag, or in the last one when none is open."""
+        return self._count
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Topics that are subscribed to."""
+        return tuple(self._subscriptions_by_topic)
+
+    def start(self) -> str:
+        """Open a bag and record; RecordingError when it cannot be made or one is open."""
+        if self._writer is not None:
+            raise RecordingError(f'recording into {self._writer.path} already')
+        self._writer = self._open_bag(self._next_path())
+        self._bags += 1
+        self._count = 0
+        self.look()
+        return self._tell(f'recording into {self._writer.path}')
+
+    def stop(self) -> str:
+        """Complete the bag, and say where it is and how many messages it holds."""
+        if self._writer is None:
+            raise RecordingError('nothing is being recorded')
+        for subscription in self._subscriptions_by_topic.values():
+            subscription.close()
+        self._subscriptions_by_topic.clear()
+        writer, self._writer = self._writer, None
+        self._write_held(writer, 0)
+        writer.close()
+        return self._tell(f'{writer.path}: {self._count} messages')
+
+    def look(self) -> None:
+        """Subscribe to topics that have appeared, with the QoS of their publishers."""
+        if self._writer is None:
+            return
+        for subscription in self._subscriptions_by_topic.values():
+            subscription.match()
+        for topic, types in self.get_topic_names_and_types():
+            wanted = topic in self._wanted if self._wanted else '/_' not in topic
+            if wanted and topic not in self._subscriptions_by_topic:
+                self._record(self._writer, topic, types)
+
+    def condition(self) -> tuple[str, Mapping[str, object]]:
+        """Say where the messages go and how many there are."""
+        missing = self._wanted - set(self._subscriptions_by_topic)
+        trouble = f'nobody publishes {", ".join(sorted(missing))}' if missing else ''
+        values: dict[str, object] = {
+            'recording': int(self.recording),
+            'messages': self.message_count,
+            'topics': len(self._subscriptions_by_topic),
+        }
+        if self._writer is not None:
+            values['bag'] = self._writer.path
+        return (trouble if self.recording else ''), values
+
+    def close(self) -> None:
+        """Complete the bag."""
+        if self._writer is not None:
+            self.stop()
+
+    def _record(self, writer: BagWriter, topic: str, types: Sequence[str]) -> None:
+        publishers = self.get_publishers_info_by_topic(topic)
+        if not publishers:
+            return
+        try:
+            if len(types) > 1:
+                raise RecordingError(f'{topic} has several types: {", ".join(types)}')
+            message_type = message_class(types[0])
+            writer.add_topic(
+                topic,
+                types[0],
+                qos=recorded(publishers),
+                definition=installed_definition(types[0]),
+            )
+        except ArmidError as error:
+            self.complaints.say('topic', f'{topic} is not recorded: {error}')
+            return
+        channel = Channel(topic, is_stamped(message_type))
+        self._subscriptions_by_topic[topic] = MatchedSubscription(
+            self, message_type, topic, partial(self._on_message, channel), raw=True
+        )
+
+    def _on_message(self, channel: Channel, data: bytes) -> None:
+        writer = self._writer
+        if writer is None:
+            return
+        now = self.get_clock().now().nanoseconds
+        if now == 0:  # simulated time has not begun
+            if len(self._held) < _HELD:
+                self._held.append((channel, data))
+            else:
+                self.complaints.say('message', 'messages are lost: /clock has not begun')
+            return
+        if self._held:
+            self._write_held(writer, now)
+        self._write(writer, channel, data, now)
+
+    def _write_held(self, writer: BagWriter, now: int) -> None:
+        held, self._held = self._held, []
+        for channel, data in held:
+            self._write(writer, channel, data, now)
+
+    def _write(self, writer: BagWriter, channel: Channel, data: bytes, now: int) -> None:
+        sent = header_stamp(data) if channel.stamped else 0
+        try:
+            writer.write(channel.topic, data, now, sent or now)
+            self._count += 1
+        except OSError as error:
+            self.complaints.say('bag', f'{writer.path}: cannot be written: {error.strerror}')
+
+    def _flush(self) -> None:
+        if self._writer is not None:
+            self._writer.flush()
+
+    def _tell(self, text: str) -> str:
+        self.get_logger().info(text)
+        return text
+
+    def _next_path(self) -> Path:
+        name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
+        # The first bag must not exist; those of later ~/start are numbered.
+        path = Path(name).expanduser()
+        number = self._bags
+        while number and path.exists():
+            path = path.with_name(f'{Path(name).name}_{number}')
+            number += 1
+        return path
+
+    def _default_bag(self, path: Path) -> BagWriter:
+        return BagWriter(
+            path, chunk_age=self.value('chunk_age'), compression=self.value('compression')
+        )
+
+
+def header_stamp(data: bytes) -> int:
+    """Return the stamp of a serialised message that begins with a header [ns]; 0 if unset."""
+    seconds, nanoseconds = struct.unpack_from('<iI' if data[1] & 1 else '>iI', data, 4)
+    return int(seconds) * 10**9 + int(nanoseconds)
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    run(RecorderNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,140 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""One ROS context and executor a test, on a domain of its own, spun by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import os
+import time
+from typing import Any, TypeVar
+
+from armid_ros.nodes.domains import private_context
+from armid_ros.nodes.process import make_executor
+from armid_ros.nodes.qos import LATCHED
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+import pytest
+from rcl_interfaces.msg import Log
+from rclpy.context import Context
+from rclpy.executors import TimeoutException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
+
+AnyNode = TypeVar('AnyNode', bound=Node)
+
+#: Only reached when something is broken; nothing is asserted about how long things take.
+PATIENCE = 20.0
+#: A message published within this process is delivered at once; this is a thousand times more [s].
+QUIET = 0.02
+
+
+class Bench:
+    """A test bench: nodes under test, and a probe node to talk to them."""
+
+    def __init__(self, context: Context) -> None:
+        self.context = context
+        self.executor = make_executor('single', context)
+        self.probe = self.add(Node, node_name='probe')
+        self._clock = self.probe.create_publisher(Clock, '/clock', 10)
+
+    def add(self, make: Callable[..., AnyNode], *args: Any, **parameters: Any) -> AnyNode:
+        """Make a node on the bench; keywords are parameters, except node_name and namespace."""
+        ros = {k: parameters.pop(k) for k in ('node_name', 'namespace') if k in parameters}
+        node = make(
+            *args,
+            context=self.context,
+            use_global_arguments=False,
+            parameter_overrides=[Parameter(k, value=v) for k, v in parameters.items()],
+            **ros,
+        )
+        self.executor.add_node(node)
+        return node
+
+    def spin_until(self, predicate: Callable[[], object], what: str = 'the condition') -> None:
+        """Work until something holds."""
+        deadline = time.monotonic() + PATIENCE
+        while not predicate():
+            if time.monotonic() > deadline:
+                pytest.fail(f'{what} never came')
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def settle(self) -> None:
+        """Work until nothing is left to do."""
+        while True:
+            try:
+                handler, _, _ = self.executor.wait_for_ready_callbacks(timeout_sec=QUIET)
+            except TimeoutException:
+                return
+            handler()
+            if handler.exception() is not None:
+                raise handler.exception()
+
+    def listen(
+        self, message_type: type[Any], topic: str, qos: QoSProfile | int = 1000
+    ) -> list[Any]:
+        """Return a list that fills with the messages of a topic."""
+        messages: list[Any] = []
+        self.probe.create_subscription(message_type, topic, messages.append, qos)
+        return messages
+
+    def matched_publisher(
+        self, message_type: type[Any], topic: str, qos: QoSProfile | int = 1000, readers: int = 1
+    ) -> Any:
+        """Return a publisher that a node listens to."""
+        publisher = self.probe.create_publisher(message_type, topic, qos)
+        self.spin_until(lambda: publisher.get_subscription_count() >= readers, topic)
+        return publisher
+
+    def tick(self, nanoseconds: int) -> None:
+        """Set /clock, and wait until every node on simulated time has it."""
+        nodes = [
+            node for node in self.executor.get_nodes() if node.get_parameter('use_sim_time').value
+        ]
+        self.spin_until(lambda: self._clock.get_subscription_count() >= len(nodes), '/clock')
+        stamp = Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+        self._clock.publish(Clock(clock=stamp))
+        self.spin_until(
+            lambda: all(n.get_clock().now().nanoseconds == nanoseconds for n in nodes), '/clock'
+        )
+
+    def call(self, service: str) -> Trigger.Response:
+        """Call a Trigger service."""
+        client = self.probe.create_client(Trigger, service)
+        self.spin_until(client.service_is_ready, service)
+        future = client.call_async(Trigger.Request())
+        self.spin_until(future.done, f'the answer of {service}')
+        return future.result()
+
+    def rosout(self) -> list[Log]:
+        """Return a list that fills with what is logged from now on."""
+        messages = self.listen(Log, '/rosout', LATCHED)
+        return messages
+
+    def diagnostics(self) -> list[DiagnosticArray]:
+        """Return a list that fills with diagnostics."""
+        return self.listen(DiagnosticArray, '/diagnostics')
+
+
+@pytest.fixture(scope='session', autouse=True)
+def _localhost_only() -> None:
+    """Keep the tests off the network."""
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ.pop('ROS_LOCALHOST_ONLY', None)
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    """Return a test bench on a domain of its own."""
+    with private_context() as context:
+        bench = Bench(context)
+        yield bench
+        for node in list(bench.executor.get_nodes()):
+            bench.executor.remove_node(node)
+            if hasattr(node, 'close'):
+                node.close()
+            node.destroy_node()
+        bench.executor.shutdown()

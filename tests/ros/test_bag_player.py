@@ -1,0 +1,97 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The bag player publishes what a bag holds, when it was recorded."""
+
+from __future__ import annotations
+
+from armid_ros.errors import ArmidError
+from armid_ros.motion import Motion
+from armid_ros.nodes.bag_player import BagPlayerNode
+from armid_ros.nodes.qos import LATCHED
+from armid_ros.recording import write_recording
+import numpy as np
+import pytest
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+SECOND = 10**9
+JOINTS = ('a', 'b')
+STATES = ['joint_states']
+
+
+@pytest.fixture
+def bag(tmp_path):
+    t = np.arange(100) * 0.01
+    q = np.column_stack([t, -t])
+    motion = Motion(JOINTS, t, q, np.ones_like(q), np.zeros_like(q), 2.0 * q)
+    write_recording(
+        tmp_path / 'bag', motion, start_ns=7 * SECOND, robot_description='<robot name="r"/>'
+    )
+    return str(tmp_path / 'bag')
+
+
+def stamps(messages):
+    return [m.header.stamp.sec * SECOND + m.header.stamp.nanosec for m in messages]
+
+
+def test_all_messages_come_in_order(bench, bag):
+    states = bench.listen(JointState, 'joint_states')
+    descriptions = bench.listen(String, 'robot_description', LATCHED)
+    player = bench.add(BagPlayerNode, bag=bag, rate=100.0)
+    bench.spin_until(lambda: len(states) == 100 and descriptions)
+    assert stamps(states) == [7 * SECOND + k * SECOND // 100 for k in range(100)]
+    assert player.finished and player.played == 101
+    assert states[50].effort[0] == pytest.approx(1.0)
+
+
+def test_in_lock_step_what_is_due_depends_on_the_clock_alone(bench, bag):
+    states = bench.listen(JointState, 'joint_states')
+    player = bench.add(
+        BagPlayerNode, bag=bag, topics=STATES, use_sim_time=True, subscriber_timeout=20.0
+    )
+    for clock, due in ((1000.0, 1), (1000.1, 11), (1000.105, 11), (1000.5, 51), (1010.0, 100)):
+        bench.tick(round(clock * SECOND))
+        bench.spin_until(lambda due=due: len(states) >= due)
+        bench.settle()
+        assert len(states) == player.played == due
+
+
+def test_start_offset_leaves_out_the_beginning(bench, bag):
+    states = bench.listen(JointState, 'joint_states')
+    player = bench.add(BagPlayerNode, bag=bag, topics=STATES, rate=100.0, start_offset=0.495)
+    bench.spin_until(lambda: player.finished and len(states) == 50)
+    bench.settle()
+    assert stamps(states)[0] == 7 * SECOND + SECOND // 2
+
+
+def test_a_loop_begins_again(bench, bag):
+    states = bench.listen(JointState, 'joint_states')
+    player = bench.add(BagPlayerNode, bag=bag, topics=STATES, rate=100.0, loop=True)
+    bench.spin_until(lambda: len(states) > 250)
+    assert stamps(states)[100] == stamps(states)[0] and not player.finished
+
+
+def test_bag_time_is_published_as_the_clock(bench, bag):
+    clock = bench.listen(Clock, '/clock')
+    bench.listen(JointState, 'joint_states')
+    player = bench.add(BagPlayerNode, bag=bag, topics=STATES, rate=10.0, clock_rate=100.0)
+    bench.spin_until(lambda: player.finished)
+    times = [c.clock.sec + 1e-9 * c.clock.nanosec for c in clock]
+    assert times[0] >= 7.0 and np.all(np.diff(times) > 0.0)
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'message'),
+    [
+        ({}, 'give a bag'),
+        ({'bag': '/nowhere/bag'}, 'there is no such bag'),
+        ({'topics': ['effort']}, 'no topic /effort; there are /joint_states, /robot_description'),
+        ({'clock_rate': 10.0, 'use_sim_time': True}, 'follows /clock'),
+    ],
+)
+def test_what_cannot_be_played_is_said(bench, bag, parameters, message):
+    if parameters and 'bag' not in parameters:
+        parameters = {'bag': bag, **parameters}
+    with pytest.raises(ArmidError, match=message):
+        bench.add(BagPlayerNode, **parameters)

@@ -1,0 +1,87 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every parameter of every node is described, checked, and refused with what to do instead."""
+
+from __future__ import annotations
+
+from armid_ros.nodes.base import EXECUTOR
+from armid_ros.nodes.parameters import declare, NodeParameter, ParameterError
+from armid_ros.nodes.recorder import RecorderNode
+import pytest
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+TABLE = (
+    NodeParameter('rate', 100.0, 'How often.', 'Hz', lower=1.0, upper=1000.0, read_only=False),
+    NodeParameter('count', 3, 'How many.', lower=1, upper=9, read_only=False),
+    NodeParameter('kind', 'a', 'Which.', choices=('a', 'b'), read_only=False),
+    NodeParameter('fixed', True, 'Whether.'),
+    NodeParameter('names', [''], 'Who.'),
+)
+
+
+class Declared(Node):
+    def __init__(self, **kwargs):
+        super().__init__('declared', **kwargs)
+        declare(self, TABLE)
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'advice'),
+    [
+        ('rate', 100, r"'rate' cannot be 100 of type INTEGER; use 100\.0"),
+        ('rate', 5000.0, r"'rate' is 5000\.0, outside its range 1 to 1000 Hz"),
+        ('rate', float('nan'), "'rate' is nan, outside its range"),
+        ('rate', 'fast', 'use a number'),
+        ('count', 2.0, 'use a value such as 3'),
+        ('count', 10, 'outside its range 1 to 9'),
+        ('kind', 'c', "'kind' is 'c', not one of a, b"),
+        ('kind', 7, 'quote it'),
+        ('fixed', 1, 'use a value such as true'),
+    ],
+)
+def test_a_wrong_override_is_refused_with_what_to_write(bench, name, value, advice):
+    with pytest.raises(ParameterError, match=advice) as error:
+        bench.add(Declared, **{name: value})
+    assert '\n' not in str(error.value)
+
+
+def test_descriptors_hold_unit_range_choices_and_read_only(bench):
+    node = bench.add(Declared)
+    rate, kind, fixed = (node.describe_parameter(name) for name in ('rate', 'kind', 'fixed'))
+    assert '[Hz]' in rate.description
+    assert rate.floating_point_range[0].to_value == 1000.0
+    assert 'One of: a, b.' in kind.description
+    assert fixed.read_only and not rate.read_only
+
+
+def test_a_valid_value_is_taken_while_running_and_an_invalid_one_is_not(bench):
+    node = bench.add(Declared)
+    results = node.set_parameters(
+        [
+            Parameter('rate', value=50.0),
+            Parameter('rate', value=0.5),
+            Parameter('kind', value='c'),
+            Parameter('fixed', value=False),
+        ]
+    )
+    assert [r.successful for r in results] == [True, False, False, False]
+    assert node.get_parameter('rate').value == 50.0
+    assert all(r.reason for r in results[1:])
+
+
+def test_a_refused_parameter_is_said_on_rosout_and_counted_on_diagnostics(bench, tmp_path):
+    rosout, diagnostics = bench.rosout(), bench.diagnostics()
+    node = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), topics=['nothing'])
+    for _ in range(3):
+        node.set_parameters([Parameter('chunk_age', value=100.0)])
+    node.publish_diagnostics()
+    bench.spin_until(lambda: any('chunk_age' in m.msg for m in rosout), 'the complaint')
+    bench.spin_until(lambda: diagnostics, 'diagnostics')
+    values = {v.key: v.value for v in diagnostics[-1].status[0].values}
+    assert values['rejected parameter'] == '3'
+    assert sum('chunk_age' in m.msg for m in rosout) == 1
+
+
+def test_every_node_has_an_executor_choice():
+    assert EXECUTOR.objection('many') and not EXECUTOR.objection('events')
