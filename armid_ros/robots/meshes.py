@@ -25,6 +25,8 @@ import numpy as np
 
 SLABS = 12
 GROWTH = 1.1  # volume of a hull over what it stands for: less is close enough
+FLAT = 1e-5  # thickness over length of points that span no volume
+NO_VOLUME = (RuntimeError, ValueError)  # what comes of points that a hull cannot be made of
 
 
 def find_mesh(name: str, urdf: Path | None) -> Path | None:
@@ -44,9 +46,9 @@ def find_mesh(name: str, urdf: Path | None) -> Path | None:
     return next((path for path in candidates if path.is_file()), None)
 
 
-def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.ConvexBase, ...]:
+def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry, ...]:
     """
-    Return convex bodies that together contain a mesh and little else.
+    Return convex bodies that together contain a mesh and little else; a flat mesh stays one.
 
     Parameters
     ----------
@@ -58,7 +60,7 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.ConvexBase, ...]:
     Raises
     ------
     RobotError
-        If the file is no mesh, or the mesh is flat.
+        If the file is no mesh.
 
     """
     try:
@@ -68,8 +70,8 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.ConvexBase, ...]:
     vertices = np.array(mesh.vertices())
     try:
         whole = _hull(vertices)
-    except RuntimeError:
-        raise RobotError(f'{path}: the mesh is flat; a collision body needs a volume') from None
+    except NO_VOLUME:
+        return (mesh,)
     if whole.computeVolume() < GROWTH * abs(mesh.computeVolume()):
         return (whole,)
     faces = [mesh.tri_indices(number) for number in range(mesh.num_tris)]
@@ -90,7 +92,7 @@ def _slabs(triangles: FloatArray, axis: FloatArray) -> tuple[coal.ConvexBase, ..
         try:
             hulls.append(_hull(points))
             thin = np.empty((0, 3))
-        except RuntimeError:
+        except NO_VOLUME:
             thin = points
     if len(thin) > 0:
         hulls.append(_hull(np.vstack([hulls.pop().points(), thin])))
@@ -142,7 +144,12 @@ def _slab(triangles: FloatArray, along: FloatArray, low: float, high: float) -> 
 
 
 def _hull(points: FloatArray) -> coal.ConvexBase:
-    """Convex hull of points, shape (k, 3); RuntimeError when they have none."""
+    """Convex hull of points, shape (k, 3); ValueError when they are flat, which kills qhull."""
+    if len(points) < 4:
+        raise ValueError('fewer than four points')
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if spread[2] < FLAT * spread[0]:
+        raise ValueError('points in a plane')
     corners = coal.StdVec_Vec3s()
     corners.extend(list(np.unique(points, axis=0)))
     return coal.Convex.convexHull(corners, True, 'Qt')

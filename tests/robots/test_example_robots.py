@@ -1,0 +1,117 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Arms of other people: each loads as it is, and its regressor is its dynamics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+from armid_ros.robots import load_robot, Robot
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+ARMS = {
+    'TwoDofs.urdf': 2,
+    'borinot_flying_arm_2.urdf': 2,
+    'double_pendulum.urdf': 2,
+    'double_pendulum_continuous.urdf': 2,
+    'double_pendulum_simple.urdf': 2,
+    'finger_edu.urdf': 3,
+    'hextilt_flying_arm_5.urdf': 5,
+    'kinova.urdf': 6,
+    'panda.urdf': 7,
+    'panda_collision.urdf': 7,
+    'so100.urdf': 5,
+    'so101.urdf': 5,
+    'talos_left_arm.urdf': 6,
+    'tiago_no_hand.urdf': 12,
+    'ur3_robot.urdf': 6,
+    'ur3_gripper.urdf': 6,
+    'ur3_joint_limited_robot.urdf': 6,
+    'ur5_robot.urdf': 6,
+    'ur5_gripper.urdf': 6,
+    'ur5_joint_limited_robot.urdf': 6,
+    'ur10_robot.urdf': 6,
+    'ur10_joint_limited_robot.urdf': 6,
+    'xarm7.urdf': 7,
+    'z1.urdf': 6,
+    'baxter.urdf': 15,
+}
+
+FindRobot = Callable[[str], Path]
+
+
+def random_states(robot: Robot, count: int) -> np.ndarray:
+    """Return q, dq, ddq of each sample, shape (count, 3, n)."""
+    states = np.random.default_rng(3).standard_normal((count, 3, robot.n_joints))
+    return states * np.array((2.0, 3.0, 10.0))[:, None]
+
+
+@pytest.mark.parametrize(('name', 'n_joints'), ARMS.items())
+def test_regressor_times_parameters_is_inverse_dynamics(
+    name: str, n_joints: int, example_robot: FindRobot
+) -> None:
+    robot = load_robot(example_robot(name), gravity=(0.5, -3.0, -9.0))
+    assert robot.n_joints == robot.model.nq == robot.model.nv == n_joints
+    data = robot.model.createData()
+    for q, dq, ddq in random_states(robot, 20):
+        tau = pin.rnea(robot.model, data, q, dq, ddq).copy()
+        regressor = pin.computeJointTorqueRegressor(robot.model, data, q, dq, ddq)
+        error = np.linalg.norm(regressor @ robot.rigid_parameters - tau)
+        assert error <= 1e-9 * np.linalg.norm(tau)
+
+
+@pytest.mark.parametrize('name', ['panda.urdf', 'kinova.urdf', 'ur10_robot.urdf', 'z1.urdf'])
+def test_an_independent_engine_computes_the_same_torques(
+    name: str, example_robot: FindRobot
+) -> None:
+    gravity = (0.5, -3.0, -9.0)
+    robot = load_robot(example_robot(name), gravity=gravity)
+    other = mujoco.MjModel.from_xml_string(without_shapes(robot.urdf))
+    other.opt.gravity[:] = gravity
+    other.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    other.dof_damping[:] = 0.0
+    other.dof_frictionloss[:] = 0.0
+    dofs = [int(other.joint(joint).dofadr[0]) for joint in robot.joints]
+    data, state = robot.model.createData(), mujoco.MjData(other)
+    for q, dq, ddq in random_states(robot, 20):
+        state.qpos[dofs], state.qvel[dofs], state.qacc[dofs] = q, dq, ddq
+        mujoco.mj_inverse(other, state)
+        tau = pin.rnea(robot.model, data, q, dq, ddq)
+        np.testing.assert_allclose(
+            tau, state.qfrc_inverse[dofs], atol=1e-6 * np.abs(tau).max(), rtol=0.0
+        )
+
+
+def without_shapes(urdf: str) -> str:
+    root = ElementTree.fromstring(urdf)
+    for link in root.findall('link'):
+        for shape in [*link.findall('visual'), *link.findall('collision')]:
+            link.remove(shape)
+    return ElementTree.tostring(root, encoding='unicode')
+
+
+def test_the_panda_is_seven_joints_and_a_closed_hand(example_robot: FindRobot) -> None:
+    robot = load_robot(example_robot('panda.urdf'))
+    assert robot.joints == tuple(f'panda_joint{number}' for number in range(1, 8))
+    assert robot.links == tuple(f'panda_link{number}' for number in range(1, 8))
+    assert any('panda_finger_joint2' in note and 'locked at 0 m' in note for note in robot.notes)
+
+
+def test_locked_joints_add_their_links_to_the_body_that_carries_them(
+    example_robot: FindRobot,
+) -> None:
+    path = example_robot('panda.urdf')
+    whole, shorter = load_robot(path), load_robot(path, joints=['panda_joint2', 'panda_joint4'])
+    moved = sum(body.mass for body in list(whole.model.inertias)[2:])
+    assert sum(body.mass for body in list(shorter.model.inertias)[1:]) == pytest.approx(moved)
+
+
+def test_a_link_may_have_the_name_of_its_joint(example_robot: FindRobot) -> None:
+    everything = ('shoulder_pan', 'shoulder_lift', 'elbow_flex', 'wrist_flex', 'wrist_roll')
+    robot = load_robot(example_robot('so100.urdf'), joints=(*everything, 'gripper'))
+    assert robot.joints == (*everything, 'gripper')

@@ -1,0 +1,124 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The shipped humanoid arm is the one of the literature."""
+
+from __future__ import annotations
+
+from armid_ros.robots import load_robot, Robot, shipped_robots
+import numpy as np
+import pinocchio as pin
+import pytest
+
+ARMS = ('humanoid_arm', 'humanoid_arm_loaded')
+MASSES = (0.8, 0.7, 0.5, 0.3, 0.3, 0.2)  # kg
+CENTROIDS = (  # m, in the link frames
+    (0.0005, 0.0035, -0.070),
+    (0.0015, 0.0040, 0.0050),
+    (0.0055, 0.0130, 0.150),
+    (0.0075, -0.030, 0.0045),
+    (0.0035, 0.0110, 0.100),
+    (0.0020, 0.0055, 0.0030),
+)
+HANGING = np.radians((90.0, -90.0, 0.0, 0.0, 0.0, 0.0))
+
+
+def largest_holding_torque(robot: Robot, joint: int) -> float:
+    """
+    Largest torque that holds a joint against gravity, over all poses.
+
+    As a function of one position the torque is a + b cos q + c sin q, so that three values give
+    its extremes exactly; going through the joints from several poses finds the largest.
+
+    """
+    data = robot.model.createData()
+
+    def torque(q: np.ndarray) -> float:
+        return float(pin.computeGeneralizedGravity(robot.model, data, q)[joint])
+
+    largest = 0.0
+    for pose in np.random.default_rng(7).uniform(-np.pi, np.pi, (12, robot.n_joints)):
+        for sign in (1.0, -1.0):
+            q = pose.copy()
+            for moved in list(range(robot.n_joints)) * 25:
+                values = []
+                for position in (0.0, np.pi / 2.0, np.pi):
+                    q[moved] = position
+                    values.append(torque(q))
+                mean = (values[0] + values[2]) / 2.0
+                q[moved] = np.arctan2(sign * (values[1] - mean), sign * (values[0] - mean))
+            largest = max(largest, sign * torque(q))
+    return largest
+
+
+@pytest.mark.parametrize(
+    ('name', 'published'),
+    [
+        ('humanoid_arm', (762.8, 761.9, 147.01, 141.58, 7.27, 1.90)),
+        ('humanoid_arm_loaded', (1057.0, 1056.2, 270.85, 265.81, 10.10, 4.74)),
+    ],
+)
+def test_largest_lunar_torques_are_those_published(
+    name: str, published: tuple[float, ...]
+) -> None:
+    robot = load_robot(name, gravity='moon')
+    largest = [1000.0 * largest_holding_torque(robot, joint) for joint in range(6)]
+    digits = [len(str(value).split('.')[1]) for value in published]
+    rounding = [0.51 * 10.0**-digit for digit in digits]
+    assert np.all(np.abs(np.subtract(largest, published)) < rounding), largest
+
+
+def test_masses_and_centroids() -> None:
+    bodies = list(load_robot('humanoid_arm').model.inertias)[1:]
+    np.testing.assert_allclose([body.mass for body in bodies], MASSES, rtol=1e-12)
+    np.testing.assert_allclose([body.lever for body in bodies], CENTROIDS, atol=1e-12)
+    assert sum(body.mass for body in bodies) == pytest.approx(2.8)
+
+
+def test_the_load_is_in_the_hand_and_leaves_its_centroid() -> None:
+    empty, loaded = (list(load_robot(name).model.inertias) for name in ARMS)
+    assert loaded[6].mass == pytest.approx(0.5)
+    np.testing.assert_allclose(loaded[6].lever, CENTROIDS[5], atol=1e-12)
+    for before, after in zip(empty[1:6], loaded[1:6], strict=True):
+        np.testing.assert_array_equal(before.toDynamicParameters(), after.toDynamicParameters())
+
+
+def test_at_zero_the_arm_is_stretched_sideways_and_the_first_axis_is_lateral() -> None:
+    robot = load_robot('humanoid_arm')
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, np.zeros(6))
+    np.testing.assert_allclose(data.oMi[1].rotation[:, 2], (0.0, 1.0, 0.0), atol=1e-12)
+    shoulder, elbow, wrist = (data.oMi[joint].translation for joint in (1, 3, 6))
+    np.testing.assert_allclose(elbow - shoulder, (0.0, -0.35, 0.0), atol=1e-12)
+    np.testing.assert_allclose(wrist - shoulder, (0.0, -0.60, 0.0), atol=1e-12)
+
+
+def test_hanging_pose_points_straight_down() -> None:
+    robot = load_robot('humanoid_arm')
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, HANGING)
+    arm = data.oMi[6].translation - data.oMi[1].translation
+    np.testing.assert_allclose(arm, (0.0, 0.0, -0.6), atol=1e-12)
+    assert np.all((robot.lower < HANGING) & (HANGING < robot.upper))
+
+
+@pytest.mark.parametrize('name', ARMS)
+def test_every_link_could_exist(name: str) -> None:
+    robot = load_robot(name)
+    assert robot.notes == ()
+    for body in list(robot.model.inertias)[1:]:
+        pseudo = body.toPseudoInertia().toMatrix()
+        assert np.linalg.eigvalsh(pseudo).min() > 0.0
+
+
+@pytest.mark.parametrize('name', ARMS)
+def test_motors_hold_the_arm_on_earth_with_a_margin(name: str) -> None:
+    robot = load_robot(name, gravity='earth')
+    holding = [largest_holding_torque(robot, joint) for joint in range(6)]
+    assert np.all(robot.torque_limit > 1.5 * np.array(holding))
+
+
+def test_what_is_shipped_loads_under_its_name() -> None:
+    assert set(ARMS) <= set(shipped_robots())
+    for name, description in shipped_robots().items():
+        assert load_robot(name).name == name
+        assert description

@@ -1,0 +1,333 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What becomes of a description: which joints are driven, what is refused and in which words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import RobotError
+from armid_ros.robots import load_robot, parse_gravity, robot_from_urdf
+import numpy as np
+import pinocchio as pin
+import pytest
+
+INERTIAL = (
+    '<inertial><origin xyz="0.1 0.02 -0.03"/><mass value="1.5"/>'
+    '<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.015"/></inertial>'
+)
+LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="40"/>'
+
+
+def link(name: str, inside: str = INERTIAL) -> str:
+    return f'<link name="{name}">{inside}</link>\n'
+
+
+def joint(name: str, parent: str, child: str, kind: str = 'revolute', inside: str = LIMIT) -> str:
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="0 0 0.3" rpy="0.2 0 0"/><axis xyz="0 1 0"/>{inside}</joint>\n'
+    )
+
+
+def robot(*elements: str) -> str:
+    return f'<robot name="made_by_hand">\n{"".join(elements)}</robot>'
+
+
+BASE = link('base', '')
+ARM = BASE + link('upper') + joint('shoulder', 'base', 'upper')
+FOREARM = link('lower') + joint('elbow', 'upper', 'lower')
+TWO_LINKS = robot(ARM, FOREARM)
+LOOP = TWO_LINKS.replace('parent link="base"', 'parent link="lower"')
+
+
+def inverse_dynamics(arm: Any, *state: float) -> np.ndarray:
+    """Joint torques of one driven joint at q, dq, ddq."""
+    q, dq, ddq = (np.full(arm.n_joints, value) for value in state)
+    return np.array(pin.rnea(arm.model, arm.model.createData(), q, dq, ddq))
+
+
+class TestKinds:
+    def test_limits_and_links_are_the_descriptions(self) -> None:
+        arm = robot_from_urdf(TWO_LINKS)
+        assert arm.name == 'made_by_hand'
+        assert (arm.joints, arm.links) == (('shoulder', 'elbow'), ('upper', 'lower'))
+        np.testing.assert_array_equal(arm.lower, (-1.0, -1.0))
+        np.testing.assert_array_equal(arm.upper, (2.0, 2.0))
+        np.testing.assert_array_equal(arm.velocity_limit, (3.0, 3.0))
+        np.testing.assert_array_equal(arm.torque_limit, (40.0, 40.0))
+        assert arm.torque_units == ('N m', 'N m')
+
+    def test_a_continuous_joint_is_a_revolute_one_without_position_limits(self) -> None:
+        turning = robot(ARM, link('lower'), joint('elbow', 'upper', 'lower', 'continuous'))
+        arm, limited = robot_from_urdf(turning), robot_from_urdf(TWO_LINKS)
+        assert arm.model.nq == 2
+        assert (arm.lower[1], arm.upper[1]) == (-np.inf, np.inf)
+        assert arm.velocity_limit[1] == 3.0
+        np.testing.assert_array_equal(
+            inverse_dynamics(arm, 4.0, 1.0, 2.0), inverse_dynamics(limited, 4.0, 1.0, 2.0)
+        )
+
+    def test_a_prismatic_joint_lifts_what_it_carries(self) -> None:
+        lift = joint('lift', 'base', 'car', 'prismatic').replace('0 1 0', '0 0 2')
+        arm = robot_from_urdf(robot(BASE, link('car'), lift.replace('rpy="0.2 0 0"', '')))
+        assert arm.prismatic.tolist() == [True]
+        assert (arm.position_units, arm.torque_units) == (('m',), ('N',))
+        np.testing.assert_allclose(inverse_dynamics(arm, 0.5, 0.0, 2.0), 1.5 * (9.81 + 2.0))
+
+    def test_links_behind_fixed_joints_belong_to_the_body_before_them(self) -> None:
+        tool = link('tool') + joint('flange', 'lower', 'tool', 'fixed', '')
+        frame = link('tool0', '') + joint('mount', 'tool', 'tool0', 'fixed', '')
+        arm = robot_from_urdf(robot(ARM, FOREARM, tool, frame))
+        assert arm.n_joints == 2
+        assert arm.model.inertias[2].mass == pytest.approx(3.0)
+
+    def test_friction_and_damping_are_kept_but_do_not_act(self) -> None:
+        rubbing = '<dynamics damping="0.7" friction="0.2"/>' + LIMIT
+        arm = robot_from_urdf(
+            robot(BASE, link('upper'), joint('shoulder', 'base', 'upper', inside=rubbing))
+        )
+        assert (arm.urdf_damping[0], arm.urdf_friction[0]) == (0.7, 0.2)
+        for effect in (arm.model.damping, arm.model.friction, arm.model.armature):
+            assert not np.any(effect)
+
+    @pytest.mark.parametrize(
+        'limit',
+        ['', '<limit effort="0" velocity="0"/>', '<limit lower="0" upper="0"/>'],
+    )
+    def test_a_limit_that_is_not_given_is_infinite_and_noted(self, limit: str) -> None:
+        loose = joint('shoulder', 'base', 'upper', inside=limit)
+        arm = robot_from_urdf(robot(BASE, link('upper'), loose))
+        assert (arm.lower[0], arm.upper[0]) == (-np.inf, np.inf)
+        assert arm.velocity_limit[0] == arm.torque_limit[0] == np.inf
+        assert any("'shoulder'" in note and 'unlimited' in note for note in arm.notes)
+
+    def test_an_impossible_inertia_is_noted_by_name(self) -> None:
+        needle = link('upper', INERTIAL.replace('iyy="0.02"', 'iyy="0.5"'))
+        arm = robot_from_urdf(robot(BASE, needle, joint('shoulder', 'base', 'upper')))
+        assert any("link 'upper'" in note and 'triangle' in note for note in arm.notes)
+
+
+class TestDrivenJoints:
+    def test_named_joints_come_in_the_robots_own_order(self) -> None:
+        arm = robot_from_urdf(TWO_LINKS, joints=['elbow', 'shoulder'])
+        assert arm.joints == ('shoulder', 'elbow')
+
+    def test_a_joint_left_out_is_locked_where_zero_or_its_nearest_limit_is(self) -> None:
+        bent = joint('elbow', 'upper', 'lower', inside=LIMIT.replace('-1', '0.5'))
+        arm = robot_from_urdf(robot(ARM, link('lower'), bent), joints=['shoulder'])
+        both = robot_from_urdf(robot(ARM, link('lower'), bent))
+        assert any("'elbow'" in note and '0.5 rad' in note for note in arm.notes)
+        torque = pin.rnea(
+            both.model, both.model.createData(), np.array([0.4, 0.5]), np.zeros(2), np.zeros(2)
+        )
+        np.testing.assert_allclose(inverse_dynamics(arm, 0.4, 0.0, 0.0)[0], torque[0], rtol=1e-12)
+
+    def test_a_gripper_is_not_driven_unless_named(self) -> None:
+        gripper = link('pad') + joint('gripper_slide', 'lower', 'pad', 'prismatic')
+        text = robot(ARM, FOREARM, gripper)
+        assert robot_from_urdf(text).joints == ('shoulder', 'elbow')
+        named = ('shoulder', 'elbow', 'gripper_slide')
+        assert robot_from_urdf(text, joints=named).joints == named
+
+    def test_a_joint_of_the_arm_may_have_finger_in_its_name(self) -> None:
+        text = robot(ARM, FOREARM).replace('name="shoulder"', 'name="finger_swing"')
+        assert robot_from_urdf(text).joints == ('finger_swing', 'elbow')
+
+    def test_mimic_joints_and_what_they_follow_make_a_gripper(self) -> None:
+        mimic = '<mimic joint="left" multiplier="-1" offset="0.1"/>' + LIMIT
+        hand = (
+            link('one')
+            + joint('left', 'lower', 'one')
+            + link('two')
+            + joint('right', 'lower', 'two', inside=mimic)
+        )
+        arm = robot_from_urdf(robot(ARM, FOREARM, hand))
+        assert arm.joints == ('shoulder', 'elbow')
+        assert any("'right'" in note and 'locked at 0.1 rad' in note for note in arm.notes)
+
+    def test_a_mimic_joint_within_the_arm_is_refused(self) -> None:
+        mimic = '<mimic joint="shoulder"/>' + LIMIT
+        linked = link('lower') + joint('elbow', 'upper', 'lower', inside=mimic)
+        wrist = link('hand') + joint('wrist', 'lower', 'hand')
+        with pytest.raises(RobotError, match="'elbow' mimics the driven joint 'shoulder'"):
+            robot_from_urdf(robot(ARM, linked, wrist))
+        with pytest.raises(RobotError, match="'elbow' mimics another one"):
+            robot_from_urdf(robot(ARM, linked, wrist), joints=['elbow'])
+
+    @pytest.mark.parametrize(
+        ('joints', 'message'),
+        [
+            (['elbo'], "no joint is named 'elbo'; joints to drive: shoulder, elbow"),
+            (['elbow', 'elbow'], "'elbow' is named twice"),
+            ([], 'needs one at least'),
+            (['flange'], "'flange' is fixed; joints to drive: shoulder, elbow"),
+        ],
+    )
+    def test_names_that_cannot_be_driven(self, joints: list[str], message: str) -> None:
+        tool = link('tool') + joint('flange', 'lower', 'tool', 'fixed', '')
+        with pytest.raises(RobotError, match=message):
+            robot_from_urdf(robot(ARM, FOREARM, tool), joints=joints)
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ('text', 'message'),
+        [
+            ('<robot name="r">\n<link name="a">\n</robot>', 'malformed XML at line 3'),
+            ('<mujoco/>', 'root element is <mujoco>, not <robot>'),
+            ('<robot name="r"/>', 'it has no links'),
+            (robot(link('base', ''), link('base', '')), "two links are named 'base'"),
+            (robot(ARM, joint('shoulder', 'base', 'upper')), "two joints are named 'shoulder'"),
+            (robot(ARM, joint('elbow', 'upper', 'hand')), "'elbow' has the child link 'hand'"),
+            (robot(ARM, link('loose')), r'2 links have no parent \(base, loose\)'),
+            (robot(ARM, joint('again', 'base', 'upper')), "'upper' is the child of two joints"),
+            (LOOP, "'upper' is part of a closed loop"),
+            (robot(ARM, link('l'), joint('free', 'upper', 'l', 'floating')), "'free' is floating"),
+            (robot(ARM, link('l'), joint('slide', 'upper', 'l', 'planar')), "'slide' is planar"),
+            (robot(ARM, link('l'), joint('odd', 'upper', 'l', 'hinge')), "has the type 'hinge'"),
+            (robot(ARM).replace('0 1 0', '0 0 0'), "axis of joint 'shoulder' has no direction"),
+            (robot(ARM).replace('0 1 0', '0 1'), "joint 'shoulder': xyz='0 1' of <axis>"),
+            (robot(ARM).replace('lower="-1"', 'lower="3"'), "'shoulder' has its lower limit 3"),
+            (robot(ARM).replace('"1.5"', '"heavy"'), "link 'upper': value='heavy' of <mass>"),
+            (robot(ARM).replace('<mass value="1.5"/>', ''), "of link 'upper' has no <mass>"),
+            (robot(BASE), 'no joint can be driven'),
+            (
+                robot(ARM, link('lower', ''), joint('elbow', 'upper', 'lower')),
+                "link 'lower', moved by joint 'elbow', has no <inertial>",
+            ),
+        ],
+    )
+    def test_by_name(self, text: str, message: str) -> None:
+        with pytest.raises(RobotError, match=message):
+            robot_from_urdf(text)
+
+    def test_a_massless_link_within_the_arm_is_no_reason(self) -> None:
+        wrist = link('cross', '') + joint('roll', 'upper', 'cross')
+        hand = link('hand') + joint('pitch', 'cross', 'hand')
+        assert robot_from_urdf(robot(ARM, wrist, hand)).joints == ('shoulder', 'roll', 'pitch')
+
+
+class TestSources:
+    def test_a_file_and_its_text_are_the_same_robot(self, tmp_path: Path) -> None:
+        path = tmp_path / 'arm.urdf'
+        path.write_text(TWO_LINKS)
+        from_file, from_text = load_robot(path), load_robot(TWO_LINKS)
+        np.testing.assert_array_equal(from_file.rigid_parameters, from_text.rigid_parameters)
+        assert from_file.urdf == from_text.urdf
+        assert from_file.path == path
+
+    def test_an_unknown_name_lists_what_is_shipped(self) -> None:
+        with pytest.raises(RobotError, match=r'humanoid.*shipped are humanoid_arm, '):
+            load_robot('humanoid')
+
+    def test_a_file_that_is_no_text(self, tmp_path: Path) -> None:
+        path = tmp_path / 'arm.urdf'
+        path.write_bytes(b'\xff\xfe\x00\x9d')
+        with pytest.raises(RobotError, match='cannot be read as text'):
+            load_robot(path)
+
+    def test_xacro_with_arguments_and_an_include(self, tmp_path: Path) -> None:
+        (tmp_path / 'forearm.xacro').write_text(robot(FOREARM))
+        heavy = ARM.replace('"1.5"', '"${2 * mass}"')
+        xacro = (
+            '<robot name="made_by_hand" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+            '<xacro:arg name="mass" default="1"/><xacro:property name="mass" value="$(arg mass)"/>'
+            f'{heavy}<xacro:include filename="forearm.xacro"/></robot>'
+        )
+        path = tmp_path / 'arm.urdf.xacro'
+        path.write_text(xacro)
+        assert load_robot(path).model.inertias[1].mass == pytest.approx(2.0)
+        arm = load_robot(path, xacro_arguments={'mass': '4'})
+        assert arm.model.inertias[1].mass == pytest.approx(8.0)
+        assert 'xacro:' not in arm.urdf
+
+    def test_xacro_that_does_not_expand(self, tmp_path: Path) -> None:
+        path = tmp_path / 'arm.xacro'
+        path.write_text(robot(ARM).replace('"1.5"', '"${mass}"'))
+        with pytest.raises(RobotError, match=r'arm.xacro: xacro: .*mass'):
+            load_robot(path)
+
+    def test_arguments_for_a_file_that_takes_none(self, tmp_path: Path) -> None:
+        path = tmp_path / 'arm.urdf'
+        path.write_text(TWO_LINKS)
+        with pytest.raises(RobotError, match='not a xacro file'):
+            load_robot(path, xacro_arguments={'mass': '4'})
+
+
+class TestGravity:
+    @pytest.mark.parametrize(
+        ('value', 'vector'),
+        [
+            ('earth', (0.0, 0.0, -9.81)),
+            ('Moon', (0.0, 0.0, -1.62)),
+            ('0, 1.5,-9', (0.0, 1.5, -9.0)),
+            ([0, 0, 3.7], (0.0, 0.0, 3.7)),
+        ],
+    )
+    def test_as_people_write_it(self, value: Any, vector: tuple[float, ...]) -> None:
+        np.testing.assert_array_equal(parse_gravity(value), vector)
+        np.testing.assert_array_equal(robot_from_urdf(TWO_LINKS, gravity=value).gravity, vector)
+
+    @pytest.mark.parametrize('value', ['mars', '1,2', '1,2,nan', (1.0, 2.0), 9.81, None])
+    def test_what_is_no_gravity_is_refused(self, value: Any) -> None:
+        with pytest.raises(RobotError, match='gravity'):
+            parse_gravity(value)
+
+    def test_another_gravity_is_another_robot(self) -> None:
+        earth = robot_from_urdf(TWO_LINKS)
+        moon = earth.with_gravity((0.0, 0.0, -1.62))
+        ratio = inverse_dynamics(moon, 0.3, 0.0, 0.0) / inverse_dynamics(earth, 0.3, 0.0, 0.0)
+        np.testing.assert_allclose(ratio, 1.62 / 9.81)
+        np.testing.assert_array_equal(earth.gravity, (0.0, 0.0, -9.81))
+
+
+class TestRigidParameters:
+    def test_they_come_back_as_they_were_given(self) -> None:
+        arm = robot_from_urdf(TWO_LINKS)
+        wanted = arm.rigid_parameters * np.linspace(0.5, 2.0, 20)
+        before = arm.rigid_parameters
+        np.testing.assert_allclose(arm.with_inertias(wanted).rigid_parameters, wanted, rtol=1e-12)
+        np.testing.assert_array_equal(arm.rigid_parameters, before)
+
+    def test_dynamics_are_linear_in_them_even_without_mass(self) -> None:
+        arm = robot_from_urdf(TWO_LINKS)
+        state = (0.3, 1.0, -2.0)
+        sum_of_each = np.zeros(2)
+        for number, value in enumerate(arm.rigid_parameters):
+            alone = np.zeros(20)
+            alone[number] = value
+            moment = number % 10 in (1, 2, 3)
+            alone[number - number % 10] += 1.0 if moment else 0.0
+            torque = inverse_dynamics(arm.with_inertias(alone), *state)
+            if moment:
+                alone[number] = 0.0
+                torque -= inverse_dynamics(arm.with_inertias(alone), *state)
+            sum_of_each += torque
+        np.testing.assert_allclose(sum_of_each, inverse_dynamics(arm, *state), rtol=1e-10)
+
+    def test_a_moment_without_a_mass_is_refused(self) -> None:
+        arm = robot_from_urdf(TWO_LINKS)
+        without_mass = np.array(arm.rigid_parameters)
+        without_mass[10] = 0.0
+        with pytest.raises(RobotError, match="link 'lower'"):
+            arm.with_inertias(without_mass)
+
+    def test_a_wrong_number_of_them_is_refused(self) -> None:
+        with pytest.raises(RobotError, match='20 finite numbers'):
+            robot_from_urdf(TWO_LINKS).with_inertias(np.ones(19))
+
+
+def test_arrays_cannot_be_written_to() -> None:
+    arm = robot_from_urdf(TWO_LINKS)
+    for values in (arm.lower, arm.prismatic, arm.gravity, arm.rigid_parameters):
+        with pytest.raises(ValueError, match='read-only'):
+            values[0] = 1
+
+
+def test_an_unknown_joint_is_answered_with_those_that_exist() -> None:
+    arm = robot_from_urdf(TWO_LINKS)
+    assert arm.index('elbow') == 1
+    with pytest.raises(RobotError, match='its driven joints are shoulder, elbow'):
+        arm.index('elbo')
