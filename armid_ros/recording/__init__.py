@@ -18,8 +18,14 @@ from armid_ros.recording.joint_state_encoder import (
 from armid_ros.recording.qos import LATCHED, QosProfile
 from armid_ros.recording.reader import read_recording
 from armid_ros.recording.recording import Gap, ReadReport, Recording
+from armid_ros.recording.recover import recover, RecoveryReport
 from armid_ros.recording.source import RawMessage, Topic
 from armid_ros.recording.string_message import read_robot_description, string_cdr
+from armid_ros.recording.trajectory import (
+    joint_trajectory_cdr,
+    read_joint_trajectory,
+    write_joint_trajectory,
+)
 from armid_ros.recording.writer import BagWriter
 
 __all__ = [
@@ -32,6 +38,11 @@ __all__ = [
     'BagWriter',
     'QosProfile',
     'LATCHED',
+    'joint_trajectory_cdr',
+    'write_joint_trajectory',
+    'read_joint_trajectory',
+    'recover',
+    'RecoveryReport',
     'write_joint_states',
     'joint_state_cdr',
     'string_cdr',

@@ -119,6 +119,20 @@ class BagWriter:
         """Complete the bag."""
         self.close()
 
+    @property
+    def topics(self) -> tuple[Topic, ...]:
+        """The topics, with the number of messages written out."""
+        counts = self._mcap.counts
+        return tuple(
+            replace(topic, count=counts[self._channels[name]])
+            for name, topic in self._topics.items()
+        )
+
+    @property
+    def time_range(self) -> tuple[int, int]:
+        """Log time of the first and the last message written out [ns]."""
+        return self._mcap.time_range
+
     def add_topic(
         self,
         name: str,
@@ -300,12 +314,7 @@ class BagWriter:
         return self._open.records
 
     def _information(self, file_name: str | None) -> dict[str, object]:
-        counts = self._mcap.counts
-        counted = [
-            replace(topic, count=counts[self._channels[topic.name]])
-            for topic in self._topics.values()
-        ]
-        return bag_information(counted, file_name, *self._mcap.time_range)
+        return bag_information(self.topics, file_name, *self.time_range)
 
     def _write_information(self, file_name: str | None) -> None:
         """Put into the file what rosbag2 puts there at its beginning and end."""

@@ -1,0 +1,197 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Reference motions as trajectory_msgs/JointTrajectory, what a ROS 2 controller takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import RecordingError
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for, STRING
+from armid_ros.recording.qos import LATCHED
+from armid_ros.recording.source import Topic
+from armid_ros.recording.string_message import string_cdr
+from armid_ros.recording.writer import BagWriter
+import numpy as np
+from rosbags.serde import SerdeError
+from rosbags.typesys import get_typestore, Stores
+
+
+def joint_trajectory_cdr(motion: Motion, *, stamp_ns: int = 0, frame_id: str = '') -> bytes:
+    """
+    Serialise a motion as one trajectory_msgs/JointTrajectory.
+
+    Parameters
+    ----------
+    motion : Motion
+        Positions, velocities and accelerations over time; time_from_start is its time.
+    stamp_ns : int
+        When to start [ns]; 0 means now.
+    frame_id : str
+        Of the header.
+
+    """
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types = store.types
+    nothing = np.empty(0)
+    points: list[Any] = []
+    for sample, time in enumerate(np.rint(motion.t * 1e9).astype(np.int64).tolist()):
+        seconds, nanoseconds = divmod(time, 10**9)
+        points.append(
+            types['trajectory_msgs/msg/JointTrajectoryPoint'](
+                positions=motion.q[sample],
+                velocities=motion.dq[sample],
+                accelerations=motion.ddq[sample],
+                effort=nothing,
+                time_from_start=types['builtin_interfaces/msg/Duration'](
+                    sec=seconds, nanosec=nanoseconds
+                ),
+            )
+        )
+    seconds, nanoseconds = divmod(stamp_ns, 10**9)
+    message = types[JOINT_TRAJECTORY](
+        header=types['std_msgs/msg/Header'](
+            stamp=types['builtin_interfaces/msg/Time'](sec=seconds, nanosec=nanoseconds),
+            frame_id=frame_id,
+        ),
+        joint_names=list(motion.joints),
+        points=points,
+    )
+    return bytes(store.serialize_cdr(message, JOINT_TRAJECTORY))
+
+
+def write_joint_trajectory(
+    path: str | Path,
+    motion: Motion,
+    *,
+    topic: str = '/joint_trajectory',
+    robot_description: str | None = None,
+    log_time_ns: int = 10**9,
+) -> None:
+    """
+    Write a reference motion as a bag with one JointTrajectory message.
+
+    Parameters
+    ----------
+    path : str or Path
+        The bag directory to be made; it must not exist.
+    motion : Motion
+        The motion; its torque is not written.
+    topic : str
+        Topic of the message.
+    robot_description : str, optional
+        URDF to be written to /robot_description.
+    log_time_ns : int
+        When the message counts as recorded [ns].
+
+    Raises
+    ------
+    RecordingError
+        The bag exists already.
+
+    """
+    cdr = joint_trajectory_cdr(motion)
+    with BagWriter(path) as writer:
+        if robot_description is not None:
+            writer.add_topic('/robot_description', STRING, qos=[LATCHED])
+            writer.write('/robot_description', string_cdr(robot_description), log_time_ns)
+        writer.add_topic(topic, JOINT_TRAJECTORY, qos=[LATCHED])
+        writer.write(topic, cdr, log_time_ns)
+
+
+def read_joint_trajectory(
+    path: str | Path, joints: Sequence[str], *, topic: str | None = None
+) -> Motion:
+    """
+    Read the last JointTrajectory of a bag.
+
+    Parameters
+    ----------
+    path : str or Path
+        A rosbag2 directory, or a bare file.
+    joints : sequence of str
+        The joints wanted, in this order.
+    topic : str, optional
+        Topic of the message; by default the only one of its type.
+
+    Returns
+    -------
+    Motion
+        The reference, without torque. Velocities and accelerations that the message does not give
+        are differences of positions and velocities.
+
+    Raises
+    ------
+    RecordingError
+        There is no such bag or topic, or the trajectory does not name a joint or is not valid.
+
+    """
+    with Bag(path) as bag:
+        chosen = _choose_topic(bag, topic)
+        cdr = b''
+        for block in bag.blocks(chosen.name):
+            cdr = block.message(len(block) - 1)
+    where = f'{path}: {chosen.name}'
+    if not cdr:
+        raise RecordingError(f'{where} has no messages')
+    try:
+        message: Any = store_for(chosen.message_type).deserialize_cdr(cdr, JOINT_TRAJECTORY)
+    except SerdeError as error:
+        raise RecordingError(f'{where}: the trajectory cannot be decoded: {error}') from error
+    return _motion(where, message, tuple(joints))
+
+
+def _motion(where: str, message: Any, joints: tuple[str, ...]) -> Motion:
+    """Take a decoded message apart."""
+    names = list(message.joint_names)
+    missing = [joint for joint in joints if joint not in names]
+    if missing:
+        raise RecordingError(
+            f'{where} does not name {", ".join(missing)}; its joints are {", ".join(names)}'
+        )
+    columns = [names.index(joint) for joint in joints]
+    points = message.points
+    if len(points) < 2:
+        raise RecordingError(f'{where}: a trajectory needs two points, this has {len(points)}')
+    t = np.array([p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in points])
+    if (np.diff(t) <= 0).any():
+        at = int(np.flatnonzero(np.diff(t) <= 0)[0]) + 1
+        raise RecordingError(f'{where}: time_from_start does not increase at point {at}')
+
+    def quantity(name: str) -> FloatArray | None:
+        rows = [getattr(point, name) for point in points]
+        lengths = {len(row) for row in rows}
+        if lengths == {0}:
+            return None
+        if lengths != {len(names)}:
+            raise RecordingError(
+                f'{where}: points have {sorted(lengths)} {name} for {len(names)} joints'
+            )
+        return np.array(rows, np.float64)[:, columns]
+
+    q, dq, ddq = quantity('positions'), quantity('velocities'), quantity('accelerations')
+    if q is None:
+        raise RecordingError(f'{where}: the points have no positions')
+    dq = np.gradient(q, t, axis=0) if dq is None else dq
+    ddq = np.gradient(dq, t, axis=0) if ddq is None else ddq
+    return Motion(joints, t, q, dq, ddq)
+
+
+def _choose_topic(bag: Bag, wanted: str | None) -> Topic:
+    """Return the topic to read."""
+    candidates = [topic for topic in bag.topics() if topic.type_name == JOINT_TRAJECTORY]
+    if wanted is not None:
+        name = '/' + wanted.lstrip('/')
+        candidates = [topic for topic in candidates if '/' + topic.name.lstrip('/') == name]
+    if len(candidates) == 1:
+        return candidates[0]
+    listed = ', '.join(f'{topic.name} ({topic.type_name})' for topic in bag.topics()) or 'none'
+    problem = 'several topics' if candidates else 'no topic'
+    asked = f' called {wanted}' if wanted else ''
+    raise RecordingError(
+        f'{bag.path}: {problem} of {JOINT_TRAJECTORY}{asked}; the topics are {listed}'
+    )
