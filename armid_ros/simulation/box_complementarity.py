@@ -15,13 +15,22 @@ Source: block principal pivoting with Murty's rule as its safeguard, Judice and 
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
+#: What each element does: 1 slips forwards, -1 backwards, 0 sticks.
+Modes = tuple[int, ...]
+
 #: Share of its diagonal that is added to G. Elements that depend on one another (two joints and
 #: the sum of the two) make G singular and leave their torques undetermined, never the velocities.
 REGULARISATION = 1e-10
+
+#: Rounding that does not count as breaking a law: share of a bound, and velocity [rad/s or m/s].
+TORQUE_TOLERANCE = 1e-12
+SPEED_TOLERANCE = 1e-13
 
 #: Rounds in which all elements that break their law change at once. Typical steps take one; some
 #: problems make this cycle, from there only the first offender changes, which always ends.
@@ -29,77 +38,115 @@ BLOCK_ROUNDS = 12
 ROUNDS = 500
 
 
+@dataclass(frozen=True, eq=False)
+class BoxLaw:
+    """
+    The bounds of m friction elements.
+
+    Attributes
+    ----------
+    lower, upper : ndarray, shape (m,)
+        Torque while the element moves backwards, and forwards; lower < upper, infinite for what
+        never gives way.
+
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    _limits: list[tuple[float, float]] = field(init=False, repr=False)
+    _patterns: dict[Modes, _Pattern] = field(init=False, repr=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Put the tolerance on the bounds."""
+        lower = self.lower - TORQUE_TOLERANCE * np.abs(self.lower)
+        upper = self.upper + TORQUE_TOLERANCE * np.abs(self.upper)
+        object.__setattr__(self, '_limits', list(zip(lower.tolist(), upper.tolist(), strict=True)))
+
+    def torques(self, g: FloatArray, w_free: FloatArray, modes: Modes) -> FloatArray:
+        """
+        Take the torques of slipping elements from their bounds, of sticking ones from w = 0.
+
+        Patterns of modes come back step after step, so what they need is kept.
+
+        """
+        pattern = self._patterns.get(modes)
+        if pattern is None:
+            pattern = self._patterns[modes] = _pattern(self, modes)
+        if pattern.stuck is None:
+            return pattern.bound
+        system = g * pattern.rows
+        system += pattern.ones
+        right = w_free * pattern.stuck
+        right += pattern.bound
+        return np.asarray(dgesv(system, right, 1, 1)[2])
+
+    def violations(self, w: FloatArray, f: FloatArray, modes: Modes) -> list[tuple[int, int]]:
+        """Return the elements that break their law, each with the mode to try next."""
+        broken = []
+        for element, (speed, torque, (lower, upper), mode) in enumerate(
+            zip(w.tolist(), f.tolist(), self._limits, modes, strict=True)
+        ):
+            if mode:
+                if speed * mode < -SPEED_TOLERANCE:
+                    broken.append((element, 0))
+            elif torque > upper:
+                broken.append((element, 1))
+            elif torque < lower:
+                broken.append((element, -1))
+        return broken
+
+
+@dataclass(frozen=True, eq=False)
+class _Pattern:
+    """Constants of one pattern of modes: masks (m,), (m, m) and the bounds of what slips."""
+
+    bound: FloatArray
+    stuck: FloatArray | None
+    rows: FloatArray
+    ones: FloatArray
+
+
 def solve_box_complementarity(
-    g: FloatArray,
-    w_free: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
-    modes: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
+    law: BoxLaw, g: FloatArray, w_free: FloatArray, modes: Modes
+) -> tuple[FloatArray, Modes]:
     """
     Solve for the torques of the friction elements.
 
     Parameters
     ----------
+    law : BoxLaw
+        Bounds of the m elements.
     g : ndarray, shape (m, m)
         Change of velocity per torque.
     w_free : ndarray, shape (m,)
         Velocities at the end of the step without friction.
-    lower, upper : ndarray, shape (m,)
-        Bounds of the torques, lower < upper; infinite for a stop.
-    modes : ndarray, shape (m,)
-        First guess: 1.0 slips forwards, -1.0 backwards, 0.0 sticks. That of the last step is
-        nearly always right.
+    modes : tuple of int, length m
+        First guess; that of the last step is nearly always right.
 
     Returns
     -------
     torque : ndarray, shape (m,)
         f [N m], within its bounds.
-    modes : ndarray, shape (m,)
+    modes : tuple of int, length m
         What each element does.
 
     """
+    f = law.torques(g, w_free, modes)
     for rounds in range(ROUNDS):
-        f = _torques(g, w_free, lower, upper, modes)
-        margin, change = _judge(w_free - g.dot(f), f, lower, upper, modes)
-        if min(margin) >= 0.0:
+        broken = law.violations(w_free - g.dot(f), f, modes)
+        if not broken:
             break
-        modes = modes.copy()
-        for element, value in enumerate(margin):
-            if value < 0.0:
-                modes[element] = change[element]
-                if rounds >= BLOCK_ROUNDS:
-                    break
+        changed = list(modes)
+        for element, mode in broken if rounds < BLOCK_ROUNDS else broken[:1]:
+            changed[element] = mode
+        modes = tuple(changed)
+        f = law.torques(g, w_free, modes)
     return f, modes
 
 
-def _torques(
-    g: FloatArray, w_free: FloatArray, lower: FloatArray, upper: FloatArray, modes: FloatArray
-) -> FloatArray:
-    """Take the torques of slipping elements from their bounds, of sticking ones from w = 0."""
-    at_bound = np.where(modes > 0.0, upper, lower)
-    stuck = modes == 0.0
-    if not np.count_nonzero(stuck):
-        return at_bound
-    system = np.where(stuck[:, np.newaxis], g, 0.0)
-    diagonal = system.reshape(-1)[:: len(modes) + 1]
-    diagonal *= 1.0 + REGULARISATION
-    diagonal += ~stuck
-    return np.asarray(dgesv(system, np.where(stuck, w_free, at_bound))[2])
-
-
-def _judge(
-    w: FloatArray, f: FloatArray, lower: FloatArray, upper: FloatArray, modes: FloatArray
-) -> tuple[list[float], list[float]]:
-    """Say by how much each element keeps its law (negative: breaks it), and its next mode."""
-    margin, change = [], []
-    for speed, torque, least, most, mode in zip(
-        w.tolist(), f.tolist(), lower.tolist(), upper.tolist(), modes.tolist(), strict=True
-    ):
-        if mode:
-            margin.append(speed * mode)
-            change.append(0.0)
-        else:
-            margin.append(min(torque - least, most - torque))
-            change.append(1.0 if torque > most else -1.0)
-    return margin, change
+def _pattern(law: BoxLaw, modes: Modes) -> _Pattern:
+    array = np.array(modes)
+    stuck = array == 0
+    bound = np.where(stuck, 0.0, np.where(array > 0, law.upper, law.lower))
+    rows = stuck[:, np.newaxis] * (1.0 + REGULARISATION * np.eye(len(modes)))
+    return _Pattern(bound, stuck * 1.0 if stuck.any() else None, rows, np.diag(1.0 - stuck))

@@ -8,9 +8,42 @@ from dataclasses import dataclass
 
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.simulation.controller import Controller
-from armid_ros.simulation.plant import Plant, State, step
+from armid_ros.simulation.integrator import step
+from armid_ros.simulation.plant import Plant, State
 import numpy as np
-import numpy.typing as npt
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """
+    What a controller is to do at N successive steps.
+
+    Attributes
+    ----------
+    q, dq, ddq : ndarray, shape (N, n)
+        The reference [rad or m, s].
+    feedforward : ndarray, shape (N, n)
+        What the controller derives from the reference alone [N m].
+
+    """
+
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+    feedforward: FloatArray
+
+    @classmethod
+    def of(cls, desired: Motion, controller: Controller) -> Targets:
+        """Return the targets of a reference that has one row per step."""
+        return cls(desired.q, desired.dq, desired.ddq, controller.feedforward(desired))
+
+    def __getitem__(self, rows: slice) -> Targets:
+        """Return some of the steps."""
+        return Targets(self.q[rows], self.dq[rows], self.ddq[rows], self.feedforward[rows])
+
+    def __len__(self) -> int:
+        """Return the number of steps N."""
+        return len(self.q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,29 +53,38 @@ class Trace:
 
     Attributes
     ----------
-    first : int
-        Time of the first row in steps.
     q, dq : ndarray, shape (N, n)
         State at the beginning of each step.
     ddq, tau : ndarray, shape (N, n)
-        Mean acceleration, and the torque, of each step.
-    saturated : ndarray of bool, shape (N, n)
-        Where the controller asked for more than the drive has.
+        Mean acceleration and actuator torque of each step.
     state : State
         The state after the last step.
+    torque : ndarray, shape (n,)
+        The torque that the controller asks for there, as far as the drives have it.
 
     """
 
-    first: int
     q: FloatArray
     dq: FloatArray
     ddq: FloatArray
     tau: FloatArray
-    saturated: npt.NDArray[np.bool_]
     state: State
+    torque: FloatArray
 
 
-def run(plant: Plant, controller: Controller, state: State, desired: Motion) -> Trace:
+def command(
+    plant: Plant, controller: Controller, state: State, targets: Targets, row: int
+) -> FloatArray:
+    """Return the torque for one row of the targets, within the limits of the drives, (n,)."""
+    desired = targets.q[row], targets.dq[row], targets.ddq[row]
+    asked = controller.torque(state.q, state.dq, desired, targets.feedforward[row])
+    limit = plant.torque_limit
+    return np.minimum(np.maximum(asked, -limit), limit)
+
+
+def run(
+    plant: Plant, controller: Controller, state: State, torque: FloatArray, targets: Targets
+) -> Trace:
     """
     Let an arm follow a reference.
 
@@ -54,22 +96,16 @@ def run(plant: Plant, controller: Controller, state: State, desired: Motion) -> 
         What drives it.
     state : State
         Where it starts.
-    desired : Motion
-        The reference, one row per step, the first one for the start.
+    torque : ndarray, shape (n,)
+        Torque of the first step, from `command`.
+    targets : Targets
+        What to do at the end of each step.
 
     """
-    first, (n_steps, n) = state.steps, desired.q.shape
-    feedforward = controller.feedforward(desired)
-    q, dq, ddq, tau = (np.empty((n_steps, n)) for _ in range(4))
-    asked = np.empty((n_steps, n))
-    limit = plant.robot.torque_limit
-    bounded = bool(np.any(np.isfinite(limit)))
-    for k, wanted in enumerate(zip(desired.q, desired.dq, desired.ddq, strict=True)):
-        torque = controller.torque(state.q, state.dq, wanted, feedforward[k])
-        asked[k] = torque
-        if bounded:
-            torque = np.minimum(np.maximum(torque, -limit), limit)
+    q, dq, ddq, tau = np.empty((4, len(targets), len(torque)))
+    for k in range(len(targets)):
         q[k], dq[k], tau[k] = state.q, state.dq, torque
         state = step(plant, state, torque)
         ddq[k] = state.ddq
-    return Trace(first, q, dq, ddq, tau, np.abs(asked) > limit, state)
+        torque = command(plant, controller, state, targets, k)
+    return Trace(q, dq, ddq, tau, state, torque)

@@ -1,15 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-The plant: an arm model integrated over one fixed step at a time.
-
-The rigid body and the smooth effects are taken at the middle of the step, half a step ahead of the
-state, which makes the integration second order in the step with one evaluation of the dynamics;
-the torque is constant over a step, as a drive gives it. Damping is linearly implicit. Dry friction
-and joint stops are complementarity conditions on the velocity at the end of the step, so that what
-sticks has velocity zero, not a small one.
-
-"""
+"""The plant: an arm model made ready to be integrated, and the state it is in."""
 
 from __future__ import annotations
 
@@ -22,12 +13,11 @@ from armid_ros.effects import DryFriction
 from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
-from armid_ros.simulation.box_complementarity import solve_box_complementarity
+from armid_ros.simulation.box_complementarity import BoxLaw, Modes
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 from scipy.linalg import eigh
-from scipy.linalg.lapack import dposv
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +35,8 @@ class State:
         Position [rad or m] and velocity.
     ddq : ndarray, shape (n,)
         Mean acceleration of the step that led here.
-    modes : ndarray, shape (m,)
-        What each dry friction element did: 1.0 slipped forwards, -1.0 backwards, 0.0 stuck.
+    modes : tuple of int, length m
+        What each dry friction element did: 1 slipped forwards, -1 backwards, 0 stuck.
 
     """
 
@@ -55,7 +45,34 @@ class State:
     q: FloatArray
     dq: FloatArray
     ddq: FloatArray
-    modes: FloatArray
+    modes: Modes
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """
+    Elements that can hold: dry friction, and joint stops.
+
+    Attributes
+    ----------
+    directions : ndarray, shape (m, n)
+        Velocity of each element as a combination of the joint velocities.
+    law : BoxLaw
+        What torques they take.
+    axes : tuple of int, length m
+        The joint that an element acts on alone; -1 if it acts on several.
+
+    """
+
+    directions: FloatArray
+    law: BoxLaw
+    axes: tuple[int, ...]
+
+    @classmethod
+    def of(cls, friction: DryFriction) -> Contacts:
+        """Return the contacts of friction elements."""
+        axes = tuple(_axis(direction) for direction in friction.directions)
+        return cls(friction.directions, BoxLaw(friction.lower, friction.upper), axes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +90,24 @@ class Plant:
         Whether the joints stop, without bouncing, at the position limits of the robot.
     robot : Robot
         The rigid body as the effects make it.
-
-    Notes
-    -----
-    The scratch memory of the rigid-body algorithms is kept here: `step` is a pure function, but
-    two threads need two plants.
+    contacts : Contacts
+        Friction elements that can stick, m of them.
+    damping : ndarray, shape (n, n)
+        Viscous matrix [N m s/rad].
+    inertia : ndarray, shape (n, n)
+        What is added to the inertia matrix of the rigid body: rotors, and the implicit part of
+        the damping [kg m^2].
+    constant : ndarray, shape (n,)
+        Constant torque that the actuators have to supply [N m].
+    torque : callable (t, q, dq) -> ndarray (n,), or None
+        Anything else that they have to supply.
+    torque_limit : ndarray, shape (n,)
+        What the drives have [N m].
+    stops : list of (float, float)
+        Lower and upper position limit of every joint [rad or m].
+    data : pinocchio.Data
+        Scratch memory of the rigid-body algorithms: integrating is a pure function, but two
+        threads need two plants.
 
     """
 
@@ -85,15 +115,19 @@ class Plant:
     dt: float = 1e-3
     hard_stops: bool = True
     robot: Robot = field(init=False)
-    friction: DryFriction = field(init=False)
-    _torque: Callable[[FloatArray, FloatArray, FloatArray], FloatArray] | None = field(
+    contacts: Contacts = field(init=False, repr=False)
+    torque: Callable[[FloatArray, FloatArray, FloatArray], FloatArray] | None = field(
         init=False, repr=False
     )
-    _data: pin.Data = field(init=False, repr=False)
-    _damping: FloatArray = field(init=False, repr=False)
-    _constant: FloatArray = field(init=False, repr=False)
-    _added_inertia: FloatArray = field(init=False, repr=False)
-    _axes: tuple[int, ...] = field(init=False, repr=False)
+    data: pin.Data = field(init=False, repr=False)
+    damping: FloatArray = field(init=False, repr=False)
+    constant: FloatArray = field(init=False, repr=False)
+    inertia: FloatArray = field(init=False, repr=False)
+    torque_limit: FloatArray = field(init=False, repr=False)
+    stops: list[tuple[float, float]] = field(init=False, repr=False)
+    _at_stops: dict[tuple[bytes, bytes], Contacts] = field(
+        init=False, repr=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         """Collect what the effects do."""
@@ -111,13 +145,14 @@ class Plant:
         weight = _damping_weight(np.array(data.M) + inertia, damping, self.dt)
         values = {
             'robot': robot,
-            'friction': friction,
-            '_data': data,
-            '_torque': action.torque,
-            '_damping': damping,
-            '_constant': constant,
-            '_added_inertia': inertia + weight * self.dt * damping,
-            '_axes': tuple(_axis(direction) for direction in friction.directions),
+            'contacts': Contacts.of(friction),
+            'torque_limit': robot.torque_limit,
+            'stops': list(zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)),
+            'data': data,
+            'torque': action.torque,
+            'damping': damping,
+            'constant': constant,
+            'inertia': inertia + weight * self.dt * damping,
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
@@ -152,152 +187,40 @@ class Plant:
                         f"{self.robot.name}: joint '{joint}' cannot be at {x:.4g}, its stops are "
                         f'at {lower:.4g} and {upper:.4g}'
                     )
-        modes = read_only(np.sign(self.friction.directions @ velocity))
+        modes = tuple(np.sign(self.contacts.directions @ velocity).astype(int).tolist())
         return State(steps, steps * self.dt, position, velocity, acceleration, modes)
 
+    def times(self, first: int, count: int) -> FloatArray:
+        """Return the times of successive steps [s], shape (count,)."""
+        return np.asarray(self.dt * np.arange(first, first + count), dtype=np.float64)
 
-def step(plant: Plant, state: State, torque: FloatArray) -> State:
-    """
-    Integrate one step under a constant actuator torque.
+    def contacts_at(
+        self, at_lower: npt.NDArray[np.bool_], at_upper: npt.NDArray[np.bool_]
+    ) -> Contacts:
+        """
+        Return the friction elements, and after them the stops that some joints are at.
 
-    Parameters
-    ----------
-    plant : Plant
-        The arm.
-    state : State
-        Where it is.
-    torque : ndarray, shape (n,)
-        Actuator torque [N m].
+        A stop is an element that holds any torque one way: its law is w <= 0, f >= 0, w f = 0 at
+        the upper limit.
 
-    Returns
-    -------
-    State
-        Where it is one step later.
-
-    """
-    dt, half = plant.dt, 0.5 * plant.dt
-    model, data, friction = plant.robot.model, plant._data, plant.friction
-    dq = state.dq
-    q_middle = state.q + half * dq
-    dq_middle = dq + half * state.ddq
-    force = torque - pin.nonLinearEffects(model, data, q_middle, dq_middle)
-    force -= plant._constant
-    force -= plant._damping.dot(dq)
-    if plant._torque is not None:
-        force -= plant._torque(np.asarray(state.t + half), q_middle, dq_middle)
-    inertia = pin.crba(model, data, q_middle) + plant._added_inertia
-
-    solution = _solve(inertia, force, friction.directions)
-    dq_free = dq + dt * solution[:, 0]
-    if len(plant._axes):
-        dq_next, modes = _rub(plant, friction, solution, dq_free, state.modes, plant._axes)
-    else:
-        dq_next, modes = dq_free, state.modes
-    q_next = q_middle + half * dq_next
-    if plant.hard_stops and not _inside(plant.robot, q_next):
-        q_next, dq_next, modes = _stop(plant, inertia, force, state, q_middle, q_next)
-    steps = state.steps + 1
-    return State(steps, steps * dt, q_next, dq_next, (dq_next - dq) / dt, modes)
+        """
+        key = (at_lower.tobytes(), at_upper.tobytes())
+        if key not in self._at_stops:
+            friction, hit = self.contacts, np.flatnonzero(at_lower | at_upper)
+            self._at_stops[key] = Contacts.of(
+                DryFriction(
+                    np.vstack([friction.directions, np.eye(self.robot.n_joints)[hit]]),
+                    np.append(friction.law.lower, np.where(at_lower[hit], -np.inf, 0.0)),
+                    np.append(friction.law.upper, np.where(at_upper[hit], np.inf, 0.0)),
+                )
+            )
+        return self._at_stops[key]
 
 
 def middle_position(robot: Robot) -> FloatArray:
     """Return the middle of the range of every joint, 0 where there is none, shape (n,)."""
     limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
     return np.asarray(np.where(limited, np.where(limited, robot.lower + robot.upper, 0.0) / 2, 0))
-
-
-def _solve(inertia: FloatArray, force: FloatArray, directions: FloatArray) -> FloatArray:
-    """Return the inverse inertia times (force, directions^T), shape (n, 1 + m)."""
-    right = np.empty((1 + len(directions), len(force)))
-    right[0] = force
-    right[1:] = directions
-    _, solution, failed = dposv(inertia, right.T)
-    if failed:
-        raise ModelError(
-            f'the inertia matrix is not positive definite at joint {failed}: the rigid-body '
-            'parameters are not those of a body'
-        )
-    return np.asarray(solution)
-
-
-def _rub(
-    plant: Plant,
-    friction: DryFriction,
-    solution: FloatArray,
-    dq_free: FloatArray,
-    modes: FloatArray,
-    axes: tuple[int, ...],
-) -> tuple[FloatArray, FloatArray]:
-    """Let the friction elements act on the velocity at the end of the step."""
-    directions = friction.directions
-    response = plant.dt * solution[:, 1:]
-    torque, modes = solve_box_complementarity(
-        directions.dot(response), directions.dot(dq_free), friction.lower, friction.upper, modes
-    )
-    dq = dq_free - response.dot(torque)
-    _clear_stuck(dq, directions, modes.tolist(), axes)
-    return dq, modes
-
-
-def _clear_stuck(
-    dq: FloatArray, directions: FloatArray, modes: list[float], axes: tuple[int, ...]
-) -> None:
-    """Make the velocity of what sticks exactly zero, where the solution has rounding errors."""
-    fixed = []
-    for axis, mode in zip(axes, modes, strict=True):
-        if mode == 0.0 and axis >= 0:
-            dq[axis] = 0.0
-            fixed.append(axis)
-    for direction, axis, mode in zip(directions, axes, modes, strict=True):
-        if mode == 0.0 and axis < 0:
-            free = np.abs(direction)
-            free[fixed] = 0.0
-            pivot = int(np.argmax(free))
-            if free[pivot] > 0.0:
-                dq[pivot] = 0.0
-                dq[pivot] = -direction.dot(dq) / direction[pivot]
-                fixed.append(pivot)
-
-
-def _inside(robot: Robot, q: FloatArray) -> bool:
-    return bool(np.minimum(q - robot.lower, robot.upper - q).min() >= 0.0)
-
-
-def _stop(
-    plant: Plant,
-    inertia: FloatArray,
-    force: FloatArray,
-    state: State,
-    q_middle: FloatArray,
-    q_next: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """
-    Repeat the step with the stops that it ran into.
-
-    A stop is a friction element that holds any torque one way: its law is w <= 0, f >= 0, w f = 0
-    at the upper limit.
-
-    """
-    robot, friction = plant.robot, plant.friction
-    n, m = robot.n_joints, len(friction.lower)
-    at_upper, at_lower = q_next > robot.upper, q_next < robot.lower
-    while True:
-        hit = np.flatnonzero(at_upper | at_lower)
-        stops = DryFriction(
-            np.vstack([friction.directions, np.eye(n)[hit]]),
-            np.append(friction.lower, np.where(at_lower[hit], -np.inf, 0.0)),
-            np.append(friction.upper, np.where(at_upper[hit], np.inf, 0.0)),
-        )
-        solution = _solve(inertia, force, stops.directions)
-        guess = np.append(state.modes, np.zeros(len(hit)))
-        dq_free = state.dq + plant.dt * solution[:, 0]
-        axes = plant._axes + tuple(hit.tolist())
-        dq, modes = _rub(plant, stops, solution, dq_free, guess, axes)
-        q = q_middle + 0.5 * plant.dt * dq
-        beyond_upper, beyond_lower = q > robot.upper, q < robot.lower
-        if not np.any((beyond_upper & ~at_upper) | (beyond_lower & ~at_lower)):
-            return np.clip(q, robot.lower, robot.upper), dq, modes[:m]
-        at_upper, at_lower = at_upper | beyond_upper, at_lower | beyond_lower
 
 
 def _split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFriction, FloatArray]:

@@ -164,15 +164,13 @@ class Reference:
         The first point has to be later than time zero.
 
         """
-        first_dq = np.zeros_like(self.q) if self.dq is None else self.dq
-        first_ddq = np.zeros_like(self.q) if self.ddq is None else self.ddq
-        way = _polynomials(
-            np.array([0.0, self.t[0]]),
-            np.stack([q, self.q[0]]),
-            np.stack([dq, first_dq[0]]),
-            np.stack([ddq, first_ddq[0]]),
+        return Reference(
+            self.joints,
+            np.append(0.0, self.t),
+            np.vstack([q, self.q]),
+            None if self.dq is None else np.vstack([dq, self.dq]),
+            None if self.ddq is None else np.vstack([ddq, self.ddq]),
         )
-        return _joined(self, q, way)
 
     def require_limits(self, robot: Robot, dt: float) -> None:
         """
@@ -223,18 +221,6 @@ class Reference:
         for first in range(0, steps, _BLOCK):
             t = dt * np.arange(first, min(first + _BLOCK, steps))
             yield self.sample(np.minimum(t, self.duration))
-
-
-def _joined(reference: Reference, q: FloatArray, way: FloatArray) -> Reference:
-    """Return a reference with one more segment in front, its polynomial given."""
-    joined = Reference(
-        reference.joints,
-        np.append(0.0, reference.t),
-        np.vstack([q, reference.q]),
-    )
-    coefficients = np.concatenate([way, reference._coefficients], axis=1)
-    object.__setattr__(joined, '_coefficients', coefficients)
-    return joined
 
 
 def _polynomials(

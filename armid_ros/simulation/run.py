@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.simulation.closed_loop import run
+from armid_ros.simulation.closed_loop import command, run, Targets
 from armid_ros.simulation.controller import ComputedTorque, Controller
 from armid_ros.simulation.plant import Plant
 from armid_ros.simulation.reference import Reference
@@ -41,7 +41,7 @@ class SimulatedRun:
     reference : Motion
         What the arm should have done.
     saturated : ndarray, shape (n,)
-        Share of the time during which a joint wanted more torque than its drive has.
+        Share of the time during which the drive of a joint gave all the torque it has.
 
     """
 
@@ -111,24 +111,26 @@ def simulate(
     duration = curve.duration if duration is None else duration
     last = stride * int(np.floor(duration / (stride * plant.dt) + 1e-9))
 
+    def targets(first: int, count: int) -> Targets:
+        return Targets.of(curve.sample(plant.times(first, count)), controller)
+
     start = curve.sample(np.zeros(1))
     state = plant.state(start.q[0], start.dq[0], start.ddq[0])
+    torque = command(plant, controller, state, targets(0, 1), 0)
     pieces = []
     while state.steps <= last:
-        block = np.arange(state.steps, min(state.steps + _BLOCK, last + 1))
-        trace = run(
-            plant, controller, state, curve.sample(np.asarray(plant.dt * block, dtype=np.float64))
-        )
+        count = min(_BLOCK, last + 1 - state.steps)
+        trace = run(plant, controller, state, torque, targets(state.steps + 1, count))
         pieces.append(trace)
-        state = trace.state
+        state, torque = trace.state, trace.torque
         if progress is not None:
-            progress(min(1.0, state.steps / (last + 1)))
+            progress(state.steps / (last + 1))
 
     q, dq, ddq, tau = (
         np.concatenate([getattr(piece, name) for piece in pieces])
         for name in ('q', 'dq', 'ddq', 'tau')
     )
-    saturated = np.concatenate([piece.saturated for piece in pieces])
+    saturated = np.mean(np.abs(tau) >= plant.torque_limit, axis=0)
     ddq, tau = (np.concatenate([x[:1], (x[1:] + x[:-1]) / 2]) for x in (ddq, tau))
     rows = np.arange(0, last + 1, stride)
     t = np.asarray(plant.dt * rows, dtype=np.float64)
@@ -136,7 +138,7 @@ def simulate(
     late = tau[np.maximum(rows - sensors.torque_delay, 0)]
     readings = sensors.measure(truth.q, truth.dq, late, stride * plant.dt, rng)
     desired = curve.sample(t)
-    return SimulatedRun(truth.joints, t, *readings, truth, desired, saturated.mean(axis=0))
+    return SimulatedRun(truth.joints, t, *readings, truth, desired, saturated)
 
 
 def whole_steps(time: float, dt: float, what: str) -> int:

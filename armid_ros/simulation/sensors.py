@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +41,12 @@ class Sensors:
     resolution: float | FloatArray = 0.0
     velocity_from_encoder: bool = False
     torque_delay: int = 0
+    _noisy: bool = field(init=False, repr=False)
+    _counted: npt.NDArray[np.bool_] = field(init=False, repr=False)
+    _size: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse negative values."""
+        """Refuse negative values, and see what there is to do."""
         for name in ('torque_noise', 'position_noise', 'velocity_noise', 'resolution'):
             value = np.asarray(getattr(self, name), dtype=float)
             if not np.all(np.isfinite(value)) or np.any(value < 0.0):
@@ -51,6 +55,12 @@ class Sensors:
             raise ModelError(
                 f'sensors: torque_delay is a whole number of steps, not {self.torque_delay}'
             )
+
+        noises = (self.torque_noise, self.position_noise, self.velocity_noise)
+        resolution = np.asarray(self.resolution, dtype=float)
+        object.__setattr__(self, '_noisy', any(np.any(np.asarray(std)) for std in noises))
+        object.__setattr__(self, '_counted', resolution > 0.0)
+        object.__setattr__(self, '_size', np.where(resolution > 0.0, resolution, 1.0))
 
     def measure(
         self,
@@ -82,16 +92,20 @@ class Sensors:
             The readings.
 
         """
-        noise = rng.standard_normal((len(q), 3, q.shape[1]))
-        position = self._quantise(q + noise[:, 0] * self.position_noise)
+        position, noise = q, None
+        if self._noisy:
+            noise = rng.standard_normal((len(q), 3, q.shape[1]))
+            position = position + noise[:, 0] * self.position_noise
+        position = self._quantise(position)
         if self.velocity_from_encoder:
             before = self._quantise(q[:1] - dt * dq[:1]) if previous is None else previous[None]
             dq = np.diff(np.concatenate([before, position]), axis=0) / dt
-        velocity = dq + noise[:, 1] * self.velocity_noise
-        return position, velocity, tau + noise[:, 2] * self.torque_noise
+        if noise is not None:
+            dq = dq + noise[:, 1] * self.velocity_noise
+            tau = tau + noise[:, 2] * self.torque_noise
+        return position, dq, tau
 
     def _quantise(self, q: FloatArray) -> FloatArray:
-        resolution = np.broadcast_to(self.resolution, q.shape[-1:])
-        counted = resolution > 0.0
-        size = np.where(counted, resolution, 1.0)
-        return np.where(counted, np.round(q / size) * size, q)
+        if not self._counted.any():
+            return q
+        return np.where(self._counted, np.rint(q / self._size) * self._size, q)

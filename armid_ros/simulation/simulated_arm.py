@@ -1,0 +1,228 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""An arm that stands there, takes trajectories, and is read while time goes on."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.simulation.closed_loop import command, run, Targets, Trace
+from armid_ros.simulation.controller import ComputedTorque, Controller
+from armid_ros.simulation.plant import middle_position, Plant, State
+from armid_ros.simulation.reference import Reference
+from armid_ros.simulation.sensors import Sensors
+import numpy as np
+import numpy.typing as npt
+
+#: How far the first point of a trajectory that begins at once may be from where the arm is to be
+#: [rad or m], and how fast it may begin or end [rad/s or m/s].
+START_TOLERANCE = 0.01
+REST_TOLERANCE = 1e-3
+
+#: Steps of the reference that are evaluated in one go.
+_BLOCK = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """
+    One reading of the sensors.
+
+    Attributes
+    ----------
+    steps : int
+        Time in steps of the plant.
+    t : float
+        Time [s].
+    q, dq, tau : ndarray, shape (n,)
+        Position [rad or m], velocity and torque [N m or N] as measured.
+
+    """
+
+    steps: int
+    t: float
+    q: FloatArray
+    dq: FloatArray
+    tau: FloatArray
+
+
+class SimulatedArm:
+    """
+    A simulated arm with its controller, drives and sensors.
+
+    It holds its pose until it is given a trajectory, and the last point of that when it ends.
+
+    Parameters
+    ----------
+    arm : ArmModel or Plant
+        The arm; an ArmModel is integrated at 1 kHz with hard stops.
+    rng : numpy.random.Generator
+        Source of the sensors' noise.
+    controller : Controller, optional
+        Computed torque of the true arm by default.
+    sensors : Sensors, optional
+        Perfect by default.
+    start : array_like, shape (n,), optional
+        Where it stands [rad or m]: the middle of the range of motion by default.
+
+    Raises
+    ------
+    TrajectoryError
+        If it cannot stand there.
+
+    """
+
+    def __init__(
+        self,
+        arm: ArmModel | Plant,
+        *,
+        rng: np.random.Generator,
+        controller: Controller | None = None,
+        sensors: Sensors | None = None,
+        start: npt.ArrayLike | None = None,
+    ) -> None:
+        self.plant = arm if isinstance(arm, Plant) else Plant(arm)
+        self.controller = controller or ComputedTorque(self.plant.arm)
+        self.sensors = sensors or Sensors()
+        self._rng = rng
+        start = middle_position(self.plant.robot) if start is None else start
+        self._home = start
+        self.reset()
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joint names in column order."""
+        return self.plant.robot.joints
+
+    @property
+    def state(self) -> State:
+        """The true state of the arm."""
+        return self._state
+
+    @property
+    def ends_at(self) -> float:
+        """Time at which the trajectory ends, or has ended [s]."""
+        return self._start * self.plant.dt + self._reference.duration
+
+    def reset(self, steps: int = 0) -> None:
+        """
+        Put the arm back to where it stood first, at rest and without a trajectory.
+
+        Parameters
+        ----------
+        steps : int
+            What time it is then, in steps of the plant.
+
+        """
+        self._state = self.plant.state(self._home, steps=steps)
+        self._previous: FloatArray | None = None
+        position = self._state.q
+        self._follow(Reference(self.joints, np.zeros(1), position[np.newaxis]))
+        self._readings = deque([self._torque], maxlen=1 + self.sensors.torque_delay)
+
+    def set_trajectory(self, reference: Reference) -> None:
+        """
+        Begin a trajectory now, in place of the one that may be under way.
+
+        A first point later than time zero gives the arm that time to get there from where it is
+        to be now.
+
+        Raises
+        ------
+        TrajectoryError
+            If a joint is unknown or missing, a position or velocity limit is passed, the first
+            point is somewhere else and there is no time to get there, or the last point is not at
+            rest. The arm goes on with what it was doing.
+
+        """
+        curve = reference.for_robot(self.plant.robot)
+        now = self._desired(self._state.steps, 1)
+        if curve.dq is not None:
+            self._require_none('ends with', curve.dq[-1], REST_TOLERANCE, '/s', 'stop it')
+        if curve.t[0] > 0.0:
+            curve = curve.after(now.q[0], now.dq[0], now.ddq[0])
+        else:
+            advice = 'give its first point a later time, to get there'
+            self._require_none(
+                'starts away by', curve.q[0] - now.q[0], START_TOLERANCE, '', advice
+            )
+            if curve.dq is not None:
+                jump = curve.dq[0] - now.dq[0]
+                self._require_none('starts with a jump of', jump, REST_TOLERANCE, '/s', advice)
+        curve.require_limits(self.plant.robot, self.plant.dt)
+        self._follow(curve)
+
+    def advance(self, steps: int = 1) -> Sample:
+        """
+        Let time go on, and read the sensors.
+
+        Parameters
+        ----------
+        steps : int
+            Steps of the plant, 1 or more.
+
+        """
+        if steps < 1:
+            raise ValueError(f'an arm advances by 1 step or more, not {steps}')
+        left = steps
+        while left:
+            row = self._state.steps + 1 - self._first
+            if row >= len(self._targets):
+                self._look_ahead()
+                row = 1
+            taken = min(left, len(self._targets) - row)
+            targets = self._targets[row : row + taken]
+            self._record(run(self.plant, self.controller, self._state, self._torque, targets))
+            left -= taken
+        return self._read(steps * self.plant.dt)
+
+    def _follow(self, reference: Reference) -> None:
+        """Do what the reference says from now on."""
+        self._reference, self._start = reference, self._state.steps
+        self._look_ahead()
+        self._torque = command(self.plant, self.controller, self._state, self._targets, 0)
+
+    def _look_ahead(self) -> None:
+        """Evaluate the reference from now on, for some time."""
+        self._first = self._state.steps
+        self._targets = Targets.of(self._desired(self._first, _BLOCK + 1), self.controller)
+
+    def _desired(self, first: int, count: int) -> Motion:
+        motion = self._reference.sample(self.plant.times(first - self._start, count))
+        return replace(motion, t=self.plant.times(first, count))
+
+    def _record(self, trace: Trace) -> None:
+        """Keep where the arm is, and the torques that the sensor has yet to read."""
+        self._state, self._torque = trace.state, trace.torque
+        recent = trace.tau[-1 - self.sensors.torque_delay :]
+        self._readings.extend((recent[1:] + recent[:-1]) / 2)
+        self._readings.append((recent[-1] + self._torque) / 2)
+
+    def _read(self, dt: float) -> Sample:
+        state = self._state
+        q, dq, tau = self.sensors.measure(
+            state.q[np.newaxis],
+            state.dq[np.newaxis],
+            self._readings[0][np.newaxis],
+            dt,
+            self._rng,
+            self._previous,
+        )
+        self._previous = q[0]
+        return Sample(state.steps, state.t, q[0], dq[0], tau[0])
+
+    def _require_none(
+        self, what: str, values: FloatArray, tolerance: float, per: str, advice: str
+    ) -> None:
+        """Refuse a trajectory that has more of something than rounding, in any joint."""
+        worst = int(np.argmax(np.abs(values)))
+        if abs(values[worst]) > tolerance:
+            unit = self.plant.robot.position_units[worst] + per
+            raise TrajectoryError(
+                f"trajectory: joint '{self.joints[worst]}' {what} {values[worst]:.4g} {unit}, "
+                f'more than {tolerance:g} {unit}; {advice}'
+            )
