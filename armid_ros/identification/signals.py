@@ -26,10 +26,10 @@ from scipy.interpolate import CubicSpline
 GAP_PERIODS = 5.0
 #: Stamps within this share of a period of an even grid are taken as even.
 JITTER_TOLERANCE = 0.05
-#: Torque and regressor keep this many times the band of the motion (Gautier 1997: two to five).
-MODEL_BANDS = 5.0
+#: Torque and regressor keep this many times the band of the motion and what friction adds to it.
+MODEL_BANDS = 10.0
 #: The positions' spectrum ends where it is less than this many times the noise.
-NOISE_MARGIN = 10.0
+NOISE_MARGIN = 3.0
 #: Half length of the decimation filter in output samples; its edges are cut off.
 _HALF_TAPS = 4
 
@@ -93,7 +93,7 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
 
     The positions keep what stands out of their noise: the cut-off is where their spectrum meets
     it, at most a fifth of the rate, for beyond it there is nothing to differentiate but noise.
-    Torque and regressor keep five times the band of the motion, the frequency below which 99 % of
+    Torque and regressor keep ten times the band of the motion, the frequency below which 99 % of
     the velocities' power lies, and are decimated to 2.5 samples per period of that.
 
     """

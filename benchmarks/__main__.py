@@ -1,0 +1,29 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Run benchmarks by name, or all of them: ``python -m benchmarks [NAME ...]``."""
+
+from pathlib import Path
+import subprocess
+import sys
+
+LIBRARY = {'__init__', '__main__', 'real_recordings'}
+
+
+def main() -> int:
+    """Run each in a process of its own, with memory and threads of its own."""
+    known = sorted(
+        path.stem for path in Path(__file__).parent.glob('*.py') if path.stem not in LIBRARY
+    )
+    names = sys.argv[1:] or known
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        print(f"benchmarks: no '{unknown[0]}'; there are {', '.join(known)}", file=sys.stderr)
+        return 2
+    failed = 0
+    for name in names:
+        print(f'== {name}', flush=True)
+        failed |= subprocess.run([sys.executable, '-m', f'benchmarks.{name}']).returncode
+    return failed
+
+
+sys.exit(main())

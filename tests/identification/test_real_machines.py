@@ -1,0 +1,100 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings of real machines: errors and parameters next to the published ones."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
+from armid_ros.identification.recursive import RecursiveLeastSquares
+from armid_ros.identification.regression import regressions
+from armid_ros.recording import read_recording
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+from benchmarks import real_recordings
+
+pytestmark = pytest.mark.real_data
+
+FRICTION = ('viscous_friction', 'coulomb_friction', 'torque_offset')
+
+
+def fit(robot, bag, effects, method='wls', **signals):
+    arm = ArmModel(robot)
+    for name in effects:
+        arm = arm.with_effect(make_effect(name, robot))
+    settings = IdentificationSettings(method, SignalSettings(**signals))
+    recording = read_recording(bag, joints=robot.joints)
+    return identify(arm, [recording], settings, rng=np.random.default_rng(0))
+
+
+def error(fits):
+    return Score.of(fits).relative_error_percent
+
+
+@pytest.fixture(scope='module')
+def emps(real_data, tmp_path_factory):
+    data = real_recordings.emps(real_data, tmp_path_factory.mktemp('emps'))
+    return load_robot(str(data.robot)), data.bags
+
+
+@pytest.fixture(scope='module')
+def tx40(real_data, tmp_path_factory):
+    data = real_recordings.tx40(real_data, tmp_path_factory.mktemp('tx40'))
+    return load_robot(str(data.robot)), data.bags[0]
+
+
+def test_emps_parameters_are_the_published_ones(emps):
+    """Janot, Gautier and Brunot 2019: M 95.11 kg, Fv 203.5 N s/m, Fc 20.39 N, offset -3.16 N."""
+    robot, (bag, pulses) = emps
+    result = fit(robot, bag, FRICTION)
+    published = [95.1089, 203.5034, 20.3935, -3.1648]
+    np.testing.assert_allclose(result.estimate.values, published, rtol=5e-3)
+    assert error(result.training) <= 4.10
+    assert error(result.predict([read_recording(pulses, joints=robot.joints)])) <= 6.0
+
+
+def test_emps_error_falls_with_every_effect(emps):
+    """Mass 69.4 %, viscous 17.9 %, Coulomb 7.1 %, offset 4.04 %, asymmetry 3.06 %."""
+    robot, (bag, _) = emps
+    ladder = [(), FRICTION[:1], FRICTION[:2], FRICTION, (*FRICTION, 'asymmetric_friction')]
+    errors = [error(fit(robot, bag, effects).training) for effects in ladder]
+    np.testing.assert_allclose(errors, [69.4, 17.9, 7.1, 4.04, 3.06], rtol=0.06)
+
+
+def test_recursive_is_batch_on_emps(emps):
+    robot, (bag, _) = emps
+    arm = ArmModel(robot)
+    for name in FRICTION:
+        arm = arm.with_effect(make_effect(name, robot))
+    result = fit(robot, bag, FRICTION, method='ols')
+    recursive = RecursiveLeastSquares(result.estimate.parameters)
+    motion = result.training[0].motion
+    (problem,) = regressions(
+        arm, result.base.independent, [read_recording(bag, joints=robot.joints)], result.used
+    )
+    for rows, tau in zip(problem.columns, motion.tau, strict=True):
+        recursive.update(rows, tau)
+    np.testing.assert_allclose(recursive.estimate.values, result.estimate.values, rtol=1e-6)
+
+
+def test_tx40_needs_the_coupling_of_its_wrist(tx40):
+    robot, bag = tx40
+    effects = (*FRICTION, 'rotor_inertia')
+    without = fit(robot, bag, effects, method='ols', decimation=100)
+    coupled = fit(robot, bag, (*effects, 'coupled_joint_friction'), method='ols', decimation=100)
+    assert error(coupled.training) <= 5.2
+    assert Score.of(without.training).joint_relative_error_percent[4] > 40.0
+    estimate = coupled.estimate
+    published = {'viscous_coefficient': 8.087, 'coulomb_torque': 7.014}
+    for name, value in published.items():
+        found = estimate.values[estimate.index(name, 'joint_1')]
+        np.testing.assert_allclose(found, value, rtol=0.02)
+
+
+def test_ur10_from_its_own_bag(real_data):
+    data = real_recordings.ur10(real_data)
+    robot = load_robot(str(data.robot))
+    result = fit(robot, data.bags[0], FRICTION)
+    assert error(result.training) <= 6.6
+    assert error(fit(robot, data.bags[0], FRICTION, decimation=1).training) <= 6.6
