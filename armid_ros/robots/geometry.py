@@ -15,6 +15,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+_Meshes = dict[tuple[Path, tuple[float, float, float]], tuple[coal.CollisionGeometry, ...]]
+
 
 def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]]:
     """
@@ -37,6 +39,7 @@ def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]
 
     """
     geometry, notes = pin.GeometryModel(), []
+    meshes: _Meshes = {}
     frames = {
         frame.name: index
         for index, frame in enumerate(robot.model.frames)
@@ -47,7 +50,7 @@ def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]
         frame = robot.model.frames[frames[name]]
         for number, element in enumerate(link.findall('collision')):
             try:
-                shapes, missing = _shapes(element, robot.path)
+                shapes, missing = _shapes(element, robot.path, meshes)
                 placement = frame.placement * _placement(element)
             except (TypeError, ValueError):
                 raise RobotError(
@@ -70,7 +73,7 @@ def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]
 
 
 def _shapes(
-    element: ElementTree.Element, urdf: Path | None
+    element: ElementTree.Element, urdf: Path | None, meshes: _Meshes
 ) -> tuple[tuple[coal.CollisionGeometry, ...], str]:
     """Bodies of a <collision>; and the name of its mesh when there is no such file."""
     for shape in element.findall('geometry/*'):
@@ -84,8 +87,12 @@ def _shapes(
         if shape.tag == 'mesh':
             name = shape.get('filename', '')
             path = find_mesh(name, urdf)
-            scale = np.array(_numbers(shape.get('scale', '1 1 1')))
-            return ((), name) if path is None else (convex_bodies(path, scale), '')
+            scale = _numbers(shape.get('scale', '1 1 1'))
+            if path is None:
+                return (), name
+            if (path, scale) not in meshes:
+                meshes[path, scale] = convex_bodies(path, np.array(scale))
+            return meshes[path, scale], ''
     raise ValueError
 
 

@@ -22,6 +22,7 @@ from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray
 import coal
 import numpy as np
+import numpy.typing as npt
 
 SLABS = 12
 GROWTH = 1.1  # volume of a hull over what it stands for: less is close enough
@@ -75,20 +76,25 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry
     if whole.computeVolume() < GROWTH * abs(mesh.computeVolume()):
         return (whole,)
     faces = [mesh.tri_indices(number) for number in range(mesh.num_tris)]
-    triangles = vertices[np.array([[face[0], face[1], face[2]] for face in faces])]
+    corners = np.array([(face[0], face[1], face[2]) for face in faces])
+    sides = np.sort(np.vstack([corners[:, (0, 1)], corners[:, (1, 2)], corners[:, (2, 0)]]))
+    edges = np.unique(sides[:, 0] * len(vertices) + sides[:, 1])
+    ends = np.column_stack(np.divmod(edges, len(vertices)))
     _, axes = np.linalg.eigh(np.cov(np.array(whole.points()).T))
-    best = min((_slabs(triangles, axis) for axis in axes.T), key=_volume)
+    best = min((_slabs(vertices, ends, axis) for axis in axes.T), key=_volume)
     bodies = _join(best)
     return bodies if _volume(bodies) * GROWTH < whole.computeVolume() else (whole,)
 
 
-def _slabs(triangles: FloatArray, axis: FloatArray) -> tuple[coal.ConvexBase, ...]:
+def _slabs(
+    vertices: FloatArray, ends: npt.NDArray[np.intp], axis: FloatArray
+) -> tuple[coal.ConvexBase, ...]:
     """Hulls of slabs across an axis; a slab too thin for a hull goes with the one before it."""
-    along = triangles @ axis
+    along = vertices @ axis
     hulls: list[coal.ConvexBase] = []
     thin = np.empty((0, 3))
     for low, high in pairwise(np.linspace(along.min(), along.max(), SLABS + 1)):
-        points = np.vstack([thin, _slab(triangles, along, low, high)])
+        points = np.vstack([thin, _slab(vertices, ends, along, low, high)])
         try:
             hulls.append(_hull(points))
             thin = np.empty((0, 3))
@@ -129,17 +135,17 @@ def _volume(bodies: Sequence[coal.ConvexBase]) -> float:
     return sum(float(body.computeVolume()) for body in bodies)
 
 
-def _slab(triangles: FloatArray, along: FloatArray, low: float, high: float) -> FloatArray:
-    """Corners of the triangles within a slab, and where their edges cross its two planes."""
-    points = [triangles[(along >= low) & (along <= high)]]
-    for first, second in ((0, 1), (1, 2), (2, 0)):
-        start, end = along[:, first], along[:, second]
-        for plane in (low, high):
-            crosses = (start - plane) * (end - plane) < 0.0
-            share = ((plane - start[crosses]) / (end[crosses] - start[crosses]))[:, None]
-            points.append(
-                (1.0 - share) * triangles[crosses, first] + share * triangles[crosses, second]
-            )
+def _slab(
+    vertices: FloatArray, ends: npt.NDArray[np.intp], along: FloatArray, low: float, high: float
+) -> FloatArray:
+    """Vertices within a slab, and where edges of the mesh cross its two planes."""
+    points = [vertices[(along >= low) & (along <= high)]]
+    start, end = along[ends[:, 0]], along[ends[:, 1]]
+    for plane in (low, high):
+        crosses = (start - plane) * (end - plane) < 0.0
+        share = ((plane - start[crosses]) / (end[crosses] - start[crosses]))[:, None]
+        first, second = vertices[ends[crosses, 0]], vertices[ends[crosses, 1]]
+        points.append((1.0 - share) * first + share * second)
     return np.vstack(points)
 
 
@@ -151,7 +157,7 @@ def _hull(points: FloatArray) -> coal.ConvexBase:
     if spread[2] < FLAT * spread[0]:
         raise ValueError('points in a plane')
     corners = coal.StdVec_Vec3s()
-    corners.extend(list(np.unique(points, axis=0)))
+    corners.extend(list(points))
     return coal.Convex.convexHull(corners, True, 'Qt')
 
 
