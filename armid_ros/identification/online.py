@@ -1,0 +1,378 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Online identification: joint states in, one at a time; an estimate that converges, out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError, RecordingError
+from armid_ros.estimate import Estimate
+from armid_ros.identification.causal import (
+    CausalFilter,
+    CausalMotion,
+    ROW_RATE_RATIO,
+    TripleLag,
+)
+from armid_ros.identification.recursive import RecursiveLeastSquares
+from armid_ros.model import BaseParameters
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+#: Noise of a torque sensor relative to the torque limit of its joint, when nobody gives it; only
+#: the ratios between joints matter, as the residuals then say how large it is.
+_NOISE_OF_LIMIT = 0.01
+#: Time constants of the row filter until its start, or a joint's rest, is forgotten, to 3e-3.
+_FORGOTTEN = 10.0
+
+
+@dataclass(frozen=True)
+class OnlineSettings:
+    """
+    How parameters are estimated online.
+
+    Attributes
+    ----------
+    cutoff : float
+        Frequency of the low-pass on torque and regressor rows [Hz]. Well above the motion, as
+        the inertial torque is in the motion's fastest part; below what shakes the torque signal.
+    row_rate : float or None
+        Rows used per second [1/s]; 40 times the cut-off frequency by default. The rows between
+        them are nearly the same once filtered, so they would cost time and teach nothing.
+    forgetting : float
+        Forgetting factor per row used, 0.9 to 1. A memory of T seconds is 1 - 1 / (T row_rate).
+    torque_noise : tuple of float or None
+        Standard deviation of the noise in single torque samples, per joint [N m]. Without it the
+        noise is proportional to the torque limits and its size is taken from the residuals.
+    prior : Estimate or None
+        What is known of the base parameters; by default nothing, with the arm's values to start
+        from.
+    rest_velocity : float
+        A joint that is slower [rad/s or m/s] for longer than `rest_time` [s] is at rest: where
+        dry friction may hold it, its torque says nothing and is not used.
+    rest_time : float
+        See `rest_velocity`; longer than a reversal takes.
+    period : float or None
+        Sampling period [s], learned from the stamps by default.
+    max_gap : int
+        Missing samples that are interpolated across; a longer gap restarts the filters.
+    measured_velocity : bool
+        Differentiate the measured velocity instead of the position.
+
+    """
+
+    cutoff: float = 5.0
+    row_rate: float | None = None
+    forgetting: float = 1.0
+    torque_noise: tuple[float, ...] | None = None
+    prior: Estimate | None = None
+    rest_velocity: float = 0.01
+    rest_time: float = 0.1
+    period: float | None = None
+    max_gap: int = 10
+    measured_velocity: bool = False
+
+
+@dataclass(frozen=True)
+class OnlineSample:
+    """
+    One sample that the estimator saw.
+
+    Attributes
+    ----------
+    t : float
+        When it was [s]: the stamp of the newest joint state minus the delay of the filters.
+    measured : ndarray, shape (n,)
+        Filtered measured torque [N m].
+    predicted : ndarray, shape (n,)
+        What the estimate before this sample predicts, filtered alike [N m].
+    used : ndarray of bool, shape (n,)
+        False for a joint at rest, which friction may hold with any torque.
+
+    """
+
+    t: float
+    measured: FloatArray
+    predicted: FloatArray
+    used: npt.NDArray[np.bool_]
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured minus predicted torque, shape (n,) [N m]."""
+        return self.measured - self.predicted
+
+
+class OnlineIdentifier:
+    """
+    Estimate the base parameters of an arm and of its effects while it moves.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Structure: robot and effects, which have to be linear in their parameters.
+    settings : OnlineSettings, optional
+        Filters, weights, forgetting.
+    rng : numpy.random.Generator
+        Draws the states over which base parameters are found.
+
+    Raises
+    ------
+    IdentificationError
+        If a setting is out of range or does not fit the arm.
+
+    Attributes
+    ----------
+    base : BaseParameters
+        What is estimated.
+
+    """
+
+    def __init__(
+        self,
+        arm: ArmModel,
+        settings: OnlineSettings | None = None,
+        *,
+        rng: np.random.Generator,
+    ) -> None:
+        settings = settings or OnlineSettings()
+        robot = arm.robot
+        self.arm = arm
+        self.settings = settings
+        self.base: BaseParameters = arm.base_parameters(rng)
+        self._filter = CausalFilter(
+            robot.n_joints,
+            settings.cutoff,
+            period=settings.period,
+            max_gap=settings.max_gap,
+            measured_velocity=settings.measured_velocity,
+            prismatic=robot.prismatic,
+        )
+        self._row_filter = TripleLag(settings.cutoff)
+        self._row_period = 1.0 / _row_rate(settings)
+        self._estimator = RecursiveLeastSquares(
+            self.base.parameters,
+            _noise(arm, settings),
+            forgetting=settings.forgetting,
+            prior=settings.prior,
+            start=self.base.values(arm.theta),
+            scale_covariance=settings.torque_noise is None,
+        )
+        rigid = len(robot.rigid_parameters)
+        columns = self.base.independent
+        self._rigid = columns[columns < rigid]
+        self._effects = columns[columns >= rigid] - rigid
+        self._order = np.argsort(np.argsort(columns >= rigid, kind='stable'), kind='stable')
+        self._data = robot.model.createData()
+        held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
+        self._held = np.array([joint in held for joint in robot.joints])
+        self._generation = -1
+        self._last_row: float | None = None
+        self._last_moving = np.full(robot.n_joints, -np.inf)
+        self._last_useless: FloatArray | None = None
+        self._bandwidth: float | None = None
+
+    def reset(self) -> None:
+        """Forget everything that was learned, and set the counters to zero."""
+        self._filter.reset()
+        self._estimator.reset()
+
+    def update(
+        self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
+    ) -> OnlineSample | None:
+        """
+        Take in one joint state.
+
+        Parameters
+        ----------
+        t : float
+            Stamp [s].
+        q, tau : array_like, shape (n,)
+            Measured position [rad or m] and torque [N m or N], in the order of the robot.
+        dq : array_like, shape (n,), or None
+            Measured velocity; not used unless the settings say so.
+
+        Returns
+        -------
+        OnlineSample or None
+            None between rows, while the filters settle, and for a sample that is left out.
+
+        """
+        motion = self._filter.update(t, q, dq, tau)
+        if motion is None:
+            return None
+        if self._filter.generation != self._generation:
+            self._begin()
+        useless = self._watch_rest(motion)
+        step = self._row_period if self._last_row is None else motion.t - self._last_row
+        if step < self._row_period - 0.5 * (self._filter.period or 0.0):
+            return None
+        self._last_row = motion.t
+        used = motion.t - useless > _FORGOTTEN / self._row_filter.pole
+        return self._learn(motion, step, used)
+
+    def estimate(self) -> Estimate:
+        """Return values and covariance of the base parameters."""
+        return self._estimator.estimate
+
+    def model(self) -> ArmModel:
+        """Return the arm with the estimate, otherwise as near as possible to what it was."""
+        return self.arm.with_theta(self.base.lift(self._estimator.values, self.arm.theta))
+
+    @property
+    def condition_number(self) -> float:
+        """Condition number of the weighted regressor so far; takes a millisecond."""
+        return self._estimator.condition_number
+
+    @property
+    def samples(self) -> int:
+        """Samples that the estimate rests on."""
+        return self._estimator.samples
+
+    @property
+    def rejected(self) -> Mapping[str, int]:
+        """Joint states left out, by reason; see CausalFilter."""
+        return self._filter.rejected
+
+    @property
+    def restarts(self) -> Mapping[str, int]:
+        """Restarts of the filters, by reason; see CausalFilter."""
+        return self._filter.restarts
+
+    @property
+    def delay(self) -> float | None:
+        """Delay of the filters [s]; None until the sampling period is known."""
+        pole = self._filter.pole
+        return None if pole is None else 3.0 / pole + self._row_filter.delay
+
+    def _begin(self) -> None:
+        """Start the row filter anew, together with the motion filter."""
+        self._row_filter.reset()
+        self._generation = self._filter.generation
+        self._last_row = None
+        self._last_moving[:] = -np.inf
+        self._last_useless = None
+        self._bandwidth = None
+
+    def _watch_rest(self, motion: CausalMotion) -> FloatArray:
+        """Return when each joint was last at rest, or the row filter started, shape (n,) [s]."""
+        if self._last_useless is None:
+            self._last_useless = np.full(len(motion.q), motion.t)
+        self._last_moving[np.abs(motion.dq) >= self.settings.rest_velocity] = motion.t
+        resting = motion.t - self._last_moving > self.settings.rest_time
+        self._last_useless[resting & self._held] = motion.t
+        return self._last_useless
+
+    def _learn(
+        self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_]
+    ) -> OnlineSample:
+        rows = self._rows(motion)
+        n, rank = rows.shape
+        stacked = np.concatenate([rows, motion.tau[:, np.newaxis]], axis=1).reshape(-1)
+        filtered = self._row_filter.update(step, stacked)[2].reshape(n, rank + 1)
+        rows, measured = filtered[:, :rank], filtered[:, rank]
+        gain, independent = self._noise_of_row(step)
+        scale = 1.0 / gain
+        innovation = self._estimator.update(rows * scale, measured * scale, used * independent)
+        stamp = motion.t - (self.delay or 0.0)
+        return OnlineSample(stamp, measured, measured - innovation * gain, used)
+
+    def _rows(self, motion: CausalMotion) -> FloatArray:
+        """Return the regressor of one sample in the independent columns, shape (n, r)."""
+        robot = self.arm.robot
+        q, dq, ddq = motion.q, motion.dq, motion.ddq
+        rigid = pin.computeJointTorqueRegressor(robot.model, self._data, q, dq, ddq)
+        one = Motion(robot.joints, np.array([motion.t]), q[None], dq[None], ddq[None])
+        effects = self.arm.effect_columns(one)[0]
+        rows = np.concatenate([rigid[:, self._rigid], effects[:, self._effects]], axis=1)
+        return np.asarray(rows[:, self._order])
+
+    def _noise_of_row(self, step: float) -> tuple[float, float]:
+        """
+        Return what filtering leaves of white noise, and the independent samples in one row.
+
+        The noise of a sample, of standard deviation s and density s^2 T, leaves a filter H with
+        the variance s^2 T B, where B is the integral of |H|^2 over all frequencies; rows that
+        are `step` apart hold step B independent observations each.
+
+        """
+        period, pole = self._filter.period, self._filter.pole
+        assert period is not None and pole is not None
+        if self._bandwidth is None:
+            self._bandwidth = _bandwidth(pole, self._row_filter.pole, 0.5 / period)
+        independent = min(1.0, self._bandwidth * min(step, self._row_period))
+        return float(np.sqrt(period * self._bandwidth)), independent
+
+
+@dataclass(frozen=True)
+class JointOrder:
+    """
+    Where the joints of a robot are in a message that names its joints in an order of its own.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        The joints that are wanted, in the order that is wanted.
+
+    """
+
+    joints: tuple[str, ...]
+
+    def map(self, names: Sequence[str]) -> npt.NDArray[np.intp]:
+        """
+        Return the positions of the wanted joints among the names; others are left out.
+
+        Raises
+        ------
+        RecordingError
+            If joints are missing or named twice; the message lists them.
+
+        """
+        missing = [joint for joint in self.joints if joint not in names]
+        if missing:
+            raise RecordingError(
+                f'joint states without {", ".join(missing)}; they name '
+                f'{", ".join(names) or "no joints"}'
+            )
+        twice = [joint for joint in self.joints if list(names).count(joint) > 1]
+        if twice:
+            raise RecordingError(f'joint states name {", ".join(twice)} twice')
+        return np.array([list(names).index(joint) for joint in self.joints], dtype=np.intp)
+
+
+def _row_rate(settings: OnlineSettings) -> float:
+    rate = ROW_RATE_RATIO * settings.cutoff if settings.row_rate is None else settings.row_rate
+    if not (np.isfinite(rate) and rate >= 2.0 * settings.cutoff):
+        raise IdentificationError(
+            f'{rate} rows per second: a cut-off frequency of {settings.cutoff:g} Hz needs at '
+            f'least {2.0 * settings.cutoff:g}'
+        )
+    return rate
+
+
+def _noise(arm: ArmModel, settings: OnlineSettings) -> FloatArray:
+    robot = arm.robot
+    if settings.torque_noise is not None:
+        noise = np.array(settings.torque_noise, dtype=np.float64)
+        if noise.shape != (robot.n_joints,):
+            raise IdentificationError(
+                f'torque_noise has {noise.size} values, but {robot.name} has {robot.n_joints} '
+                f'driven joints: {", ".join(robot.joints)}'
+            )
+        return noise
+    limit = robot.torque_limit
+    known = np.isfinite(limit) & (limit > 0.0)
+    if not known.any():
+        return np.ones(robot.n_joints)
+    return _NOISE_OF_LIMIT * np.where(known, limit, np.median(limit[known]))
+
+
+def _bandwidth(motion_pole: float, row_pole: float, nyquist: float) -> float:
+    """Integrate the squared gain of both filters over frequency, both signs [Hz]."""
+    f = np.linspace(0.0, min(nyquist, 20.0 * row_pole / (2.0 * np.pi)), 4001)
+    w = 2.0 * np.pi * f
+    gain = 1.0 / ((1.0 + (w / motion_pole) ** 2) * (1.0 + (w / row_pole) ** 2)) ** 3
+    return float(2.0 * np.trapezoid(gain, f))
