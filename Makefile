@@ -33,6 +33,7 @@ MESSAGES := $(shell find msg_schemas -type f)
 .DEFAULT_GOAL := all
 .PHONY: all demo test lint bench lock clean help check
 .DELETE_ON_ERROR:
+.NOTPARALLEL:
 
 all: $(STAMPS)/armid_ros $(VENV)/setup.bash  ## set up .venv: ROS 2, armid_msgs, armid_ros
 	@echo 'armid_ros is in $(VENV); to use it in a shell:  . $(VENV)/setup.bash'
@@ -81,43 +82,43 @@ check:
 $(STAMPS)/venv: | $(if $(filter file,$(origin PYTHON)),,check)
 	@$(CHECK)
 	$(PYTHON) -m venv $(VENV)
-	mkdir -p $(STAMPS)
-	touch $@
+	@mkdir -p $(STAMPS)
+	@touch $@
 
 $(STAMPS)/run: requirements/run.txt requirements/build.txt $(STAMPS)/venv
 	@echo 'installing ROS 2 Jazzy and the libraries (a minute or two, once)'
 	$(PIP) --require-hashes -r requirements/build.txt
 	$(LOCKED) -r requirements/run.txt
-	touch $@
+	@touch $@
 
 $(STAMPS)/test: requirements/test.txt $(STAMPS)/run
 	$(LOCKED) -r $<
-	touch $@
+	@touch $@
 
 $(STAMPS)/bench: requirements/bench.txt $(STAMPS)/run
 	$(LOCKED) -r $<
-	touch $@
+	@touch $@
 
 MESSAGES_BUILD := $(VENV)/build/armid_msgs
 $(STAMPS)/armid_msgs: $(MESSAGES) $(STAMPS)/run
 	@echo 'compiling armid_msgs'
-	rm -rf $(MESSAGES_BUILD) && mkdir -p $(MESSAGES_BUILD)
-	( PATH="$(abspath $(BIN)):$$PATH" && \
+	@rm -rf $(MESSAGES_BUILD) && mkdir -p $(MESSAGES_BUILD)
+	@( PATH="$(abspath $(BIN)):$$PATH" && \
 	cmake -S msg_schemas -B $(MESSAGES_BUILD) -G Ninja -DCMAKE_BUILD_TYPE=Release \
 		-DBUILD_TESTING=OFF -DCMAKE_INSTALL_PREFIX=$(abspath $(VENV)) \
 		-DCMAKE_PREFIX_PATH=$(abspath $(VENV)) \
 		-DPython3_EXECUTABLE=$(abspath $(BIN))/python && \
 	cmake --build $(MESSAGES_BUILD) && cmake --install $(MESSAGES_BUILD) \
 	) >$(MESSAGES_BUILD)/log 2>&1 || { cat $(MESSAGES_BUILD)/log; exit 1; }
-	touch $@
+	@touch $@
 
 # Not editable, for pip then leaves out the files that ROS 2 looks for. What a build left behind
 # would be installed again, files that are gone included.
 $(STAMPS)/armid_ros: $(TREE) setup.py setup.cfg package.xml requirements/run.in requirements/ros.in \
 		requirements/test.in $(STAMPS)/armid_msgs
-	rm -rf build/lib build/bdist.*
+	@rm -rf build/lib build/bdist.*
 	$(PIP) --no-deps --no-build-isolation --force-reinstall .
-	touch $@
+	@touch $@
 
 define SETUP_BASH
 # Source this to use armid_ros and its ROS 2 in a shell.

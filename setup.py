@@ -7,13 +7,14 @@ from pathlib import Path
 
 from setuptools import find_packages, setup
 
+HERE = Path(__file__).resolve().parent  # `colcon build --symlink-install` runs a link to this file
 NAME = 'armid_ros'
 NODES = ('bag_player', 'excitation_publisher', 'online_identifier', 'recorder', 'simulated_arm')
 
 
 def requirements(group):
     """Read requirements/<group>.in: one requirement a line, after a '#' a comment."""
-    lines = Path('requirements', f'{group}.in').read_text(encoding='utf-8').splitlines()
+    lines = (HERE / 'requirements' / f'{group}.in').read_text(encoding='utf-8').splitlines()
     names = (line.split('#')[0].strip() for line in lines)
     return [name for name in names if name and not name.startswith('-')]
 
@@ -49,6 +50,7 @@ setup(
     extras_require={
         'ros': requirements('ros'),
         'test': requirements('test'),
+        'bench': requirements('bench'),
     },
     zip_safe=False,
     entry_points={

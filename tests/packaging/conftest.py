@@ -21,7 +21,9 @@ def root():
 def prefix():
     """Return the prefix that armid_ros is installed in; skip the test in a bare source tree."""
     try:
-        metadata.distribution('armid_ros')
+        installed = metadata.distribution('armid_ros').locate_file('')
     except metadata.PackageNotFoundError:
+        installed = ROOT
+    if not Path(installed).is_relative_to(sys.prefix):
         pytest.skip('armid_ros is not installed in this environment: run make')
     return Path(sys.prefix)

@@ -40,8 +40,18 @@ def workspace(root, tmp_path_factory):
 @pytest.fixture(scope='module')
 def install(workspace):
     """Build the workspace."""
-    run(['colcon', 'build', '--event-handlers', 'console_direct+'], workspace)
+    run(['colcon', 'build'], workspace)
     return workspace / 'install'
+
+
+@pytest.fixture(scope='module')
+def linked_install(workspace, tmp_path_factory):
+    """Build armid_ros alone with links into the source tree, as developers do."""
+    folder = tmp_path_factory.mktemp('linked_workspace')
+    (folder / 'src').mkdir()
+    (folder / 'src' / 'armid_ros').symlink_to(workspace / 'src' / 'armid_ros')
+    run(['colcon', 'build', '--symlink-install'], folder)
+    return folder / 'install'
 
 
 def test_both_packages_are_found_messages_first(workspace):
@@ -51,8 +61,10 @@ def test_both_packages_are_found_messages_first(workspace):
     assert run(listed, workspace / 'src' / 'armid_ros').split() == ['armid_msgs', 'armid_ros']
 
 
-def test_build_installs_what_ros2_looks_for(install, root):
+@pytest.mark.parametrize('built', ['install', 'linked_install'])
+def test_build_installs_what_ros2_looks_for(built, root, request):
     """Marker, manifest and executables, without one of the scripts being lost or added."""
+    install = request.getfixturevalue(built)
     share = install / 'armid_ros' / 'share'
     assert (share / 'ament_index' / 'resource_index' / 'packages' / 'armid_ros').is_file()
     assert (share / 'armid_ros' / 'package.xml').is_file()
