@@ -1,0 +1,93 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A swinging arm's recording, and bags made message by message."""
+
+from armid_ros.recording import BagWriter, joint_state_cdr, Recording
+from armid_ros.recording.message_types import JOINT_STATE
+import numpy as np
+import pytest
+
+JOINTS = ('shoulder', 'elbow', 'wrist')
+START_NS = 1_795_254_519_961_369_502
+PERIOD_NS = 1_000_000
+
+
+def swing(samples=500, joints=JOINTS, period_ns=PERIOD_NS, start_ns=START_NS):
+    """Return a recording of joints that swing, each at a rate of its own."""
+    t = np.arange(samples) * period_ns * 1e-9
+    rates = 2.0 + np.arange(len(joints))
+    return Recording(
+        joints=joints,
+        t=t,
+        q=np.sin(np.outer(t, rates)),
+        dq=rates * np.cos(np.outer(t, rates)),
+        tau=10 * np.cos(np.outer(t, rates) + 0.2),
+        start_ns=start_ns,
+    )
+
+
+@pytest.fixture
+def swinging():
+    """Return a recording of three joints, 500 samples at 1 kHz."""
+    return swing()
+
+
+@pytest.fixture
+def make_swing():
+    """Return the function that makes recordings."""
+    return swing
+
+
+@pytest.fixture
+def stamps(swinging):
+    """Return the stamps of the recording [ns]."""
+    return START_NS + PERIOD_NS * np.arange(len(swinging), dtype=np.int64)
+
+
+@pytest.fixture
+def write_bag(tmp_path):
+    """Return a function that writes messages, given as (topic, CDR, log time), to a bag."""
+
+    def write(messages, name='bag', type_name=JOINT_STATE, **options):
+        with BagWriter(tmp_path / name, **options) as writer:
+            for topic, cdr, log_time_ns in messages:
+                writer.add_topic(topic, type_name)
+                writer.write(topic, cdr, log_time_ns)
+        return tmp_path / name
+
+    return write
+
+
+@pytest.fixture
+def messages_of():
+    """Return a function that makes messages of samples, one each, logged at their stamps."""
+
+    def make(recording, stamps, joints=None, *, log=None, topic='/joint_states', **kept):
+        names = list(joints or recording.joints)
+        columns = [recording.joints.index(name) for name in names]
+        values = []
+        for quantity in ('q', 'dq', 'tau'):
+            array = kept.get(quantity, getattr(recording, quantity))
+            values.append(None if array is None else array[:, columns])
+        cdr = joint_state_cdr(names, stamps, *values)
+        times = np.asarray(stamps if log is None else log).tolist()
+        return [(topic, data, time) for data, time in zip(cdr, times, strict=True)]
+
+    return make
+
+
+@pytest.fixture
+def assert_same():
+    """Return a function that compares two recordings, of the second only some samples."""
+
+    def compare(got, expected, samples=slice(None), joints=None):
+        columns = [expected.joints.index(name) for name in joints or expected.joints]
+        assert got.joints == tuple(joints or expected.joints)
+        t = expected.t[samples]
+        np.testing.assert_allclose(got.t, t - t[0], rtol=0, atol=1e-9)
+        for quantity in ('q', 'dq', 'tau'):
+            np.testing.assert_array_equal(
+                getattr(got, quantity), getattr(expected, quantity)[samples][:, columns]
+            )
+
+    return compare

@@ -1,0 +1,191 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What one writes the other reads: this package, rosbags and mcap-ros2-support."""
+
+from armid_ros.motion import Motion
+from armid_ros.recording import (
+    joint_state_cdr,
+    read_recording,
+    read_robot_description,
+    Recording,
+    topics,
+    write_recording,
+)
+from armid_ros.recording.message_types import JOINT_STATE
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+import numpy as np
+import pytest
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
+from rosbags.typesys import get_typestore, Stores
+
+
+@pytest.mark.parametrize('compression', ['zstd', 'lz4', 'none'])
+@pytest.mark.parametrize('chunk_size', [1, 4096, 1 << 20])
+def test_what_is_written_is_read_back_exactly(
+    swinging, tmp_path, assert_same, compression, chunk_size
+):
+    write_recording(tmp_path / 'bag', swinging, compression=compression, chunk_size=chunk_size)
+    back = read_recording(tmp_path / 'bag', joints=swinging.joints)
+    assert_same(back, swinging)
+    assert back.start_ns == swinging.start_ns
+    assert back.clock == 'header'
+    assert back.topic == '/joint_states'
+    assert back.report.clean
+    assert (back.report.messages, back.report.samples) == (500, 500)
+
+
+def test_the_bare_file_holds_the_same(swinging, tmp_path, assert_same):
+    write_recording(tmp_path / 'bag', swinging)
+    assert_same(read_recording(tmp_path / 'bag' / 'bag_0.mcap', joints=swinging.joints), swinging)
+
+
+def test_a_motion_is_written_with_names_and_start_of_ones_choice(tmp_path):
+    t = np.linspace(0.0, 1.0, 11)
+    motion = Motion(('a',), t, t[:, None], np.ones((11, 1)), np.zeros((11, 1)))
+    write_recording(tmp_path / 'bag', motion, joint_names=['elbow'], start_ns=5 * 10**9)
+    back = read_recording(tmp_path / 'bag', joints=['elbow'])
+    np.testing.assert_array_equal(back.q, motion.q)
+    np.testing.assert_allclose(back.t, t, atol=1e-9)
+    assert back.start_ns == 5 * 10**9
+    assert back.tau is None
+    assert back.report.absent == ('effort',)
+
+
+def test_the_robot_description_travels_with_the_recording(swinging, tmp_path):
+    urdf = '<robot name="ärmchen"/>'
+    write_recording(tmp_path / 'with', swinging, robot_description=urdf)
+    write_recording(tmp_path / 'without', swinging)
+    assert read_robot_description(tmp_path / 'with') == urdf
+    assert read_robot_description(tmp_path / 'without') is None
+    latched = {topic.name: topic.qos[0].latched for topic in topics(tmp_path / 'with')}
+    assert latched == {'/robot_description': True, '/joint_states': False}
+
+
+def test_rosbags_reads_what_is_written(swinging, tmp_path, stamps):
+    write_recording(tmp_path / 'bag', swinging)
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Reader(tmp_path / 'bag') as reader:
+        assert reader.message_count == len(swinging)
+        assert reader.start_time == stamps[0]
+        assert reader.ros_distro == 'jazzy'
+        (connection,) = reader.connections
+        assert connection.msgtype == JOINT_STATE
+        assert connection.digest == store.hash_rihs01(JOINT_STATE)
+        rows = [
+            (log, store.deserialize_cdr(raw, JOINT_STATE)) for _, log, raw in reader.messages()
+        ]
+    np.testing.assert_array_equal([log for log, _ in rows], stamps)
+    assert all(tuple(message.name) == swinging.joints for _, message in rows)
+    np.testing.assert_array_equal([message.position for _, message in rows], swinging.q)
+    np.testing.assert_array_equal([message.effort for _, message in rows], swinging.tau)
+    stamp = rows[-1][1].header.stamp
+    assert stamp.sec * 10**9 + stamp.nanosec == stamps[-1]
+
+
+def test_mcap_ros2_reads_what_is_written_by_its_own_schema(swinging, tmp_path, stamps):
+    write_recording(tmp_path / 'bag', swinging)
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as stream:
+        reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        assert reader.get_header().profile == 'ros2'
+        rows = list(reader.iter_decoded_messages())
+        summary = reader.get_summary()
+    assert [message.log_time for _, _, message, _ in rows] == stamps.tolist()
+    np.testing.assert_array_equal([list(row[3].velocity) for row in rows], swinging.dq)
+    assert summary.statistics.message_count == len(swinging)
+    assert summary.statistics.message_start_time == stamps[0]
+    assert summary.statistics.message_end_time == stamps[-1]
+    assert len(summary.chunk_indexes) == summary.statistics.chunk_count
+
+
+@pytest.mark.parametrize('version', [8, 9])
+@pytest.mark.parametrize(
+    ('storage', 'mode'),
+    [(StoragePlugin.MCAP, mode) for mode in CompressionMode]
+    + [(StoragePlugin.SQLITE3, m) for m in CompressionMode if m is not CompressionMode.STORAGE],
+)
+def test_what_rosbags_writes_is_read(
+    swinging, tmp_path, stamps, assert_same, version, storage, mode
+):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    writer = Writer(tmp_path / 'bag', version=version, storage_plugin=storage)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    messages = joint_state_cdr(swinging.joints, stamps, swinging.q, swinging.dq, swinging.tau)
+    with writer:
+        connection = writer.add_connection('/arm/joint_states', JOINT_STATE, typestore=store)
+        for stamp, message in zip(stamps.tolist(), messages, strict=True):
+            writer.write(connection, stamp, message)
+    back = read_recording(tmp_path / 'bag', joints=swinging.joints)
+    assert_same(back, swinging)
+    assert back.topic == '/arm/joint_states'
+    assert back.report.clean
+    (topic,) = topics(tmp_path / 'bag')
+    assert (topic.count, topic.type_name) == (len(swinging), JOINT_STATE)
+    if mode is CompressionMode.FILE:
+        (packed,) = (tmp_path / 'bag').glob('*.zstd')
+        assert_same(read_recording(packed, joints=swinging.joints), swinging)
+
+
+@pytest.mark.parametrize('distribution', [Stores.ROS2_FOXY, Stores.ROS2_HUMBLE, Stores.LATEST])
+def test_definitions_of_other_distributions_are_read(
+    swinging, tmp_path, stamps, assert_same, distribution
+):
+    store = get_typestore(distribution)
+    types = store.types
+    with Writer(tmp_path / 'bag', version=9) as writer:
+        connection = writer.add_connection('/joint_states', JOINT_STATE, typestore=store)
+        for at, stamp in enumerate(stamps.tolist()):
+            time = types['builtin_interfaces/msg/Time'](sec=stamp // 10**9, nanosec=stamp % 10**9)
+            message = types[JOINT_STATE](
+                header=types['std_msgs/msg/Header'](stamp=time, frame_id='base'),
+                name=list(swinging.joints),
+                position=swinging.q[at],
+                velocity=swinging.dq[at],
+                effort=swinging.tau[at],
+            )
+            writer.write(connection, stamp, store.serialize_cdr(message, JOINT_STATE))
+    assert_same(read_recording(tmp_path / 'bag', joints=swinging.joints), swinging)
+
+
+@pytest.mark.parametrize('names', [('j',), ('a', 'bc', 'def', 'ghij', 'klmno'), ('ä', 'gelenk_2')])
+@pytest.mark.parametrize('frame_id', ['', 'x', 'base', 'a_longer_frame'])
+@pytest.mark.parametrize('fields', ['q', 'q dq', 'q tau', 'q dq tau'])
+def test_the_encoder_agrees_with_rosbags_whatever_the_lengths(names, frame_id, fields):
+    rng = np.random.default_rng(len(names) + len(frame_id))
+    arrays = [
+        rng.normal(size=(3, len(names))) if name in fields.split() else None
+        for name in ('q', 'dq', 'tau')
+    ]
+    store = get_typestore(Stores.ROS2_JAZZY)
+    stamps = [1, 2 * 10**9 + 3, 4 * 10**9]
+    messages = joint_state_cdr(names, stamps, *arrays, frame_id=frame_id)
+    for at, (stamp, raw) in enumerate(zip(stamps, messages, strict=True)):
+        message = store.deserialize_cdr(raw, JOINT_STATE)
+        assert message.header.frame_id == frame_id
+        assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == stamp
+        assert tuple(message.name) == names
+        for field, array in zip(('position', 'velocity', 'effort'), arrays, strict=True):
+            expected = [] if array is None else array[at]
+            np.testing.assert_array_equal(getattr(message, field), expected)
+        assert bytes(store.serialize_cdr(message, JOINT_STATE)) == raw
+
+
+def test_arrays_of_a_recording_are_read_only(swinging, tmp_path):
+    write_recording(tmp_path / 'bag', swinging)
+    back = read_recording(tmp_path / 'bag', joints=swinging.joints)
+    for array in (back.t, back.q, back.dq, back.tau):
+        with pytest.raises(ValueError, match='read-only'):
+            array[0] = 0.0
+
+
+def test_a_recording_refuses_arrays_that_do_not_match():
+    with pytest.raises(Exception, match=r'q has shape \(4, 2\).*need \(4, 3\)'):
+        Recording(joints=('a', 'b', 'c'), t=np.arange(4.0), q=np.zeros((4, 2)))
+
+
+def test_a_recording_of_no_samples_is_a_bag_that_says_so(tmp_path):
+    empty = Recording(joints=('a',), t=np.empty(0), q=np.empty((0, 1)))
+    write_recording(tmp_path / 'bag', empty)
+    with pytest.raises(Exception, match=r'bag: /joint_states has no messages'):
+        read_recording(tmp_path / 'bag', joints=['a'])
