@@ -93,6 +93,7 @@ def effects(as_json: bool) -> None:
 @click.option('--method', type=click.Choice(['ols', 'wls', 'irls']), default='wls')
 @click.option('--cutoff', type=float, default=None, help='Of the position filter [Hz].')
 @click.option('--decimation', type=int, default=None, help='Keep one sample of this many.')
+@click.option('--quasi-static', is_flag=True, help='Weight and effects only: for slow motions.')
 @click.option('--topic', default=None, help='JointState topic, where a bag has several.')
 @_gravity
 @_joints
@@ -107,6 +108,7 @@ def identify(
     method: str,
     cutoff: float | None,
     decimation: int | None,
+    quasi_static: bool,
     topic: str | None,
     gravity: str,
     joints: str | None,
@@ -117,7 +119,7 @@ def identify(
     from armid_ros import identification as ident
 
     robot = _load_robot(robot_source, gravity, joints, bags)
-    arm = ArmModel(robot)
+    arm = ArmModel(robot, quasi_static=quasi_static)
     for name in filter(None, names.split(',')):
         arm = arm.with_effect(make_effect(name, robot))
     settings = ident.IdentificationSettings(

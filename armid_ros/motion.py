@@ -89,6 +89,11 @@ class Motion:
             tau=tau,
         )
 
+    def at_rest(self) -> Motion:
+        """Return the same positions held still: what weight alone takes."""
+        zero = np.zeros_like(self.q)
+        return replace(self, dq=zero, ddq=zero)
+
     def with_torque(self, tau: npt.ArrayLike | None) -> Motion:
         """Return the same motion with another torque, shape (N, n) [N m]."""
         return replace(self, tau=None if tau is None else read_only(tau))

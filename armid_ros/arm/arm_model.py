@@ -37,12 +37,16 @@ class ArmModel:
         What else acts.
     values : tuple of ndarray, each of shape (P_e,)
         Parameter values of every effect, zero by default.
+    quasi_static : bool
+        Whether the rigid body is felt by its weight alone, as in motions slow enough for inertia
+        not to matter: tau = Y(q, 0, 0) pi + effects.
 
     """
 
     robot: Robot
     effects: tuple[Effect, ...] = ()
     values: tuple[FloatArray, ...] = ()
+    quasi_static: bool = False
 
     def __post_init__(self) -> None:
         """Fill in zeros, freeze the values and check their number."""
@@ -81,7 +85,7 @@ class ArmModel:
         size = len(self.robot.rigid_parameters)
         cuts = np.cumsum([size, *(len(v) for v in self.values)])
         parts = np.split(theta, cuts)[:-1]
-        return ArmModel(self.robot.with_inertias(parts[0]), self.effects, tuple(parts[1:]))
+        return replace(self, robot=self.robot.with_inertias(parts[0]), values=tuple(parts[1:]))
 
     def effect_columns(self, motion: Motion) -> FloatArray:
         """Return the sensitivities of the effects, shape (N, n, P - 10 n)."""
@@ -91,7 +95,8 @@ class ArmModel:
 
     def columns(self, motion: Motion) -> FloatArray:
         """Return the sensitivities of the torques to ``parameters``, shape (N, n, P)."""
-        return np.concatenate([regressor(self.robot, motion), self.effect_columns(motion)], axis=2)
+        rigid = regressor(self.robot, self._felt(motion))
+        return np.concatenate([rigid, self.effect_columns(motion)], axis=2)
 
     def action(self) -> Action:
         """Return how the robot and all effects together act on the plant."""
@@ -127,13 +132,16 @@ class ArmModel:
         action = self.action()
         assert action.robot is not None and action.damping is not None
         assert action.inertia is not None
-        tau = inverse_dynamics(action.robot, motion)
+        tau = inverse_dynamics(action.robot, self._felt(motion))
         tau += motion.dq @ action.damping.T + motion.ddq @ action.inertia.T
         if action.dry_friction is not None:
             tau += action.dry_friction.torque(motion.dq)
         if action.torque is not None:
             tau += action.torque(motion.t, motion.q, motion.dq)
         return tau
+
+    def _felt(self, motion: Motion) -> Motion:
+        return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(self, rng: np.random.Generator) -> BaseParameters:
         """Find the combinations of all standard parameters that any motion can tell apart."""

@@ -41,13 +41,6 @@ def check_motion(
         Naming the recording, the joint and the remedy.
 
     """
-    for recording in recordings:
-        if recording.duration < SHORTEST or not any(True for _ in segments(recording, used)):
-            raise IdentificationError(
-                f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
-                f'too short; record a movement of several seconds'
-            )
-        _check_positions(robot, recording)
     ranges = np.max([np.ptp(recording.q, axis=0) for recording in recordings], axis=0)
     resting = [name for name, size in zip(robot.joints, ranges, strict=True) if size < REST_RANGE]
     if len(resting) == robot.n_joints:
@@ -55,6 +48,13 @@ def check_motion(
             f'{recordings[0].source}: no motion, every joint stays within {REST_RANGE} rad; '
             'record the arm while it follows an excitation'
         )
+    for recording in recordings:
+        if recording.duration < SHORTEST or not any(True for _ in segments(recording, used)):
+            raise IdentificationError(
+                f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
+                f'too short; record a movement of several seconds'
+            )
+        _check_positions(robot, recording)
     if resting:
         return (f'at rest throughout: {", ".join(resting)}; nothing of their own is identified',)
     return ()

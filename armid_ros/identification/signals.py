@@ -30,6 +30,8 @@ JITTER_TOLERANCE = 0.05
 MODEL_BANDS = 10.0
 #: The positions' spectrum ends where it is less than this many times the noise.
 NOISE_MARGIN = 3.0
+#: Periods of the cut-off that are cut off at both ends, where the filter has no neighbours.
+EDGE_PERIODS = 4.0
 #: Half length of the decimation filter in output samples; its edges are cut off.
 _HALF_TAPS = 4
 
@@ -98,12 +100,10 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
 
     """
     rate = float(np.median([sampling_rate(recording) for recording in recordings]))
-    band = MODEL_BANDS * max(_motion_band(recording) for recording in recordings)
+    crossing = max(_noise_crossing(recording) for recording in recordings)
+    band = MODEL_BANDS * max(_motion_band(recording, crossing) for recording in recordings)
     decimation = settings.decimation or max(1, int(rate / (2.5 * band)))
-    cutoff = settings.cutoff_hz
-    if cutoff is None:
-        noise = max(_noise_crossing(recording) for recording in recordings)
-        cutoff = min(max(noise, band), 0.2 * rate)
+    cutoff = settings.cutoff_hz or min(max(crossing, band), 0.2 * rate)
     if cutoff >= 0.5 * rate:
         raise IdentificationError(
             f'{recordings[0].source}: a cut-off of {cutoff:g} Hz needs more than '
@@ -195,7 +195,7 @@ def _differentiated(
     smooth = signal.sosfiltfilt(sections, q, axis=0)
     dq = _central_difference(smooth, t[1] - t[0])
     ddq = _central_difference(dq, t[1] - t[0])
-    edge = int(np.ceil(used.rate_hz / used.cutoff_hz)) + 4
+    edge = int(np.ceil(EDGE_PERIODS * used.rate_hz / used.cutoff_hz))
     inner = slice(edge, len(t) - edge)
     return Motion(joints, t[inner], smooth[inner], dq[inner], ddq[inner], tau[inner])
 
@@ -212,15 +212,20 @@ def _central_difference(x: FloatArray, step: float) -> FloatArray:
     )
 
 
-def _motion_band(recording: Recording) -> float:
-    """Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint."""
+def _motion_band(recording: Recording, noise_hz: float) -> float:
+    """
+    Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint.
+
+    What is above a given frequency is noise and does not count.
+
+    """
     rate = sampling_rate(recording)
     band = 1.0 / recording.duration
     for position in recording.q.T:
         if np.ptp(position) > 0.0:
             frequency, power = signal.periodogram(np.diff(position), fs=rate)
-            share = np.cumsum(power) / np.sum(power)
-            band = max(band, float(frequency[np.searchsorted(share, 0.99)]))
+            share = np.cumsum(power[frequency <= noise_hz])
+            band = max(band, float(frequency[np.searchsorted(share, 0.99 * share[-1])]))
     return band
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import math
 from pathlib import Path
 from xml.etree import ElementTree
@@ -138,8 +139,7 @@ def robot_from_urdf(
         notes=description.notes + locked,
         path=path,
     )
-    _require_inertia(robot, source)
-    return robot
+    return replace(robot, notes=robot.notes + _inertia_notes(robot))
 
 
 def _expand_xacro(path: Path, arguments: Mapping[str, str]) -> str:
@@ -225,8 +225,8 @@ def _join(numbers: Sequence[float]) -> str:
     return ' '.join(map(repr, numbers))
 
 
-def _require_inertia(robot: Robot, source: str) -> None:
-    """Refuse a joint that moves no mass, in any of several poses: nothing can simulate it."""
+def _inertia_notes(robot: Robot) -> tuple[str, ...]:
+    """Note a joint that moves no mass in any of several poses: it cannot be simulated as it is."""
     data = robot.model.createData()
     generator = np.random.default_rng(0)
     moved = np.zeros(robot.n_joints)
@@ -234,10 +234,9 @@ def _require_inertia(robot: Robot, source: str) -> None:
         q = generator.uniform(-math.pi, math.pi, robot.n_joints)
         mass_matrix = pin.crba(robot.model, data, q)
         moved = np.maximum(moved, np.abs(np.diag(mass_matrix)))
-    for joint, link, inertia in zip(robot.joints, robot.links, moved, strict=True):
-        if inertia < NO_INERTIA:
-            raise RobotError(
-                f"{source}: link '{link}', moved by joint '{joint}', has no <inertial>, nor has "
-                f"any link beyond it: give it a rough one, or leave '{joint}' out of the driven "
-                f'joints'
-            )
+    return tuple(
+        f"link '{link}', moved by joint '{joint}', has no <inertial>, nor has any link beyond it: "
+        'its inertia can be identified, but simulating the arm needs a rough one'
+        for joint, link, inertia in zip(robot.joints, robot.links, moved, strict=True)
+        if inertia < NO_INERTIA
+    )

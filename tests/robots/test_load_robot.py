@@ -193,15 +193,16 @@ class TestRefused:
             (robot(ARM).replace('"1.5"', '"heavy"'), "link 'upper': value='heavy' of <mass>"),
             (robot(ARM).replace('<mass value="1.5"/>', ''), "of link 'upper' has no <mass>"),
             (robot(BASE), 'no joint can be driven'),
-            (
-                robot(ARM, link('lower', ''), joint('elbow', 'upper', 'lower')),
-                "link 'lower', moved by joint 'elbow', has no <inertial>",
-            ),
         ],
     )
     def test_by_name(self, text: str, message: str) -> None:
         with pytest.raises(RobotError, match=message):
             robot_from_urdf(text)
+
+    def test_a_joint_that_moves_nothing_is_noted(self) -> None:
+        arm = robot_from_urdf(robot(ARM, link('lower', ''), joint('elbow', 'upper', 'lower')))
+        (note,) = arm.notes
+        assert "link 'lower', moved by joint 'elbow', has no <inertial>" in note
 
     def test_a_massless_link_within_the_arm_is_no_reason(self) -> None:
         wrist = link('cross', '') + joint('roll', 'upper', 'cross')

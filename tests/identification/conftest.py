@@ -1,0 +1,59 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""An arm, a rich motion in closed form, and what would be recorded of it."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.motion import Motion
+from armid_ros.recording import Recording
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+FRICTION = {'viscous_friction': 0.08, 'coulomb_friction': 0.05, 'torque_offset': 0.02}
+
+
+@pytest.fixture(scope='session')
+def arm():
+    """Return the humanoid arm with friction and offsets."""
+    robot = load_robot('humanoid_arm')
+    model = ArmModel(robot)
+    for name, value in FRICTION.items():
+        model = model.with_effect(make_effect(name, robot), np.full(6, value))
+    return model
+
+
+@pytest.fixture(scope='session')
+def structure(arm):
+    """Return the same arm with nothing known of its effects."""
+    return ArmModel(arm.robot, arm.effects)
+
+
+def multisine(joints, duration, rate, seed, amplitude=0.5, base_hz=0.1):
+    """Return three harmonics per joint with random phases, exact to the second derivative."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(duration * rate)) / rate
+    w = 2 * np.pi * base_hz * np.array([1.0, 2.0, 5.0])[:, None]
+    size = amplitude * np.array([1.0, 0.6, 0.2])[:, None]
+    phase = rng.uniform(0, 2 * np.pi, (3, len(joints)))
+    angle = w[None] * t[:, None, None] + phase
+    return Motion(
+        tuple(joints),
+        t,
+        np.sum(size * np.sin(angle), axis=1),
+        np.sum(size * w * np.cos(angle), axis=1),
+        np.sum(-size * w**2 * np.sin(angle), axis=1),
+    )
+
+
+def recorded(arm, motion, seed=0, torque_noise=0.0, position_noise=0.0, source='bag'):
+    """Return what sensors with white noise would record of an arm in exact motion."""
+    rng = np.random.default_rng(seed)
+    tau = arm.torque(motion)
+    return Recording(
+        joints=motion.joints,
+        t=motion.t,
+        q=motion.q + position_noise * rng.normal(size=motion.q.shape),
+        tau=tau + torque_noise * rng.normal(size=tau.shape),
+        source=source,
+    )

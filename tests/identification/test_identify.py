@@ -1,0 +1,141 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import IdentificationError
+from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
+from armid_ros.model import random_motion
+import numpy as np
+import pytest
+
+from .conftest import FRICTION, multisine, recorded
+
+
+@pytest.fixture(scope='module')
+def motion(arm):
+    return multisine(arm.robot.joints, 30.0, 500.0, seed=1)
+
+
+@pytest.fixture
+def recording(arm, motion):
+    return recorded(arm, motion, torque_noise=0.02, position_noise=1e-6)
+
+
+def run(structure, *recordings, **signals):
+    settings = IdentificationSettings(signals=SignalSettings(**signals))
+    return identify(structure, recordings, settings, rng=np.random.default_rng(0))
+
+
+def test_parameters_come_back_within_their_uncertainty(arm, structure, recording):
+    result = run(structure, recording)
+    truth = result.base.values(arm.theta)
+    error = (result.estimate.values - truth) / result.estimate.std
+    assert np.sqrt(np.mean(error**2)) < 1.4
+    assert np.abs(error).max() < 5.0
+
+
+def test_friction_comes_back_in_numbers(structure, recording):
+    estimate = run(structure, recording).estimate
+    names = {
+        'viscous_coefficient': FRICTION['viscous_friction'],
+        'coulomb_torque': FRICTION['coulomb_friction'],
+        'torque_offset': FRICTION['torque_offset'],
+    }
+    for name, value in names.items():
+        found = estimate.values[estimate.index(name, 'elbow_pitch')]
+        assert abs(found - value) < 0.005
+
+
+def test_model_predicts_any_motion_not_only_the_training_data(arm, structure, recording):
+    identified = run(structure, recording).arm
+    other = random_motion(arm.robot, 200, np.random.default_rng(9))
+    error = identified.torque(other) - arm.torque(other)
+    assert np.linalg.norm(error) < 0.03 * np.linalg.norm(arm.torque(other))
+
+
+def test_held_out_error_is_the_noise(arm, structure, recording):
+    result = run(structure, recording)
+    held_out = recorded(arm, multisine(arm.robot.joints, 15.0, 500.0, seed=7), 3, 0.02, 1e-6)
+    score = Score.of(result.predict([held_out]))
+    taps = result.used.taps()
+    np.testing.assert_allclose(score.rms, 0.02 * np.linalg.norm(taps), rtol=0.3)
+
+
+def test_a_resting_joint_is_noted_and_the_others_are_identified(arm, structure):
+    moving = multisine(arm.robot.joints, 30.0, 500.0, seed=1)
+    still = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+    motion = replace(moving, q=moving.q * still, dq=moving.dq * still, ddq=moving.ddq * still)
+    result = run(structure, recorded(arm, motion, torque_noise=0.01))
+    assert any('at rest throughout: wrist_pitch' in note for note in result.notes)
+    assert result.base.rank < arm.base_parameters(np.random.default_rng(0)).rank
+    estimate = result.estimate
+    found = estimate.values[estimate.index('viscous_coefficient', 'elbow_pitch')]
+    assert abs(found - FRICTION['viscous_friction']) < 0.01
+
+
+def test_progress_ends_at_one(structure, recording):
+    shares = []
+    identify(structure, [recording], rng=np.random.default_rng(0), progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] > 0.9
+
+
+class TestRefusals:
+    """Data that cannot identify anything are refused with the reason and the remedy."""
+
+    def refused(self, structure, recording, message):
+        with pytest.raises(IdentificationError, match=message) as caught:
+            run(structure, recording)
+        assert 'bag' in str(caught.value)
+
+    def test_too_short(self, structure, recording):
+        part = slice(0, 300)
+        short = replace(
+            recording, t=recording.t[part], q=recording.q[part], tau=recording.tau[part]
+        )
+        self.refused(structure, short, 'too short; record')
+
+    def test_no_motion(self, structure, recording):
+        self.refused(structure, replace(recording, q=0.0 * recording.q), 'no motion')
+
+    def test_no_torque(self, structure, recording):
+        self.refused(structure, replace(recording, tau=None), 'no effort')
+
+    def test_constant_torque(self, structure, recording):
+        self.refused(structure, replace(recording, tau=0.0 * recording.tau), 'constant')
+
+    def test_wrong_sign(self, structure, recording):
+        self.refused(structure, replace(recording, tau=-recording.tau), 'opposite sign.*negate')
+
+    def test_wrong_sign_of_an_arm_that_the_description_does_not_know(self, arm, recording):
+        """A description without masses says nothing of the sign; the dissipated energy does."""
+        masses = 1e-9 * arm.robot.rigid_parameters
+        light = ArmModel(arm.robot.with_inertias(masses), arm.effects)
+        lossy = replace(recording, tau=-(recording.tau - 0.0))
+        with pytest.raises(IdentificationError, match='sign'):
+            run(light, lossy)
+
+    def test_newton_millimetres(self, structure, recording):
+        self.refused(structure, replace(recording, tau=1e3 * recording.tau), 'N mm')
+
+    def test_degrees(self, structure, recording):
+        self.refused(structure, replace(recording, q=np.rad2deg(recording.q)), 'degrees')
+
+
+def test_payload_is_found_against_a_known_arm(arm, motion):
+    """Two identifications of one arm, without and with 0.3 kg: the difference is the payload."""
+    robot = arm.robot
+    point = 0.3 * np.array([1.0, 2e-3, 5.5e-3, 3e-3])
+    payload = np.concatenate([point, np.zeros(6)])
+    loaded = arm.with_effect(make_effect('payload', robot), payload)
+    structure = ArmModel(robot, arm.effects)
+    first = run(structure, recorded(arm, motion, 1, 0.01))
+    second = run(structure, recorded(loaded, motion, 2, 0.01))
+    change = second.estimate.values - first.estimate.values
+    columns = first.base.grouping[:, 50:60]
+    weights = np.linalg.inv(first.estimate.covariance + second.estimate.covariance)
+    normal = columns[:, :4].T @ weights @ columns[:, :4]
+    found = np.linalg.solve(normal, columns[:, :4].T @ weights @ change)
+    assert abs(found[0] - 0.3) < 0.01
