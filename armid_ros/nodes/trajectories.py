@@ -45,10 +45,20 @@ def read_trajectory(message: JointTrajectory) -> Reference:
     )
 
 
-def write_trajectory(motion: Motion) -> JointTrajectory:
-    """Return the message that holds every sample of a motion, from time zero."""
+def write_trajectory(motion: Motion, lead: float) -> JointTrajectory:
+    """
+    Return the message that holds every sample of a motion.
+
+    Parameters
+    ----------
+    motion : Motion
+        What the arm shall do.
+    lead : float
+        Time it has to get to the first sample [s].
+
+    """
     message = JointTrajectory(joint_names=list(motion.joints))
-    for row, t in enumerate(motion.t - motion.t[0]):
+    for row, t in enumerate(motion.t - motion.t[0] + lead):
         seconds, nanoseconds = divmod(round(float(t) * 1e9), 10**9)
         message.points.append(
             JointTrajectoryPoint(

@@ -1,0 +1,118 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the parameters of the simulated arm say, as the arm they describe."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from armid_ros.arm import ArmModel
+from armid_ros.arm.model_file import load_model
+from armid_ros.effects import parse_effect
+from armid_ros.errors import RobotError
+from armid_ros.motion import FloatArray
+from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.robots import load_robot, parse_gravity
+from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Sensors, SimulatedArm
+import numpy as np
+
+Values = Callable[[str], Any]
+
+ARM_PARAMETERS = (
+    NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
+    NodeParameter(
+        'gravity',
+        '',
+        'earth, moon, or x,y,z in the base frame; empty: that of the model, or earth [m/s^2].',
+        check=lambda text: text and parse_gravity(text),
+    ),
+    NodeParameter('model', '', 'Path of a model.yaml; empty: the description and the effects.'),
+    NodeParameter(
+        'effects', [''], 'Effects, each as NAME[@joint+joint]:quantity=value,quantity=value.'
+    ),
+    NodeParameter('start', '', 'Where it stands, as q1,q2,...; empty: in mid-range [rad or m].'),
+    NodeParameter(
+        'controller',
+        'computed_torque',
+        'What makes it follow its trajectory.',
+        choices=('computed_torque', 'gravity_pd'),
+    ),
+    NodeParameter('torque_noise', [0.0], 'Standard deviation, one or one a joint.', 'N m or N'),
+    NodeParameter('position_noise', [0.0], 'Standard deviation, one or one a joint.', 'rad or m'),
+    NodeParameter('velocity_noise', [0.0], 'Standard deviation, one or one a joint.', 'rad/s'),
+    NodeParameter('resolution', [0.0], 'Encoder step, one or one a joint; 0: none.', 'rad or m'),
+    NodeParameter('velocity_from_encoder', False, 'Differentiate positions for the velocity.'),
+    NodeParameter('torque_delay', 0, 'Steps by which torque is read late.', lower=0, upper=100000),
+    NodeParameter('seed', 0, 'Of the noise.', lower=0, upper=2**62),
+    NodeParameter('time_step', 0.001, 'Of the integration.', 's', lower=1e-5, upper=0.01),
+)
+
+
+def make_arm(value: Values) -> SimulatedArm:
+    """
+    Make the simulated arm that parameters describe.
+
+    Parameters
+    ----------
+    value : callable
+        Returns the value of a parameter of `ARM_PARAMETERS`.
+
+    Raises
+    ------
+    ArmidError
+        If robot, model, effects or sensors are not valid or do not fit each other.
+
+    """
+    plant = Plant(_model(value), dt=value('time_step'))
+    n = plant.robot.n_joints
+    controllers = {'computed_torque': ComputedTorque, 'gravity_pd': GravityPD}
+    start = _numbers(value('start'), n, 'start') if value('start') else None
+    return SimulatedArm(
+        plant,
+        rng=np.random.default_rng(value('seed')),
+        controller=controllers[value('controller')](plant.arm),
+        sensors=Sensors(
+            torque_noise=_per_joint(value('torque_noise'), n, 'torque_noise'),
+            position_noise=_per_joint(value('position_noise'), n, 'position_noise'),
+            velocity_noise=_per_joint(value('velocity_noise'), n, 'velocity_noise'),
+            resolution=_per_joint(value('resolution'), n, 'resolution'),
+            velocity_from_encoder=value('velocity_from_encoder'),
+            torque_delay=value('torque_delay'),
+        ),
+        start=start,
+    )
+
+
+def _model(value: Values) -> ArmModel:
+    gravity = value('gravity')
+    if value('model'):
+        arm = load_model(value('model'))
+        if gravity:
+            arm = replace(arm, robot=arm.robot.with_gravity(parse_gravity(gravity)))
+    else:
+        arm = ArmModel(load_robot(value('robot'), gravity=gravity or 'earth'))
+    for text in filter(None, value('effects')):
+        effect, values = parse_effect(text, arm.robot)
+        arm = arm.with_effect(effect, values)
+    return arm
+
+
+def _numbers(text: str, count: int, name: str) -> FloatArray:
+    try:
+        numbers = [float(part) for part in text.split(',')]
+    except ValueError:
+        raise RobotError(f"parameter '{name}' is '{text}'; write numbers: 0.1,0.2") from None
+    if len(numbers) != count:
+        raise RobotError(f"parameter '{name}' has {len(numbers)} numbers, for {count} joints")
+    return np.array(numbers)
+
+
+def _per_joint(values: list[float], count: int, name: str) -> FloatArray:
+    if len(values) not in (1, count):
+        raise RobotError(
+            f"parameter '{name}' has {len(values)} numbers; give one, or one for each of "
+            f'{count} joints'
+        )
+    return np.broadcast_to(np.array(values, dtype=float), (count,))

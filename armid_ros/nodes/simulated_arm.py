@@ -1,0 +1,202 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The simulated arm node: takes trajectories like a controller, speaks like a robot's drivers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import time
+from typing import Any
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.nodes.arm_parameters import ARM_PARAMETERS, make_arm
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.process import run
+from armid_ros.nodes.qos import LATCHED, STREAM
+from armid_ros.nodes.trajectories import read_trajectory
+from armid_ros.simulation import Reference, SimulatedArm
+from armid_ros.simulation.run import whole_steps
+from rclpy.clock import Clock, ClockType
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from trajectory_msgs.msg import JointTrajectory
+
+#: How late or early a trajectory may be [s]; more is a message from another time.
+LATEST = 1.0
+EARLIEST = 60.0
+#: Longest stretch of work before services are answered [s], and backlog that is given up.
+_BURST = 0.005
+_BACKLOG = 0.2
+#: Timers cannot be much faster [s].
+_SHORTEST_PERIOD = 0.0005
+
+
+class SimulatedArmNode(ArmidNode):
+    """
+    A simulated arm on topics.
+
+    In real time its stamps are those of the system clock. At another real_time_factor it also
+    publishes /clock. With use_sim_time it moves as far as /clock does, and no further.
+
+    """
+
+    table = (
+        *ARM_PARAMETERS,
+        NodeParameter('rate', 1000.0, 'Of joint_states.', 'Hz', lower=0.1, upper=100000.0),
+        NodeParameter(
+            'real_time_factor',
+            1.0,
+            'Simulated time per real time, if the computer can; who cannot follow loses '
+            'messages. 0: moves only when told.',
+            lower=0.0,
+            upper=1000.0,
+        ),
+    )
+
+    def __init__(
+        self, arm: SimulatedArm | None = None, start_ns: int | None = None, **kwargs: Any
+    ) -> None:
+        """
+        Make the node.
+
+        Parameters
+        ----------
+        arm : SimulatedArm, optional
+            The arm; by default the one the parameters describe.
+        start_ns : int, optional
+            Stamp of the beginning [ns]; by default that of the node's clock.
+        **kwargs
+            For rclpy's Node.
+
+        """
+        super().__init__('simulated_arm', **kwargs)
+        self._arm = arm or make_arm(self.value)
+        rate = self.value('rate')
+        self._dt_ns = round(self._arm.plant.dt * 1e9)
+        self._stride = whole_steps(1.0 / rate, self._arm.plant.dt, f'a rate of {rate:g} Hz')
+        self._follows = bool(self.value('use_sim_time'))
+        self._factor = 0.0 if self._follows else self.value('real_time_factor')
+        self._origin_ns = start_ns
+        if start_ns is None and not self._follows:
+            self._origin_ns = self.get_clock().now().nanoseconds
+        self._pending: tuple[int, Reference] | None = None
+        self._anchor = (time.monotonic(), 0)
+        self._states = self.create_publisher(
+            JointState,
+            'joint_states',
+            STREAM,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        self._message = JointState(name=list(self._arm.joints))
+        self._clock_publisher = None
+        if not self._follows and self._factor != 1.0:
+            self._clock_publisher = self.create_publisher(ClockMessage, '/clock', STREAM)
+        description = self.create_publisher(String, 'robot_description', LATCHED)
+        description.publish(String(data=self._arm.plant.robot.urdf))
+        self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, LATCHED)
+        self.offer('~/reset', self.reset)
+        if self._follows:
+            self.create_timer(1.0 / rate, self.follow)
+        elif self._factor:
+            period = max(1.0 / (rate * self._factor), _SHORTEST_PERIOD)
+            self.create_timer(period, self.catch_up, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    @property
+    def stamp_ns(self) -> int:
+        """Stamp of the present state of the arm [ns]."""
+        return (self._origin_ns or 0) + self._arm.state.steps * self._dt_ns
+
+    @property
+    def moving(self) -> bool:
+        """Whether a trajectory is under way or about to begin."""
+        return self._pending is not None or self._arm.state.t < self._arm.ends_at
+
+    @property
+    def hardware(self) -> str:
+        """Name of the robot."""
+        return str(self._arm.plant.robot.name)
+
+    def step(self) -> int:
+        """Move on to the next sample, publish it, and return its stamp [ns]."""
+        if self._pending is not None and self._pending[0] <= self.stamp_ns:
+            reference, self._pending = self._pending[1], None
+            self._begin(reference)
+        sample = self._arm.advance(self._stride)
+        stamp_ns = self.stamp_ns
+        stamp = Time(nanoseconds=stamp_ns).to_msg()
+        if self._clock_publisher is not None:
+            self._clock_publisher.publish(ClockMessage(clock=stamp))
+        message = self._message
+        message.header.stamp = stamp
+        message.position = sample.q.tolist()
+        message.velocity = sample.dq.tolist()
+        message.effort = sample.tau.tolist()
+        self._states.publish(message)
+        return stamp_ns
+
+    def follow(self) -> None:
+        """Move as far as /clock has."""
+        now = self.get_clock().now().nanoseconds
+        if self._origin_ns is None or now < self.stamp_ns:
+            self._origin_ns = now - self._arm.state.steps * self._dt_ns
+        while self.stamp_ns + self._stride * self._dt_ns <= now:
+            self.step()
+
+    def catch_up(self) -> None:
+        """Move as far as real time has, times the factor; what cannot be made up is given up."""
+        begun, now = self._anchor, time.monotonic()
+        due = begun[1] + (now - begun[0]) * self._factor
+        while self._elapsed() < due and time.monotonic() - now < _BURST:
+            self.step()
+        if (due - self._elapsed()) / self._factor > _BACKLOG:
+            self._anchor = (time.monotonic(), self._elapsed())
+
+    def reset(self) -> str:
+        """Put the arm back to where it stood first; time goes on."""
+        self._arm.reset(self._arm.state.steps)
+        self._pending = None
+        return f'{self.hardware} is where it began'
+
+    def condition(self) -> tuple[str, Mapping[str, object]]:
+        """Say how far the simulation is."""
+        return '', {'simulated_time': self._arm.state.t, 'moving': int(self.moving)}
+
+    def _elapsed(self) -> float:
+        return float(self._arm.state.t)
+
+    def _on_trajectory(self, message: JointTrajectory) -> None:
+        try:
+            reference = read_trajectory(message).for_robot(self._arm.plant.robot)
+            start_ns = Time.from_msg(message.header.stamp).nanoseconds or self.stamp_ns
+            delay = (start_ns - self.stamp_ns) * 1e-9
+            if not -LATEST <= delay <= EARLIEST:
+                when = f'{delay:.3g} s from now' if delay > 0 else f'{-delay:.3g} s ago'
+                raise TrajectoryError(
+                    f'trajectory: it was to begin {when}; a sender and an arm in different times '
+                    'need use_sim_time on both or on neither'
+                )
+        except TrajectoryError as error:
+            self.complaints.say('trajectory', str(error))
+            return
+        self._pending = (start_ns, reference)
+
+    def _begin(self, reference: Reference) -> None:
+        try:
+            self._arm.set_trajectory(reference)
+        except TrajectoryError as error:
+            self.complaints.say('trajectory', str(error))
+            return
+        self.get_logger().info(f'follows a trajectory of {reference.duration:g} s')
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    run(SimulatedArmNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,247 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The simulated arm moves as it is told, in the time it is given, and refuses the rest."""
+
+from __future__ import annotations
+
+from armid_ros.errors import ArmidError
+from armid_ros.nodes.qos import LATCHED
+from armid_ros.nodes.simulated_arm import SimulatedArmNode
+from armid_ros.robots import load_robot
+from builtin_interfaces.msg import Duration, Time
+import numpy as np
+import pytest
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+SECOND = 10**9
+ROBOT = load_robot('humanoid_arm')
+HOME = (ROBOT.lower + ROBOT.upper) / 2.0
+
+
+def trajectory(goal, seconds=1, joints=ROBOT.joints, stamp=None):
+    n = len(joints)
+    point = JointTrajectoryPoint(
+        positions=[float(q) for q in goal],
+        velocities=[0.0] * n,
+        accelerations=[0.0] * n,
+        time_from_start=Duration(sec=seconds),
+    )
+    message = JointTrajectory(joint_names=list(joints), points=[point])
+    if stamp is not None:
+        message.header.stamp = Time(sec=stamp)
+    return message
+
+
+def still_arm(bench, **parameters):
+    """Make an arm that moves only when the test steps it, from a stamp of 100 s on."""
+    parameters = {'rate': 100.0, 'real_time_factor': 0.0, **parameters}
+    return bench.add(lambda **kw: SimulatedArmNode(start_ns=100 * SECOND, **kw), **parameters)
+
+
+def send(bench, message):
+    publisher = bench.matched_publisher(JointTrajectory, 'joint_trajectory', LATCHED)
+    publisher.publish(message)
+    bench.settle()
+
+
+def stamps(states):
+    return [s.header.stamp.sec * SECOND + s.header.stamp.nanosec for s in states]
+
+
+def step_to_rest(bench, arm, states, limit=1000):
+    for _ in range(limit):
+        stamp = arm.step()
+        if not arm.moving:
+            bench.spin_until(lambda last=stamp: stamps(states)[-1:] == [last])
+            return states[-1]
+    pytest.fail('the arm never came to rest')
+
+
+def test_it_says_what_it_is_and_holds_its_pose(bench):
+    arm = still_arm(bench)
+    states = bench.listen(JointState, 'joint_states')
+    description = bench.listen(String, 'robot_description', LATCHED)
+    bench.settle()
+    stepped = [arm.step() for _ in range(20)]
+    bench.spin_until(lambda: len(states) == 20 and description)
+    assert load_robot(description[0].data).joints == ROBOT.joints
+    assert stepped == [100 * SECOND + k * SECOND // 100 for k in range(1, 21)]
+    assert stamps(states) == stepped
+    np.testing.assert_allclose(states[-1].position, HOME, atol=1e-9)
+    assert tuple(states[-1].name) == ROBOT.joints
+
+
+def test_it_follows_a_trajectory_to_its_end_and_holds_there(bench):
+    arm = still_arm(bench)
+    states = bench.listen(JointState, 'joint_states')
+    goal = HOME + 0.1
+    send(bench, trajectory(goal))
+    last = step_to_rest(bench, arm, states)
+    np.testing.assert_allclose(last.position, goal, atol=1e-4)
+    for _ in range(20):
+        arm.step()
+    bench.settle()
+    np.testing.assert_allclose(states[-1].position, goal, atol=1e-4)
+    np.testing.assert_allclose(states[-1].velocity, 0.0, atol=1e-3)
+
+
+def test_joints_are_matched_by_name(bench):
+    arm = still_arm(bench)
+    states = bench.listen(JointState, 'joint_states')
+    goal = HOME + 0.02 * np.arange(6)
+    send(bench, trajectory(goal[::-1], joints=ROBOT.joints[::-1]))
+    last = step_to_rest(bench, arm, states)
+    np.testing.assert_allclose(last.position, goal, atol=1e-4)
+
+
+def test_a_stamped_trajectory_begins_at_its_stamp(bench):
+    arm = still_arm(bench)
+    states = bench.listen(JointState, 'joint_states')
+    send(bench, trajectory(HOME + 0.1, stamp=101))
+    for _ in range(100):
+        arm.step()
+    bench.settle()
+    np.testing.assert_allclose(states[-1].position, HOME, atol=1e-9)
+    assert arm.moving
+    last = step_to_rest(bench, arm, states)
+    assert last.header.stamp.sec == 102
+
+
+def spoil(what):
+    message = trajectory(HOME + 0.1)
+    if what == 'unknown joint':
+        message.joint_names[0] = 'tail'
+    elif what == 'missing joint':
+        message = trajectory((HOME + 0.1)[1:], joints=ROBOT.joints[1:])
+    elif what == 'wrong length':
+        message.points[0].positions = [0.0, 0.0]
+    elif what == 'nan':
+        message.points[0].positions[2] = float('nan')
+    elif what == 'position limit':
+        message.points[0].positions[1] = float(ROBOT.upper[1]) + 0.2
+    elif what == 'velocity limit':
+        message.points[0].time_from_start = Duration(nanosec=10_000_000)
+    elif what == 'no points':
+        message.points = []
+    elif what == 'no positions':
+        message.points[0].positions = []
+    elif what == 'time':
+        message.points.append(message.points[0])
+    elif what == 'another time':
+        message.header.stamp = Time(sec=7)
+    elif what == 'moving end':
+        message.points[0].velocities = [0.1] * 6
+    return message
+
+
+@pytest.mark.parametrize(
+    ('what', 'words'),
+    [
+        ('unknown joint', "'tail'"),
+        ('missing joint', f"'{ROBOT.joints[0]}' is missing"),
+        ('wrong length', 'has 2 positions, but there are 6 joint names'),
+        ('nan', f"'{ROBOT.joints[2]}'"),
+        ('position limit', f"'{ROBOT.joints[1]}' reaches"),
+        ('velocity limit', 'velocity limit'),
+        ('no points', 'no points'),
+        ('no positions', 'no positions'),
+        ('time', 'time has to increase'),
+        ('another time', '93 s ago'),
+        ('moving end', 'ends with'),
+    ],
+)
+def test_a_bad_trajectory_is_refused_once_and_clearly_and_the_arm_goes_on(bench, what, words):
+    arm = still_arm(bench)
+    rosout, diagnostics = bench.rosout(), bench.diagnostics()
+    states = bench.listen(JointState, 'joint_states')
+    publisher = bench.matched_publisher(JointTrajectory, 'joint_trajectory', LATCHED)
+    for _ in range(3):
+        publisher.publish(spoil(what))
+        bench.settle()
+        arm.step()
+    arm.publish_diagnostics()
+    bench.spin_until(lambda: diagnostics and any(words in m.msg for m in rosout), words)
+    assert len([m for m in rosout if words in m.msg]) == 1
+    status = diagnostics[-1].status[0]
+    assert words in status.message and status.level == status.WARN
+    assert {v.key: v.value for v in status.values}['rejected trajectory'] == '3'
+    publisher.publish(trajectory(HOME + 0.1))
+    bench.settle()
+    last = step_to_rest(bench, arm, states)
+    np.testing.assert_allclose(last.position, HOME + 0.1, atol=1e-4)
+
+
+def test_reset_puts_it_back_and_time_goes_on(bench):
+    arm = still_arm(bench)
+    states = bench.listen(JointState, 'joint_states')
+    send(bench, trajectory(HOME + 0.1))
+    step_to_rest(bench, arm, states)
+    before = arm.stamp_ns
+    assert bench.call('simulated_arm/reset').success
+    arm.step()
+    bench.settle()
+    np.testing.assert_allclose(states[-1].position, HOME, atol=1e-6)
+    assert arm.stamp_ns == before + SECOND // 100
+
+
+def test_with_simulated_time_it_moves_exactly_as_far_as_the_clock(bench):
+    states = bench.listen(JointState, 'joint_states')
+    bench.add(SimulatedArmNode, rate=100.0, use_sim_time=True)
+    bench.tick(50 * SECOND)
+    bench.settle()
+    for clock, samples in ((50.01, 1), (50.03, 3), (50.035, 3), (50.5, 50)):
+        bench.tick(round(clock * SECOND))
+        bench.settle()
+        assert len(states) == samples
+        assert states[-1].header.stamp.nanosec == samples * SECOND // 100 or samples == 50
+
+
+def test_faster_than_real_time_it_publishes_the_clock(bench):
+    clock, states = bench.listen(Clock, '/clock'), bench.listen(JointState, 'joint_states')
+    bench.add(SimulatedArmNode, rate=100.0, real_time_factor=5.0)
+    bench.spin_until(lambda: len(states) >= 200 and len(clock) >= 200)
+    np.testing.assert_array_equal(np.diff(stamps(states)), SECOND // 100)
+
+
+def test_in_real_time_there_is_no_clock_and_stamps_are_evenly_spaced(bench):
+    clock, states = bench.listen(Clock, '/clock'), bench.listen(JointState, 'joint_states')
+    bench.add(SimulatedArmNode, rate=1000.0)
+    bench.spin_until(lambda: len(states) >= 300)
+    np.testing.assert_array_equal(np.diff(stamps(states)), SECOND // 1000)
+    assert not clock
+
+
+def test_gravity_and_effects_are_parameters(bench):
+    def effort(**parameters):
+        arm = still_arm(bench, **parameters)
+        states = bench.listen(JointState, 'joint_states')
+        arm.step()
+        bench.spin_until(lambda: states)
+        bench.executor.remove_node(arm)
+        arm.destroy_node()
+        return np.array(states[-1].effort)
+
+    earth, moon = effort(gravity='earth'), effort(gravity='moon')
+    np.testing.assert_allclose(moon, earth * 1.62 / 9.81, atol=1e-3)
+    shifted = effort(gravity='earth', effects=['torque_offset:torque_offset=0.5'])
+    np.testing.assert_allclose(shifted, earth + 0.5, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'words'),
+    [
+        ({'robot': 'r2d2'}, 'humanoid_arm'),
+        ({'gravity': 'mars'}, 'moon'),
+        ({'effects': ['stickiness']}, 'the catalogue has'),
+        ({'torque_noise': [0.1, 0.2]}, 'one for each of 6 joints'),
+        ({'start': '0.1,x'}, 'write numbers'),
+        ({'rate': 300.0}, 'does not fit the step'),
+        ({'model': '/nowhere/model.yaml'}, 'model.yaml'),
+    ],
+)
+def test_an_arm_that_cannot_be_made_is_refused_with_the_reason(bench, parameters, words):
+    with pytest.raises(ArmidError, match=words):
+        bench.add(SimulatedArmNode, **parameters)
