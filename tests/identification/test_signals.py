@@ -24,7 +24,8 @@ def sine(rate=1000.0, duration=10.0, hz=1.0):
 def test_derivatives_of_a_sine_have_no_phase():
     t, q = sine()
     recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
-    (motion,) = segments(recording, Conditioning(1000.0, 50.0, 10))
+    (whole,) = segments(recording, Conditioning(1000.0, 50.0, 10))
+    motion = whole.select(slice(100, -100))
     w = 2 * np.pi
     np.testing.assert_allclose(motion.dq[:, 0], w * np.cos(w * motion.t), atol=1e-4 * w)
     np.testing.assert_allclose(motion.ddq[:, 0], -w * w * np.sin(w * motion.t), atol=1e-4 * w * w)
