@@ -125,15 +125,12 @@ class CausalMotion:
     ----------
     t : float
         Stamp of the newest sample in it [s].
-    dt : float
-        Time since the sample before [s]; 0 for the first one after a start.
     q, dq, ddq, tau : ndarray, shape (n,)
         Filtered position, velocity, acceleration, torque.
 
     """
 
     t: float
-    dt: float
     q: FloatArray
     dq: FloatArray
     ddq: FloatArray
@@ -268,7 +265,7 @@ class CausalFilter:
         stages = self._lag.update(dt, self._unwrapped(signal))
         if t - self._start < _SETTLED / self._lag.pole:
             return None
-        return self._motion(t, dt, stages)
+        return self._motion(t, stages)
 
     def _signal(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
@@ -332,7 +329,7 @@ class CausalFilter:
         fastest = _FASTEST_POLE / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
         self._lag = TripleLag(min(MOTION_FILTER_RATIO * self._cutoff, fastest))
 
-    def _motion(self, t: float, dt: float, stages: FloatArray) -> CausalMotion:
+    def _motion(self, t: float, stages: FloatArray) -> CausalMotion:
         n = self._n_joints
         assert self._lag is not None
         pole = self._lag.pole
@@ -343,4 +340,4 @@ class CausalFilter:
         else:
             curvature = pole * pole * (one[:n] - 2.0 * two[:n] + three[:n])
             q, dq, ddq = three[:n], slope[:n], curvature
-        return CausalMotion(t, dt, q, dq, ddq, three[-n:])
+        return CausalMotion(t, q, dq, ddq, three[-n:])
