@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-import os
 from pathlib import Path
 import struct
 from typing import Any, Literal, NamedTuple
@@ -102,6 +101,11 @@ class McapWriter:
             raise RecordingError(f'{path}: cannot be written: {error.strerror}') from error
         head = MAGIC + _record(Header('ros2', library))
         self._done = _Committed(self._append(head))
+
+    @property
+    def finished(self) -> bool:
+        """Whether the file has its summary and is closed."""
+        return self._stream.closed
 
     @property
     def chunk_count(self) -> int:
@@ -212,8 +216,6 @@ class McapWriter:
 
     def finish(self) -> None:
         """Write the summary and close the file; may be called again if it was interrupted."""
-        if self._stream.closed:
-            return
         data_end = _record(DataEnd(0))
         begin = self._done.position + len(data_end)
         groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
@@ -234,7 +236,6 @@ class McapWriter:
         crc = zlib.crc32(summary + offsets + footer)
         tail = data_end + summary + offsets + _record(Footer(begin, offsets_begin, crc)) + MAGIC
         self._append(tail)
-        os.fsync(self._stream.fileno())
         self._stream.close()
 
     def _statistics(self) -> Statistics:

@@ -106,6 +106,8 @@ def _register(
             types = dict(get_types_from_msg(text, name))
         except (TypesysError, ValueError) as error:
             raise RecordingError(f'type {name}: no valid message definition: {error}') from error
+        if name not in types:
+            raise RecordingError(f'type {name}: the definition given is that of {", ".join(types)}')
     store.register(types)
     for _, fields in types.values():
         for _, description in fields:

@@ -94,15 +94,15 @@ def dump_qos_text(profiles: Iterable[QosProfile]) -> str:
 
 
 def parse_qos(profiles: str | Iterable[Mapping[str, Any]] | None) -> tuple[QosProfile, ...]:
-    """Return profiles from either notation; what cannot be understood counts as unknown."""
-    if isinstance(profiles, str):
-        try:
-            profiles = yaml.safe_load(profiles)
-        except yaml.YAMLError:
+    """Return profiles from either notation; none where it cannot be understood."""
+    try:
+        listed = yaml.safe_load(profiles) if isinstance(profiles, str) else profiles
+        if not isinstance(listed, (list, tuple)):
             return ()
-    if not isinstance(profiles, (list, tuple)):
+        return tuple(_parse_profile(profile) for profile in listed if isinstance(profile, Mapping))
+    except (yaml.YAMLError, ValueError, TypeError):
+        # What a publisher offered is good to know, but no reason not to read what it sent.
         return ()
-    return tuple(_parse_profile(profile) for profile in profiles if isinstance(profile, Mapping))
 
 
 def _parse_profile(profile: Mapping[str, Any]) -> QosProfile:

@@ -299,9 +299,10 @@ class BagWriter:
         """Complete the file, and write metadata.yaml; a closed bag stays as it is."""
         if self._closed:
             return
-        self.flush()
-        self._write_information(self.file.name)
-        self._mcap.finish()
+        if not self._mcap.finished:
+            self.flush()
+            self._write_information(self.file.name)
+            self._mcap.finish()
         write_metadata(self.path, self._information(self.file.name))
         self._closed = True
 

@@ -1,0 +1,410 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Bags as rosbag2 expects them, whatever ends the writing."""
+
+import inspect
+import resource
+import signal
+import subprocess
+import sys
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording import (
+    BagWriter,
+    iter_raw,
+    joint_state_cdr,
+    LATCHED,
+    QosProfile,
+    read_recording,
+    string_cdr,
+    topics,
+    write_recording,
+)
+from armid_ros.recording.mcap_writer import McapWriter
+from armid_ros.recording.message_types import JOINT_STATE, message_type, store_for, STRING
+from armid_ros.recording.writer import DEFAULT_CHUNK_AGE
+from mcap.reader import make_reader
+from mcap.records import Channel, Chunk, MessageIndex, Metadata, Schema
+from mcap.stream_reader import StreamReader
+import numpy as np
+import pytest
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import get_typestore, Stores
+import yaml
+
+JOINTS = ('shoulder', 'elbow', 'wrist')
+WRITER_FILES = [inspect.getfile(BagWriter), inspect.getfile(McapWriter)]
+ESTIMATE = """\
+# What an identifier believes.
+std_msgs/Header header
+string[] name    # of the parameters
+float64[] value
+uint64 samples
+"""
+
+
+def metadata_of(bag):
+    """Return the inner map of a bag's metadata.yaml."""
+    return yaml.safe_load((bag / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+
+
+def test_metadata_is_that_of_rosbag2_version_9(swinging, stamps, tmp_path):
+    write_recording(tmp_path / 'run', swinging)
+    duration = {'nanoseconds': int(stamps[-1] - stamps[0])}
+    start = {'nanoseconds_since_epoch': int(stamps[0])}
+    forever = {'sec': 9223372036, 'nsec': 854775807}
+    assert metadata_of(tmp_path / 'run') == {
+        'version': 9,
+        'storage_identifier': 'mcap',
+        'duration': duration,
+        'starting_time': start,
+        'message_count': 500,
+        'topics_with_message_count': [
+            {
+                'topic_metadata': {
+                    'name': '/joint_states',
+                    'type': 'sensor_msgs/msg/JointState',
+                    'serialization_format': 'cdr',
+                    'offered_qos_profiles': [
+                        {
+                            'history': 'unknown',
+                            'depth': 0,
+                            'reliability': 'reliable',
+                            'durability': 'volatile',
+                            'deadline': forever,
+                            'lifespan': forever,
+                            'liveliness': 'automatic',
+                            'liveliness_lease_duration': forever,
+                            'avoid_ros_namespace_conventions': False,
+                        }
+                    ],
+                    'type_description_hash': (
+                        'RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e'
+                    ),
+                },
+                'message_count': 500,
+            }
+        ],
+        'compression_format': '',
+        'compression_mode': '',
+        'relative_file_paths': ['run_0.mcap'],
+        'files': [
+            {
+                'path': 'run_0.mcap',
+                'starting_time': start,
+                'duration': duration,
+                'message_count': 500,
+            }
+        ],
+        'custom_data': None,
+        'ros_distro': 'jazzy',
+    }
+    assert sorted(file.name for file in (tmp_path / 'run').iterdir()) == [
+        'metadata.yaml',
+        'run_0.mcap',
+    ]
+    assert '&' not in (tmp_path / 'run' / 'metadata.yaml').read_text()  # no aliases
+
+
+def test_an_empty_bag_is_that_of_rosbag2(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/joint_states', JOINT_STATE)
+    metadata = metadata_of(tmp_path / 'bag')
+    assert metadata['starting_time'] == {'nanoseconds_since_epoch': 9223372036854775807}
+    assert metadata['duration'] == {'nanoseconds': 0}
+    with Reader(tmp_path / 'bag') as reader:
+        assert [connection.topic for connection in reader.connections] == ['/joint_states']
+        assert list(reader.messages()) == []
+
+
+def test_the_file_is_in_order_by_mcaps_own_rules(swinging, tmp_path):
+    write_recording(tmp_path / 'bag', swinging, chunk_size=20_000, robot_description='<robot/>')
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as stream:
+        records = list(StreamReader(stream, emit_chunks=True, validate_crcs=True).records)
+        stream.seek(0)
+        reader = make_reader(stream, validate_crcs=True)
+        inside = list(reader.iter_messages())
+        summary = reader.get_summary()
+    kinds = [type(record).__name__ for record in records]
+    assert kinds[0] == 'Header'
+    assert kinds[-1] == 'Footer'
+    chunks = [record for record in records if isinstance(record, Chunk)]
+    assert len(chunks) == summary.statistics.chunk_count > 3
+    assert sum(isinstance(record, MessageIndex) for record in records) == len(chunks)
+    assert len(inside) == summary.statistics.message_count == len(swinging) + 1
+    assert all(message.publish_time == message.log_time for _, _, message in inside)
+    written = [record for record in records if isinstance(record, Metadata)]
+    assert [record.name for record in written] == ['rosbag2', 'rosbag2']
+    first, last = (yaml.safe_load(record.metadata['serialized_metadata']) for record in written)
+    assert (first['message_count'], last['message_count']) == (0, 501)
+    assert last == metadata_of(tmp_path / 'bag')
+
+
+def test_the_schema_is_the_definition_with_what_it_contains(swinging, tmp_path):
+    write_recording(tmp_path / 'bag', swinging)
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as stream:
+        records = list(StreamReader(stream).records)
+    schema = next(record for record in records if isinstance(record, Schema))
+    channel = next(record for record in records if isinstance(record, Channel))
+    assert (schema.name, schema.encoding) == ('sensor_msgs/msg/JointState', 'ros2msg')
+    parts = schema.data.decode().split('=' * 80 + '\n')
+    assert parts[0].startswith('std_msgs/Header header\nstring[] name\n')
+    assert [part.splitlines()[0] for part in parts[1:]] == [
+        'MSG: std_msgs/Header',
+        'MSG: builtin_interfaces/Time',
+    ]
+    assert channel.message_encoding == 'cdr'
+    assert channel.metadata['topic_type_hash'].startswith('RIHS01_a13ee3a3')
+    assert yaml.safe_load(channel.metadata['offered_qos_profiles'])[0]['reliability'] == 'reliable'
+
+
+def test_times_of_sending_and_receiving_are_kept_apart(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/chatter', STRING)
+        writer.write('/chatter', string_cdr('a'), 2000, 1500)
+        writer.write('/chatter', memoryview(string_cdr('b')), 3000)
+    assert list(iter_raw(tmp_path / 'bag')) == [
+        ('/chatter', 2000, 1500, string_cdr('a')),
+        ('/chatter', 3000, 3000, string_cdr('b')),
+    ]
+
+
+def test_qos_is_recorded(tmp_path):
+    offered = [LATCHED, QosProfile('keep_last', 7, 'best_effort', deadline_ns=1_500_000_000)]
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/chatter', STRING, qos=offered)
+    (topic,) = topics(tmp_path / 'bag')
+    assert topic.qos == tuple(offered)
+    with Reader(tmp_path / 'bag') as reader:
+        first, second = reader.connections[0].ext.offered_qos_profiles
+    assert first.durability.name == 'TRANSIENT_LOCAL'
+    assert (second.history.name, second.depth) == ('KEEP_LAST', 7)
+    assert second.reliability.name == 'BEST_EFFORT'
+    assert (second.deadline.sec, second.deadline.nsec) == (1, 500_000_000)
+
+
+def test_a_type_of_ones_own_is_described_by_its_definition(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/estimate', 'my_msgs/msg/Estimate', definition=ESTIMATE)
+    (topic,) = topics(tmp_path / 'bag')
+    assert 'MSG: builtin_interfaces/Time' in topic.message_type.definition
+    assert len(topic.message_type.type_hash) == len('RIHS01_') + 64
+
+
+def test_a_type_installed_in_a_workspace_is_found(tmp_path, monkeypatch):
+    folder = tmp_path / 'prefix' / 'share' / 'my_msgs' / 'msg'
+    folder.mkdir(parents=True)
+    (folder / 'Inner.msg').write_text('float64 value\n')
+    (folder / 'Outer.msg').write_text('my_msgs/Inner[] parts\ngeometry_msgs/Vector3 axis\n')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{tmp_path / "prefix"}')
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/outer', 'my_msgs/msg/Outer')
+    (topic,) = topics(tmp_path / 'bag')
+    assert 'MSG: my_msgs/Inner\nfloat64 value' in topic.message_type.definition
+    assert 'MSG: geometry_msgs/Vector3' in topic.message_type.definition
+
+
+def test_a_type_nobody_knows_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setenv('AMENT_PREFIX_PATH', '/nowhere')
+    with BagWriter(tmp_path / 'bag') as writer:
+        with pytest.raises(RecordingError, match=r'my_msgs/msg/Outer is not known.*/nowhere'):
+            writer.add_topic('/outer', 'my_msgs/msg/Outer')
+        with pytest.raises(RecordingError, match='my_msgs/msg/Outer: no valid message definition'):
+            writer.add_topic('/outer', 'my_msgs/msg/Outer', definition='float64 ) value')
+        assert writer.topics == ()
+
+
+def test_a_bag_is_never_overwritten(swinging, tmp_path):
+    write_recording(tmp_path / 'bag', swinging)
+    before = (tmp_path / 'bag' / 'bag_0.mcap').read_bytes()
+    with pytest.raises(RecordingError, match=r'bag: exists already; choose another name'):
+        write_recording(tmp_path / 'bag', swinging)
+    assert (tmp_path / 'bag' / 'bag_0.mcap').read_bytes() == before
+
+
+def test_misuse_is_refused_by_name(tmp_path):
+    with pytest.raises(RecordingError, match="compression 'gzip' is not known; there are zstd"):
+        BagWriter(tmp_path / 'other', compression='gzip')
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(RecordingError, match='cannot be made: Not a directory'):
+        BagWriter(tmp_path / 'file' / 'bag')
+    writer = BagWriter(tmp_path / 'bag')
+    writer.add_topic('/chatter', STRING)
+    writer.add_topic('/chatter', STRING)
+    with pytest.raises(RecordingError, match='/chatter is a topic of std_msgs/msg/String already'):
+        writer.add_topic('/chatter', JOINT_STATE)
+    with pytest.raises(RecordingError, match="'/chat' was not announced; there are /chatter"):
+        writer.write('/chat', b'', 1)
+    writer.close()
+    writer.close()
+    with pytest.raises(RecordingError, match='the bag is closed'):
+        writer.write('/chatter', string_cdr(''), 1)
+
+
+def test_what_was_written_before_an_error_is_a_complete_bag(
+    swinging, stamps, messages_of, tmp_path, assert_same
+):
+    with pytest.raises(ZeroDivisionError), BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/joint_states', JOINT_STATE)
+        for topic, cdr, time in messages_of(swinging, stamps)[:100]:
+            writer.write(topic, cdr, time)
+        raise ZeroDivisionError
+    recording = read_recording(tmp_path / 'bag', joints=JOINTS)
+    assert_same(recording, swinging, slice(0, 100))
+    assert recording.report.clean
+    assert metadata_of(tmp_path / 'bag')['message_count'] == 100
+
+
+class InterruptAt:
+    """Raises KeyboardInterrupt when so many lines of the writer have been run."""
+
+    def __init__(self, line):
+        self.left = line
+
+    def __call__(self, frame, event, _):
+        if frame.f_code.co_filename not in WRITER_FILES:
+            return None
+        if event == 'line':
+            self.left -= 1
+            if self.left == 0:
+                raise KeyboardInterrupt
+        return self
+
+
+def write_interrupted(bag, messages, line):
+    """Write messages and close the bag; return which message was interrupted, None if none."""
+    bag_writer = BagWriter(bag, chunk_size=700, clock=lambda: 0.0)
+    bag_writer.add_topic('/joint_states', JOINT_STATE)
+    trace, struck = sys.gettrace(), None
+    rest = list(messages)
+    sys.settrace(InterruptAt(line))
+    try:
+        while rest:
+            topic, cdr, time = rest.pop(0)
+            bag_writer.write(topic, cdr, time)
+        time = None
+        bag_writer.close()
+    except KeyboardInterrupt:
+        struck = time or 'close'
+    finally:
+        sys.settrace(trace)
+    for topic, cdr, time in rest:
+        bag_writer.write(topic, cdr, time)
+    bag_writer.close()
+    return struck
+
+
+def test_an_interrupt_anywhere_in_the_writer_spoils_nothing(
+    swinging, stamps, messages_of, tmp_path
+):
+    messages = messages_of(swinging, stamps)[:6]
+    expected = stamps[:6].tolist()
+    line, struck = 0, True
+    while struck:
+        line += 1
+        bag = tmp_path / f'bag{line}'
+        struck = write_interrupted(bag, messages, line)
+        with (bag / f'bag{line}_0.mcap').open('rb') as stream:
+            reader = make_reader(stream, validate_crcs=True)
+            times = [message.log_time for _, _, message in reader.iter_messages()]
+            count = reader.get_summary().statistics.message_count
+        # Only the message that was being written may be lost.
+        assert times in (expected, [time for time in expected if time != struck])
+        metadata = (bag / 'metadata.yaml').read_text()
+        assert count == len(times)
+        assert f'message_count: {count}\n' in metadata
+    assert line > 100
+
+
+KILLED = """
+import sys
+from armid_ros.recording import BagWriter, joint_state_cdr
+rate, seconds = 3000, 2.0
+now = [0.0]
+writer = BagWriter(sys.argv[1], clock=lambda: now[0])
+writer.add_topic('/joint_states', 'sensor_msgs/msg/JointState')
+values = [[0.1] * 7]
+joints = [f'joint_{i}' for i in range(7)]
+for number in range(int(rate * seconds)):
+    now[0] = number / rate
+    stamp = 10**9 + round(now[0] * 1e9)
+    writer.write(
+        '/joint_states', joint_state_cdr(joints, [stamp], values, values, values)[0], stamp
+    )
+print('written', flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_kill_loses_less_than_0_3_s_at_3_khz(tmp_path):
+    bag = tmp_path / 'bag'
+    with subprocess.Popen(
+        [sys.executable, '-c', KILLED, str(bag)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout.readline() == 'written\n'
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    assert process.returncode == -signal.SIGKILL
+    assert [file.name for file in bag.iterdir()] == ['bag_0.mcap']
+    recording = read_recording(bag, joints=[f'joint_{i}' for i in range(7)])
+    lost = 6000 - len(recording)
+    assert lost <= DEFAULT_CHUNK_AGE * 3000 <= 0.3 * 3000
+    np.testing.assert_allclose(recording.t, np.arange(len(recording)) / 3000, atol=1e-8)
+    assert 'without its index, as after a crash' in recording.report.damage
+    assert 'The file ends without its index' in recording.report.describe()
+
+
+def test_flush_writes_out_what_is_waiting(swinging, stamps, messages_of, tmp_path):
+    writer = BagWriter(tmp_path / 'bag', clock=lambda: 0.0)
+    writer.add_topic('/joint_states', JOINT_STATE)
+    for topic, cdr, time in messages_of(swinging, stamps)[:10]:
+        writer.write(topic, cdr, time)
+    with pytest.raises(RecordingError, match='no topic of sensor_msgs/msg/JointState'):
+        read_recording(tmp_path / 'bag', joints=JOINTS)
+    writer.flush()
+    assert len(read_recording(tmp_path / 'bag', joints=JOINTS)) == 10
+    writer.flush()
+    writer.close()
+    assert read_recording(tmp_path / 'bag', joints=JOINTS).report.clean
+
+
+def test_a_full_disk_is_reported_and_what_fits_again_is_written(
+    swinging, stamps, messages_of, tmp_path, assert_same
+):
+    writer = BagWriter(tmp_path / 'bag', clock=lambda: 0.0)
+    writer.add_topic('/joint_states', JOINT_STATE)
+    for topic, cdr, time in messages_of(swinging, stamps):
+        writer.write(topic, cdr, time)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
+    try:
+        with pytest.raises(RecordingError, match=r'bag_0.mcap: cannot be written: File too large'):
+            writer.flush()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    writer.close()
+    recording = read_recording(tmp_path / 'bag', joints=JOINTS)
+    assert_same(recording, swinging)
+    assert recording.report.clean
+
+
+def test_messages_written_at_once_are_those_written_one_by_one(swinging, stamps, tmp_path):
+    write_recording(tmp_path / 'once', swinging)
+    cdr = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    with BagWriter(tmp_path / 'each') as writer:
+        writer.add_topic('/joint_states', JOINT_STATE)
+        for data, stamp in zip(cdr, stamps.tolist(), strict=True):
+            writer.write('/joint_states', data, stamp)
+    assert list(iter_raw(tmp_path / 'once')) == list(iter_raw(tmp_path / 'each'))
+
+
+def test_the_hash_of_a_type_does_not_depend_on_where_its_definition_is_from():
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for name in (JOINT_STATE, STRING, 'diagnostic_msgs/msg/DiagnosticArray'):
+        text, _ = store.generate_msgdef(name, ros_version=2)
+        assert message_type(name, text) == message_type(name)
+        assert message_type(name).type_hash == store.hash_rihs01(name)
+        assert name in store_for(message_type(name)).types
