@@ -16,7 +16,7 @@ from __future__ import annotations
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.box_complementarity import Modes, solve_box_complementarity
-from armid_ros.simulation.plant import Contacts, Plant, State
+from armid_ros.simulation.plant import Contacts, NO_BODY, Plant, State
 import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dposv
@@ -70,10 +70,7 @@ def _solve(inertia: FloatArray, force: FloatArray, directions: FloatArray) -> Fl
     right[1:] = directions
     _, solution, failed = dposv(inertia, right.T, 0, 0, 1)
     if failed:
-        raise ModelError(
-            f'the inertia matrix is not positive definite at joint {failed}: the rigid-body '
-            'parameters are not those of a body'
-        )
+        raise ModelError(NO_BODY)
     return np.asarray(solution)
 
 

@@ -17,7 +17,12 @@ from armid_ros.simulation.box_complementarity import BoxLaw, Modes
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
-from scipy.linalg import eigh
+from scipy.linalg import eigh, LinAlgError
+
+NO_BODY = (
+    'the inertia matrix of the arm is not positive definite, so its rigid-body parameters and '
+    'rotor inertias are not those of bodies: correct them, or estimate physically consistent ones'
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,8 +261,11 @@ def _damping_weight(inertia: FloatArray, damping: FloatArray, dt: float) -> floa
     Source: Liniger and Willoughby 1970, exponential fitting.
 
     """
-    symmetric = (damping + damping.T) / 2
-    z = dt * float(eigh(symmetric, inertia, eigvals_only=True)[-1])
+    try:
+        rates = eigh((damping + damping.T) / 2, inertia, eigvals_only=True)
+    except LinAlgError:
+        raise ModelError(NO_BODY) from None
+    z = dt * float(rates[-1])
     if z < 1e-3:
         return 0.5
     return 1.0 / -math.expm1(-z) - 1.0 / z

@@ -75,9 +75,11 @@ class Reference:
                     f"trajectory: {name} of joint '{self.joints[joint]}' at point {point} is "
                     f'{values[point, joint]}'
                 )
-        if not np.all(np.isfinite(self.t)) or self.t[0] < 0.0:
-            raise TrajectoryError(f'trajectory: its first time is {self.t[0]} s; 0 or later it is')
-        late = np.flatnonzero(np.diff(self.t) <= 0.0)
+        if not self.t[0] >= 0.0:
+            raise TrajectoryError(
+                f'trajectory: its first time is {self.t[0]} s; it has to be 0 or later'
+            )
+        late = np.flatnonzero(~((np.diff(self.t) > 0.0) & np.isfinite(self.t[1:])))
         if len(late):
             point = int(late[0]) + 1
             raise TrajectoryError(
@@ -125,8 +127,9 @@ class Reference:
             ddq = ddq * u + 2.0 * dq
             dq = dq * u + q
             q = q * u + c[segment]
-        dq, ddq = dq / span, ddq / span**2
-        return Motion(self.joints, t, q, np.where(outside, 0.0, dq), np.where(outside, 0.0, ddq))
+        q = np.where((t > self.t[-1])[:, np.newaxis], self.q[-1], q)
+        dq, ddq = (np.where(outside, 0.0, x) for x in (dq / span, ddq / span**2))
+        return Motion(self.joints, t, q, dq, ddq)
 
     def for_robot(self, robot: Robot) -> Reference:
         """

@@ -1,0 +1,111 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How well an arm follows what it is told, and what its drives do not have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import ModelError
+from armid_ros.robots import Robot
+from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Reference, simulate, step
+import numpy as np
+import pytest
+
+MIDDLE = np.array([0.3, -0.4, 0.2, 0.8, 0.1, 0.2])
+
+
+def with_friction(robot: Robot) -> ArmModel:
+    arm = ArmModel(robot)
+    arm = arm.with_effect(make_effect('viscous_friction', robot), [0.3, 0.3, 0.1, 0.1, 0.02, 0.02])
+    return arm.with_effect(
+        make_effect('coulomb_friction', robot), [0.4, 0.4, 0.2, 0.2, 0.05, 0.05]
+    )
+
+
+def swinging(robot: Robot, duration: float = 4.0) -> Reference:
+    t = np.linspace(0.0, duration, 81)[:, np.newaxis]
+    w = np.linspace(1.5, 4.0, robot.n_joints)
+    q = MIDDLE + 0.3 * np.cos(w * t)
+    return Reference(
+        robot.joints, t[:, 0], q, -0.3 * w * np.sin(w * t), -0.3 * w**2 * np.cos(w * t)
+    )
+
+
+def test_computed_torque_of_the_true_arm_tracks_to_a_tenth_of_a_milliradian(humanoid) -> None:
+    run = simulate(with_friction(humanoid), swinging(humanoid), rng=np.random.default_rng(0))
+    assert np.abs(run.truth.q - run.reference.q).max() < 1.5e-4
+    np.testing.assert_array_equal(run.saturated, 0.0)
+
+
+def test_an_unknown_friction_costs_tracking_as_the_gains_say(slider) -> None:
+    """At constant velocity the error is the friction over the stiffness, F / (m omega^2)."""
+    robot = slider()
+    arm = ArmModel(robot).with_effect(make_effect('coulomb_friction', robot), [10.0])
+    reference = Reference(robot.joints, np.array([0.0, 2.0]), np.array([[0.0], [1.0]]))
+    nominal = ComputedTorque(ArmModel(robot), bandwidth=20.0)
+    run = simulate(arm, reference, rng=np.random.default_rng(0), controller=nominal)
+    late = run.reference.q[-2] - run.truth.q[-2]
+    assert late[0] == pytest.approx(10.0 / (2.0 * 20.0**2), rel=1e-3)
+
+
+def test_computed_torque_closes_an_error_like_a_critically_damped_spring(humanoid) -> None:
+    plant, omega = Plant(ArmModel(humanoid)), 20.0
+    controller = ComputedTorque(ArmModel(humanoid), bandwidth=omega)
+    still = np.zeros(6)
+    state = plant.state(MIDDLE + 0.1)
+    for _ in range(100):
+        torque = controller.torque(state.q, state.dq, (MIDDLE, still, still), still)
+        state = step(plant, state, torque)
+    left = 0.1 * (1.0 + omega * state.t) * np.exp(-omega * state.t)
+    np.testing.assert_allclose(state.q - MIDDLE, left, rtol=0.05)
+
+
+def test_a_spring_and_damper_hold_the_arm_against_gravity_to_rounding(humanoid) -> None:
+    hold = Reference(humanoid.joints, np.zeros(1), MIDDLE[np.newaxis])
+    run = simulate(
+        ArmModel(humanoid),
+        hold,
+        rng=np.random.default_rng(0),
+        controller=GravityPD(ArmModel(humanoid)),
+        duration=2.0,
+    )
+    assert np.abs(run.truth.q - MIDDLE).max() < 1e-12
+
+
+def test_spring_and_damper_sag_under_a_gravity_they_do_not_know(humanoid) -> None:
+    stiffness = np.array([800.0, 800.0, 200.0, 200.0, 2.0, 2.0])
+    moon = ArmModel(humanoid.with_gravity([0.0, 0.0, -1.62]))
+    hold = Reference(humanoid.joints, np.zeros(1), MIDDLE[np.newaxis])
+    run = simulate(
+        ArmModel(humanoid),
+        hold,
+        rng=np.random.default_rng(0),
+        controller=GravityPD(moon, stiffness),
+        duration=6.0,
+    )
+    sag = run.truth.q[-1] - MIDDLE
+    missing = run.truth.select(slice(-1, None))
+    expected = ArmModel(humanoid).torque(missing)[0] - moon.torque(missing)[0]
+    assert np.abs(expected).max() > 1.0
+    np.testing.assert_allclose(stiffness * sag, -expected, rtol=1e-3, atol=1e-4)
+
+
+def test_drives_give_no_more_torque_than_they_have(humanoid) -> None:
+    needed = simulate(ArmModel(humanoid), swinging(humanoid), rng=np.random.default_rng(0))
+    limit = 0.8 * np.abs(needed.truth.tau).max(axis=0)
+    weak = ArmModel(replace(humanoid, torque_limit=limit))
+    run = simulate(weak, swinging(humanoid), rng=np.random.default_rng(0))
+    assert np.all(np.abs(run.truth.tau) <= limit)
+    assert np.any(run.saturated > 0.0)
+    assert np.abs(run.truth.q - run.reference.q).max() > 1e-3
+
+
+@pytest.mark.parametrize('bad', [-1.0, np.nan, [1.0, 2.0]])
+def test_gains_that_make_no_sense_are_refused(humanoid, bad) -> None:
+    with pytest.raises(ModelError, match='bandwidth has to be one number, or one for each of 6'):
+        ComputedTorque(ArmModel(humanoid), bandwidth=bad)
+    with pytest.raises(ModelError, match='stiffness'):
+        GravityPD(ArmModel(humanoid), stiffness=bad)

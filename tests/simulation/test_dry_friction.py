@@ -1,0 +1,117 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Friction that holds, and lets go, as dry friction does."""
+
+from __future__ import annotations
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import ModelError
+from armid_ros.simulation import Plant, State, step
+import numpy as np
+import pytest
+
+WEIGHT = 2.0 * 9.81
+
+
+def run(plant: Plant, state: State, seconds: float, torque) -> list[State]:
+    passed = [state]
+    for _ in range(round(seconds / plant.dt)):
+        passed.append(step(plant, passed[-1], np.asarray(torque)))
+    return passed
+
+
+def with_coulomb(robot, values) -> ArmModel:
+    return ArmModel(robot).with_effect(make_effect('coulomb_friction', robot), values)
+
+
+@pytest.mark.parametrize('push', [9.99999, -9.99999, 3.0])
+def test_a_block_pushed_less_than_breakaway_does_not_move_at_all(slider, push: float) -> None:
+    plant = Plant(with_coulomb(slider(), [10.0]))
+    for state in run(plant, plant.state([0.123456789]), 10.0, [push]):
+        assert state.q[0] == 0.123456789
+        assert state.dq[0] == 0.0
+
+
+@pytest.mark.parametrize('push', [10.001, -14.0])
+def test_a_block_pushed_more_slides_the_way_it_is_pushed(slider, push: float) -> None:
+    plant = Plant(with_coulomb(slider(), [10.0]))
+    final = run(plant, plant.state([0.0]), 1.0, [push])[-1]
+    acceleration = (push - 10.0 * np.sign(push)) / 2.0
+    assert final.q[0] == pytest.approx(acceleration / 2, rel=1e-2)
+    assert final.dq[0] == pytest.approx(acceleration, rel=1e-9)
+
+
+def test_a_block_stops_after_its_braking_distance_and_stays(slider) -> None:
+    plant = Plant(with_coulomb(slider(), [10.0]))
+    slide = run(plant, plant.state([0.0], [2.0]), 1.0, [0.0])
+    assert slide[-1].q[0] == pytest.approx(2.0 * 2.0**2 / (2 * 10.0), abs=2.0 * plant.dt)
+    assert all(state.dq[0] == 0.0 for state in slide[401:])
+    assert min(state.dq[0] for state in slide) == 0.0
+
+
+def test_asymmetric_levels_hold_between_both(slider) -> None:
+    robot = slider()
+    arm = with_coulomb(robot, [10.0]).with_effect(
+        make_effect('asymmetric_friction', robot), [4.0, 0.0]
+    )
+    plant = Plant(arm)
+    for push, moves in ((13.9, 0), (14.1, 1), (-5.9, 0), (-6.1, -1)):
+        assert np.sign(run(plant, plant.state([0.0]), 0.5, [push])[-1].dq[0]) == moves
+
+
+def test_friction_holds_a_block_on_a_steep_rail(slider) -> None:
+    plant = Plant(with_coulomb(slider('0 0 1'), [1.001 * WEIGHT]))
+    assert run(plant, plant.state([0.0]), 2.0, [0.0])[-1].q[0] == 0.0
+    plant = Plant(with_coulomb(slider('0 0 1'), [0.999 * WEIGHT]))
+    assert run(plant, plant.state([0.0]), 2.0, [0.0])[-1].q[0] < 0.0
+
+
+def test_an_arm_that_friction_holds_stands_still_in_every_joint(humanoid) -> None:
+    plant = Plant(with_coulomb(humanoid, np.full(6, 6.0)))
+    start = plant.state([0.1, -0.2, 0.3, 0.4, -0.1, 0.2])
+    final = run(plant, start, 10.0, np.zeros(6))[-1]
+    np.testing.assert_array_equal(final.q, start.q)
+    np.testing.assert_array_equal(final.dq, np.zeros(6))
+
+
+def test_joints_stick_and_slip_each_for_itself(humanoid) -> None:
+    plant = Plant(with_coulomb(humanoid, [6.0, 6.0, 6.0, 6.0, 1e-3, 6.0]))
+    start = plant.state([0.1, -0.2, 0.3, 0.4, -0.1, 0.2])
+    final = run(plant, start, 0.1, [0.0, 0.0, 0.0, 0.0, 0.05, 0.0])[-1]
+    assert final.modes.count(0) == 5
+    np.testing.assert_array_equal(np.delete(final.q, 4), np.delete(start.q, 4))
+    assert final.q[4] > start.q[4]
+
+
+def test_a_shared_shaft_sticks_along_its_direction_only(pendulum) -> None:
+    robot = pendulum(links=2, axis='0 0 1')
+    arm = ArmModel(robot).with_effect(
+        make_effect('coupled_joint_friction', robot), [0.0, 0.0, 5.0]
+    )
+    plant = Plant(arm)
+    final = run(plant, plant.state([0.1, 0.2]), 1.0, [0.004, -0.002])[-1]
+    assert final.dq[0] == -final.dq[1] != 0.0
+    assert final.q.sum() == pytest.approx(0.3, abs=1e-14)
+    assert np.all(run(plant, plant.state([0.1, 0.2]), 1.0, [6.0, 6.0])[-1].dq.sum() > 0.0)
+
+
+def test_two_joints_and_their_shared_shaft_can_stick_together(pendulum) -> None:
+    """Three elements on two joints: their torques are undetermined, the motion is not."""
+    robot = pendulum(links=2, axis='0 0 1')
+    arm = with_coulomb(robot, [1.0, 1.0]).with_effect(
+        make_effect('coupled_joint_friction', robot), [0.0, 0.0, 2.0]
+    )
+    plant = Plant(arm)
+    start = plant.state([0.1, 0.2])
+    for torque in ([2.99, 2.99], [0.99, -0.99], [2.99, 1.01], [-2.99, -2.99]):
+        final = run(plant, start, 1.0, torque)[-1]
+        np.testing.assert_array_equal(final.q, start.q)
+        np.testing.assert_array_equal(final.dq, [0.0, 0.0])
+    for torque in ([3.01, 3.01], [1.01, -1.01], [4.01, 0.0], [3.01, 0.99]):
+        assert np.any(run(plant, start, 0.1, torque)[-1].dq != 0.0)
+
+
+def test_friction_with_negative_width_is_refused(slider) -> None:
+    with pytest.raises(ModelError, match='friction torques have to be positive'):
+        Plant(with_coulomb(slider(), [-1.0]))

@@ -1,0 +1,176 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The plant without friction that sticks, against closed forms and against energy."""
+
+from __future__ import annotations
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import ModelError, TrajectoryError
+from armid_ros.simulation import Plant, State, step
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.special import ellipk
+
+
+def states(plant: Plant, state: State, n_steps: int, torque=None) -> list[State]:
+    """Return the states after 0, 1, ... steps under a constant torque."""
+    torque = np.zeros(plant.robot.n_joints) if torque is None else np.asarray(torque)
+    passed = [state]
+    for _ in range(n_steps):
+        passed.append(step(plant, passed[-1], torque))
+    return passed
+
+
+def energy(plant: Plant, state: State) -> float:
+    model = plant.robot.model
+    return pin.computeMechanicalEnergy(model, model.createData(), state.q, state.dq)
+
+
+@pytest.mark.parametrize('gravity', [9.81, 1.62])
+def test_free_fall_is_a_parabola(slider, gravity: float) -> None:
+    plant = Plant(ArmModel(slider(axis='0 0 1').with_gravity([0.0, 0.0, -gravity])))
+    fall = states(plant, plant.state([1.0], [0.5], [-gravity]), 2000)
+    t = np.array([s.t for s in fall])
+    q = np.array([s.q[0] for s in fall])
+    np.testing.assert_allclose(q, 1.0 + 0.5 * t - gravity * t**2 / 2, atol=1e-10)
+
+
+@pytest.mark.parametrize('amplitude', [0.01, 1.0, 2.5])
+def test_a_pendulum_swings_with_its_period(pendulum, amplitude: float) -> None:
+    plant = Plant(ArmModel(pendulum()))
+    inertia = 0.01 + 1.0 * 0.4**2
+    period = 4.0 * np.sqrt(inertia / (1.0 * 9.81 * 0.4)) * ellipk(np.sin(amplitude / 2) ** 2)
+    swing = states(plant, plant.state([amplitude]), round(10.2 * period / plant.dt))
+    q = np.array([s.q[0] for s in swing])
+    before = np.flatnonzero((q[:-1] > 0.0) & (q[1:] <= 0.0))
+    crossing = (before + q[before] / (q[before] - q[before + 1])) * plant.dt
+    assert np.diff(crossing).mean() == pytest.approx(period, rel=1e-5)
+
+
+def test_without_friction_a_double_pendulum_keeps_its_energy_to_the_order_of_the_step(pendulum):
+    drift = []
+    for dt in (2e-3, 1e-3, 5e-4):
+        plant = Plant(ArmModel(pendulum(links=2)), dt=dt)
+        swing = states(plant, plant.state([1.0, 0.5]), round(5.0 / dt))
+        values = np.array([energy(plant, s) for s in swing])
+        drift.append(np.ptp(values) / (1.0 * 9.81 * 0.4))
+    assert drift[1] < 1e-4
+    np.testing.assert_allclose(drift[0] / drift[1], 4.0, rtol=0.2)
+    np.testing.assert_allclose(drift[1] / drift[2], 4.0, rtol=0.2)
+
+
+def test_the_integration_is_second_order_in_the_step(humanoid) -> None:
+    arm = ArmModel(humanoid).with_effect(
+        make_effect('viscous_friction', humanoid), [0.3, 0.3, 0.1, 0.1, 0.005, 0.005]
+    )
+    torque = np.array([0.5, -1.0, 0.2, 0.1, 0.01, -0.01])
+
+    def end(dt: float) -> np.ndarray:
+        plant = Plant(arm, dt=dt, hard_stops=False)
+        return states(plant, plant.state(np.full(6, 0.3)), round(0.4 / dt), torque)[-1].q
+
+    best = end(5e-5)
+    errors = [np.linalg.norm(end(dt) - best) for dt in (2e-3, 1e-3, 5e-4)]
+    assert errors[1] < 1e-4
+    np.testing.assert_allclose(errors[0] / errors[1], 4.0, rtol=0.1)
+    np.testing.assert_allclose(errors[1] / errors[2], 4.0, rtol=0.1)
+
+
+@pytest.mark.parametrize('damping', [0.1, 20.0, 2e3, 1e6])
+def test_viscous_friction_decays_exponentially_however_stiff(slider, damping: float) -> None:
+    robot = slider()
+    arm = ArmModel(robot).with_effect(make_effect('viscous_friction', robot), [damping])
+    plant = Plant(arm)
+    slow = states(plant, plant.state([0.0], [1.0]), 200)
+    t = np.array([s.t for s in slow])
+    dq = np.array([s.dq[0] for s in slow])
+    np.testing.assert_allclose(dq, np.exp(-damping / 2.0 * t), rtol=1e-6, atol=1e-12)
+    assert np.all(dq >= 0.0)
+
+
+def test_friction_dissipates_what_it_does_in_work(pendulum) -> None:
+    robot = pendulum(links=2)
+    arm = ArmModel(robot)
+    arm = arm.with_effect(make_effect('viscous_friction', robot), [0.1, 0.05])
+    arm = arm.with_effect(make_effect('coulomb_friction', robot), [0.3, 0.1])
+    plant = Plant(arm)
+    swing = states(plant, plant.state([1.5, 0.0]), 4000)
+    dq = np.array([s.dq for s in swing])
+    middle = (dq[1:] + dq[:-1]) / 2
+    work = np.sum(np.array([0.1, 0.05]) * middle**2 + np.array([0.3, 0.1]) * np.abs(middle))
+    lost = energy(plant, swing[0]) - energy(plant, swing[-1])
+    assert lost > 3.0
+    assert work * plant.dt == pytest.approx(lost, rel=1e-3)
+
+
+def test_rotor_inertia_slows_its_own_joint(slider) -> None:
+    robot = slider()
+    plant = Plant(ArmModel(robot).with_effect(make_effect('rotor_inertia', robot), [3.0]))
+    pushed = states(plant, plant.state([0.0]), 1000, [10.0])[-1]
+    assert pushed.dq[0] == pytest.approx(10.0 / (2.0 + 3.0), rel=1e-12)
+
+
+def test_a_torque_offset_moves_the_arm_the_other_way(slider) -> None:
+    robot = slider()
+    plant = Plant(ArmModel(robot).with_effect(make_effect('torque_offset', robot), [4.0]))
+    assert states(plant, plant.state([0.0]), 1000)[-1].dq[0] == pytest.approx(-2.0, rel=1e-12)
+
+
+def test_asymmetric_friction_alone_is_an_offset_and_never_holds(slider) -> None:
+    robot = slider()
+    arm = ArmModel(robot).with_effect(make_effect('asymmetric_friction', robot), [4.0, 0.0])
+    plant = Plant(arm)
+    assert states(plant, plant.state([0.0]), 1000)[-1].dq[0] == pytest.approx(-2.0, rel=1e-12)
+
+
+def test_time_is_counted_in_steps(slider) -> None:
+    plant = Plant(ArmModel(slider()), dt=1e-3)
+    state = states(plant, plant.state([0.0], steps=10_000_000), 3)[-1]
+    assert (state.steps, state.t) == (10_000_003, 10_000_003 * 1e-3)
+
+
+def test_a_step_changes_nothing_it_was_given(pendulum) -> None:
+    plant = Plant(ArmModel(pendulum(links=2)))
+    state = plant.state([0.3, 0.2], [1.0, 2.0])
+    torque = np.array([1.0, 2.0])
+    first, again = step(plant, state, torque), step(plant, state, torque)
+    np.testing.assert_array_equal(torque, [1.0, 2.0])
+    np.testing.assert_array_equal(state.q, [0.3, 0.2])
+    np.testing.assert_array_equal(first.q, again.q)
+    np.testing.assert_array_equal(first.dq, again.dq)
+
+
+def test_a_joint_stops_at_its_limit_and_stays_until_it_is_pushed_off(pendulum) -> None:
+    plant = Plant(ArmModel(pendulum(links=2, stop=0.5)))
+    swing = states(plant, plant.state([0.4, 0.4], [3.0, 2.0]), 300, [20.0, 5.0])
+    q = np.array([s.q for s in swing])
+    assert q.max() <= 0.5 and q.min() >= -0.5
+    np.testing.assert_array_equal(swing[-1].q, [0.5, 0.5])
+    np.testing.assert_array_equal(swing[-1].dq, [0.0, 0.0])
+    one = Plant(ArmModel(pendulum(stop=0.5)))
+    assert states(one, one.state([0.5]), 50, [-1.0])[-1].q[0] < 0.5
+    assert states(one, one.state([0.5]), 50, [3.0])[-1].q[0] == 0.5
+
+
+def test_hitting_a_stop_gains_no_energy(pendulum) -> None:
+    plant = Plant(ArmModel(pendulum(links=3, stop=0.7)))
+    swing = states(plant, plant.state([0.6, 0.0, -0.6], [0.0, 4.0, 0.0]), 3000)
+    values = np.array([energy(plant, s) for s in swing])
+    assert np.diff(values[1:]).max() < 1e-5
+    assert values[-1] < values[0] - 0.5
+
+
+def test_an_arm_cannot_begin_beyond_its_stops(pendulum) -> None:
+    with pytest.raises(TrajectoryError, match=r"joint 'joint1' cannot be at 0.6.* -0.5 and 0.5"):
+        Plant(ArmModel(pendulum(stop=0.5))).state([0.6])
+    Plant(ArmModel(pendulum(stop=0.5)), hard_stops=False).state([0.6])
+
+
+def test_bodies_that_cannot_be_are_refused(slider) -> None:
+    robot = slider()
+    with pytest.raises(ModelError, match='not positive definite'):
+        Plant(ArmModel(robot.with_inertias(-robot.rigid_parameters)))
+    with pytest.raises(ModelError, match='positive time'):
+        Plant(ArmModel(robot), dt=0.0)

@@ -1,0 +1,143 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Waypoints, the curve through them, and what is refused."""
+
+from __future__ import annotations
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.motion import Motion
+from armid_ros.simulation import Reference
+import numpy as np
+from numpy.polynomial import Polynomial
+import pytest
+
+T = np.array([0.0, 0.3, 1.0, 1.1])
+FINE = np.linspace(0.0, 1.1, 200)
+
+
+def along(polynomials: list[Polynomial], t: np.ndarray) -> np.ndarray:
+    return np.stack([p(t) for p in polynomials], axis=1)
+
+
+def curves(degree: int) -> list[Polynomial]:
+    rng = np.random.default_rng(0)
+    return [Polynomial(rng.normal(size=degree + 1)) for _ in range(2)]
+
+
+def test_a_quintic_passes_through_positions_velocities_and_accelerations() -> None:
+    p = curves(5)
+    dp, ddp = [c.deriv() for c in p], [c.deriv(2) for c in p]
+    motion = Reference(('a', 'b'), T, along(p, T), along(dp, T), along(ddp, T)).sample(FINE)
+    np.testing.assert_allclose(motion.q, along(p, FINE), atol=1e-12)
+    np.testing.assert_allclose(motion.dq, along(dp, FINE), atol=1e-11)
+    np.testing.assert_allclose(motion.ddq, along(ddp, FINE), atol=1e-10)
+
+
+def test_a_cubic_passes_through_positions_and_velocities() -> None:
+    p = curves(3)
+    dp = [c.deriv() for c in p]
+    motion = Reference(('a', 'b'), T, along(p, T), along(dp, T)).sample(FINE)
+    np.testing.assert_allclose(motion.q, along(p, FINE), atol=1e-12)
+    np.testing.assert_allclose(motion.dq, along(dp, FINE), atol=1e-11)
+
+
+def test_positions_alone_are_joined_by_lines() -> None:
+    q = along(curves(3), T)
+    motion = Reference(('a', 'b'), T, q).sample(FINE)
+    expected = np.stack([np.interp(FINE, T, q[:, j]) for j in range(2)], axis=1)
+    np.testing.assert_allclose(motion.q, expected, atol=1e-12)
+    np.testing.assert_allclose(motion.dq[1], (q[1] - q[0]) / 0.3)
+
+
+def test_outside_its_points_a_reference_holds_still() -> None:
+    reference = Reference(
+        ('a',), np.array([1.0, 2.0]), np.array([[0.1], [0.7]]), np.ones((2, 1)), np.ones((2, 1))
+    )
+    motion = reference.sample(np.array([0.0, 0.999, 2.001, 100.0]))
+    np.testing.assert_array_equal(motion.q[:, 0], [0.1, 0.1, 0.7, 0.7])
+    np.testing.assert_array_equal(motion.dq, 0.0)
+    np.testing.assert_array_equal(motion.ddq, 0.0)
+
+
+def test_one_point_is_a_pose_to_hold() -> None:
+    motion = Reference(('a', 'b'), np.zeros(1), np.array([[0.1, 0.2]])).sample(FINE)
+    np.testing.assert_array_equal(motion.q, np.tile([0.1, 0.2], (len(FINE), 1)))
+    np.testing.assert_array_equal(motion.dq, 0.0)
+
+
+def test_the_reference_of_a_motion_passes_through_its_samples() -> None:
+    rng = np.random.default_rng(0)
+    q, dq, ddq = rng.normal(size=(3, 5, 2))
+    motion = Motion(('a', 'b'), 7.0 + np.arange(5.0), q, dq, ddq)
+    again = Reference.of(motion).sample(np.arange(5.0))
+    np.testing.assert_allclose(again.q, q, atol=1e-12)
+    np.testing.assert_allclose(again.dq, dq, atol=1e-12)
+    np.testing.assert_allclose(again.ddq, ddq, atol=1e-11)
+
+
+def test_joints_are_matched_by_name(humanoid) -> None:
+    backwards = humanoid.joints[::-1]
+    q = np.arange(6.0)[np.newaxis]
+    ordered = Reference(backwards, np.zeros(1), q, 10.0 + q, 20.0 + q).for_robot(humanoid)
+    assert ordered.joints == humanoid.joints
+    np.testing.assert_array_equal(ordered.q, q[:, ::-1])
+    np.testing.assert_array_equal(ordered.dq, 10.0 + q[:, ::-1])
+    np.testing.assert_array_equal(ordered.ddq, 20.0 + q[:, ::-1])
+
+
+def test_unknown_and_missing_joints_are_named(humanoid) -> None:
+    names = ('elbo', *humanoid.joints[1:])
+    with pytest.raises(TrajectoryError, match=r"'elbo' is not one of .*shoulder_pitch"):
+        Reference(names, np.zeros(1), np.zeros((1, 6))).for_robot(humanoid)
+    with pytest.raises(TrajectoryError, match="'shoulder_pitch' is missing"):
+        Reference(humanoid.joints[1:], np.zeros(1), np.zeros((1, 5))).for_robot(humanoid)
+
+
+@pytest.mark.parametrize(
+    ('t', 'q', 'message'),
+    [
+        ([0.0, 1.0, 1.0], np.zeros((3, 1)), r'point 2 is at 1.0 s and the one before it at 1.0 s'),
+        ([0.0, 2.0, 1.0], np.zeros((3, 1)), r'time has to increase'),
+        ([-1.0, 1.0], np.zeros((2, 1)), r'first time is -1.0 s'),
+        ([0.0, np.nan], np.zeros((2, 1)), r'point 1 is at nan s'),
+        ([], np.zeros((0, 1)), r'no points'),
+        ([0.0, 1.0], np.zeros((3, 1)), r'q has shape \(3, 1\)'),
+        ([0.0, 1.0], np.array([[0.0], [np.nan]]), r"q of joint 'a' at point 1 is nan"),
+    ],
+)
+def test_malformed_waypoints_are_refused(t, q, message: str) -> None:
+    with pytest.raises(TrajectoryError, match=message):
+        Reference(('a',), np.array(t), q)
+
+
+def test_accelerations_without_velocities_and_repeated_joints_are_refused() -> None:
+    with pytest.raises(TrajectoryError, match='accelerations but no velocities'):
+        Reference(('a',), np.zeros(1), np.zeros((1, 1)), None, np.zeros((1, 1)))
+    with pytest.raises(TrajectoryError, match='named twice'):
+        Reference(('a', 'a'), np.zeros(1), np.zeros((1, 2)))
+
+
+def test_a_limit_that_only_the_curve_passes_is_found(humanoid) -> None:
+    """Both waypoints are inside the limits; the cubic between them is not."""
+    upper = humanoid.upper[3]
+    q, dq = np.zeros((2, 6)), np.zeros((2, 6))
+    q[:, 3] = upper - 0.01
+    dq[:, 3] = [1.0, -1.0]
+    reference = Reference(humanoid.joints, np.array([0.0, 0.5]), q, dq)
+    message = rf"'{humanoid.joints[3]}' reaches .* beyond its upper limit of {upper:.4g} rad"
+    with pytest.raises(TrajectoryError, match=message):
+        reference.require_limits(humanoid, 1e-3)
+    q[:, 3] = upper - 0.2
+    Reference(humanoid.joints, np.array([0.0, 0.5]), q, dq).require_limits(humanoid, 1e-3)
+
+
+def test_lower_and_velocity_limits_are_named(humanoid) -> None:
+    q = np.zeros((2, 6))
+    q[1, 0] = humanoid.lower[0] - 0.1
+    slow = Reference(humanoid.joints, np.array([0.0, 100.0]), q)
+    with pytest.raises(TrajectoryError, match=r"'shoulder_pitch' reaches .* lower limit"):
+        slow.require_limits(humanoid, 1e-3)
+    q[1, 0] = 0.5
+    fast = Reference(humanoid.joints, np.array([0.0, 0.1]), q)
+    with pytest.raises(TrajectoryError, match=r"'shoulder_pitch' reaches 5 rad/s .* velocity"):
+        fast.require_limits(humanoid, 1e-3)

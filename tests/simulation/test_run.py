@@ -1,0 +1,125 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recorded runs: what is said to be true is true, and the same again with the same generator."""
+
+from __future__ import annotations
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import ModelError, TrajectoryError
+from armid_ros.robots import Robot
+from armid_ros.simulation import Reference, Sensors, simulate, SimulatedRun
+import numpy as np
+import pytest
+
+MIDDLE = np.array([0.3, -0.4, 0.2, 0.8, 0.1, 0.2])
+
+
+@pytest.fixture(scope='module')
+def arm(humanoid) -> ArmModel:
+    """Return the arm with friction, rotors and a shared shaft in its wrist."""
+    arm = ArmModel(humanoid)
+    for name, values in (
+        ('viscous_friction', [0.3, 0.3, 0.1, 0.1, 0.02, 0.02]),
+        ('coulomb_friction', [0.4, 0.4, 0.2, 0.2, 0.05, 0.05]),
+        ('rotor_inertia', [0.02, 0.02, 0.01, 0.01, 1e-3, 1e-3]),
+        ('coupled_joint_friction', [1e-4, 1e-3, 0.02]),
+        ('torque_offset', [0.1, -0.2, 0.1, 0.0, 0.01, 0.0]),
+    ):
+        arm = arm.with_effect(make_effect(name, humanoid), values)
+    return arm
+
+
+def swinging(robot: Robot, duration: float = 3.0) -> Reference:
+    t = np.linspace(0.0, duration, 61)[:, np.newaxis]
+    w = np.linspace(1.5, 4.0, robot.n_joints)
+    q = MIDDLE + 0.3 * np.cos(w * t)
+    return Reference(
+        robot.joints, t[:, 0], q, -0.3 * w * np.sin(w * t), -0.3 * w**2 * np.cos(w * t)
+    )
+
+
+@pytest.fixture(scope='module')
+def run(arm) -> SimulatedRun:
+    """Return a run with perfect sensors."""
+    return simulate(arm, swinging(arm.robot), rng=np.random.default_rng(0))
+
+
+def test_inverse_dynamics_of_the_true_motion_is_the_torque_that_caused_it(arm, run) -> None:
+    dq = run.truth.dq
+    shaft = dq[:, 4:5] + dq[:, 5:6]
+    speeds = np.column_stack([dq, shaft])
+    slipping = np.all(np.abs(speeds) > 0.02, axis=1)
+    slipping[[0, -1]] = False
+    error = arm.torque(run.truth)[slipping] - run.truth.tau[slipping]
+    assert slipping.mean() > 0.4
+    assert np.abs(error).max() < 1e-5 * np.abs(run.truth.tau).max()
+
+
+def test_velocity_and_acceleration_are_the_derivatives_of_position(run) -> None:
+    truth = run.truth
+    middle = slice(1, -1)
+    dq = (truth.q[2:] - truth.q[:-2]) / 2e-3
+    ddq = (truth.q[2:] - 2.0 * truth.q[1:-1] + truth.q[:-2]) / 1e-6
+    np.testing.assert_allclose(truth.dq[middle], dq, atol=2e-3)
+    smooth = np.all(np.abs(truth.dq[middle]) > 0.05, axis=1)
+    np.testing.assert_allclose(truth.ddq[middle][smooth], ddq[smooth], atol=1e-3)
+
+
+def test_it_lasts_as_long_as_its_reference_at_the_rate_asked_for(arm) -> None:
+    run = simulate(arm, swinging(arm.robot, 1.0), rng=np.random.default_rng(0), rate=200.0)
+    np.testing.assert_allclose(run.t, np.arange(201) / 200.0, atol=1e-15)
+    fine = simulate(arm, swinging(arm.robot, 1.0), rng=np.random.default_rng(0))
+    np.testing.assert_array_equal(run.truth.q, fine.truth.q[::5])
+    np.testing.assert_array_equal(run.tau, fine.tau[::5])
+
+
+def test_after_its_reference_the_arm_holds(arm) -> None:
+    reference = swinging(arm.robot, 1.0)
+    run = simulate(arm, reference, rng=np.random.default_rng(0), duration=3.0)
+    held = run.truth.q[run.t > 2.0]
+    np.testing.assert_allclose(held, np.tile(reference.q[-1], (len(held), 1)), atol=0.02)
+    assert np.ptp(held, axis=0).max() < 1e-6
+
+
+def test_the_same_generator_gives_the_same_run_and_another_one_other_noise(arm) -> None:
+    sensors = Sensors(torque_noise=0.1, position_noise=1e-4, velocity_noise=0.01)
+
+    def again(seed: int) -> SimulatedRun:
+        rng = np.random.default_rng(seed)
+        return simulate(arm, swinging(arm.robot, 0.5), rng=rng, sensors=sensors)
+
+    first, second, other = again(1), again(1), again(2)
+    for name in ('t', 'q', 'dq', 'tau'):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+    np.testing.assert_array_equal(first.truth.q, other.truth.q)
+    assert np.all(first.tau != other.tau)
+
+
+def test_delayed_torque_is_the_torque_of_some_steps_before(arm) -> None:
+    reference = swinging(arm.robot, 0.5)
+    late = simulate(arm, reference, rng=np.random.default_rng(0), sensors=Sensors(torque_delay=7))
+    np.testing.assert_array_equal(late.tau[7:], late.truth.tau[:-7])
+    np.testing.assert_array_equal(late.q, late.truth.q)
+
+
+def test_progress_goes_up_to_the_end(arm) -> None:
+    shares: list[float] = []
+    reference = swinging(arm.robot, 2.5)
+    simulate(arm, reference, rng=np.random.default_rng(0), progress=shares.append)
+    assert len(shares) >= 2 and shares == sorted(shares) and shares[-1] == 1.0
+
+
+def test_a_run_cannot_be_written_to(run) -> None:
+    for array in (run.t, run.q, run.dq, run.tau, run.truth.q, run.reference.q):
+        with pytest.raises(ValueError, match='read-only'):
+            array[0] = 0.0
+
+
+def test_what_does_not_fit_is_refused(arm) -> None:
+    rng = np.random.default_rng(0)
+    with pytest.raises(ModelError, match='a rate of 300 Hz does not fit the step of'):
+        simulate(arm, swinging(arm.robot), rng=rng, rate=300.0)
+    far = Reference(arm.robot.joints, np.zeros(1), np.full((1, 6), 10.0))
+    with pytest.raises(TrajectoryError, match='beyond its upper limit'):
+        simulate(arm, far, rng=rng)

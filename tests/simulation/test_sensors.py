@@ -1,0 +1,80 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What sensors add, and that they add exactly that."""
+
+from __future__ import annotations
+
+from armid_ros.errors import ModelError
+from armid_ros.simulation import Sensors
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+N = 20_000
+ZERO = np.zeros((N, 2))
+
+
+def test_noise_has_the_standard_deviation_asked_for_and_is_white() -> None:
+    stds = {'position': [1e-4, 2e-4], 'velocity': [0.01, 0.02], 'torque': [0.5, 1.5]}
+    sensors = Sensors(
+        position_noise=np.array(stds['position']),
+        velocity_noise=np.array(stds['velocity']),
+        torque_noise=np.array(stds['torque']),
+    )
+    readings = sensors.measure(ZERO, ZERO, ZERO, 1e-3, np.random.default_rng(1))
+    low, high = chi2.ppf([1e-4, 1.0 - 1e-4], N)
+    for reading, std in zip(readings, stds.values(), strict=True):
+        squares = np.sum((reading / np.array(std)) ** 2, axis=0)
+        assert np.all((low < squares) & (squares < high))
+        correlation = np.mean(reading[1:] * reading[:-1], axis=0) / np.array(std) ** 2
+        assert np.all(np.abs(correlation) < 4.0 / np.sqrt(N))
+    across = np.corrcoef(np.column_stack(readings).T) - np.eye(6)
+    assert np.abs(across).max() < 4.5 / np.sqrt(N)
+
+
+def test_perfect_sensors_read_the_truth() -> None:
+    q, dq, tau = np.random.default_rng(0).normal(size=(3, 50, 2))
+    readings = Sensors().measure(q, dq, tau, 1e-3, np.random.default_rng(0))
+    for reading, truth in zip(readings, (q, dq, tau), strict=True):
+        np.testing.assert_array_equal(reading, truth)
+
+
+def test_an_encoder_reads_whole_steps_within_half_a_step_of_the_truth() -> None:
+    q = np.linspace(-1.0, 1.0, N)[:, np.newaxis] * np.array([1.0, 1.0])
+    resolution = np.array([2.0 * np.pi / 4096, 0.0])
+    read, _, _ = Sensors(resolution=resolution).measure(q, q, q, 1e-3, np.random.default_rng(0))
+    steps = read[:, 0] / resolution[0]
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+    error = read[:, 0] - q[:, 0]
+    assert np.abs(error).max() <= resolution[0] / 2 * (1.0 + 1e-9)
+    assert error.std() == pytest.approx(resolution[0] / np.sqrt(12.0), rel=0.01)
+    np.testing.assert_array_equal(read[:, 1], q[:, 1])
+
+
+def test_velocity_from_the_encoder_is_the_difference_of_its_readings() -> None:
+    t = 1e-3 * np.arange(200)
+    q, dq = np.sin(3.0 * t)[:, np.newaxis], 3.0 * np.cos(3.0 * t)[:, np.newaxis]
+    sensors = Sensors(resolution=1e-3, velocity_from_encoder=True)
+    position, velocity, _ = sensors.measure(q, dq, q, 1e-3, np.random.default_rng(0))
+    np.testing.assert_allclose(velocity[1:], np.diff(position, axis=0) / 1e-3)
+    assert np.abs(velocity - dq).max() <= 1.0 + 0.01
+
+
+def test_one_sample_at_a_time_reads_the_same_as_all_at_once() -> None:
+    q, dq, tau = np.random.default_rng(0).normal(size=(3, 20, 2))
+    sensors = Sensors(0.1, 0.2, 0.3, resolution=0.05, velocity_from_encoder=True)
+    together = sensors.measure(q, dq, tau, 0.1, np.random.default_rng(5))
+    rng, previous = np.random.default_rng(5), None
+    for k in range(20):
+        row = slice(k, k + 1)
+        single = sensors.measure(q[row], dq[row], tau[row], 0.1, rng, previous)
+        previous = single[0][0]
+        for one, all_at_once in zip(single, together, strict=True):
+            np.testing.assert_array_equal(one, all_at_once[row])
+
+
+def test_nonsense_is_refused() -> None:
+    with pytest.raises(ModelError, match='torque_noise has to be 0 or more'):
+        Sensors(torque_noise=-0.1)
+    with pytest.raises(ModelError, match='whole number of steps'):
+        Sensors(torque_delay=-1)

@@ -1,0 +1,188 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The arm that stands there: holds, follows, refuses, and is where `simulate` would have it."""
+
+from __future__ import annotations
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import TrajectoryError
+from armid_ros.simulation import GravityPD, Plant, Reference, Sensors, simulate, SimulatedArm
+import numpy as np
+import pytest
+
+HOME = np.array([0.3, -0.4, 0.2, 0.8, 0.1, 0.2])
+SENSORS = Sensors(
+    torque_noise=0.05,
+    position_noise=1e-5,
+    resolution=1e-4,
+    velocity_from_encoder=True,
+    torque_delay=3,
+)
+
+
+@pytest.fixture
+def model(humanoid) -> ArmModel:
+    """Return the shipped arm with friction."""
+    arm = ArmModel(humanoid)
+    return arm.with_effect(
+        make_effect('coulomb_friction', humanoid), [0.4, 0.4, 0.2, 0.2, 0.05, 0.05]
+    )
+
+
+@pytest.fixture
+def arm(model) -> SimulatedArm:
+    """Return the arm at its home pose, with sensors that have every fault."""
+    return SimulatedArm(model, rng=np.random.default_rng(0), sensors=SENSORS, start=HOME)
+
+
+def there_and_back(joints, duration: float = 1.5, first: float = 0.0) -> Reference:
+    """Return a smooth excursion from home that starts and ends at rest."""
+    t = np.linspace(0.0, duration, 31)[:, np.newaxis]
+    w = 2.0 * np.pi / duration
+    reach = 0.1 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    q = HOME + reach * (1.0 - np.cos(w * t))
+    dq, ddq = reach * w * np.sin(w * t), reach * w**2 * np.cos(w * t)
+    return Reference(joints, first + t[:, 0], q, dq, ddq)
+
+
+def test_without_a_trajectory_it_stands_still(arm) -> None:
+    for _ in range(10):
+        sample = arm.advance(100)
+    assert (sample.steps, sample.t) == (1000, 1.0)
+    np.testing.assert_array_equal(arm.state.q, HOME)
+    np.testing.assert_array_equal(arm.state.dq, 0.0)
+
+
+@pytest.mark.parametrize('stride', [1, 5, 7])
+def test_it_reads_what_simulate_records(model, stride: int) -> None:
+    reference = there_and_back(model.robot.joints)
+    rng = np.random.default_rng(3)
+    run = simulate(Plant(model, dt=1.0 / 700), reference, rng=rng, sensors=SENSORS, rate=100.0)
+    rng = np.random.default_rng(3)
+    arm = SimulatedArm(Plant(model, dt=1.0 / 700), rng=rng, start=HOME)
+    arm.set_trajectory(reference)
+    for _ in range(0, 700, stride):
+        arm.advance(stride)
+    np.testing.assert_allclose(arm.state.q, run.truth.q[100], atol=1e-8)
+
+
+def test_noise_and_delay_are_those_of_simulate_sample_by_sample(model) -> None:
+    reference = there_and_back(model.robot.joints)
+    rng = np.random.default_rng(3)
+    run = simulate(model, reference, rng=rng, sensors=SENSORS, rate=200.0)
+    rng = np.random.default_rng(3)
+    arm = SimulatedArm(model, rng=rng, sensors=SENSORS, start=HOME)
+    arm.set_trajectory(reference)
+    rng.standard_normal((1, 3, 6))  # the sample at time zero, which a stepped arm does not take
+    samples = [arm.advance(5) for _ in range(len(run.t) - 1)]
+    np.testing.assert_allclose([s.t for s in samples], run.t[1:], atol=1e-15)
+    np.testing.assert_allclose([s.q for s in samples], run.q[1:], atol=1e-8)
+    np.testing.assert_allclose([s.tau for s in samples], run.tau[1:], atol=1e-6)
+    np.testing.assert_allclose([s.dq for s in samples[1:]], run.dq[2:], atol=1e-6)
+
+
+def test_it_follows_and_then_holds_the_last_point(arm) -> None:
+    reference = there_and_back(arm.joints)
+    arm.advance(200)
+    arm.set_trajectory(reference)
+    assert arm.ends_at == pytest.approx(1.7)
+    arm.advance(750)
+    np.testing.assert_allclose(arm.state.q, reference.sample(np.array([0.75])).q[0], atol=2e-3)
+    arm.advance(2000)
+    np.testing.assert_allclose(arm.state.q, HOME, atol=2e-3)
+    np.testing.assert_array_equal(arm.state.dq, 0.0)
+
+
+def test_it_goes_to_a_first_point_that_is_later(arm) -> None:
+    shifted = Reference(arm.joints, np.array([2.0]), HOME[np.newaxis] + 0.3, np.zeros((1, 6)))
+    arm.set_trajectory(shifted)
+    arm.advance(1000)
+    np.testing.assert_allclose(arm.state.q, HOME + 0.15, atol=5e-3)
+    arm.advance(2000)
+    np.testing.assert_allclose(arm.state.q, HOME + 0.3, atol=5e-3)
+
+
+def test_positions_alone_are_followed_too(arm) -> None:
+    points = np.stack([HOME, HOME + 0.2])
+    arm.set_trajectory(Reference(arm.joints, np.array([0.0, 1.0]), points))
+    arm.advance(1500)
+    np.testing.assert_allclose(arm.state.q, HOME + 0.2, atol=5e-3)
+
+
+def test_a_new_trajectory_takes_the_place_of_the_old_one(arm) -> None:
+    arm.set_trajectory(there_and_back(arm.joints, first=0.1))
+    arm.advance(700)
+    end = Reference(arm.joints, np.array([1.0]), HOME[np.newaxis], np.zeros((1, 6)))
+    arm.set_trajectory(end)
+    arm.advance(1500)
+    np.testing.assert_allclose(arm.state.q, HOME, atol=5e-3)
+
+
+def bad_trajectories(joints):
+    """Return trajectories that must be refused, with what the message has to say."""
+    still = np.zeros((2, 6))
+    home = np.stack([HOME, HOME])
+    t = np.array([0.0, 1.0])
+    beyond, rushed, coasting = home.copy(), home.copy(), still.copy()
+    beyond[1, 3] = 9.0
+    rushed[1, 3] += 0.8
+    coasting[1, 2] = 0.5
+    unknown = (*joints[:-1], 'tail')
+    return [
+        (Reference(joints, t + 9, beyond, still), rf"'{joints[3]}' reaches .* upper limit of"),
+        (
+            Reference(joints, 0.2 * t, rushed, still),
+            rf"'{joints[3]}' reaches .* velocity limit of",
+        ),
+        (Reference(joints, t, home, coasting), rf"'{joints[2]}' ends with 0.5 rad/s"),
+        (Reference(joints, t, home, coasting[::-1]), rf"'{joints[2]}' starts with a jump of"),
+        (Reference(joints, t, home + 0.1, still), r'starts away by 0.1 rad.* later time'),
+        (Reference(unknown, t, home, still), "'tail' is not one of"),
+        (Reference(joints[:-1], t, home[:, :-1]), f"'{joints[-1]}' is missing"),
+    ]
+
+
+@pytest.mark.parametrize('which', range(7))
+def test_a_refused_trajectory_leaves_the_arm_with_what_it_was_doing(arm, model, which) -> None:
+    twin = SimulatedArm(model, rng=np.random.default_rng(0), sensors=SENSORS, start=HOME)
+    for each in (arm, twin):
+        each.advance(100)
+    bad, message = bad_trajectories(arm.joints)[which]
+    with pytest.raises(TrajectoryError, match=message):
+        arm.set_trajectory(bad)
+    for each in (arm, twin):
+        each.set_trajectory(there_and_back(each.joints))
+        each.advance(300)
+    with pytest.raises(TrajectoryError):
+        arm.set_trajectory(bad)
+    one, other = arm.advance(400), twin.advance(400)
+    np.testing.assert_array_equal(one.q, other.q)
+    np.testing.assert_array_equal(one.tau, other.tau)
+
+
+def test_reset_brings_it_home_and_forgets_the_trajectory(arm) -> None:
+    arm.set_trajectory(there_and_back(arm.joints))
+    arm.advance(600)
+    arm.reset()
+    assert (arm.state.steps, arm.state.t) == (0, 0.0)
+    arm.advance(500)
+    np.testing.assert_array_equal(arm.state.q, HOME)
+    arm.reset(steps=2000)
+    assert arm.advance().t == 2.001
+
+
+def test_it_starts_in_the_middle_of_its_range_unless_told(humanoid) -> None:
+    arm = SimulatedArm(
+        ArmModel(humanoid), rng=np.random.default_rng(0), controller=GravityPD(ArmModel(humanoid))
+    )
+    np.testing.assert_allclose(arm.state.q, (humanoid.lower + humanoid.upper) / 2)
+    arm.advance(1000)
+    np.testing.assert_allclose(arm.state.q, (humanoid.lower + humanoid.upper) / 2, atol=1e-12)
+    with pytest.raises(TrajectoryError, match='cannot be at 9'):
+        SimulatedArm(ArmModel(humanoid), rng=np.random.default_rng(0), start=np.full(6, 9.0))
+
+
+def test_time_only_goes_forwards(arm) -> None:
+    with pytest.raises(ValueError, match='1 step or more'):
+        arm.advance(0)
