@@ -1,0 +1,154 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Ten minutes of a 7-joint arm at 1 kHz, from bag to parameters with standard deviations.
+
+Ours reads a bag; figaroh (1.0.2) is handed the same samples as arrays, with the same filter,
+decimation and parameters, and solves by weighted least squares as ours does. Each is a process of
+its own, started in turn.
+
+"""
+
+import argparse
+import json
+from pathlib import Path
+import subprocess
+import sys
+import tempfile
+import time
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.motion import Motion
+from armid_ros.recording import read_recording, write_recording
+from armid_ros.robots import load_robot
+import numpy as np
+
+from benchmarks.real_recordings import example_robot
+
+RATE = 1000.0
+CUTOFF_HZ = 20.0
+DECIMATION = 20
+FRICTION = {'viscous_friction': 0.5, 'coulomb_friction': 0.3, 'torque_offset': 0.1}
+
+
+def panda():
+    """Load the arm with friction."""
+    arm = ArmModel(load_robot(str(example_robot('panda_description/urdf/panda.urdf'))))
+    for name, value in FRICTION.items():
+        arm = arm.with_effect(make_effect(name, arm.robot), np.full(7, value))
+    return arm
+
+
+def motion(arm, minutes, rng):
+    """Return three sines per joint with torque and its noise."""
+    t = np.arange(round(60 * minutes * RATE)) / RATE
+    q, dq, ddq = np.zeros((3, len(t), arm.robot.n_joints))
+    for hz, size in ((0.1, 0.5), (0.2, 0.3), (0.5, 0.1)):
+        w = 2 * np.pi * hz
+        angle = w * t[:, None] + rng.uniform(0, 2 * np.pi, arm.robot.n_joints)
+        q += size * np.sin(angle)
+        dq += size * w * np.cos(angle)
+        ddq -= size * w * w * np.sin(angle)
+    exact = Motion(arm.robot.joints, t, q, dq, ddq)
+    return exact.with_torque(arm.torque(exact) + 0.05 * rng.normal(size=q.shape))
+
+
+def ours(bag):
+    """Read and identify; returns seconds and the friction of joint 1."""
+    from armid_ros.identification import IdentificationSettings, identify, SignalSettings
+
+    arm = panda()
+    arm = ArmModel(arm.robot, arm.effects)
+    start = time.perf_counter()
+    recording = read_recording(bag, joints=arm.robot.joints)
+    settings = IdentificationSettings('wls', SignalSettings(CUTOFF_HZ, DECIMATION))
+    result = identify(arm, [recording], settings, rng=np.random.default_rng(0))
+    seconds = time.perf_counter() - start
+    index = result.estimate.index('viscous_coefficient', arm.robot.joints[0])
+    return seconds, result.estimate.values[index], result.estimate.std[index]
+
+
+def theirs(bag):
+    """Give figaroh the arrays; returns seconds, viscous friction of joint 1, its deviation."""
+    from figaroh.identification.base_identification import BaseIdentification
+    from pinocchio.robot_wrapper import RobotWrapper
+
+    robot = panda().robot
+    recording = read_recording(bag, joints=robot.joints)
+
+    class Panda(BaseIdentification):
+        def load_param(self, config_file, setting_type='identification'):
+            axes = list(range(7))
+            self.identif_config = {
+                'robot_name': 'panda',
+                'act_idxq': axes,
+                'act_idxv': axes,
+                'active_joints': list(robot.joints),
+                'has_friction': True,
+                'has_actuator_inertia': False,
+                'has_joint_offset': True,
+                'is_joint_torques': True,
+                'is_external_wrench': False,
+                'force_torque': None,
+                **dict.fromkeys(('fv', 'fs', 'Ia', 'off'), [0.0] * 7),
+                'filter_config': {
+                    'differentiation_method': 'gradient',
+                    'filter_params': {
+                        'nbutter': 4,
+                        'f_butter': CUTOFF_HZ,
+                        'med_fil': 5,
+                        'f_sample': RATE,
+                    },
+                },
+            }
+
+        def load_trajectory_data(self, data_source=None):
+            return {
+                'timestamps': recording.t,
+                'positions': recording.q,
+                'velocities': None,
+                'accelerations': None,
+                'torques': recording.tau,
+            }
+
+    start = time.perf_counter()
+    task = Panda(RobotWrapper(robot.model.copy()), '')
+    task.initialize()
+    task.solve(decimation_factor=DECIMATION, plotting=False, wls=True)
+    seconds = time.perf_counter() - start
+    index = next(k for k, name in enumerate(task.params_base) if name.startswith('fv'))
+    deviation = abs(task.phi_base[index]) * task.result['wls_std_deviations'][index] / 100
+    return seconds, task.phi_base[index], deviation
+
+
+def main():
+    """Print seconds of both and the ratio."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--minutes', type=float, default=10.0)
+    parser.add_argument('--run', choices=['ours', 'theirs'], help=argparse.SUPPRESS)
+    parser.add_argument('--bag', type=Path, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.run:
+        print(json.dumps({'ours': ours, 'theirs': theirs}[arguments.run](arguments.bag)))
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        bag = Path(folder, 'panda')
+        arm = panda()
+        write_recording(bag, motion(arm, arguments.minutes, np.random.default_rng(0)))
+        seconds = {}
+        for name in ('ours', 'theirs'):
+            command = [sys.executable, '-m', 'benchmarks.offline_speed', '--run', name]
+            done = subprocess.run(
+                [*command, '--bag', str(bag)], capture_output=True, text=True, check=True
+            )
+            seconds[name], value, std = json.loads(done.stdout.splitlines()[-1])
+            print(
+                f'{name:7s}{seconds[name]:8.1f} s   viscous friction of joint 1: {value:.4f} +- '
+                f'{std:.4f} N m s/rad (true {FRICTION["viscous_friction"]})'
+            )
+        print(f'ratio {seconds["theirs"] / seconds["ours"]:.1f} x, wanted 10 x')
+
+
+if __name__ == '__main__':
+    main()
