@@ -5,6 +5,7 @@
 from importlib import metadata
 from pathlib import Path
 import sys
+import sysconfig
 
 import pytest
 
@@ -18,12 +19,15 @@ def root():
 
 
 @pytest.fixture(scope='session')
-def prefix():
-    """Return the prefix that armid_ros is installed in; skip the test in a bare source tree."""
-    try:
-        installed = metadata.distribution('armid_ros').locate_file('')
-    except metadata.PackageNotFoundError:
-        installed = ROOT
-    if not Path(installed).is_relative_to(sys.prefix):
-        pytest.skip('armid_ros is not installed in this environment: run make')
+def distribution():
+    """Return what pip installed in this environment; skip the test where it has not."""
+    site_packages = [sysconfig.get_path('purelib')]  # not the source tree, which has metadata too
+    for installed in metadata.distributions(name='armid_ros', path=site_packages):
+        return installed
+    pytest.skip('armid_ros is not installed in this environment: run make')
+
+
+@pytest.fixture(scope='session')
+def prefix(distribution):
+    """Return the prefix that armid_ros is installed in."""
     return Path(sys.prefix)

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where `ros2 pkg`, `ros2 run` and `ros2 interface` look, something is to be found."""
 
-from importlib import metadata
 import os
 from pathlib import Path
 import re
@@ -30,9 +29,10 @@ def executables(prefix, package):
     return {path.name for path in paths if path.is_file() and os.access(path, os.X_OK)}
 
 
-def console_scripts():
+@pytest.fixture
+def console_scripts(distribution):
     """Return the console scripts of the installed package, name to 'module:function'."""
-    entries = metadata.distribution('armid_ros').entry_points
+    entries = distribution.entry_points
     return {entry.name: entry.value for entry in entries if entry.group == 'console_scripts'}
 
 
@@ -44,10 +44,10 @@ def test_index_finds_the_package_and_its_manifest(prefix, package):
     assert ElementTree.parse(manifest).findtext('name') == package
 
 
-def test_executables_are_the_scripts_and_the_console_scripts(prefix, root):
+def test_executables_are_the_scripts_and_the_console_scripts(prefix, root, console_scripts):
     """Pip and colcon fill lib/armid_ros from different lists, which must not differ."""
     scripts = {path.name for path in (root / 'scripts').iterdir()}
-    assert scripts == executables(prefix, 'armid_ros') == set(console_scripts())
+    assert scripts == executables(prefix, 'armid_ros') == set(console_scripts)
     assert scripts == NODES | {'armid'}
 
 
@@ -57,10 +57,10 @@ def test_scripts_are_executable_in_the_source_tree(root):
         assert stat.S_IMODE(path.stat().st_mode) & 0o111 == 0o111, path
 
 
-def test_console_scripts_name_the_module_like_the_node():
+def test_console_scripts_name_the_module_like_the_node(console_scripts):
     """The scripts rely on it: they import the module named like themselves."""
     expected = {node: f'armid_ros.nodes.{node}:main' for node in NODES}
-    assert console_scripts() == expected | {'armid': 'armid_ros.cli:main'}
+    assert console_scripts == expected | {'armid': 'armid_ros.cli:main'}
 
 
 def test_nodes_are_those_that_are_installed(root):
@@ -106,9 +106,9 @@ def test_interface_show_finds_the_definition(prefix, root):
     assert installed == (root / 'msg_schemas' / 'msg' / 'ParameterEstimate.msg').read_text()
 
 
-def test_data_of_the_package_is_installed(root):
+def test_data_of_the_package_is_installed(root, distribution):
     """What is not Python in the package's tree, robots and templates, travels with it."""
-    installed = {str(path) for path in metadata.files('armid_ros')}
+    installed = {str(path) for path in distribution.files}
     package = root / 'armid_ros'
     wanted = {
         str(path.relative_to(root))
@@ -127,7 +127,7 @@ def test_launch_and_config_files_are_in_share(prefix, root):
                 assert (prefix / 'share' / 'armid_ros' / folder / path.name).is_file()
 
 
-def test_all_say_one_version(root):
+def test_all_say_one_version(root, distribution):
     """Manifests, setup.py, the package and the changelog."""
     manifests = (root / 'package.xml', root / 'msg_schemas' / 'package.xml')
     versions = {ElementTree.parse(path).findtext('version') for path in manifests}
@@ -135,7 +135,7 @@ def test_all_say_one_version(root):
     changelog = (root / 'CHANGELOG.md').read_text()
     versions.add(re.search(r"version='([^']+)'", setup).group(1))
     versions.add(re.search(r'^## (\S+)', changelog, re.MULTILINE).group(1))
-    versions.add(metadata.version('armid_ros'))
+    versions.add(distribution.version)
     versions.add(armid_ros.__version__)
     assert versions == {armid_ros.__version__}
 
