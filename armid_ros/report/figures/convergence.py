@@ -8,11 +8,8 @@ import textwrap
 
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray
-from armid_ros.report.figures.parameters import (
-    HALF_WIDTH,
-    is_rigid,
-    parameter_families,
-)
+from armid_ros.report.families import is_rigid, parameter_families
+from armid_ros.report.figures.parameters import HALF_WIDTH
 from armid_ros.report.figures.style import (
     COLOURS,
     FAINT,
@@ -21,9 +18,9 @@ from armid_ros.report.figures.style import (
     new_figure,
     plain,
     PREDICTED,
-    pretty,
     RESIDUAL,
 )
+from armid_ros.report.notation import pretty
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
@@ -91,7 +88,7 @@ def _title(name: ParameterName) -> str:
     text = name.name
     if not is_rigid(name):
         text = f'{text.replace("_", " ").capitalize()}, {name.joint}'
-    return textwrap.fill(textwrap.shorten(text, 60, placeholder=' ...'), 32)
+    return textwrap.fill(textwrap.shorten(text, 50, placeholder=' ...'), 28)
 
 
 def _telling(

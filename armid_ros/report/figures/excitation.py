@@ -6,16 +6,16 @@ from __future__ import annotations
 
 from armid_ros.excitation import Excitation, Information
 from armid_ros.motion import FloatArray
-from armid_ros.report.figures.parameters import parameter_families, short_label
+from armid_ros.report.families import parameter_families, short_label
 from armid_ros.report.figures.style import (
     COLOURS,
     LIMIT,
     new_figure,
     plain,
-    position_unit,
     PREDICTED,
     RESIDUAL,
 )
+from armid_ros.report.notation import position_unit
 from armid_ros.robots import CollisionModel, Robot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

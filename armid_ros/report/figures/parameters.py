@@ -6,17 +6,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.estimate import Estimate
 from armid_ros.motion import FloatArray
+from armid_ros.report.families import parameter_families, short_label
 from armid_ros.report.figures.style import (
     legend,
     MEASURED,
     new_figure,
     plain,
     PREDICTED,
-    pretty,
     RESIDUAL,
 )
+from armid_ros.report.notation import pretty
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
@@ -76,42 +77,6 @@ def parameter_figure(
     return figure
 
 
-def parameter_families(names: tuple[ParameterName, ...]) -> dict[str, list[int]]:
-    """
-    Sort parameters into kinds that share an axis.
-
-    Returns
-    -------
-    dict of str to list of int
-        Heading, and the positions of its parameters: the rigid ones by their unit, those of the
-        effects by name; all of a kind have one unit.
-
-    """
-    families: dict[str, list[int]] = {}
-    kinds = {'kg m^2': 'Inertias', 'kg m': 'First moments', 'kg': 'Masses'}
-    for position, name in enumerate(names):
-        kind = kinds.get(name.unit) if is_rigid(name) else None
-        title = kind or name.name.replace('_', ' ').capitalize()
-        known = families.get(title)
-        if known and names[known[0]].unit != name.unit:
-            title = f'{title} [{pretty(name.unit)}]'  # a joint that slides among joints that turn
-        families.setdefault(title, []).append(position)
-    return families
-
-
-def is_rigid(name: ParameterName) -> bool:
-    """Whether a parameter is a mass, moment or inertia of a link, or a grouping of such."""
-    return name.name.lstrip('-').startswith(('I', 'm')) and '_' not in name.name
-
-
-def short_label(name: ParameterName) -> str:
-    """Return a label that fits an axis: the leading symbol of a grouping, or the joint."""
-    if not is_rigid(name):
-        return name.joint or name.name
-    leader = name.name.split(' ')[0]
-    return leader if leader == name.name else f'{leader} *'
-
-
 def _contains(estimate: Estimate, target: FloatArray) -> npt.NDArray[np.bool_]:
     return np.asarray(np.abs(estimate.values - target) <= HALF_WIDTH * estimate.std)
 
@@ -143,7 +108,7 @@ def _signed_log(axes: Axes, near_zero: float) -> None:
     axes.set_xscale('symlog', linthresh=linear, linscale=0.8)
     lowest, highest = axes.get_xlim()
     place = axes.xaxis.get_transform().transform
-    apart = 0.21 * float(place(highest) - place(lowest))
+    apart = 0.19 * float(place(highest) - place(lowest))
     ticks = [0.0]
     for end in (lowest, highest):
         last = 0.0

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armid_ros.robots import Robot
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -63,23 +62,3 @@ def legend(figure: Figure, axes: Axes, columns: int = 6) -> None:
         frameon=False,
         fontsize=_TITLE,
     )
-
-
-def pretty(unit: str) -> str:
-    """Return a unit as it is printed: 'kg m²' for 'kg m^2'."""
-    return unit.replace('^2', '²').replace('^3', '³')
-
-
-def digits(value: float, count: int = 2) -> str:
-    """Return a number with significant digits, zeros kept: '2.0', not '2'."""
-    return f'{value:#.{count}g}'.rstrip('.')
-
-
-def torque_unit(robot: Robot, joint: int) -> str:
-    """Return the unit of a joint's actuator torque: N for one that slides."""
-    return 'N' if robot.prismatic[joint] else 'N m'
-
-
-def position_unit(robot: Robot, joint: int) -> str:
-    """Return the unit of a joint's position."""
-    return 'm' if robot.prismatic[joint] else 'rad'

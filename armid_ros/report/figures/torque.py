@@ -10,15 +10,14 @@ from armid_ros.identification import Fit, Score
 from armid_ros.motion import FloatArray
 from armid_ros.report.figures.style import (
     BROAD,
-    digits,
     FAINT,
     legend,
     new_figure,
     plain,
     PREDICTED,
     RESIDUAL,
-    torque_unit,
 )
+from armid_ros.report.notation import digits, torque_unit
 from armid_ros.robots import Robot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

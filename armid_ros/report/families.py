@@ -1,0 +1,44 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters in the kinds that a reader compares with each other."""
+
+from __future__ import annotations
+
+from armid_ros.estimate import ParameterName
+from armid_ros.report.notation import pretty
+
+
+def parameter_families(names: tuple[ParameterName, ...]) -> dict[str, list[int]]:
+    """
+    Sort parameters into kinds that share an axis.
+
+    Returns
+    -------
+    dict of str to list of int
+        Heading, and the positions of its parameters: the rigid ones by their unit, those of the
+        effects by name; all of a kind have one unit.
+
+    """
+    families: dict[str, list[int]] = {}
+    kinds = {'kg m^2': 'Inertias', 'kg m': 'First moments', 'kg': 'Masses'}
+    for position, name in enumerate(names):
+        kind = kinds.get(name.unit) if is_rigid(name) else None
+        title = kind or name.name.replace('_', ' ').capitalize()
+        known = families.get(title)
+        if known and names[known[0]].unit != name.unit:
+            title = f'{title} [{pretty(name.unit)}]'  # a joint that slides among joints that turn
+        families.setdefault(title, []).append(position)
+    return families
+
+
+def is_rigid(name: ParameterName) -> bool:
+    """Whether a parameter is a mass, moment or inertia of a link, or a grouping of such."""
+    return name.name.lstrip('-').startswith(('I', 'm')) and '_' not in name.name
+
+
+def short_label(name: ParameterName) -> str:
+    """Return a label that fits an axis: the leading symbol of a grouping, or the joint."""
+    if not is_rigid(name):
+        return name.joint or name.name
+    leader = name.name.split(' ')[0]
+    return leader if leader == name.name else f'{leader} *'

@@ -1,0 +1,32 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How numbers and units are printed, in figures and in reports alike."""
+
+from __future__ import annotations
+
+from armid_ros.robots import Robot
+
+
+def pretty(unit: str) -> str:
+    """Return a unit as it is printed: 'kg m²' for 'kg m^2'."""
+    return unit.replace('^2', '²').replace('^3', '³')
+
+
+def digits(value: float, count: int = 2) -> str:
+    """Return a number with significant digits, zeros kept: '2.0', not '2'."""
+    return f'{value:#.{count}g}'.rstrip('.')
+
+
+def counted(number: int, what: str, plural: str = '') -> str:
+    """Return a number with its noun: '1 joint', '2 joints'."""
+    return f'{number} {what if number == 1 else plural or what + "s"}'
+
+
+def torque_unit(robot: Robot, joint: int) -> str:
+    """Return the unit of a joint's actuator torque: N for one that slides."""
+    return 'N' if robot.prismatic[joint] else 'N m'
+
+
+def position_unit(robot: Robot, joint: int) -> str:
+    """Return the unit of a joint's position."""
+    return 'm' if robot.prismatic[joint] else 'rad'
