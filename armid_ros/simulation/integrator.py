@@ -41,7 +41,7 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
         Where it is one step later.
 
     """
-    dt, half = plant.dt, 0.5 * plant.dt
+    dt, half = plant.spans
     model, data, dq = plant.robot.model, plant.data, state.dq
     q_middle = state.q + half * dq
     dq_middle = dq + half * state.ddq
@@ -60,7 +60,7 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
     if plant.hard_stops and not _inside(plant.stops, q_next):
         q_next, dq_next, modes = _stop(plant, inertia, force, state, q_middle, q_next)
     steps = state.steps + 1
-    return State(steps, steps * dt, q_next, dq_next, (dq_next - dq) / dt, modes)
+    return State(steps, steps * plant.dt, q_next, dq_next, (dq_next - dq) / dt, modes)
 
 
 def _solve(inertia: FloatArray, force: FloatArray, directions: FloatArray) -> FloatArray:

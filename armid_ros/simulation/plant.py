@@ -106,6 +106,8 @@ class Plant:
         Constant torque that the actuators have to supply [N m].
     torque : callable (t, q, dq) -> ndarray (n,), or None
         Anything else that they have to supply.
+    spans : tuple of ndarray, each of shape ()
+        The step and half of it [s]; numpy multiplies by these in half the time of a float.
     torque_limit : ndarray, shape (n,)
         What the drives have [N m].
     stops : list of (float, float)
@@ -128,6 +130,7 @@ class Plant:
     damping: FloatArray = field(init=False, repr=False)
     constant: FloatArray = field(init=False, repr=False)
     inertia: FloatArray = field(init=False, repr=False)
+    spans: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
     torque_limit: FloatArray = field(init=False, repr=False)
     stops: list[tuple[float, float]] = field(init=False, repr=False)
     _at_stops: dict[tuple[bytes, bytes], Contacts] = field(
@@ -151,6 +154,7 @@ class Plant:
         values = {
             'robot': robot,
             'contacts': Contacts.of(friction),
+            'spans': (np.array(self.dt), np.array(self.dt / 2)),
             'torque_limit': robot.torque_limit,
             'stops': list(zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)),
             'data': data,
