@@ -1,0 +1,84 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Options that several commands have, and what they stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import RobotError
+from armid_ros.recording import read_recording, read_robot_description, Recording
+from armid_ros.robots import load_robot, Robot, robot_from_urdf
+import click
+
+DEFAULT_EFFECTS = 'viscous_friction,coulomb_friction,torque_offset'
+
+robot = click.option(
+    '--robot',
+    'robot_source',
+    required=True,
+    metavar='R',
+    help='Shipped name, path of a URDF or xacro, or - for the /robot_description in the bag.',
+)
+gravity = click.option(
+    '--gravity', default='earth', show_default=True, help='earth, moon, or a vector x,y,z [m/s^2].'
+)
+joints = click.option(
+    '--joints', default=None, metavar='A,B,...', help='Driven joints; all but grippers by default.'
+)
+effects = click.option(
+    '--effects',
+    default=DEFAULT_EFFECTS,
+    show_default=True,
+    metavar='E,...',
+    help="What acts beside the rigid body; 'E@joint+joint' for some joints only.",
+)
+folder = click.option(
+    '--out',
+    required=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help='Folder to fill.',
+)
+bag = click.option(
+    '--out', required=True, type=click.Path(path_type=Path), help='Bag to write; must not exist.'
+)
+seed = click.option('--seed', default=0, show_default=True, help='Of every random number.')
+as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
+
+
+def open_robot(source: str, gravity: str, joints: str | None, bags: Sequence[Path] = ()) -> Robot:
+    """Load the robot that --robot, --gravity and --joints ask for."""
+    chosen = tuple(joints.split(',')) if joints else None
+    if source != '-':
+        return load_robot(source, gravity=gravity, joints=chosen)
+    for path in bags:
+        text = read_robot_description(path)
+        if text is not None:
+            return robot_from_urdf(text, gravity=gravity, joints=chosen, source=str(path))
+    raise RobotError(
+        f'no /robot_description in {", ".join(map(str, bags)) or "any bag"}; '
+        'name the URDF with --robot'
+    )
+
+
+def with_effects(arm: ArmModel, names: str) -> ArmModel:
+    """Add the effects that --effects names."""
+    for name in filter(None, names.split(',')):
+        arm = arm.with_effect(make_effect(name, arm.robot))
+    return arm
+
+
+def read(bags: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
+    """Read what the bags hold of the robot's joints."""
+    return [read_recording(path, joints=robot.joints, topic=topic) for path in bags]
+
+
+def kept_source(source: str, robot: Robot, out: Path) -> str:
+    """Return how files in a folder refer to the robot; one from a bag is put beside them."""
+    if source == '-':
+        (out / 'robot.urdf').write_text(robot.urdf, encoding='utf-8')
+        return 'robot.urdf'
+    return str(Path(source).resolve()) if Path(source).is_file() else source
