@@ -19,6 +19,9 @@ import numpy.typing as npt
 import pinocchio as pin
 from scipy.linalg import eigh, LinAlgError
 
+#: How far beyond a limit is rounding, as a share of the range between the limits.
+LIMIT_TOLERANCE = 1e-6
+
 NO_BODY = (
     'the inertia matrix of the arm is not positive definite, so its rigid-body parameters and '
     'rotor inertias are not those of bodies: correct them, or estimate physically consistent ones'
@@ -188,16 +191,19 @@ class Plant:
             for x in (q, dq, ddq)
         )
         if self.hard_stops:
-            for joint, x, lower, upper in zip(
-                self.robot.joints, position, self.robot.lower, self.robot.upper, strict=True
-            ):
-                if not lower <= x <= upper:
-                    raise TrajectoryError(
-                        f"{self.robot.name}: joint '{joint}' cannot be at {x:.4g}, its stops are "
-                        f'at {lower:.4g} and {upper:.4g}'
-                    )
+            position = self._within_stops(position)
         modes = tuple(np.sign(self.contacts.directions @ velocity).astype(int).tolist())
         return State(steps, steps * self.dt, position, velocity, acceleration, modes)
+
+    def _within_stops(self, q: FloatArray) -> FloatArray:
+        lower, upper = self.robot.lower, self.robot.upper
+        slack = limit_slack(self.robot)
+        for joint in np.flatnonzero((q < lower - slack) | (q > upper + slack))[:1]:
+            raise TrajectoryError(
+                f"{self.robot.name}: joint '{self.robot.joints[joint]}' cannot be at "
+                f'{q[joint]:.4g}, its stops are at {lower[joint]:.4g} and {upper[joint]:.4g}'
+            )
+        return read_only(np.clip(q, lower, upper))
 
     def times(self, first: int, count: int) -> FloatArray:
         """Return the times of successive steps [s], shape (count,)."""
@@ -224,6 +230,12 @@ class Plant:
                 )
             )
         return self._at_stops[key]
+
+
+def limit_slack(robot: Robot) -> FloatArray:
+    """Return how far beyond a position limit is rounding [rad or m], shape (n,)."""
+    span = robot.upper - robot.lower
+    return np.asarray(LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0))
 
 
 def middle_position(robot: Robot) -> FloatArray:

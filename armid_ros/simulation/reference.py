@@ -17,10 +17,8 @@ from dataclasses import dataclass, field
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
+from armid_ros.simulation.plant import limit_slack, LIMIT_TOLERANCE
 import numpy as np
-
-#: How far beyond a limit is rounding, as a share of the limit's range.
-LIMIT_TOLERANCE = 1e-6
 
 #: Samples looked at in one go when a reference is compared with the limits.
 _BLOCK = 20_000
@@ -192,8 +190,7 @@ class Reference:
             If a limit is passed; the message names the joint, the time, the value and the limit.
 
         """
-        span = robot.upper - robot.lower
-        slack = LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0)
+        slack = limit_slack(robot)
         fastest = robot.velocity_limit * (1.0 + LIMIT_TOLERANCE)
         for motion in self._blocks(dt):
             for beyond, values, kind, unit in (

@@ -166,6 +166,7 @@ def test_an_arm_cannot_begin_beyond_its_stops(pendulum) -> None:
     with pytest.raises(TrajectoryError, match=r"joint 'joint1' cannot be at 0.6.* -0.5 and 0.5"):
         Plant(ArmModel(pendulum(stop=0.5))).state([0.6])
     Plant(ArmModel(pendulum(stop=0.5)), hard_stops=False).state([0.6])
+    assert Plant(ArmModel(pendulum(stop=0.5))).state([0.5 + 1e-9]).q[0] == 0.5
 
 
 def test_bodies_that_cannot_be_are_refused(slider) -> None:
