@@ -9,7 +9,7 @@ for the nodes; none of it needs ROS.
 
 """
 
-from armid_ros.recording.bag import iter_raw, topics
+from armid_ros.recording.bag import Bag, iter_raw, topics
 from armid_ros.recording.joint_state_encoder import (
     joint_state_cdr,
     write_joint_states,
@@ -46,6 +46,7 @@ __all__ = [
     'write_joint_states',
     'joint_state_cdr',
     'string_cdr',
+    'Bag',
     'Topic',
     'RawMessage',
     'topics',

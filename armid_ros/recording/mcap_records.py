@@ -124,7 +124,7 @@ def map_file(data: bytes | mmap.mmap, path: Path) -> FileMap:
         raise RecordingError(f'{path}: not an MCAP file, or its beginning is damaged')
     found = FileMap(data)
     size, position = len(data), len(MAGIC)
-    while position + RECORD_HEADER <= size and not found.finished:
+    while position + RECORD_HEADER <= size:
         opcode, length = struct.unpack_from('<BQ', data, position)
         begin, end = position + RECORD_HEADER, position + RECORD_HEADER + length
         if end > size or not opcode:
@@ -141,8 +141,10 @@ def map_file(data: bytes | mmap.mmap, path: Path) -> FileMap:
             found.loose.append((begin, end))
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS):
             add_definition(found, opcode, data[begin:end])
-        found.finished = opcode == Opcode.FOOTER
         position = end
+        if opcode == Opcode.FOOTER:
+            found.finished = data[end : end + len(MAGIC)] == MAGIC
+            break
     if not found.finished:
         found.damage = (
             f'the file ends without its index, as after a crash: readable up to byte {position} '

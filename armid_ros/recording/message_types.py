@@ -107,7 +107,7 @@ def _register(
         except (TypesysError, ValueError) as error:
             raise RecordingError(f'type {name}: no valid message definition: {error}') from error
         if name not in types:
-            raise RecordingError(f'type {name}: the definition given is that of {", ".join(types)}')
+            raise RecordingError(f'type {name}: that is the definition of {", ".join(types)}')
     store.register(types)
     for _, fields in types.values():
         for _, description in fields:

@@ -267,7 +267,6 @@ class BagWriter:
         channel = self._channels.get(topic)
         if channel is None or self._closed:
             raise self._refusal(topic)
-        self.flush()
         length = messages.dtype.itemsize
         record = np.dtype([('head', MESSAGE), ('cdr', np.void, length)])
         at_once = max(1, self._chunk_size // record.itemsize)
@@ -281,19 +280,17 @@ class BagWriter:
             head['channel'] = channel
             head['log_time'] = head['publish_time'] = log_times_ns[at : at + at_once]
             records['cdr'] = some
-            offsets = np.arange(len(some), dtype=np.int64) * record.itemsize
-            self._mcap.write_chunk(records.tobytes(), offsets)
+            waiting, offsets = _joined(self._open_records())
+            more = len(waiting) + np.arange(len(some), dtype=np.int64) * record.itemsize
+            self._mcap.write_chunk(waiting + records.tobytes(), np.concatenate([offsets, more]))
 
     def flush(self) -> None:
         """Write out what is in memory; for a timer, should messages stop coming."""
         self._check_open()
-        records = self._open_records()
-        if not records:
-            return
-        lengths = np.array([len(record) for record in records], np.int64)
-        is_message = np.array([record[0] == Opcode.MESSAGE for record in records])
-        offsets = np.cumsum(lengths) - lengths
-        self._mcap.write_chunk(b''.join(records), offsets[is_message])
+        content, offsets = _joined(self._open_records())
+        # Without a message there is nothing to lose.
+        if len(offsets):
+            self._mcap.write_chunk(content, offsets)
 
     def close(self) -> None:
         """Complete the file, and write metadata.yaml; a closed bag stays as it is."""
@@ -330,3 +327,10 @@ class BagWriter:
         self._check_open()
         known = ', '.join(self._topics) or 'none'
         return RecordingError(f"{self.path}: topic '{topic}' was not announced; there are {known}")
+
+
+def _joined(records: list[bytes]) -> tuple[bytes, IntArray]:
+    """Return records as one, and where the messages among them begin."""
+    lengths = np.array([len(record) for record in records], np.int64)
+    is_message = np.array([record[0] == Opcode.MESSAGE for record in records], np.bool_)
+    return b''.join(records), (np.cumsum(lengths) - lengths)[is_message]

@@ -130,7 +130,7 @@ def test_the_file_is_in_order_by_mcaps_own_rules(swinging, tmp_path):
     assert kinds[-1] == 'Footer'
     chunks = [record for record in records if isinstance(record, Chunk)]
     assert len(chunks) == summary.statistics.chunk_count > 3
-    assert sum(isinstance(record, MessageIndex) for record in records) == len(chunks)
+    assert sum(isinstance(record, MessageIndex) for record in records) == len(chunks) + 1
     assert len(inside) == summary.statistics.message_count == len(swinging) + 1
     assert all(message.publish_time == message.log_time for _, _, message in inside)
     written = [record for record in records if isinstance(record, Metadata)]
@@ -297,8 +297,8 @@ def write_interrupted(bag, messages, line):
 def test_an_interrupt_anywhere_in_the_writer_spoils_nothing(
     swinging, stamps, messages_of, tmp_path
 ):
-    messages = messages_of(swinging, stamps)[:6]
-    expected = stamps[:6].tolist()
+    messages = messages_of(swinging, stamps)[:4]
+    expected = stamps[:4].tolist()
     line, struck = 0, True
     while struck:
         line += 1

@@ -1,0 +1,285 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Bags in all the forms they come in, and things that are no bags."""
+
+import shutil
+import sqlite3
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording import (
+    BagWriter,
+    iter_raw,
+    joint_state_cdr,
+    read_recording,
+    read_robot_description,
+    string_cdr,
+    topics,
+    write_recording,
+)
+from armid_ros.recording.message_types import JOINT_STATE, message_type, STRING
+from mcap.writer import CompressionType, IndexType
+from mcap.writer import Writer as McapFileWriter
+import numpy as np
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_typestore, Stores
+import yaml
+
+JOINTS = ('shoulder', 'elbow', 'wrist')
+
+
+@pytest.fixture
+def split_bag(swinging, tmp_path):
+    """Return a bag split into 12 files by rosbag2, without metadata."""
+    bag = tmp_path / 'split'
+    bag.mkdir()
+    for number, at in enumerate(range(0, 500, 42)):
+        part = tmp_path / f'part{number}'
+        piece = swinging.select(slice(at, at + 42))
+        write_recording(part, piece, compression='lz4' if number % 2 else 'none')
+        shutil.move(part / f'part{number}_0.mcap', bag / f'split_{number}.mcap')
+    return bag
+
+
+def test_a_split_bag_is_read_in_order_with_and_without_metadata(split_bag, swinging, assert_same):
+    without = read_recording(split_bag, joints=JOINTS)
+    assert_same(without, swinging)
+    assert without.report.clean
+    assert [topic.count for topic in topics(split_bag)] == [500]
+    times = [message.log_time_ns for message in iter_raw(split_bag)]
+    assert times == sorted(times)
+    assert len(times) == 500
+    names = [f'split_{number}.mcap' for number in range(11)]
+    metadata = {'version': 9, 'relative_file_paths': names, 'storage_identifier': 'mcap'}
+    (split_bag / 'metadata.yaml').write_text(
+        yaml.safe_dump({'rosbag2_bagfile_information': metadata})
+    )
+    assert_same(read_recording(split_bag, joints=JOINTS), swinging, slice(0, 462))
+
+
+def test_paths_of_old_metadata_begin_with_the_directory(swinging, tmp_path, assert_same):
+    write_recording(tmp_path / 'bag', swinging)
+    information = {'version': 3, 'relative_file_paths': ['bag/bag_0.mcap']}
+    (tmp_path / 'bag' / 'metadata.yaml').write_text(
+        yaml.safe_dump({'rosbag2_bagfile_information': information})
+    )
+    assert_same(read_recording(tmp_path / 'bag', joints=JOINTS), swinging)
+
+
+@pytest.mark.parametrize('compression', list(CompressionType))
+@pytest.mark.parametrize('indexes', [IndexType.ALL, IndexType.NONE])
+@pytest.mark.parametrize('chunked', [True, False])
+@pytest.mark.parametrize('summary', [True, False])
+def test_files_of_mcaps_own_writer_are_read_however_bare(
+    swinging, stamps, tmp_path, assert_same, compression, indexes, chunked, summary
+):
+    path = tmp_path / 'file.mcap'
+    messages = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    with path.open('wb') as stream:
+        writer = McapFileWriter(
+            stream,
+            chunk_size=20_000,
+            compression=compression,
+            index_types=indexes,
+            use_chunking=chunked,
+            repeat_channels=summary,
+            repeat_schemas=summary,
+            use_statistics=summary,
+            use_summary_offsets=summary,
+        )
+        writer.start(profile='ros2')
+        text = message_type(JOINT_STATE).definition.encode()
+        schema = writer.register_schema('sensor_msgs/JointState', 'ros2msg', text)
+        other = writer.register_channel('/chatter', 'cdr', 0)
+        channel = writer.register_channel('/joint_states', 'cdr', schema)
+        for at, (stamp, message) in enumerate(zip(stamps.tolist(), messages, strict=True)):
+            writer.add_message(channel, stamp, message, stamp)
+            writer.add_message(other, stamp, b'x' * (at % 50), stamp)
+        writer.finish()
+    recording = read_recording(path, joints=JOINTS)
+    assert_same(recording, swinging)
+    assert recording.report.clean
+    assert {topic.name: topic.count for topic in topics(path)} == {
+        '/chatter': 500,
+        '/joint_states': 500,
+    }
+    assert len(list(iter_raw(path))) == 1000
+
+
+def test_two_publishers_recorded_as_two_channels_are_one_topic(
+    swinging, stamps, tmp_path, assert_same
+):
+    path = tmp_path / 'file.mcap'
+    messages = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    with path.open('wb') as stream:
+        writer = McapFileWriter(stream, chunk_size=9000)
+        writer.start()
+        schema = writer.register_schema(JOINT_STATE, 'ros2msg', b'')
+        channels = [writer.register_channel('/joint_states', 'cdr', schema) for _ in range(2)]
+        for at, (stamp, message) in enumerate(zip(stamps.tolist(), messages, strict=True)):
+            writer.add_message(channels[at % 3 == 0], stamp, message, stamp)
+        writer.finish()
+    recording = read_recording(path, joints=JOINTS)
+    assert_same(recording, swinging)
+    assert recording.report.clean
+    assert [topic.count for topic in topics(path)] == [500]
+
+
+@pytest.mark.parametrize('columns', ['', ', offered_qos_profiles TEXT NOT NULL'])
+def test_sqlite_files_of_the_first_distributions_are_read(
+    swinging, stamps, tmp_path, assert_same, columns
+):
+    path = tmp_path / 'old.db3'
+    messages = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    database = sqlite3.connect(path)
+    database.execute(
+        'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, '
+        f'serialization_format TEXT NOT NULL{columns})'
+    )
+    database.execute(
+        'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, '
+        'timestamp INTEGER NOT NULL, data BLOB NOT NULL)'
+    )
+    row = (1, '/joint_states', JOINT_STATE, 'cdr') + (('',) if columns else ())
+    database.execute(f'INSERT INTO topics VALUES ({",".join("?" * len(row))})', row)
+    database.executemany(
+        'INSERT INTO messages (topic_id, timestamp, data) VALUES (1, ?, ?)',
+        zip(stamps.tolist(), messages, strict=True),
+    )
+    database.commit()
+    database.close()
+    before = path.read_bytes()
+    recording = read_recording(path, joints=JOINTS)
+    assert_same(recording, swinging)
+    assert [message.log_time_ns for message in iter_raw(path)] == stamps.tolist()
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ['old.db3']
+
+
+def test_messages_come_in_the_order_of_time_whatever_the_order_of_storage(tmp_path):
+    rng = np.random.default_rng(5)
+    times = rng.permutation(2000).tolist()
+    with BagWriter(tmp_path / 'bag', chunk_size=500) as writer:
+        writer.add_topic('/a', STRING)
+        writer.add_topic('/b', STRING)
+        for time in times:
+            writer.write('/a' if time % 2 else '/b', string_cdr(str(time)), time)
+    messages = list(iter_raw(tmp_path / 'bag'))
+    assert [message.log_time_ns for message in messages] == list(range(2000))
+    assert all(message.cdr == string_cdr(str(message.log_time_ns)) for message in messages)
+    assert all((message.topic == '/b') == (message.log_time_ns % 2 == 0) for message in messages)
+
+
+def test_equal_times_keep_the_order_of_storage(tmp_path):
+    with BagWriter(tmp_path / 'bag', chunk_size=100) as writer:
+        writer.add_topic('/a', STRING)
+        for number in range(50):
+            writer.write('/a', string_cdr(str(number)), 10)
+    assert [message.cdr for message in iter_raw(tmp_path / 'bag')] == [
+        string_cdr(str(number)) for number in range(50)
+    ]
+
+
+def test_several_robot_descriptions_are_refused_equal_ones_are_not(tmp_path):
+    for name, texts in (('same', ['<a/>', '<a/>']), ('other', ['<a/>', '<b/>'])):
+        with BagWriter(tmp_path / name) as writer:
+            for side, text in zip(('left', 'right'), texts, strict=True):
+                writer.add_topic(f'/{side}/robot_description', STRING)
+                writer.write(f'/{side}/robot_description', string_cdr(text), 1)
+    assert read_robot_description(tmp_path / 'same') == '<a/>'
+    with pytest.raises(RecordingError, match='/left/robot_description, /right/robot_description'):
+        read_robot_description(tmp_path / 'other')
+
+
+@pytest.mark.parametrize(
+    ('name', 'content', 'problem'),
+    [
+        ('file.mcap', b'', 'the file is empty'),
+        ('file.mcap', bytes(1000), 'not an MCAP file'),
+        ('file.mcap', b'\x89MCAP0\r\n', 'no topic of sensor_msgs/msg/JointState.*no topics'),
+        ('file.mcap', b'\x89MCAP0\r\n' + b'\xff' * 500, 'no topic of sensor_msgs/msg/JointState'),
+        ('file.db3', b'', 'an SQLite file, but not of rosbag2'),
+        ('file.db3', b'rubbish' * 500, 'not an SQLite file of rosbag2'),
+        ('file.mcap.zstd', b'rubbish' * 500, 'the compressed file is damaged'),
+        ('file.bag', b'#ROSBAG V2.0', 'not a bag; give a rosbag2 directory'),
+    ],
+)
+def test_what_is_no_bag_is_refused_with_its_name(tmp_path, name, content, problem):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(RecordingError, match=f'{name}: {problem}'):
+        read_recording(tmp_path / name, joints=JOINTS)
+
+
+def test_random_bytes_are_refused_whatever_they_are(tmp_path):
+    rng = np.random.default_rng(11)
+    for suffix, head in (('.mcap', b'\x89MCAP0\r\n'), ('.db3', b'SQLite format 3\0')):
+        for number in range(50):
+            path = tmp_path / f'{number}{suffix}'
+            path.write_bytes(head * (number % 2) + rng.bytes(int(rng.integers(1, 4000))))
+            with pytest.raises(RecordingError, match=str(path)):
+                read_recording(path, joints=JOINTS)
+
+
+def test_directories_that_are_no_bags_are_refused_with_what_they_hold(swinging, tmp_path):
+    with pytest.raises(RecordingError, match='absent: there is no such bag'):
+        read_recording(tmp_path / 'absent', joints=JOINTS)
+    write_recording(tmp_path / 'runs' / 'first', swinging)
+    with pytest.raises(RecordingError, match=r'runs: a directory without.*bags in .*runs/first'):
+        read_recording(tmp_path / 'runs', joints=JOINTS)
+    bag = tmp_path / 'runs' / 'first'
+    (bag / 'first_0.db3').write_bytes(b'')
+    (bag / 'metadata.yaml').unlink()
+    with pytest.raises(RecordingError, match=r'holds both.*first_0.db3, first_0.mcap'):
+        read_recording(bag, joints=JOINTS)
+
+
+def test_metadata_that_lies_is_refused_with_what_there_is(swinging, tmp_path):
+    write_recording(tmp_path / 'bag', swinging)
+    metadata = tmp_path / 'bag' / 'metadata.yaml'
+    text = metadata.read_text()
+    for wrong, problem in (
+        (text.replace('bag_0.mcap', 'bag_1.mcap'), 'names bag_1.mcap, which.*it has bag_0.mcap'),
+        (text.replace('bag_0.mcap', 'metadata.yaml'), 'names metadata.yaml; a bag consists of'),
+        ('a: [', 'no valid description of a bag'),
+        ('rosbag2_bagfile_information: 3', 'no valid description of a bag'),
+        ('', 'no valid description of a bag'),
+    ):
+        metadata.write_text(wrong)
+        with pytest.raises(RecordingError, match=f'metadata.yaml: {problem}'):
+            read_recording(tmp_path / 'bag', joints=JOINTS)
+
+
+def test_messages_of_ros_1_are_refused(swinging, tmp_path):
+    path = tmp_path / 'file.mcap'
+    with path.open('wb') as stream:
+        writer = McapFileWriter(stream)
+        writer.start(profile='ros1')
+        schema = writer.register_schema('sensor_msgs/JointState', 'ros1msg', b'')
+        channel = writer.register_channel('/joint_states', 'ros1', schema)
+        writer.add_message(channel, 1, bytes(100), 1)
+        writer.finish()
+    with pytest.raises(RecordingError, match="/joint_states is serialised as 'ros1'; only CDR"):
+        read_recording(path, joints=JOINTS)
+
+
+def test_a_crashed_sqlite_recording_is_read_with_its_journal(
+    swinging, stamps, tmp_path, assert_same
+):
+    bag = tmp_path / 'bag'
+    store = get_typestore(Stores.ROS2_JAZZY)
+    messages = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    with Writer(bag, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connection = writer.add_connection('/joint_states', JOINT_STATE, typestore=store)
+        for stamp, message in zip(stamps[:300].tolist(), messages[:300], strict=True):
+            writer.write(connection, stamp, message)
+    (bag / 'metadata.yaml').unlink()
+    database = sqlite3.connect(bag / 'bag.db3')
+    database.execute('PRAGMA journal_mode = WAL')
+    rows = zip(stamps[300:].tolist(), messages[300:], strict=True)
+    database.executemany('INSERT INTO messages (topic_id, timestamp, data) VALUES (1, ?, ?)', rows)
+    database.commit()
+    crashed = tmp_path / 'crashed'
+    shutil.copytree(bag, crashed)
+    database.close()
+    assert (crashed / 'bag.db3-wal').exists()
+    assert_same(read_recording(crashed, joints=JOINTS), swinging)

@@ -1,0 +1,107 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Reference motions in bags."""
+
+from armid_ros.errors import RecordingError
+from armid_ros.motion import Motion
+from armid_ros.recording import (
+    BagWriter,
+    joint_trajectory_cdr,
+    read_joint_trajectory,
+    read_robot_description,
+    topics,
+    write_joint_trajectory,
+    write_recording,
+)
+from armid_ros.recording.message_types import JOINT_TRAJECTORY
+import numpy as np
+import pytest
+from rosbags.typesys import get_typestore, Stores
+
+
+@pytest.fixture
+def motion():
+    """Return a motion of two joints, 201 samples."""
+    t = np.linspace(0.0, 2.0, 201)
+    phase = np.outer(t, [1.0, 3.0])
+    return Motion(('a', 'b'), t, np.sin(phase), np.cos(phase) * [1, 3], -np.sin(phase) * [1, 9])
+
+
+def test_a_trajectory_is_read_back_exactly_in_the_order_asked(motion, tmp_path):
+    write_joint_trajectory(tmp_path / 'bag', motion, robot_description='<robot/>')
+    back = read_joint_trajectory(tmp_path / 'bag', ('b', 'a'))
+    assert back.joints == ('b', 'a')
+    np.testing.assert_allclose(back.t, motion.t, atol=1e-9)
+    for quantity in ('q', 'dq', 'ddq'):
+        np.testing.assert_array_equal(
+            getattr(back, quantity), getattr(motion, quantity)[:, [1, 0]]
+        )
+    assert back.tau is None
+    assert read_robot_description(tmp_path / 'bag') == '<robot/>'
+    assert {topic.type_name for topic in topics(tmp_path / 'bag')} >= {JOINT_TRAJECTORY}
+
+
+def test_rates_that_are_not_given_are_differences(motion, tmp_path):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    message = store.deserialize_cdr(joint_trajectory_cdr(motion), JOINT_TRAJECTORY)
+    for point in message.points:
+        point.velocities = point.accelerations = np.empty(0)
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/goal', JOINT_TRAJECTORY)
+        writer.write('/goal', store.serialize_cdr(message, JOINT_TRAJECTORY), 1)
+    back = read_joint_trajectory(tmp_path / 'bag', ('a', 'b'), topic='goal')
+    inner = slice(2, -2)
+    np.testing.assert_allclose(back.dq[inner], motion.dq[inner], atol=1e-3)
+    np.testing.assert_allclose(back.ddq[inner], motion.ddq[inner], atol=1e-2)
+
+
+def test_the_last_of_several_trajectories_counts(motion, tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/goal', JOINT_TRAJECTORY)
+        writer.write('/goal', joint_trajectory_cdr(motion), 1)
+        writer.write('/goal', joint_trajectory_cdr(motion.select(slice(0, 50))), 2)
+    assert len(read_joint_trajectory(tmp_path / 'bag', ('a', 'b'))) == 50
+
+
+def changed(motion, **fields):
+    """Return a trajectory message with fields of a point changed."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    message = store.deserialize_cdr(joint_trajectory_cdr(motion), JOINT_TRAJECTORY)
+    for name, value in fields.items():
+        setattr(message.points[7], name, value)
+    return bytes(store.serialize_cdr(message, JOINT_TRAJECTORY))
+
+
+def test_trajectories_that_are_not_valid_are_refused(motion, tmp_path):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    duration = store.types['builtin_interfaces/msg/Duration']
+    cases = [
+        (changed(motion, positions=np.zeros(1)), r'have \[1, 2\] positions for 2 joints'),
+        (
+            changed(motion, time_from_start=duration(sec=0, nanosec=0)),
+            'time_from_start does not increase at point 7',
+        ),
+        (joint_trajectory_cdr(motion.select(slice(0, 1))), 'needs two points, this has 1'),
+        (joint_trajectory_cdr(motion)[:-9], 'cannot be decoded'),
+    ]
+    for number, (cdr, problem) in enumerate(cases):
+        with BagWriter(tmp_path / f'bag{number}') as writer:
+            writer.add_topic('/goal', JOINT_TRAJECTORY)
+            writer.write('/goal', cdr, 1)
+        with pytest.raises(RecordingError, match=f'bag{number}: /goal.*{problem}'):
+            read_joint_trajectory(tmp_path / f'bag{number}', ('a', 'b'))
+
+
+def test_a_missing_trajectory_or_joint_is_refused_with_what_there_is(motion, swinging, tmp_path):
+    write_joint_trajectory(tmp_path / 'bag', motion)
+    with pytest.raises(RecordingError, match='does not name c; its joints are a, b'):
+        read_joint_trajectory(tmp_path / 'bag', ('a', 'c'))
+    with pytest.raises(RecordingError, match=r'no topic of .* called /x; the topics are /joint_t'):
+        read_joint_trajectory(tmp_path / 'bag', ('a', 'b'), topic='/x')
+    write_recording(tmp_path / 'states', swinging)
+    with pytest.raises(RecordingError, match='no topic of trajectory_msgs/msg/JointTrajectory'):
+        read_joint_trajectory(tmp_path / 'states', ('a', 'b'))
+    with BagWriter(tmp_path / 'empty') as writer:
+        writer.add_topic('/goal', JOINT_TRAJECTORY)
+    with pytest.raises(RecordingError, match='empty: /goal has no messages'):
+        read_joint_trajectory(tmp_path / 'empty', ('a', 'b'))
