@@ -18,8 +18,8 @@ LEFT_BEHIND = shutil.ignore_patterns(
 
 def run(command, folder):
     """Run a command as in a sourced workspace; return what it prints."""
-    env = dict(os.environ)
-    env.pop('PYTHONPATH', None)
+    measured = ('COVERAGE_', 'PYTHONPATH')  # coverage of colcon is slow and nobody's business
+    env = {name: value for name, value in os.environ.items() if not name.startswith(measured)}
     env['PATH'] = os.pathsep.join([str(Path(sys.prefix, 'bin')), env['PATH']])
     env['AMENT_PREFIX_PATH'] = sys.prefix
     env['COLCON_HOME'] = str(folder / '.colcon')
