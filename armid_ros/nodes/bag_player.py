@@ -121,6 +121,8 @@ class BagPlayerNode(ArmidNode):
             self._publish(self._next)
             self._advance()
         self._publish_clock()
+        if self.finished:
+            self._timer.cancel()
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say how far it has played."""

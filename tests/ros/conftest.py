@@ -13,7 +13,7 @@ from armid_ros.nodes.domains import private_context
 from armid_ros.nodes.process import make_executor
 from armid_ros.nodes.qos import LATCHED
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from rcl_interfaces.msg import Log
 from rclpy.context import Context
@@ -113,6 +113,14 @@ class Bench:
         """Return a list that fills with what is logged from now on."""
         messages = self.listen(Log, '/rosout', LATCHED)
         return messages
+
+    def diagnose(self, node: Any, diagnostics: list[DiagnosticArray]) -> DiagnosticStatus:
+        """Let a node publish its diagnostics, and return them; they are in the list, too."""
+        self.settle()
+        count = len(diagnostics)
+        node.publish_diagnostics()
+        self.spin_until(lambda: len(diagnostics) > count, 'diagnostics')
+        return diagnostics[-1].status[0]
 
     def diagnostics(self) -> list[DiagnosticArray]:
         """Return a list that fills with diagnostics."""

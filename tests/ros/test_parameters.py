@@ -75,10 +75,9 @@ def test_a_refused_parameter_is_said_on_rosout_and_counted_on_diagnostics(bench,
     node = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), topics=['nothing'])
     for _ in range(3):
         node.set_parameters([Parameter('chunk_age', value=100.0)])
-    node.publish_diagnostics()
+    status = bench.diagnose(node, diagnostics)
     bench.spin_until(lambda: any('chunk_age' in m.msg for m in rosout), 'the complaint')
-    bench.spin_until(lambda: diagnostics, 'diagnostics')
-    values = {v.key: v.value for v in diagnostics[-1].status[0].values}
+    values = {v.key: v.value for v in status.values}
     assert values['rejected parameter'] == '3'
     assert sum('chunk_age' in m.msg for m in rosout) == 1
 

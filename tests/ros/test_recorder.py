@@ -103,6 +103,5 @@ def test_an_existing_directory_is_not_touched(bench, tmp_path):
 def test_a_wanted_topic_that_nobody_publishes_is_reported(bench, tmp_path):
     diagnostics = bench.diagnostics()
     recorder = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), topics=['nothing'])
-    recorder.publish_diagnostics()
-    bench.spin_until(lambda: diagnostics)
-    assert diagnostics[0].status[0].message == 'nobody publishes /nothing'
+    status = bench.diagnose(recorder, diagnostics)
+    assert status.message == 'nobody publishes /nothing'

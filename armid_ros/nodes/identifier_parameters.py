@@ -1,0 +1,99 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the parameters of the online identifier say, as the identifier they describe."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.identification.online import OnlineIdentifier, OnlineSettings
+from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.robots import load_robot, parse_gravity, robot_from_urdf
+import numpy as np
+
+Values = Callable[[str], Any]
+
+IDENTIFIER_PARAMETERS = (
+    NodeParameter(
+        'robot', '', 'A shipped robot, or a path; empty: what comes on robot_description.'
+    ),
+    NodeParameter(
+        'gravity',
+        'earth',
+        'earth, moon, or x,y,z in the base frame [m/s^2].',
+        check=parse_gravity,
+    ),
+    NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
+    NodeParameter(
+        'effects',
+        ['viscous_friction', 'coulomb_friction', 'torque_offset'],
+        'Effects to estimate beside the rigid body, each as NAME[@joint+joint].',
+    ),
+    NodeParameter(
+        'cutoff', 5.0, 'Low-pass on torque and regressor.', 'Hz', lower=0.01, upper=1000.0
+    ),
+    NodeParameter(
+        'row_rate',
+        0.0,
+        'Samples used per second; 0 for 40 times the cut-off.',
+        'Hz',
+        lower=0.0,
+        upper=10000.0,
+    ),
+    NodeParameter('forgetting', 1.0, 'Per sample used; 1 keeps all.', lower=0.9, upper=1.0),
+    NodeParameter(
+        'torque_noise',
+        [0.0],
+        'Standard deviation of a torque sample, one a joint; [0.0]: from the residuals.',
+        'N m or N',
+    ),
+    NodeParameter(
+        'max_gap', 10, 'Missing samples that are interpolated across.', lower=1, upper=1000
+    ),
+    NodeParameter(
+        'measured_velocity', False, 'Differentiate the measured velocity, not the position.'
+    ),
+)
+
+
+def make_identifier(value: Values, description: str | None = None) -> OnlineIdentifier:
+    """
+    Make the identifier that parameters describe.
+
+    Parameters
+    ----------
+    value : callable
+        Returns the value of a parameter of `IDENTIFIER_PARAMETERS`.
+    description : str, optional
+        URDF, in place of the robot that the parameter names.
+
+    Raises
+    ------
+    ArmidError
+        If robot, effects or settings are not valid or do not fit each other.
+
+    """
+    joints = tuple(filter(None, value('joints'))) or None
+    gravity = value('gravity')
+    if description is None:
+        robot = load_robot(value('robot'), gravity=gravity, joints=joints)
+    else:
+        robot = robot_from_urdf(description, gravity=gravity, joints=joints)
+    arm = ArmModel(robot)
+    for text in filter(None, value('effects')):
+        arm = arm.with_effect(make_effect(text, robot))
+    noise = tuple(value('torque_noise'))
+    if len(noise) == 1:
+        noise = noise * robot.n_joints
+    settings = OnlineSettings(
+        cutoff=value('cutoff'),
+        row_rate=value('row_rate') or None,
+        forgetting=value('forgetting'),
+        torque_noise=noise if any(noise) else None,
+        max_gap=value('max_gap'),
+        measured_velocity=value('measured_velocity'),
+    )
+    return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))

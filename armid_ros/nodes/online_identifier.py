@@ -1,0 +1,214 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The online identifier node: joint states in, an estimate that converges, out."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+import time
+from typing import Any
+
+from armid_msgs.msg import ParameterEstimate
+from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.identification.online import OnlineIdentifier, OnlineSample
+from armid_ros.motion import FloatArray
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.estimates import estimate_message, save_identification
+from armid_ros.nodes.identifier_parameters import IDENTIFIER_PARAMETERS, make_identifier
+from armid_ros.nodes.joint_states import JointStateReader
+from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.process import run
+from armid_ros.nodes.qos import LATCHED, MatchedSubscription, STREAM
+import numpy as np
+from rclpy.clock import Clock, ClockType
+from rclpy.publisher import Publisher
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+#: How often publishers of joint states are looked for [s].
+_LOOK_PERIOD = 0.1
+#: Update times that are kept for diagnostics.
+_TIMED = 2000
+
+
+class OnlineIdentifierNode(ArmidNode):
+    """
+    Estimates parameters from joint_states.
+
+    Attributes
+    ----------
+    identifier : OnlineIdentifier, or None
+        None until a robot is known.
+    received : int
+        Joint states received.
+    last_stamp_ns : int
+        Stamp of the last one [ns].
+    update_times : deque of float
+        How long the last updates took [s].
+
+    """
+
+    table = (
+        *IDENTIFIER_PARAMETERS,
+        NodeParameter('estimate_rate', 10.0, 'Of ~/estimate.', 'Hz', lower=0.1, upper=1000.0),
+        NodeParameter(
+            'save_to',
+            'online_identification',
+            'Folder that ~/save writes to: estimate.yaml, model.yaml, robot.urdf.',
+            read_only=False,
+        ),
+    )
+
+    def __init__(self, identifier: OnlineIdentifier | None = None, **kwargs: Any) -> None:
+        """Take the identifier; by default made from the parameters, once the robot is known."""
+        super().__init__('online_identifier', **kwargs)
+        self.identifier: OnlineIdentifier | None = None
+        self.received = 0
+        self.last_stamp_ns = 0
+        self.update_times: deque[float] = deque(maxlen=_TIMED)
+        self._description: str | None = None
+        self._published = -1
+        self._restarts = 0
+        if identifier is None and self.value('robot'):
+            identifier = make_identifier(self.value)
+        if identifier is not None:
+            self._adopt(identifier)
+        else:
+            self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
+        self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
+        self._predictions = self.create_publisher(JointState, '~/predicted_joint_states', STREAM)
+        self._residuals = self.create_publisher(JointState, '~/residual', STREAM)
+        self.joint_states = MatchedSubscription(
+            self, JointState, 'joint_states', self._on_joint_states
+        )
+        self.offer('~/reset', self.reset)
+        self.offer('~/save', self.save)
+        self.create_timer(1.0 / self.value('estimate_rate'), self.publish_estimate)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_LOOK_PERIOD, self.joint_states.match, clock=steady)
+
+    @property
+    def hardware(self) -> str:
+        """Name of the robot."""
+        return str(self.identifier.arm.robot.name) if self.identifier else ''
+
+    def reset(self) -> str:
+        """Forget everything that was learned."""
+        self._require().reset()
+        self._published = -1
+        self._begin_statistics()
+        return 'the estimate begins anew'
+
+    def save(self) -> str:
+        """Write what was learned."""
+        paths = save_identification(Path(self.value('save_to')).expanduser(), self._require())
+        return f'wrote {", ".join(map(str, paths))}'
+
+    def publish_estimate(self) -> None:
+        """Publish the estimate if it has changed."""
+        identifier = self.identifier
+        if identifier is None or identifier.samples in (0, self._published):
+            return
+        self._published = identifier.samples
+        message = estimate_message(
+            identifier.estimate(), identifier.samples, identifier.condition_number
+        )
+        message.header.stamp = self._last_sample_stamp
+        self._estimates.publish(message)
+
+    def condition(self) -> tuple[str, Mapping[str, object]]:
+        """Say how the identification goes."""
+        identifier = self.identifier
+        if identifier is None:
+            return 'waiting for robot_description', {'received': self.received}
+        values: dict[str, object] = {
+            'received': self.received,
+            'samples': identifier.samples,
+            'condition_number': identifier.condition_number,
+        }
+        if self._counted:
+            rms = np.sqrt(self._squares / self._counted)
+            names = identifier.arm.robot.joints
+            values |= {f'residual_rms {j}': float(r) for j, r in zip(names, rms, strict=True)}
+        if self.update_times:
+            p50, p99 = np.percentile(self.update_times, (50, 99)) * 1e6
+            values |= {'update_p50_us': float(p50), 'update_p99_us': float(p99)}
+        values |= {f'left out {reason}': n for reason, n in identifier.rejected.items()}
+        values |= {f'restarted {reason}': n for reason, n in identifier.restarts.items()}
+        restarts = sum(identifier.restarts.values())
+        if restarts > self._restarts:
+            self.complaints.say('time', f'joint states jump in time: {dict(identifier.restarts)}')
+        self._restarts = restarts
+        self._begin_statistics()
+        return ('' if self.received else 'no joint states so far'), values
+
+    def _on_description(self, message: String) -> None:
+        if message.data == self._description:
+            return
+        try:
+            identifier = make_identifier(self.value, message.data)
+        except ArmidError as error:
+            self.complaints.say('robot_description', str(error))
+            return
+        self._description = message.data
+        self._adopt(identifier)
+
+    def _on_joint_states(self, message: JointState) -> None:
+        self.received += 1
+        stamp = message.header.stamp
+        self.last_stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+        if self.identifier is None:
+            return
+        sample = self._reader.read(message)
+        if sample is None:
+            return
+        begun = time.perf_counter()
+        learned = self.identifier.update(*sample)
+        self.update_times.append(time.perf_counter() - begun)
+        if learned is not None:
+            self._publish_sample(learned)
+
+    def _publish_sample(self, sample: OnlineSample) -> None:
+        self._squares += sample.residual**2
+        self._counted += 1
+        self._last_sample_stamp = self._reader.stamp(sample.t).to_msg()
+        self._publish_effort(self._predictions, sample.predicted)
+        self._publish_effort(self._residuals, sample.residual)
+
+    def _publish_effort(self, publisher: Publisher, effort: FloatArray) -> None:
+        if publisher.get_subscription_count():
+            message = JointState(name=self._names, effort=effort.tolist())
+            message.header.stamp = self._last_sample_stamp
+            publisher.publish(message)
+
+    def _adopt(self, identifier: OnlineIdentifier) -> None:
+        robot = identifier.arm.robot
+        self.identifier = identifier
+        self._names = list(robot.joints)
+        self._reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
+        self._last_sample_stamp = self._reader.stamp(0.0).to_msg()
+        self._begin_statistics()
+        self.get_logger().info(
+            f'{robot.name}: {len(identifier.base.parameters)} base parameters of '
+            f'{robot.n_joints} joints'
+        )
+
+    def _begin_statistics(self) -> None:
+        self._squares = np.zeros(len(self._names))
+        self._counted = 0
+
+    def _require(self) -> OnlineIdentifier:
+        if self.identifier is None:
+            raise IdentificationError('there is no robot yet: robot_description has not come')
+        return self.identifier
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    run(OnlineIdentifierNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,276 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The online identifier learns what its core learns, whatever else is on the topics."""
+
+from __future__ import annotations
+
+from armid_msgs.msg import ParameterEstimate
+from armid_ros.arm import ArmModel
+from armid_ros.arm.model_file import load_model
+from armid_ros.effects import parse_effect
+from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.motion import Motion
+from armid_ros.nodes.online_identifier import OnlineIdentifierNode
+from armid_ros.nodes.qos import LATCHED
+from armid_ros.robots import load_robot
+from builtin_interfaces.msg import Time
+import numpy as np
+import pytest
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+import yaml
+
+PENDULUM = """<robot name="pendulum">
+<link name="base"/>
+<link name="upper"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
+<inertia ixx="0.01" iyy="0.03" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="lower"><inertial><origin xyz="0.15 0 0"/><mass value="1"/>
+<inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+<axis xyz="0 1 0"/><limit lower="-3" upper="3" velocity="9" effort="50"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/>
+<origin xyz="0.4 0 0"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" velocity="9" effort="30"/></joint>
+</robot>"""
+EFFECT = 'viscous_friction:viscous_coefficient=0.3'
+RATE = 200.0
+
+
+@pytest.fixture(scope='module')
+def arm():
+    arm = ArmModel(load_robot(PENDULUM))
+    return arm.with_effect(*parse_effect(EFFECT, arm.robot))
+
+
+@pytest.fixture(scope='module')
+def samples(arm):
+    """Return an exact motion of 6 s: t, q, dq, tau."""
+    t = np.arange(0.0, 6.0, 1.0 / RATE)[:, np.newaxis]
+    w, phase = np.array([3.1, 4.3]), np.array([0.0, 1.0])
+    q = np.sin(w * t + phase) + 0.4 * np.sin(2.3 * w * t)
+    dq = w * np.cos(w * t + phase) + 0.4 * 2.3 * w * np.cos(2.3 * w * t)
+    ddq = -(w**2) * np.sin(w * t + phase) - 0.4 * (2.3 * w) ** 2 * np.sin(2.3 * w * t)
+    motion = Motion(arm.robot.joints, t[:, 0], q, dq, ddq)
+    return t[:, 0], q, dq, arm.torque(motion)
+
+
+def message(joints, t, q, dq, tau):
+    stamp = round((1000.0 + t) * 1e9)
+    message = JointState(name=list(joints), position=q.tolist(), velocity=dq.tolist())
+    message.effort = tau.tolist()
+    message.header.stamp = Time(sec=stamp // 10**9, nanosec=stamp % 10**9)
+    return message
+
+
+def messages(arm, samples):
+    return [message(arm.robot.joints, *sample) for sample in zip(*samples, strict=True)]
+
+
+def identifying(bench, **parameters):
+    node = bench.add(OnlineIdentifierNode, effects=['viscous_friction'], **parameters)
+    description = bench.probe.create_publisher(String, 'robot_description', LATCHED)
+    description.publish(String(data=PENDULUM))
+    bench.spin_until(lambda: node.identifier is not None, 'the robot')
+    return node
+
+
+def publish(bench, node, publisher, batch):
+    """Publish in pieces that no queue overflows of."""
+    for first in range(0, len(batch), 500):
+        piece = batch[first : first + 500]
+        goal = node.received + len(piece)
+        for one in piece:
+            publisher.publish(one)
+        bench.spin_until(lambda goal=goal: node.received >= goal, 'the joint states')
+
+
+@pytest.fixture(scope='module')
+def expected(arm, samples):
+    """Return what the core learns of the same samples."""
+    structure = ArmModel(arm.robot).with_effect(arm.effects[0])
+    core = OnlineIdentifier(structure, rng=np.random.default_rng(0))
+    for t, q, dq, tau in zip(*samples, strict=True):
+        seconds, nanoseconds = divmod(round(t * 1e9), 10**9)
+        core.update(seconds + 1e-9 * nanoseconds, q, dq, tau)
+    return core
+
+
+def test_the_estimate_is_that_of_the_core_and_the_truth(bench, arm, samples, expected):
+    estimates = bench.listen(ParameterEstimate, 'online_identifier/estimate', LATCHED)
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    publish(bench, node, publisher, messages(arm, samples))
+    node.publish_estimate()
+    bench.spin_until(lambda: estimates and estimates[-1].samples == expected.samples)
+    last = estimates[-1]
+    np.testing.assert_allclose(last.value, expected.estimate().values, rtol=1e-6, atol=1e-8)
+    names = expected.base.parameters
+    assert last.name == [p.name for p in names] and last.unit == [p.unit for p in names]
+    truth = node.identifier.base.values(arm.theta)
+    np.testing.assert_allclose(last.value, truth, rtol=2e-2, atol=2e-3)
+    assert last.condition_number == pytest.approx(expected.condition_number, rel=1e-3)
+    assert all(s >= 0.0 for s in last.std_dev)
+
+
+def test_joints_are_matched_by_name_and_others_left_out(bench, arm, samples, expected):
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    t, q, dq, tau = samples
+    extra = np.full((len(t), 1), np.nan)
+    shuffled = [
+        message(('gripper', 'elbow', 'shoulder'), *sample)
+        for sample in zip(t, *(np.hstack([extra, x[:, ::-1]]) for x in (q, dq, tau)), strict=True)
+    ]
+    publish(bench, node, publisher, shuffled)
+    np.testing.assert_allclose(
+        node.identifier.estimate().values, expected.estimate().values, rtol=1e-6, atol=1e-8
+    )
+
+
+def spoil(good, what):
+    bad = JointState(
+        header=good.header,
+        name=list(good.name),
+        position=list(good.position),
+        velocity=list(good.velocity),
+        effort=list(good.effort),
+    )
+    if what == 'unknown joints':
+        bad.name = ['left', 'right']
+    elif what == 'wrong length':
+        bad.position = [0.0]
+    elif what == 'no effort':
+        bad.effort = []
+    elif what == 'nan':
+        bad.effort[1] = float('nan')
+    elif what == 'infinite':
+        bad.position[0] = float('inf')
+    elif what == 'twice':
+        bad.name = ['shoulder', 'shoulder', 'elbow']
+        bad.position = bad.velocity = bad.effort = [0.0, 0.0, 0.0]
+    return bad
+
+
+@pytest.mark.parametrize(
+    ('what', 'words'),
+    [
+        ('unknown joints', 'without shoulder, elbow; they name left, right'),
+        ('wrong length', '2 names but 1 of position'),
+        ('no effort', 'needs measured torque'),
+        ('nan', "effort of 'elbow' is not a number"),
+        ('infinite', "position of 'shoulder' is not a number"),
+        ('twice', 'shoulder twice'),
+    ],
+)
+def test_rubbish_is_said_once_and_costs_nothing(bench, arm, samples, expected, what, words):
+    rosout, diagnostics = bench.rosout(), bench.diagnostics()
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    mixed = []
+    for k, good in enumerate(messages(arm, samples)):
+        if k % 100 == 50:
+            mixed.append(spoil(good, what))
+        mixed.append(good)
+    publish(bench, node, publisher, mixed)
+    np.testing.assert_allclose(
+        node.identifier.estimate().values, expected.estimate().values, rtol=1e-6, atol=1e-8
+    )
+    bench.diagnose(node, diagnostics)
+    bench.spin_until(lambda: any(words in m.msg for m in rosout), words)
+    assert sum(words in m.msg for m in rosout) == 1
+    assert any(words in d.status[0].message for d in diagnostics)
+    values = {v.key: v.value for v in diagnostics[-1].status[0].values}
+    assert values['rejected joint_states'] == str(len(samples[0]) // 100)
+
+
+def test_a_description_that_is_none_is_refused_and_a_good_one_still_taken(bench):
+    rosout = bench.rosout()
+    node = bench.add(OnlineIdentifierNode)
+    publisher = bench.matched_publisher(String, 'robot_description', LATCHED)
+    for text in ('hello', '<sdf/>', '<robot name="empty"/>', '<robot'):
+        publisher.publish(String(data=text))
+        bench.settle()
+        assert node.identifier is None
+    assert node.complaints.counts['robot_description'] == 4
+    publisher.publish(String(data=PENDULUM))
+    bench.spin_until(lambda: node.identifier is not None)
+    assert node.hardware == 'pendulum'
+    bench.spin_until(lambda: sum('robot description' in m.msg for m in rosout) >= 4)
+
+
+@pytest.mark.parametrize('reliability', list(ReliabilityPolicy)[1:3])
+def test_it_takes_the_qos_of_the_publisher(bench, arm, samples, reliability):
+    node = identifying(bench)
+    qos = QoSProfile(depth=1000, reliability=reliability)
+    publisher = bench.matched_publisher(JointState, 'joint_states', qos)
+    publish(bench, node, publisher, messages(arm, samples)[:100])
+    assert node.joint_states.subscription.qos_profile.reliability == reliability
+
+
+def test_it_changes_its_qos_when_a_publisher_offers_less(bench, arm, samples):
+    node = identifying(bench)
+    bench.matched_publisher(JointState, 'joint_states')
+    weak = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+    second = bench.matched_publisher(JointState, 'joint_states', weak)
+    publish(bench, node, second, messages(arm, samples)[:100])
+
+
+def test_predictions_and_residuals_add_up_to_the_torque(bench, arm, samples):
+    predictions = bench.listen(JointState, 'online_identifier/predicted_joint_states')
+    residuals = bench.listen(JointState, 'online_identifier/residual')
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    publish(bench, node, publisher, messages(arm, samples))
+    bench.spin_until(lambda: len(predictions) == len(residuals) > 700)
+    assert tuple(residuals[-1].name) == arm.robot.joints
+    assert residuals[-1].header == predictions[-1].header
+    late = np.array([r.effort for r in residuals[-500:]])
+    assert np.sqrt(np.mean(late**2)) < 0.02 * np.sqrt(np.mean(samples[3] ** 2))
+
+
+def test_a_jump_back_in_time_is_said_and_survived(bench, arm, samples, expected):
+    diagnostics = bench.diagnostics()
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    batch = messages(arm, samples)
+    publish(bench, node, publisher, batch + batch)
+    bench.diagnose(node, diagnostics)
+    assert any('jump' in d.status[0].message for d in diagnostics)
+    np.testing.assert_allclose(
+        node.identifier.estimate().values, expected.estimate().values, rtol=5e-2, atol=5e-3
+    )
+
+
+def test_messages_without_a_stamp_are_taken_at_the_clock(bench, arm, samples):
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    unstamped = messages(arm, samples)[0]
+    unstamped.header.stamp = Time()
+    publish(bench, node, publisher, [unstamped])
+    assert node.complaints.counts['stamp'] == 1
+
+
+def test_reset_and_save(bench, arm, samples, tmp_path):
+    folder = tmp_path / 'learned'
+    node = identifying(bench, save_to=str(folder))
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    publish(bench, node, publisher, messages(arm, samples))
+    saved = bench.call('online_identifier/save')
+    assert saved.success, saved.message
+    model = load_model(folder / 'model.yaml')
+    base = node.identifier.base
+    np.testing.assert_allclose(
+        base.values(model.theta), node.identifier.estimate().values, rtol=1e-6, atol=1e-9
+    )
+    document = yaml.safe_load((folder / 'estimate.yaml').read_text())
+    assert document['samples'] == node.identifier.samples
+    assert bench.call('online_identifier/reset').success
+    assert node.identifier.samples == 0
+
+
+def test_without_a_robot_the_services_say_so(bench):
+    bench.add(OnlineIdentifierNode)
+    for service in ('reset', 'save'):
+        answer = bench.call(f'online_identifier/{service}')
+        assert not answer.success and 'robot_description' in answer.message
