@@ -21,8 +21,16 @@ def requirements(group):
 
 def package_data():
     """List what lies in the package's tree and is not Python."""
-    files = (path for path in Path(NAME).rglob('*') if path.is_file())
+    files = sorted(path for path in Path(NAME).rglob('*') if path.is_file())
     return [str(path.relative_to(NAME)) for path in files if path.suffix not in ('.py', '.pyc')]
+
+
+def shared(folder):
+    """List (folder in share/armid_ros, its files) for all that is below a folder of the tree."""
+    files = sorted(
+        path for path in Path(folder).rglob('*') if path.is_file() and path.suffix != '.pyc'
+    )
+    return [(f'share/{NAME}/{path.parent.as_posix()}', [path.as_posix()]) for path in files]
 
 
 setup(
@@ -40,8 +48,8 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
-        (f'share/{NAME}/launch', sorted(glob('launch/*.launch.py'))),
-        (f'share/{NAME}/config', sorted(glob('config/*'))),
+        *shared('launch'),
+        *shared('config'),
         # pip puts console_scripts into bin/, where `ros2 run` does not look
         (f'lib/{NAME}', sorted(glob('scripts/*'))),
     ],

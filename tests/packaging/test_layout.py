@@ -121,10 +121,11 @@ def test_data_of_the_package_is_installed(root, distribution):
 
 def test_launch_and_config_files_are_in_share(prefix, root):
     """Where `ros2 launch armid_ros` and the launch files themselves look."""
+    share = prefix / 'share' / 'armid_ros'
     for folder in ('launch', 'config'):
-        for path in (root / folder).glob('*'):
-            if path.is_file():
-                assert (prefix / 'share' / 'armid_ros' / folder / path.name).is_file()
+        for path in (root / folder).rglob('*'):
+            if path.is_file() and path.suffix != '.pyc':
+                assert (share / path.relative_to(root)).is_file()
 
 
 def test_all_say_one_version(root, distribution):
@@ -144,7 +145,7 @@ def test_manifest_names_what_the_code_imports(root):
     """Every ROS 2 package that the nodes import is a dependency in package.xml."""
     manifest = ElementTree.parse(root / 'package.xml').getroot()
     declared = {element.text for element in manifest if element.tag.endswith('depend')}
-    known = {'ament_index_python', 'launch', 'launch_ros', 'rclpy', 'rcl_interfaces'}
+    known = {'ament_index_python', 'launch', 'launch_ros', 'rclpy', 'rcl_interfaces', 'xacro'}
     pattern = re.compile(r'^\s*(?:from|import) (\w+)', re.MULTILINE)
     sources = [*(root / 'armid_ros').rglob('*.py'), *(root / 'launch').glob('*.py')]
     imported = {name for path in sources for name in pattern.findall(path.read_text())}
