@@ -153,6 +153,7 @@ class Plant:
         friction, constant = _split_constant(action.dry_friction, n)
         data = robot.model.createData()
         pin.crba(robot.model, data, middle_position(robot))
+        _require_inertia(robot, np.diag(np.array(data.M) + inertia))
         weight = _damping_weight(np.array(data.M) + inertia, damping, self.dt)
         values = {
             'robot': robot,
@@ -236,6 +237,15 @@ def limit_slack(robot: Robot) -> FloatArray:
     """Return how far beyond a position limit is rounding [rad or m], shape (n,)."""
     span = robot.upper - robot.lower
     return np.asarray(LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0))
+
+
+def _require_inertia(robot: Robot, moved: FloatArray) -> None:
+    still = int(np.argmin(moved))
+    if moved[still] <= 0.0:
+        raise ModelError(
+            f'{robot.name}: joint {robot.joints[still]} moves no inertia, so no force can be too '
+            f"small for it; give link '{robot.links[still]}' an <inertial>"
+        )
 
 
 def middle_position(robot: Robot) -> FloatArray:
