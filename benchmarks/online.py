@@ -16,8 +16,6 @@ identification. The third says what the filters do to an estimate from samples w
 from __future__ import annotations
 
 import argparse
-from importlib.metadata import files
-from pathlib import Path
 import platform
 import time
 
@@ -34,6 +32,8 @@ from armid_ros.recording import Recording
 from armid_ros.robots import load_robot
 import numpy as np
 
+from benchmarks.real_recordings import example_robot
+
 FRICTION = {'viscous_friction': 1.0, 'coulomb_friction': 0.5, 'torque_offset': 0.3}
 RATE = 1000.0
 CUTOFF = 5.0
@@ -43,8 +43,7 @@ POSITION_NOISE = 1e-5
 
 def panda() -> ArmModel:
     """Return the arm with friction."""
-    entry = next(p for p in files('example-robot-data') or [] if p.name == 'panda.urdf')
-    arm = ArmModel(load_robot(Path(str(entry.locate()))))
+    arm = ArmModel(load_robot(example_robot('panda_description/urdf/panda.urdf')))
     for name, value in FRICTION.items():
         arm = arm.with_effect(make_effect(name, arm.robot), np.full(7, value))
     return arm

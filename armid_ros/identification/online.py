@@ -161,11 +161,6 @@ class OnlineIdentifier:
             start=self.base.values(arm.theta),
             scale_covariance=settings.torque_noise is None,
         )
-        rigid = len(robot.rigid_parameters)
-        columns = self.base.independent
-        self._rigid = columns[columns < rigid]
-        self._effects = columns[columns >= rigid] - rigid
-        self._order = np.argsort(np.argsort(columns >= rigid, kind='stable'), kind='stable')
         self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
         self._held = np.array([joint in held for joint in robot.joints])
@@ -285,10 +280,10 @@ class OnlineIdentifier:
         robot = self.arm.robot
         q, dq, ddq = motion.q, motion.dq, motion.ddq
         rigid = pin.computeJointTorqueRegressor(robot.model, self._data, q, dq, ddq)
+        rigid = rigid.reshape(robot.n_joints, -1)  # of a single joint it is a vector
         one = Motion(robot.joints, np.array([motion.t]), q[None], dq[None], ddq[None])
         effects = self.arm.effect_columns(one)[0]
-        rows = np.concatenate([rigid[:, self._rigid], effects[:, self._effects]], axis=1)
-        return np.asarray(rows[:, self._order])
+        return np.concatenate([rigid, effects], axis=1).take(self.base.independent, axis=1)
 
     def _noise_of_row(self, step: float) -> tuple[float, float]:
         """

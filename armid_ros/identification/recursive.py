@@ -26,7 +26,7 @@ from scipy.linalg import lapack
 
 #: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
 #: parameters of 1e-4 to 1e3; what the data leave unknown shows by this value.
-PRIOR_STD = 1e4
+PRIOR_STD = 1e6
 #: A smaller forgetting factor forgets within ten samples, which is not identification.
 SMALLEST_FORGETTING = 0.9
 #: Losses are this many times those of exponential forgetting, as samples that bring less than

@@ -3,14 +3,35 @@
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
 from armid_ros.errors import IdentificationError, RecordingError
+from armid_ros.identification import identify, Score
 from armid_ros.identification.causal import MOTION_FILTER_RATIO
+from armid_ros.identification.identify import Fit
 from armid_ros.identification.online import JointOrder, OnlineIdentifier, OnlineSettings
+from armid_ros.identification.regression import regressions
 from armid_ros.motion import Motion
+from armid_ros.recording import read_recording
+from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 import scipy.stats
 
+from benchmarks import real_recordings
+
+PENDULUM = """<robot name="pendulum">
+  <link name="base"/>
+  <link name="bob">
+    <inertial>
+      <origin xyz="0 0 -0.3"/><mass value="2"/>
+      <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/>
+    </inertial>
+  </link>
+  <joint name="hinge" type="continuous">
+    <parent link="base"/><child link="bob"/><axis xyz="0 1 0"/>
+  </joint>
+</robot>
+"""
 NOISE = 0.02
 SETTINGS = OnlineSettings(torque_noise=(NOISE,) * 6)
 
@@ -234,6 +255,38 @@ def test_other_sampling_rates(arm, rate):
     online = identifier(arm)
     feed(online, motion.t, motion.q, arm.torque(motion))
     assert torque_error(arm, online, motion) < 5e-3
+
+
+def test_an_arm_may_have_a_single_joint():
+    """A pendulum of 2 kg at 0.3 m: its moment is found from its weight."""
+    robot = load_robot(PENDULUM)
+    motion = multisine(robot, 20.0)
+    online = OnlineIdentifier(ArmModel(robot), rng=np.random.default_rng(0))
+    feed(online, motion.t, motion.q, ArmModel(robot).torque(motion))
+    estimate = online.estimate()
+    moment = estimate.values[estimate.index('mz1', 'hinge')]
+    assert moment == pytest.approx(-0.6, rel=1e-4)
+
+
+@pytest.mark.real_data
+def test_a_real_arm_is_identified_online_as_well_as_offline(real_data):
+    """UR10, one pass at 125 Hz: within a tenth of the offline fit of the same bag."""
+    data = real_recordings.ur10(real_data)
+    robot = load_robot(str(data.robot))
+    arm = ArmModel(robot)
+    for name in ('viscous_friction', 'coulomb_friction', 'torque_offset'):
+        arm = arm.with_effect(make_effect(name, robot))
+    recording = read_recording(data.bags[0], joints=robot.joints)
+    offline = identify(arm, [recording], rng=np.random.default_rng(0))
+    online = OnlineIdentifier(arm, rng=np.random.default_rng(0))
+    feed(online, recording.t, recording.q, recording.tau)
+    assert not online.rejected and not online.restarts
+    problem = regressions(arm, online.base.independent, [recording], offline.used)
+    values = online.estimate().values
+    fits = [Fit(p.source, p.motion, p.columns @ values, p.informative) for p in problem]
+    error = Score.of(fits).relative_error_percent
+    assert error <= 6.6
+    assert error <= 1.1 * Score.of(offline.training).relative_error_percent
 
 
 def test_model_predicts_what_the_arm_does(arm, clean, motion, tau):

@@ -169,7 +169,8 @@ def test_forgetting_keeps_the_window_it_promises():
 
 def test_information_never_falls():
     rng = np.random.default_rng(9)
-    estimator = RecursiveLeastSquares(names(5), NOISE, forgetting=0.95)
+    prior = Estimate(names(5), np.zeros(5), 1e4 * np.eye(5))
+    estimator = RecursiveLeastSquares(names(5), NOISE, forgetting=0.95, prior=prior)
     before = estimator.covariance
     for _ in range(500):
         rows = rng.normal(size=(3, 5)) * 10.0 ** rng.uniform(-4, 2)
