@@ -240,8 +240,8 @@ def limit_slack(robot: Robot) -> FloatArray:
 
 
 def _require_inertia(robot: Robot, moved: FloatArray) -> None:
-    still = int(np.argmin(moved))
-    if moved[still] <= 0.0:
+    still = int(np.argmin(np.abs(moved)))
+    if abs(moved[still]) < 1e-15:
         raise ModelError(
             f'{robot.name}: joint {robot.joints[still]} moves no inertia, so no force can be too '
             f"small for it; give link '{robot.links[still]}' an <inertial>"
