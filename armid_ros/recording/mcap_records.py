@@ -187,7 +187,7 @@ def chunk_content(found: FileMap, chunk: Chunk) -> bytes:
             return zstandard.ZstdDecompressor().decompress(stored, max_output_size=chunk.size)
         if chunk.compression == 'lz4':
             return bytes(lz4.frame.decompress(stored))
-    except (zstandard.ZstdError, RuntimeError, MemoryError) as error:
+    except (zstandard.ZstdError, RuntimeError, MemoryError, OverflowError) as error:
         raise RecordingError(
             f'a {chunk.compression} chunk at byte {chunk.begin} is damaged: {error}'
         ) from error

@@ -8,10 +8,16 @@ from collections.abc import Iterator
 import heapq
 import mmap
 from pathlib import Path
-import struct
 import zlib
 
 from armid_ros.errors import RecordingError
+from armid_ros.recording.mcap_content import (
+    are_messages,
+    BLOCK_MESSAGES,
+    Gathered,
+    message_block,
+    walk,
+)
 from armid_ros.recording.mcap_records import (
     add_definition,
     Chunk,
@@ -24,17 +30,9 @@ from armid_ros.recording.mcap_records import (
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
 from armid_ros.recording.source import Block, IntArray, RawMessage, records_at, Topic
-from mcap.opcode import Opcode
 from mcap.records import Channel
 import numpy as np
 import numpy.typing as npt
-
-# Chunks are put together to blocks of about this size, for small chunks would leave array code
-# little to do at a time, and large blocks fall out of the processor's cache.
-_BLOCK_BYTES = 1 << 20
-_BLOCK_MESSAGES = 4096
-
-_MESSAGE_HEADER = MESSAGE.itemsize - RECORD_HEADER
 
 
 class McapSource:
@@ -85,7 +83,7 @@ class McapSource:
         """Yield the messages of a topic, in the order they are stored."""
         self._survey()
         wanted = sorted(c.id for c in self._found.channels.values() if c.topic == topic)
-        gathered = _Gathered(self._found.data)
+        gathered = Gathered(self._found.data)
         for chunk in self._found.chunks:
             if chunk.indexes and chunk.whole and not any(c in chunk.indexes for c in wanted):
                 continue
@@ -99,8 +97,8 @@ class McapSource:
         if len(loose):
             channels = records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)
             loose = loose[np.isin(channels['channel'], wanted)]
-            for at in range(0, len(loose), _BLOCK_MESSAGES):
-                yield from gathered.add_in_place(loose[at : at + _BLOCK_MESSAGES])
+            for at in range(0, len(loose), BLOCK_MESSAGES):
+                yield from gathered.add_in_place(loose[at : at + BLOCK_MESSAGES])
         yield from gathered.flush()
 
     def messages(self) -> Iterator[RawMessage]:
@@ -131,18 +129,21 @@ class McapSource:
         """Yield messages of all channels by chunk, chunks by their first log time."""
         for chunk in sorted(self._found.chunks, key=lambda chunk: chunk.start_time):
             content = self._content(chunk)
-            offsets = _walk(content)[0]
-            if len(offsets):
-                rows = records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
-                yield chunk.start_time, _block(content, offsets), rows['channel']
+            offsets = walk(content)[0]
+            rows = records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
+            # In a damaged chunk a time can be anything; one beyond the year 2262 is not played.
+            possible = (rows['log_time'] >= 0) & (rows['publish_time'] >= 0)
+            if possible.any():
+                block = message_block(content, offsets[possible])
+                yield chunk.start_time, block, rows['channel'][possible]
         loose = self._loose()
         if len(loose):
             data = self._found.data
             rows = records_at(data, loose, MESSAGE.itemsize).view(MESSAGE)
             loose = loose[np.argsort(rows['log_time'], kind='stable')]
-            for at in range(0, len(loose), _BLOCK_MESSAGES):
-                block = _block(data, loose[at : at + _BLOCK_MESSAGES])
-                rows = records_at(data, loose[at : at + _BLOCK_MESSAGES], MESSAGE.itemsize)
+            for at in range(0, len(loose), BLOCK_MESSAGES):
+                block = message_block(data, loose[at : at + BLOCK_MESSAGES])
+                rows = records_at(data, loose[at : at + BLOCK_MESSAGES], MESSAGE.itemsize)
                 yield int(block.log_time[0]), block, rows.view(MESSAGE)['channel']
 
     def _survey(self) -> dict[int, int]:
@@ -156,7 +157,7 @@ class McapSource:
         ids = [int(channel) for channel in self._loose_channels()]
         for chunk in found.chunks:
             content = self._content(chunk)
-            offsets, definitions = _walk(content)
+            offsets, definitions = walk(content)
             for opcode, begin, end in definitions:
                 add_definition(found, opcode, content[begin:end])
             rows = records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
@@ -203,12 +204,12 @@ class McapSource:
             offsets = np.concatenate(parts)
             if len(wanted) > 1 or (len(offsets) > 1 and (np.diff(offsets) <= 0).any()):
                 offsets.sort()
-            if _are_messages(data, offsets, wanted, begin, end):
+            if are_messages(data, offsets, wanted, begin, end):
                 return offsets
         if begin:
-            offsets = _walk(bytes(memoryview(data)[begin:end]))[0] + begin
+            offsets = walk(bytes(memoryview(data)[begin:end]))[0] + begin
         else:
-            offsets = _walk(data)[0]
+            offsets = walk(data)[0]
         rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
         return offsets[np.isin(rows['channel'], wanted)]
 
@@ -219,97 +220,6 @@ class McapSource:
     def _loose_channels(self) -> npt.NDArray[np.uint16]:
         rows = records_at(self._found.data, self._loose(), MESSAGE.itemsize).view(MESSAGE)
         return np.asarray(rows['channel'])
-
-
-class _Gathered:
-    """Messages of chunks on the way to a block."""
-
-    def __init__(self, data: bytes | mmap.mmap) -> None:
-        self._file = data
-        self._parts: list[bytes] = []
-        self._offsets: list[IntArray] = []
-        self._size = self._count = 0
-
-    def add(self, content: bytes, offsets: IntArray) -> Iterator[Block]:
-        """Add messages of a content of their own."""
-        if not self._parts:
-            yield from self.flush()
-        self._parts.append(content)
-        self._offsets.append(offsets + self._size)
-        self._size += len(content)
-        self._count += len(offsets)
-        if self._size > _BLOCK_BYTES:
-            yield from self.flush()
-
-    def add_in_place(self, offsets: IntArray) -> Iterator[Block]:
-        """Add messages that lie in the file as they are."""
-        if self._parts:
-            yield from self.flush()
-        self._offsets.append(offsets)
-        self._count += len(offsets)
-        if self._count > _BLOCK_MESSAGES:
-            yield from self.flush()
-
-    def flush(self) -> Iterator[Block]:
-        """Yield what was added, if it is something."""
-        data = self._parts[0] if len(self._parts) == 1 else b''.join(self._parts)
-        if self._count:
-            yield _block(data if self._parts else self._file, np.concatenate(self._offsets))
-        self._parts, self._offsets, self._size, self._count = [], [], 0, 0
-
-
-def _block(data: bytes | mmap.mmap, offsets: IntArray) -> Block:
-    """Return the messages whose records begin there."""
-    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
-    return Block(
-        data,
-        offsets + MESSAGE.itemsize,
-        rows['length'].astype(np.int64) - _MESSAGE_HEADER,
-        rows['log_time'].astype(np.int64),
-        rows['publish_time'].astype(np.int64),
-    )
-
-
-def _are_messages(
-    data: bytes | mmap.mmap, offsets: IntArray, channels: list[int], begin: int, end: int
-) -> bool:
-    """Tell whether the index of a chunk is to be trusted."""
-    if not len(offsets):
-        return True
-    if offsets[0] < begin or offsets[-1] + MESSAGE.itemsize > end:
-        return False
-    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
-    lengths = rows['length'].astype(np.int64)
-    ends = offsets + RECORD_HEADER + lengths
-    if len(channels) == 1:
-        known = rows['channel'] == channels[0]
-    else:
-        known = np.isin(rows['channel'], channels)
-    return bool(
-        (rows['opcode'] == Opcode.MESSAGE).all()
-        and known.all()
-        and (lengths >= _MESSAGE_HEADER).all()
-        and (ends <= end).all()
-    )
-
-
-def _walk(content: bytes | mmap.mmap) -> tuple[IntArray, list[tuple[int, int, int]]]:
-    """Return where messages begin in a chunk, and its schemas and channels."""
-    offsets: list[int] = []
-    definitions: list[tuple[int, int, int]] = []
-    head = struct.Struct('<BQ')
-    position, size = 0, len(content)
-    while position + RECORD_HEADER <= size:
-        opcode, length = head.unpack_from(content, position)
-        end = position + RECORD_HEADER + length
-        if end > size:
-            break
-        if opcode == Opcode.MESSAGE and length >= _MESSAGE_HEADER:
-            offsets.append(position)
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            definitions.append((opcode, position + RECORD_HEADER, end))
-        position = end
-    return np.array(offsets, np.int64), definitions
 
 
 def _full_name(name: str) -> str:

@@ -48,7 +48,7 @@ class SqliteSource:
             }
         except OSError as error:
             raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             raise RecordingError(f'{path}: not an SQLite file of rosbag2: {error}') from error
         if not columns['topics'] or not columns['messages']:
             self._database.close()
@@ -87,7 +87,7 @@ class SqliteSource:
                 '(SELECT count(*) FROM messages WHERE topic_id = topics.id) '
                 'FROM topics ORDER BY id'
             ).fetchall()
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             raise RecordingError(f'{self._path}: the database is damaged: {error}') from error
         topics = []
         for name, type_name, encoding, qos, type_hash, count in rows:
@@ -124,5 +124,5 @@ class SqliteSource:
             cursor = self._database.execute(query, parameters)
             while rows := cursor.fetchmany(_BLOCK_MESSAGES):
                 yield rows
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             self._damage = f'the database is damaged: {error}'
