@@ -320,6 +320,16 @@ class JointOrder:
         """
         Return the positions of the wanted joints among the names; others are left out.
 
+        Parameters
+        ----------
+        names : sequence of str
+            Joint names of the message, such as JointState.name.
+
+        Returns
+        -------
+        ndarray of int, shape (n,)
+            ``position[indices]`` is in the order that is wanted.
+
         Raises
         ------
         RecordingError
