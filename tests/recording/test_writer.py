@@ -3,6 +3,7 @@
 """Bags as rosbag2 expects them, whatever ends the writing."""
 
 import inspect
+from pathlib import Path
 import resource
 import signal
 import subprocess
@@ -33,6 +34,7 @@ from rosbags.typesys import get_typestore, Stores
 import yaml
 
 JOINTS = ('shoulder', 'elbow', 'wrist')
+PROJECT = Path(__file__).parents[2]
 WRITER_FILES = [inspect.getfile(BagWriter), inspect.getfile(McapWriter)]
 ESTIMATE = """\
 # What an identifier believes.
@@ -408,3 +410,14 @@ def test_the_hash_of_a_type_does_not_depend_on_where_its_definition_is_from():
         assert message_type(name, text) == message_type(name)
         assert message_type(name).type_hash == store.hash_rihs01(name)
         assert name in store_for(message_type(name)).types
+
+
+def test_the_estimate_message_of_this_project_is_described(tmp_path):
+    text = (PROJECT / 'msg_schemas' / 'msg' / 'ParameterEstimate.msg').read_text()
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/estimate', 'armid_msgs/msg/ParameterEstimate', definition=text)
+    (topic,) = topics(tmp_path / 'bag')
+    assert topic.message_type.definition.startswith('std_msgs/Header header\nstring[] name\n')
+    assert topic.message_type.type_hash == (
+        'RIHS01_f0994942518e1871f75ba0cc8c2fe4fd00c589eaf366df042f690fdd672127b7'
+    )
