@@ -4,20 +4,40 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 import sys
 from typing import Any
 
 from armid_ros import __version__
-from armid_ros.cli.catalogues import effects, robots
-from armid_ros.cli.excite import excite
-from armid_ros.cli.identify import identify
-from armid_ros.cli.record import recover, simulate
 from armid_ros.errors import ArmidError
 import click
 
+#: Command and module, in the order of the work; a module is imported when its command is called.
+COMMANDS = {
+    'demo': 'demo',
+    'excite': 'excite',
+    'simulate': 'record',
+    'identify': 'identify',
+    'recover': 'record',
+    'robots': 'catalogues',
+    'effects': 'catalogues',
+}
+
 
 class Commands(click.Group):
-    """Reports bad input as one line on stderr and exit code 2."""
+    """Imports commands late, and reports bad input as one line on stderr and exit code 2."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """List the commands in the order of the work."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = import_module(f'armid_ros.cli.{COMMANDS[cmd_name]}')
+        command: click.Command = getattr(module, cmd_name)
+        return command
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
@@ -27,16 +47,8 @@ class Commands(click.Group):
             click.echo(f'armid: {error}', err=True)
             sys.exit(2)
 
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """List the commands in the order of the work."""
-        return list(self.commands)
-
 
 @click.group(cls=Commands, context_settings={'help_option_names': ['-h', '--help']})
 @click.version_option(__version__, prog_name='armid')
 def main() -> None:
     """Identify a robot arm: excite, record, identify, and find what the model lacks."""
-
-
-for command in (excite, simulate, identify, recover, robots, effects):
-    main.add_command(command)

@@ -7,10 +7,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import json
-from typing import Any
+from typing import Any, Self
 
+from armid_ros.estimate import Estimate
+from armid_ros.motion import FloatArray
 import click
 from rich.console import Console
+from rich.live import Live
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
@@ -70,3 +73,45 @@ def print_parameters(rows: Sequence[dict[str, Any]]) -> None:
 
 def _cell(value: Any) -> str:
     return ', '.join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+class ConvergenceTable:
+    """
+    A live table of the last parameters, which are those of the effects.
+
+    Parameters
+    ----------
+    truth : ndarray, shape (P,)
+        What the estimate should come to.
+
+    """
+
+    ROWS = 12
+
+    def __init__(self, truth: FloatArray) -> None:
+        self._truth = truth
+        self._live = Live(console=Console(stderr=True), transient=True)
+
+    def __enter__(self) -> Self:
+        """Begin to show."""
+        self._live.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Leave the terminal as it was."""
+        self._live.stop()
+
+    def show(self, t: float, duration: float, estimate: Estimate, factor: float) -> None:
+        """Show the state at a time [s]."""
+        title = f'{t:.0f} of {duration:.0f} s, {factor:.1f} x real time'
+        table = Table(title=title, box=None, header_style='bold')
+        for head in ('parameter', 'joint', 'estimate', 'std', 'truth', 'unit'):
+            table.add_column(
+                head, justify='right' if head in ('estimate', 'std', 'truth') else 'left'
+            )
+        for k in range(len(self._truth))[-self.ROWS :]:
+            name = estimate.parameters[k]
+            numbers = (estimate.values[k], estimate.std[k], self._truth[k])
+            texts = [f'{number:.4f}' for number in numbers]
+            table.add_row(*map(Text, (name.name, name.joint, *texts, name.unit)))
+        self._live.update(table)

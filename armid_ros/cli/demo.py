@@ -1,0 +1,203 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The main job from end to end on the shipped arm, over real topics."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+import shutil
+from typing import Any
+
+from armid_ros.arm import ArmModel, save_model
+from armid_ros.cli import options
+from armid_ros.cli.terminal import ConvergenceTable, progress, say
+from armid_ros.effects import make_effect
+from armid_ros.errors import RecordingError
+from armid_ros.excitation import design, DesignSettings, Excitation, save_excitation
+from armid_ros.identification import identification_document, identify, Score
+from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.motion import FloatArray
+from armid_ros.recording import read_recording
+from armid_ros.robots import collision_model, load_robot, Robot
+from armid_ros.simulation import Sensors, SimulatedArm
+import click
+import numpy as np
+
+ROBOT = 'humanoid_arm'
+
+#: What the arm has beside its rigid body, joint by joint from shoulder to wrist.
+TRUE_EFFECTS = {
+    'viscous_friction': (0.10, 0.10, 0.04, 0.04, 0.012, 0.010),
+    'coulomb_friction': (0.08, 0.08, 0.03, 0.03, 0.010, 0.008),
+    'torque_offset': (0.02, -0.03, 0.01, 0.00, -0.005, 0.004),
+}
+#: How far the masses of the links are from those of the description.
+MASS_ERRORS = (1.08, 0.94, 1.05, 0.92, 1.10, 0.95)
+SENSORS = Sensors(
+    torque_noise=np.array([0.02, 0.02, 0.01, 0.01, 0.004, 0.004]), resolution=2.0 * np.pi / 2**18
+)
+#: Files that a folder to be filled may hold already, from a demo before.
+OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html')
+
+
+@click.command(epilog='Example: armid demo --gravity earth --out demo')
+@click.option('--gravity', type=click.Choice(['moon', 'earth']), default='moon', show_default=True)
+@options.folder
+@options.seed
+@options.as_json
+def demo(gravity: str, out: Path, seed: int, as_json: bool) -> None:
+    """Excite, move, identify online, record, identify offline, and compare with the truth."""
+    from armid_ros.nodes.lockstep import Progress, replay_lockstep, run_lockstep
+
+    rng = np.random.default_rng(seed)
+    robot = load_robot(ROBOT, gravity=gravity)
+    truth = true_arm(robot)
+    nominal = ArmModel(robot, truth.effects)
+    _make_room(out)
+
+    excitation = _excite(nominal, rng)
+    save_excitation(excitation, out / 'excitation.yaml')
+    identifier = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
+    target = identifier.base.values(truth.theta)
+    history: list[Progress] = []
+    with ConvergenceTable(target) as table:
+
+        def watch(now: Progress) -> None:
+            history.append(now)
+            table.show(now.t, now.duration, now.estimate, now.real_time_factor)
+
+        plant = SimulatedArm(truth, rng=rng, sensors=SENSORS)
+        end = run_lockstep(plant, excitation, identifier, out / 'bag', on_progress=watch)
+    again = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
+    with progress('playing the bag back') as tick:
+        replay = replay_lockstep(
+            out / 'bag',
+            again,
+            duration=end.duration,
+            on_progress=lambda now: tick(now.t / now.duration),
+        )
+        tick(0.0, 'identifying offline')
+        recording = read_recording(out / 'bag', joints=robot.joints)
+        result = identify(nominal, [recording], rng=rng, progress=tick)
+    document = {
+        **identification_document(result, ROBOT, {}),
+        'truth': _compare(
+            result.estimate.values, result.estimate.std, result.base.values(truth.theta)
+        ),
+        'online': _compare(end.estimate.values, end.estimate.std, target),
+        'replay_difference': float(np.abs(replay.estimate.values - end.estimate.values).max()),
+        'real_time_factor': end.real_time_factor,
+        'held_out': _held_out_error(result.arm, truth, rng),
+    }
+    save_model(out / 'model.yaml', result.arm, ROBOT, result.estimate)
+    (out / 'identification.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    with progress('drawing'):
+        _draw(out, robot, result, history, target, result.base.values(truth.theta))
+    if as_json:
+        click.echo(json.dumps(document))
+        return
+    _tell(out, document, Score.of(result.training).relative_error_percent)
+
+
+def true_arm(robot: Robot) -> ArmModel:
+    """Return the arm that is to be identified: other masses than described, and friction."""
+    parameters = robot.rigid_parameters.reshape(-1, 10) * np.array(MASS_ERRORS)[:, np.newaxis]
+    arm = ArmModel(robot.with_inertias(parameters.ravel()))
+    for name, values in TRUE_EFFECTS.items():
+        arm = arm.with_effect(make_effect(name, robot), values)
+    return arm
+
+
+def _make_room(out: Path) -> None:
+    """Take away what a demo left; refuse a folder with anything else in it."""
+    out.mkdir(parents=True, exist_ok=True)
+    ours = {*OUTPUTS, *(path.name for path in out.glob('*.png'))}
+    foreign = sorted(path.name for path in out.iterdir() if path.name not in ours)
+    if foreign:
+        raise RecordingError(f'{out}: holds {foreign[0]}, which no demo wrote; name a new folder')
+    for path in out.iterdir():
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+
+
+def _excite(arm: ArmModel, rng: np.random.Generator) -> Excitation:
+    settings = DesignSettings(period=10.0, harmonics=5, starts=2, candidates=20, iterations=40)
+    with progress('designing the excitation') as tick:
+        result = design(
+            arm,
+            settings,
+            rng,
+            collision=collision_model(arm.robot),
+            progress=lambda now: tick(now.done),
+        )
+    return result.excitation
+
+
+def _compare(values: FloatArray, std: FloatArray, truth: FloatArray) -> dict[str, Any]:
+    """Return how an estimate agrees with the truth, in its own standard deviations."""
+    sigmas = np.abs(values - truth) / std
+    return {
+        'within_two_deviations': int(np.sum(sigmas < 2.0)),
+        'parameters': len(values),
+        'rms_deviations': float(np.sqrt(np.mean(sigmas**2))),
+    }
+
+
+def _held_out_error(arm: ArmModel, truth: ArmModel, rng: np.random.Generator) -> float:
+    """Return the error of the torque in a motion that was never run, in percent of the torque."""
+    settings = DesignSettings(period=10.0, starts=1, candidates=1, iterations=1, processes=1)
+    collision = collision_model(arm.robot)
+    motion = design(arm, settings, rng, collision=collision).excitation.motion(100.0)
+    tau = truth.torque(motion)
+    return float(100.0 * np.linalg.norm(arm.torque(motion) - tau) / np.linalg.norm(tau))
+
+
+def _draw(
+    out: Path,
+    robot: Robot,
+    result: Any,
+    history: list[Any],
+    online_truth: FloatArray,
+    truth: FloatArray,
+) -> None:
+    from armid_ros.report.figures import (
+        convergence_figure,
+        parameter_figure,
+        save_figure,
+        torque_figure,
+    )
+
+    save_figure(torque_figure(robot, result.training), out / 'torque.png')
+    save_figure(parameter_figure(result.estimate, truth), out / 'parameters.png')
+    figure = convergence_figure(
+        [now.t for now in history],
+        [now.estimate.values for now in history],
+        [now.estimate.std for now in history],
+        online_truth,
+        history[-1].estimate.parameters,
+    )
+    save_figure(figure, out / 'convergence.png')
+
+
+def _tell(out: Path, document: dict[str, Any], training: float) -> None:
+    online, offline = document['online'], document['truth']
+    say(
+        f'online:  {online["within_two_deviations"]} of {online["parameters"]} parameters within '
+        'two standard deviations of the truth'
+    )
+    say(
+        f'offline: {offline["within_two_deviations"]} of {offline["parameters"]}; relative error '
+        f'{training:.2f} % with the noise, {document["held_out"]:.2f} % of the true torque in a '
+        'motion that was never run'
+    )
+    say(
+        f'the bag played back gives the online estimate again, to '
+        f'{document["replay_difference"]:.1g}'
+    )
+    say(
+        f'{out}: bag, excitation.yaml, model.yaml, identification.json, torque.png, '
+        'parameters.png, convergence.png'
+    )
