@@ -42,3 +42,11 @@ def short_label(name: ParameterName) -> str:
         return name.joint or name.name
     leader = name.name.split(' ')[0]
     return leader if leader == name.name else f'{leader} *'
+
+
+def full_label(name: ParameterName) -> str:
+    """Return a short label that says the kind as well: 'Izz1', 'Coulomb torque of elbow'."""
+    if is_rigid(name):
+        return name.name.split(' ')[0]
+    kind = name.name.replace('_', ' ').replace('coulomb', 'Coulomb')
+    return f'{kind} of {name.joint}' if name.joint else kind

@@ -1,0 +1,262 @@
+// Copyright 2026 The armid_ros developers
+// SPDX-License-Identifier: Apache-2.0
+// Draws the charts of a report: every figure.chart holds its data as JSON.
+'use strict';
+(() => {
+  const root = document.documentElement;
+  const roles = ['measured', 'predicted', 'residual', 'before', 'after', 'floor', 'trend', 'faint',
+    'ink', 'soft', 'line', 'grid'];
+  const widths = {measured: 3, faint: 1, trend: 2};
+  const font = '11px system-ui, sans-serif';
+  const charts = new Map();  // figure -> {plot, spec}
+  let colour = {};
+
+  const readColours = () => {
+    const style = getComputedStyle(root);
+    colour = Object.fromEntries(roles.map((role) => [role, style.getPropertyValue(`--${role}`)]));
+  };
+  const brief = (value) => (value == null ? '–' : String(Number(value.toPrecision(4))));
+  const clear = (name, alpha) => `color-mix(in srgb, ${colour[name]} ${alpha}%, transparent)`;
+
+  function sticks(u, index, first, last) {
+    const stroke = new Path2D();
+    const zero = u.valToPos(0, 'y', true);
+    for (let k = first; k <= last; k++) {
+      const x = u.valToPos(u.data[0][k], 'x', true);
+      stroke.moveTo(x, zero);
+      stroke.lineTo(x, u.valToPos(u.data[index][k], 'y', true));
+    }
+    return {stroke, fill: null};
+  }
+
+  function seriesOf(entry) {
+    const paint = () => colour[entry.role];
+    const series = {
+      label: entry.label, stroke: paint, width: widths[entry.role] || 1.3,
+      points: {show: false}, value: (u, value) => brief(value),
+    };
+    if (entry.kind === 'points') {
+      const pale = () => clear(entry.role, 45);
+      Object.assign(series, {paths: () => null,
+        points: {show: true, space: 0, size: 4, width: 0, fill: pale, stroke: pale}});
+    } else if (entry.kind === 'trend') {
+      Object.assign(series, {spanGaps: true, points: {show: true, space: 0, size: 4, fill: paint}});
+    } else if (entry.kind === 'sticks') {
+      Object.assign(series, {paths: sticks, width: 2});
+    } else if (entry.kind === 'steps') {
+      series.paths = uPlot.paths.stepped({align: 1});
+    }
+    return series;
+  }
+
+  function rangeY(spec) {
+    return (u, low, high) => {
+      if (low == null) return [0, 1];
+      for (const level of spec.levels) {
+        low = Math.min(low, level.y);
+        high = Math.max(high, level.y);
+      }
+      if (spec.series.some((entry) => entry.kind === 'sticks')) {
+        low = Math.min(low, 0);
+        high = Math.max(high, 0);
+      }
+      if (spec.symmetric) {
+        high = Math.max(Math.abs(low), Math.abs(high));
+        low = -high;
+      }
+      const pad = 0.07 * (high - low) || 0.1 * Math.abs(high) || 1;
+      const flat = (edge) => edge === 0 && !spec.symmetric;
+      return [flat(low) ? 0 : low - pad, flat(high) ? 0 : high + pad];
+    };
+  }
+
+  function rangeX(spec) {
+    const [start, end] = [spec.x[0], spec.x[spec.x.length - 1]];
+    const exact = spec.series.every((entry) => entry.kind === 'line' || entry.kind === 'band');
+    const pad = exact ? 0 : 0.025 * (end - start || 1);
+    return (u, low, high) => {
+      if (low == null) return [0, 1];
+      return low <= start && high >= end ? [start - pad, end + pad] : [low, high];
+    };
+  }
+
+  function axis(label, side) {
+    const vertical = side === 3;
+    return {
+      label: label || null, side, font, labelFont: font, labelSize: 18, labelGap: 0, gap: 4,
+      stroke: () => colour.soft,
+      size: vertical ? (u, values) => 16 + 6.4 * Math.max(6, ...(values || []).map((v) => v.length)) : 26,
+      space: vertical ? 22 : 55,
+      values: (u, splits) => splits.map((value) => (value == null ? '' : String(Number(value.toPrecision(6))))),
+      grid: {stroke: () => colour.grid, width: 1},
+      ticks: {stroke: () => colour.line, width: 1, size: 4},
+    };
+  }
+
+  function drawLevels(spec) {
+    return (u) => {
+      const {ctx, bbox} = u;
+      ctx.save();
+      ctx.strokeStyle = ctx.fillStyle = colour.soft;
+      ctx.lineWidth = uPlot.pxRatio;
+      ctx.font = `${10 * uPlot.pxRatio}px system-ui, sans-serif`;
+      ctx.textAlign = 'right';
+      for (const level of spec.levels) {
+        const y = u.valToPos(level.y, 'y', true);
+        ctx.setLineDash([4 * uPlot.pxRatio, 3 * uPlot.pxRatio]);
+        ctx.beginPath();
+        ctx.moveTo(bbox.left, y);
+        ctx.lineTo(bbox.left + bbox.width, y);
+        ctx.stroke();
+        ctx.fillText(level.label, bbox.left + bbox.width - 2, y - 3 * uPlot.pxRatio);
+      }
+      ctx.restore();
+    };
+  }
+
+  const peers = (spec) => [...charts.values()].filter((chart) => spec.link && chart.spec.link === spec.link);
+  const whole = (spec) => ({min: spec.x[0], max: spec.x[spec.x.length - 1]});
+
+  // Hands a zoom on to the charts it is linked with; equal ranges end the round.
+  function share(spec, figure) {
+    return (u, key) => {
+      if (key !== 'x') return;
+      const {min, max} = u.scales.x;
+      const all = whole(spec);
+      const slack = 1e-6 * (all.max - all.min);
+      figure.querySelector('.reset').hidden = min <= all.min + slack && max >= all.max - slack;
+      for (const {plot} of peers(spec)) {
+        const other = plot.scales.x;
+        if (plot !== u && (Math.abs(other.min - min) > slack || Math.abs(other.max - max) > slack)) {
+          plot.setScale('x', {min, max});
+        }
+      }
+    };
+  }
+
+  // Two fingers zoom, one moves along what is zoomed; a double tap shows it all again.
+  function touch(u, spec) {
+    const fingers = new Map();
+    let lastTap = 0;
+    const value = (x) => u.posToVal(x - u.over.getBoundingClientRect().left, 'x');
+    const show = (min, max) => {
+      const all = whole(spec);
+      const span = Math.min(max - min, all.max - all.min);
+      const start = Math.max(all.min, Math.min(min, all.max - span));
+      u.setScale('x', {min: start, max: start + span});
+    };
+    u.over.addEventListener('pointerdown', (event) => {
+      if (event.pointerType === 'mouse') return;
+      fingers.set(event.pointerId, event.clientX);
+      if (fingers.size === 1 && event.timeStamp - lastTap < 300) show(whole(spec).min, whole(spec).max);
+      lastTap = event.timeStamp;
+    });
+    u.over.addEventListener('pointermove', (event) => {
+      if (!fingers.has(event.pointerId)) return;
+      const before = [...fingers.values()].map(value);
+      fingers.set(event.pointerId, event.clientX);
+      const after = [...fingers.values()].map(value);
+      const {min, max} = u.scales.x;
+      if (fingers.size === 1) {
+        show(min + before[0] - after[0], max + before[0] - after[0]);
+      } else if (Math.abs(after[0] - after[1]) > 1e-9 * (max - min)) {
+        const ratio = Math.abs((before[0] - before[1]) / (after[0] - after[1]));
+        const [old, now] = [(before[0] + before[1]) / 2, (after[0] + after[1]) / 2];
+        const start = old - (now - min) * ratio;
+        show(start, start + (max - min) * ratio);
+      }
+    });
+    for (const end of ['pointerup', 'pointercancel', 'pointerleave']) {
+      u.over.addEventListener(end, (event) => fingers.delete(event.pointerId));
+    }
+  }
+
+  function draw(figure) {
+    if (charts.has(figure) || !figure.clientWidth) return;
+    const spec = JSON.parse(figure.querySelector('script').textContent);
+    const data = [spec.x];
+    const series = [{label: spec.xlabel || 'at', value: (u, value) => brief(value)}];
+    const bands = [];
+    for (const entry of spec.series) {
+      if (entry.kind === 'band') {
+        const edge = {label: entry.label, stroke: () => 'transparent', points: {show: false}};
+        series.push(edge, {...edge});
+        data.push(entry.upper, entry.y);
+        bands.push({series: [series.length - 2, series.length - 1], fill: () => clear(entry.role, 25)});
+      } else {
+        series.push(seriesOf(entry));
+        data.push(entry.y);
+      }
+    }
+    const plot = new uPlot({
+      width: figure.clientWidth, height: spec.height, series, bands, padding: [8, 12, 0, 0],
+      scales: {x: {time: false, range: rangeX(spec)}, y: {range: rangeY(spec)}},
+      axes: [axis(spec.xlabel, 2), axis(spec.ylabel, 3)],
+      legend: {show: spec.legend, markers: {width: 3}},
+      cursor: {y: false, drag: {x: true, y: false}, points: {size: 6},
+        ...(spec.link ? {sync: {key: spec.link, scales: ['x', null]}} : {})},
+      hooks: {draw: [drawLevels(spec)], setScale: [share(spec, figure)]},
+    }, data, figure);
+    charts.set(figure, {plot, spec});
+    touch(plot, spec);
+    figure.querySelector('.reset').addEventListener('click', () => plot.setScale('x', whole(spec)));
+    resizing.observe(figure);
+  }
+
+  const resizing = new ResizeObserver((entries) => {
+    for (const {target, contentRect} of entries) {
+      const chart = charts.get(target);
+      const width = Math.floor(contentRect.width);
+      if (width && Math.abs(width - chart.plot.width) > 1) {
+        chart.plot.setSize({width, height: chart.spec.height});
+      }
+    }
+  });
+
+  function matrix(figure) {
+    const {labels, percent} = JSON.parse(figure.querySelector('script').textContent);
+    const image = figure.querySelector('img');
+    const output = figure.querySelector('output');
+    const read = (event) => {
+      const box = image.getBoundingClientRect();
+      const entry = (part) => Math.min(labels.length - 1, Math.max(0, Math.floor(part * labels.length)));
+      const row = entry((event.clientY - box.top) / box.height);
+      const column = entry((event.clientX - box.left) / box.width);
+      output.textContent = `${labels[row]} and ${labels[column]}: ${(percent[row][column] / 100).toFixed(2)}`;
+    };
+    image.addEventListener('pointermove', read);
+    image.addEventListener('pointerdown', read);
+  }
+
+  function drawAll() {
+    const started = performance.now();
+    document.querySelectorAll('figure.chart').forEach(draw);
+    root.dataset.charts = charts.size;
+    root.dataset.drawMilliseconds = Math.round(performance.now() - started);
+  }
+
+  const repaint = () => {
+    readColours();
+    charts.forEach(({plot}) => plot.redraw(false, true));
+  };
+
+  let closed = [];
+  window.addEventListener('beforeprint', () => {
+    closed = [...document.querySelectorAll('details:not([open])')];
+    closed.forEach((details) => { details.open = true; });
+    root.classList.add('paper');
+    readColours();
+    drawAll();
+    repaint();
+  });
+  window.addEventListener('afterprint', () => {
+    closed.forEach((details) => { details.open = false; });
+    root.classList.remove('paper');
+    repaint();
+  });
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', repaint);
+  document.querySelectorAll('details').forEach((details) => details.addEventListener('toggle', drawAll));
+  document.querySelectorAll('figure.matrix').forEach(matrix);
+  readColours();
+  drawAll();
+})();

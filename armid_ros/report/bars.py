@@ -1,0 +1,74 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Bars for a page, of HTML alone: they print, and fit any width."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.report.charts import Role
+from armid_ros.report.notation import digits
+from armid_ros.report.page import render
+from markupsafe import Markup
+
+
+@dataclass(frozen=True)
+class Bar:
+    """
+    One bar.
+
+    Attributes
+    ----------
+    value : float
+        Length, in the unit of the chart; not negative.
+    role : str
+        What it is, which gives the colour.
+    label : str
+        Text beside it; by default the value.
+
+    """
+
+    value: float
+    role: Role
+    label: str = ''
+
+    @property
+    def text(self) -> str:
+        """What is written beside the bar."""
+        return self.label or digits(self.value)
+
+
+@dataclass(frozen=True)
+class BarChart:
+    """
+    Rows of bars on a common scale from zero.
+
+    Attributes
+    ----------
+    rows : sequence of (str, sequence of Bar)
+        Label of each row, and its bars one below the other.
+    unit : str
+        Unit of all bars.
+    roles : sequence of (str, str)
+        Legend: role, and what it stands for.
+    scale_by_row : bool
+        Whether each row fills the width with its own longest bar, as for joints of different
+        strength.
+
+    """
+
+    rows: Sequence[tuple[str, Sequence[Bar]]]
+    unit: str
+    roles: Sequence[tuple[Role, str]] = ()
+    scale_by_row: bool = False
+
+    def percent(self, row: int, bar: Bar) -> float:
+        """Return how long a bar is, as a percentage of the space."""
+        bars = self.rows[row][1] if self.scale_by_row else [b for _, bs in self.rows for b in bs]
+        longest = max(other.value for other in bars)
+        return round(100.0 * bar.value / longest, 2) if longest > 0.0 else 0.0
+
+    def html(self) -> Markup:
+        """Return the bars as HTML."""
+        return render('bars.html', {'chart': self})

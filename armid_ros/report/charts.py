@@ -1,0 +1,208 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Interactive charts of a page: data and roles here, drawing in assets/report.js.
+
+A series has a role, not a colour: the style sheet has a colour for each role, one for light, one
+for dark and one for paper.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import json
+from typing import Any, Literal
+
+from armid_ros.motion import FloatArray, read_only
+from armid_ros.report.page import render
+from markupsafe import Markup
+import numpy as np
+import numpy.typing as npt
+
+Role = Literal['measured', 'predicted', 'residual', 'before', 'after', 'floor', 'trend', 'faint']
+Kind = Literal['line', 'trend', 'points', 'sticks', 'steps', 'band']
+
+#: Samples of a series beyond which the extremes of equal stretches stand for all.
+MOST_SAMPLES = 3000
+#: Values are written with this share of their range as the last digit, a tenth of a pixel.
+_RESOLUTION = 2e-5
+
+
+@dataclass(frozen=True)
+class Series:
+    """
+    One curve, cloud or band.
+
+    Attributes
+    ----------
+    label : str
+        Name in the legend.
+    y : ndarray, shape (N,)
+        Values; NaN where there is none.
+    role : str
+        What it is, which gives the colour.
+    kind : str
+        How it is drawn: 'line', broken at NaN; 'trend', with dots and not broken; 'points';
+        'sticks' from zero; 'steps'; or a 'band' from y to ``upper``.
+    upper : ndarray, shape (N,), or None
+        Upper edge of a band.
+
+    """
+
+    label: str
+    y: FloatArray
+    role: Role = 'measured'
+    kind: Kind = 'line'
+    upper: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Level:
+    """
+    A horizontal line.
+
+    Attributes
+    ----------
+    y : float
+        Where.
+    label : str
+        What it is; written at its right end.
+
+    """
+
+    y: float
+    label: str = ''
+
+
+@dataclass(frozen=True)
+class Chart:
+    """
+    Curves over a common axis that a reader can zoom into.
+
+    Attributes
+    ----------
+    x : ndarray, shape (N,)
+        Common abscissa, not decreasing.
+    series : sequence of Series
+        What is drawn, the first at the bottom.
+    xlabel, ylabel : str
+        Axes with units; no xlabel where the chart below has it.
+    height : int
+        [CSS pixel].
+    link : str
+        Charts with the same name zoom together; empty for none.
+    levels : sequence of Level
+        Horizontal lines.
+    symmetric : bool
+        Whether zero is in the middle of the ordinate.
+    legend : bool
+        Whether there is a legend, with the values under the pointer.
+
+    """
+
+    x: FloatArray
+    series: Sequence[Series]
+    xlabel: str
+    ylabel: str
+    height: int = 220
+    link: str = ''
+    levels: Sequence[Level] = ()
+    symmetric: bool = False
+    legend: bool = True
+
+    def html(self) -> Markup:
+        """Return the chart as HTML."""
+        label = f'{self.ylabel} over {self.xlabel}' if self.xlabel else self.ylabel
+        return render(
+            'chart.html', {'chart': self, 'label': label, 'json': script_json(self._data())}
+        )
+
+    def _data(self) -> dict[str, Any]:
+        return {
+            'x': rounded(self.x),
+            'xlabel': self.xlabel,
+            'ylabel': self.ylabel,
+            'height': self.height,
+            'link': self.link,
+            'symmetric': self.symmetric,
+            'legend': self.legend,
+            'levels': [{'y': level.y, 'label': level.label} for level in self.levels],
+            'series': [
+                {
+                    'label': series.label,
+                    'role': series.role,
+                    'kind': series.kind,
+                    'y': rounded(series.y),
+                    'upper': None if series.upper is None else rounded(series.upper),
+                }
+                for series in self.series
+            ],
+        }
+
+
+def thinned(*series: npt.ArrayLike, most: int = MOST_SAMPLES) -> npt.NDArray[np.intp]:
+    """
+    Choose samples that look like all of them.
+
+    Parameters
+    ----------
+    *series : array_like, shape (N,)
+        Curves over the same samples.
+    most : int
+        About how many samples to keep.
+
+    Returns
+    -------
+    ndarray of int
+        Samples in order: all, or those where one of the curves is lowest or highest within each
+        of many equal stretches. Samples with NaN are kept, for they are breaks.
+
+    """
+    curves = [np.asarray(values, dtype=float) for values in series]
+    count = len(curves[0])
+    if count <= most:
+        return np.arange(count)
+    stretches = max(1, most // (2 * len(curves)))
+    edges = np.linspace(0, count, stretches + 1).astype(np.intp)[:-1]
+    kept = [np.array([0, count - 1])]
+    for curve in curves:
+        kept.append(np.flatnonzero(np.isnan(curve)))
+        for sign in (1.0, -1.0):
+            value = np.where(np.isnan(curve), -np.inf, sign * curve)
+            best = np.maximum.reduceat(value, edges)
+            first = np.flatnonzero(value == np.repeat(best, np.diff([*edges, count])))
+            stretch = np.searchsorted(edges, first, side='right')
+            kept.append(first[np.unique(stretch, return_index=True)[1]])
+    return np.unique(np.concatenate(kept))
+
+
+def joined(parts: Sequence[FloatArray]) -> FloatArray:
+    """Return stretches one after the other with a NaN between them, where curves break."""
+    pieces = [part for stretch in parts for part in (stretch, [np.nan])]
+    return read_only(np.concatenate(pieces[:-1]))
+
+
+def joined_time(parts: Sequence[FloatArray]) -> FloatArray:
+    """Return times to go with ``joined`` values; at a break, that of the sample before."""
+    pieces = [part for stretch in parts for part in (stretch, stretch[-1:])]
+    return read_only(np.concatenate(pieces[:-1]))
+
+
+def rounded(values: npt.ArrayLike) -> list[float | None]:
+    """Return values with as many digits as a screen shows, None for NaN."""
+    array = np.asarray(values, dtype=float)
+    finite = array[np.isfinite(array)]
+    span = float(np.ptp(finite)) if len(finite) else 0.0
+    step = _RESOLUTION * (span or (abs(float(finite[0])) if len(finite) else 1.0) or 1.0)
+    decimals = int(np.ceil(-np.log10(step)))
+    return [round(value, decimals) if np.isfinite(value) else None for value in array.tolist()]
+
+
+def script_json(data: dict[str, Any]) -> Markup:
+    """Return JSON that no name in it can turn into HTML."""
+    text = json.dumps(data, allow_nan=False, separators=(',', ':'))
+    for character in '<>&\u2028\u2029':
+        text = text.replace(character, f'\\u{ord(character):04x}')
+    return Markup(text)

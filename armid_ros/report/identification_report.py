@@ -1,0 +1,128 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report of an identification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from armid_ros.arm import ArmModel
+from armid_ros.identification import Fit, Identification
+from armid_ros.recording import Recording
+from armid_ros.report.judgement import judge
+from armid_ros.report.notation import counted
+from armid_ros.report.page import Page
+from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.correlations import Correlations
+from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
+from armid_ros.report.sections.excitation import Excitation
+from armid_ros.report.sections.facts import Asked
+from armid_ros.report.sections.fit import FitSection
+from armid_ros.report.sections.next_steps import NextSteps
+from armid_ros.report.sections.origin import Origin
+from armid_ros.report.sections.parameters import Parameters
+from armid_ros.report.sections.residuals import Residuals
+from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.whiteness import WhitenessSection
+from armid_ros.report.statistics import directions, torque_scale
+
+_TONES = {'good': 'good', 'usable': 'fair', 'unproven': 'fair', 'poor': 'bad'}
+
+
+def identification_report(
+    result: Identification,
+    *,
+    description: ArmModel,
+    robot: str,
+    recordings: Sequence[Recording],
+    validation: Mapping[str, Sequence[Fit]],
+    validation_recordings: Sequence[Recording] = (),
+    provenance: Provenance | None = None,
+) -> str:
+    """
+    Return report.html of an identification.
+
+    Parameters
+    ----------
+    result : Identification
+        What was found.
+    description : ArmModel
+        The model before the identification, to compare parameters with.
+    robot : str
+        Shipped name or path of the description.
+    recordings : sequence of Recording
+        Training data.
+    validation : mapping of str to sequence of Fit
+        Predictions of recordings that were not used for fitting, by recording.
+    validation_recordings : sequence of Recording
+        Those recordings.
+    provenance : Provenance, optional
+        Files, versions, settings, seed.
+
+    Returns
+    -------
+    str
+        One HTML file that loads nothing.
+
+    """
+    arm = result.arm
+    training: dict[str, list[Fit]] = {}
+    for fit in result.training:
+        training.setdefault(fit.source, []).append(fit)
+    held_out = [fit for fits in validation.values() for fit in fits]
+    role = 'held-out' if held_out else 'training'
+    shown = held_out or list(result.training)
+    judgement = judge(result, validation, [*recordings, *validation_recordings])
+    quality = [
+        *(RecordingQuality.of(recording, 'training') for recording in recordings),
+        *(RecordingQuality.of(recording, 'held-out') for recording in validation_recordings),
+    ]
+    sections = [
+        Verdict(judgement.grade, _TONES[judgement.grade], judgement.sentences, judgement.beware),
+        Asked(_asked(result, robot, list(training), list(validation))),
+        DataQuality(quality),
+        FitSection(arm.robot, training, validation),
+        Residuals(arm.robot, shown, role),
+        Parameters(result.estimate, result.base.values(description.theta)),
+        Correlations(result.estimate),
+        Excitation(
+            result.condition_number,
+            result.base.rank,
+            directions(result.estimate, torque_scale(result)),
+        ),
+        WhitenessSection(arm.robot, shown, role),
+        NextSteps(judgement.next_steps),
+        Origin(provenance or Provenance()),
+    ]
+    subtitle = (
+        f'{robot} · {counted(len(training), "training recording")} · '
+        f'{counted(len(validation), "held-out recording")}'
+    )
+    return Page(f'Identification of {arm.robot.name}', subtitle, sections).html()
+
+
+def _asked(
+    result: Identification, robot: str, training: Sequence[str], validation: Sequence[str]
+) -> list[tuple[str, str]]:
+    methods = {
+        'ols': 'ordinary least squares',
+        'wls': 'least squares weighted by the noise of each joint',
+        'irls': 'least squares weighted by the noise of each joint, outliers weighted down',
+    }
+    gravity = ', '.join(f'{g:.4g}' for g in result.arm.robot.gravity)
+    used = result.used
+    kept = used.rate_hz / used.decimation
+    return [
+        ('Robot', robot),
+        ('Joints', ', '.join(result.arm.robot.joints)),
+        ('Gravity', f'({gravity}) m/s²'),
+        ('Effects', ', '.join(effect.name for effect in result.arm.effects) or 'none'),
+        ('Method', methods[result.settings.method]),
+        (
+            'Filter',
+            f'positions below {used.cutoff_hz:.3g} Hz of {used.rate_hz:.4g} Hz; torque and model '
+            f'alike, then every {used.decimation}th sample kept ({kept:.3g} Hz)',
+        ),
+        ('Fitted to', ', '.join(training)),
+        ('Held out', ', '.join(validation) or 'nothing'),
+    ]

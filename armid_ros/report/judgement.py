@@ -1,0 +1,248 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What an identification comes to, in words: how good, what to beware of, what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from armid_ros.identification import Fit, Identification, Score
+from armid_ros.recording import Recording
+from armid_ros.report.families import full_label
+from armid_ros.report.notation import counted, digits
+from armid_ros.report.statistics import Trend, Whiteness
+import numpy as np
+
+Grade = Literal['good', 'usable', 'poor', 'unproven']
+
+#: Relative torque error [%] up to which a model is good, and usable: published identifications of
+#: industrial arms reach 4 to 10 %, and above 20 % a rigid model without friction does as well.
+GOOD, USABLE = 10.0, 20.0
+#: Ratio of the held-out to the training error from which the model is fitted to the noise.
+_OVERFIT = 1.3
+#: Condition number from which an excitation is weak; below 100 is the usual advice (Presse and
+#: Gautier 1993), for regressors scaled by a person.
+_WEAK_EXCITATION = 1000.0
+#: Parameters that a sentence names.
+_NAMED = 8
+#: Share of a joint's residual that one variable explains, from which there is something to find.
+TELLING_SHARE = 0.15
+#: Share of the lags outside their 99 % band from which a residual is far from white.
+COLOURED_SHARE = 0.25
+
+
+class Finding(NamedTuple):
+    """Something to beware of, and what to do about it, if anything."""
+
+    text: str
+    step: str = ''
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """
+    What to think of an identification.
+
+    Attributes
+    ----------
+    grade : {'good', 'usable', 'poor', 'unproven'}
+        By the error on held-out data; unproven without such data.
+    sentences : tuple of str
+        What was identified, and how well it predicts.
+    beware : tuple of str
+        What the reader should not overlook.
+    next_steps : tuple of str
+        What to do.
+
+    """
+
+    grade: Grade
+    sentences: tuple[str, ...]
+    beware: tuple[str, ...]
+    next_steps: tuple[str, ...]
+
+
+def judge(
+    result: Identification,
+    validation: Mapping[str, Sequence[Fit]],
+    recordings: Sequence[Recording],
+) -> Judgement:
+    """
+    Judge an identification.
+
+    Parameters
+    ----------
+    result : Identification
+        What was found.
+    validation : mapping of str to sequence of Fit
+        Predictions of held-out recordings.
+    recordings : sequence of Recording
+        What was read, for what was wrong with it.
+
+    """
+    training = Score.of(result.training)
+    fits = [fit for part in validation.values() for fit in part]
+    held_out = Score.of(fits) if fits else None
+    findings = [
+        *_data_findings(recordings),
+        *_error_findings(result, training, held_out),
+        *_residual_findings(result, fits or result.training),
+        *_excitation_findings(result),
+        *(Finding(note[0].upper() + note[1:] + '.') for note in result.notes),
+    ]
+    steps = [finding.step for finding in findings if finding.step]
+    if held_out is not None and not steps:
+        steps = ['Nothing stands in the way of using this model in the range it was tested in.']
+    return Judgement(
+        grade=_grade(held_out),
+        sentences=_sentences(result, training, held_out, len(validation), len(recordings)),
+        beware=tuple(finding.text for finding in findings),
+        next_steps=tuple(dict.fromkeys(steps)),
+    )
+
+
+def _grade(held_out: Score | None) -> Grade:
+    if held_out is None:
+        return 'unproven'
+    error = held_out.relative_error_percent
+    return 'good' if error <= GOOD else 'usable' if error <= USABLE else 'poor'
+
+
+def _sentences(
+    result: Identification, training: Score, held_out: Score | None, n_held_out: int, n_read: int
+) -> tuple[str, ...]:
+    robot = result.arm.robot
+    effects = [
+        effect.name.replace('_', ' ').replace('coulomb', 'Coulomb')
+        for effect in result.arm.effects
+    ]
+    time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
+    what = (
+        f'{counted(result.base.rank, "parameter")} of {robot.name} '
+        f'({counted(robot.n_joints, "joint")}; rigid body'
+        + ''.join(f', {effect}' for effect in effects)
+        + f') identified from {time:.0f} s of motion.'
+    )
+    if held_out is None:
+        return what, (
+            f'On the data it was fitted to, the predicted torque is off by '
+            f'{digits(training.relative_error_percent)} %; how well it predicts other motions '
+            'is not known, for no data were held out.'
+        )
+    return what, (
+        f'On {counted(n_held_out, "held-out recording")} the predicted torque is off by '
+        f'{digits(held_out.relative_error_percent)} % '
+        f'({digits(training.relative_error_percent)} % on the data it was fitted to).'
+    )
+
+
+def _data_findings(recordings: Sequence[Recording]) -> list[Finding]:
+    return [
+        Finding(f'{recording.source or "A recording"}: {recording.report.describe()}')
+        for recording in recordings
+        if not recording.report.clean
+    ]
+
+
+def _error_findings(
+    result: Identification, training: Score, held_out: Score | None
+) -> list[Finding]:
+    findings = []
+    if held_out is None:
+        findings.append(
+            Finding(
+                'Nothing was held out, so nothing is proven.',
+                'Record another motion and validate with it.',
+            )
+        )
+    else:
+        ratio = held_out.relative_error_percent / max(training.relative_error_percent, 1e-9)
+        if ratio > _OVERFIT:
+            findings.append(
+                Finding(
+                    f'The error on held-out data is {digits(ratio)} times that on the training '
+                    'data: the model is fitted to what does not repeat, or the held-out motion '
+                    'goes where the training did not.',
+                    'Train on more recordings, and on the range of poses and speeds that matters.',
+                )
+            )
+    errors = (held_out or training).joint_relative_error_percent
+    joints = result.arm.robot.joints
+    bad = [(joint, e) for joint, e in zip(joints, errors, strict=True) if e > USABLE]
+    if bad:
+        findings.append(
+            Finding(
+                'Poorly predicted: ' + ', '.join(f'{j} ({digits(e)} %)' for j, e in bad) + '.',
+                f'Compare the residual of {", ".join(joint for joint, _ in bad)} with the noise '
+                'of the torque there, and diagnose what the model lacks.',
+            )
+        )
+    return findings
+
+
+def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Finding]:
+    findings = []
+    coloured = []
+    for joint, name in enumerate(result.arm.robot.joints):
+        for variable, share in explained_shares(fits, joint).items():
+            if share > TELLING_SHARE:
+                findings.append(
+                    Finding(
+                        f'{name}: {100.0 * share:.0f} % of the residual goes with {variable}.',
+                        'Diagnose what the residual that follows a variable is due to, and add '
+                        'it to the effects.',
+                    )
+                )
+        if Whiteness.of(fits, joint).outside > COLOURED_SHARE:
+            coloured.append(name)
+    if coloured:
+        findings.append(
+            Finding(
+                f'The residual of {", ".join(coloured)} is far from white: the model lacks '
+                'something there. The intervals allow for the correlation in time, not for the '
+                'bias.'
+            )
+        )
+    return findings
+
+
+def _excitation_findings(result: Identification) -> list[Finding]:
+    findings = []
+    estimate = result.estimate
+    small = np.abs(estimate.values) < 2.0 * estimate.std
+    lost = [full_label(estimate.parameters[k]) for k in np.flatnonzero(small)]
+    if lost:
+        findings.append(
+            Finding(
+                f'{len(lost)} of {len(estimate.parameters)} parameters are smaller than their '
+                f'uncertainty: {", ".join(lost[:_NAMED])}'
+                + (f' and {len(lost) - _NAMED} more' if len(lost) > _NAMED else '')
+                + '. Use the model for torques, not these values one by one.'
+            )
+        )
+    if result.condition_number > _WEAK_EXCITATION:
+        findings.append(
+            Finding(
+                f'The excitation is weak: condition number {result.condition_number:.3g}.',
+                'Design an excitation for this robot and record that.',
+            )
+        )
+    return findings
+
+
+def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
+    """Return how much of a joint's residual goes with its speed, its position and its load."""
+    used = np.concatenate([fit.informative[:, joint] for fit in fits])
+    residual = np.concatenate([fit.residual[:, joint] for fit in fits])[used]
+    if len(residual) < 20:
+        return {}
+    axes = {
+        'its speed': [fit.motion.dq[:, joint] for fit in fits],
+        'its position': [fit.motion.q[:, joint] for fit in fits],
+        'its load': [fit.predicted[:, joint] for fit in fits],
+    }
+    return {
+        name: Trend.of(np.concatenate(parts)[used], residual).share for name, parts in axes.items()
+    }

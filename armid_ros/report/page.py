@@ -1,0 +1,105 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The page that every report is: one file, nothing to load, sections one below the other.
+
+A section is a small frozen dataclass with a title and a template of its own; the template sees
+the section under that name.
+
+"""
+
+from __future__ import annotations
+
+from abc import ABC
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+import re
+from typing import Any, ClassVar
+
+from armid_ros.report.notation import counted, digits, pretty
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+
+class Section(ABC):
+    """
+    One part of a page.
+
+    Attributes
+    ----------
+    title : str
+        Heading; empty for none.
+    template : str
+        Name of the file in templates/.
+
+    """
+
+    title: ClassVar[str]
+    template: ClassVar[str]
+
+    @property
+    def anchor(self) -> str:
+        """Name of the section within the page, for links."""
+        return re.sub('[^a-z0-9]+', '-', self.title.lower()).strip('-')
+
+    def html(self) -> Markup:
+        """Return the section as HTML, everything in it escaped."""
+        return render(self.template, {'section': self})
+
+
+@dataclass(frozen=True)
+class Page:
+    """
+    A report.
+
+    Attributes
+    ----------
+    title : str
+        What it is about.
+    subtitle : str
+        Robot, data, day; in a line.
+    sections : sequence of Section
+        Parts in order; the first is the verdict.
+
+    """
+
+    title: str
+    subtitle: str
+    sections: Sequence[Section]
+
+    def html(self) -> str:
+        """Return the whole file, scripts and styles included."""
+        assets = {
+            'chart_library': _asset('uPlot.iife.min.js'),
+            'chart_licence': _asset('uPlot.LICENSE'),
+            'chart_style': _asset('uPlot.min.css'),
+            'script': _asset('report.js'),
+            'style': _asset('report.css'),
+        }
+        return str(render('page.html', {'page': self, **assets}))
+
+
+def render(template: str, values: Mapping[str, Any]) -> Markup:
+    """Return a template of templates/ with values filled in and escaped."""
+    return Markup(_environment().get_template(template).render(values))
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader('armid_ros.report'),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(digits=digits, pretty=pretty)
+    environment.globals['counted'] = counted
+    return environment
+
+
+def _asset(name: str) -> Markup:
+    """Return a file of assets/, which is part of this package and trusted."""
+    return Markup((files('armid_ros.report') / 'assets' / name).read_text(encoding='utf-8'))

@@ -1,0 +1,96 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where a report comes from: files, versions, settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+import hashlib
+from importlib import metadata
+from pathlib import Path
+import platform
+
+_BLOCK = 1 << 20
+#: Packages whose version can change a result.
+_PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'mcap')
+
+
+@dataclass(frozen=True)
+class FileHash:
+    """
+    A file and what is in it.
+
+    Attributes
+    ----------
+    path : str
+        Path as it was given.
+    size : int
+        [bytes].
+    sha256 : str
+        In hexadecimal digits.
+
+    """
+
+    path: str
+    size: int
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """
+    What is needed to get the same result again.
+
+    Attributes
+    ----------
+    files : tuple of FileHash
+        What was read.
+    versions : mapping of str to str
+        Software and its version.
+    settings : mapping of str to str
+        What was asked for.
+    seed : int or None
+        Seed of the random numbers.
+    command : str
+        Command line; empty when there was none.
+    created : str
+        When, as the caller's clock has it; empty to leave it out.
+
+    """
+
+    files: tuple[FileHash, ...] = ()
+    versions: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, str] = field(default_factory=dict)
+    seed: int | None = None
+    command: str = ''
+    created: str = ''
+
+
+def hash_files(paths: Iterable[str | Path]) -> tuple[FileHash, ...]:
+    """Hash files, and all files in folders such as bags; what is no file is left out."""
+    found = []
+    for path in map(Path, paths):
+        inside = sorted(path.rglob('*')) if path.is_dir() else [path]
+        found += [_hash(file) for file in inside if file.is_file()]
+    return tuple(found)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the software that can change a result."""
+    known = {'Python': platform.python_version(), 'system': platform.platform(terse=True)}
+    for package in _PACKAGES:
+        try:
+            known[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return known
+
+
+def _hash(path: Path) -> FileHash:
+    digest, size = hashlib.sha256(), 0
+    with path.open('rb') as stream:
+        while block := stream.read(_BLOCK):
+            digest.update(block)
+            size += len(block)
+    return FileHash(str(path), size, digest.hexdigest())

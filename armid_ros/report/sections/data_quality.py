@@ -1,0 +1,86 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the recordings are like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armid_ros.recording import Recording
+from armid_ros.report.page import Section
+import numpy as np
+
+
+@dataclass(frozen=True)
+class RecordingQuality:
+    """
+    One recording in numbers.
+
+    Attributes
+    ----------
+    source, role : str
+        Which, and what it was used for.
+    duration : float
+        [s].
+    rate : float
+        Samples per second [Hz].
+    jitter : float
+        Standard deviation of the time between samples, as a share of it, holes left out.
+    longest_gap : float
+        Longest time between two samples [s].
+    clock : str
+        Whose time it is.
+    description : str
+        What reading it met.
+    clean : bool
+        Whether that was nothing.
+
+    """
+
+    source: str
+    role: str
+    duration: float
+    rate: float
+    jitter: float
+    longest_gap: float
+    clock: str
+    description: str
+    clean: bool
+
+    @staticmethod
+    def of(recording: Recording, role: str) -> RecordingQuality:
+        """Measure a recording."""
+        steps = np.diff(recording.t) if len(recording) > 1 else np.zeros(1)
+        period = recording.period or 1.0
+        ordinary = steps[steps < 5.0 * period]
+        return RecordingQuality(
+            source=recording.source or 'in memory',
+            role=role,
+            duration=recording.duration,
+            rate=1.0 / period,
+            jitter=float(np.std(ordinary) / period) if len(ordinary) else 0.0,
+            longest_gap=float(steps.max()),
+            clock=recording.clock,
+            description=recording.report.describe(),
+            clean=recording.report.clean,
+        )
+
+
+@dataclass(frozen=True)
+class DataQuality(Section):
+    """
+    Rate, gaps and repairs of every recording.
+
+    Attributes
+    ----------
+    recordings : sequence of RecordingQuality
+        Training data first.
+
+    """
+
+    title: ClassVar[str] = 'Data quality'
+    template: ClassVar[str] = 'data_quality.html'
+
+    recordings: Sequence[RecordingQuality]

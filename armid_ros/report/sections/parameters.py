@@ -1,0 +1,131 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armid_ros.estimate import Estimate
+from armid_ros.motion import FloatArray
+from armid_ros.report.families import is_rigid, parameter_families
+from armid_ros.report.notation import digits, pretty
+from armid_ros.report.page import Section
+import numpy as np
+
+#: Half width of a 95 % interval in standard deviations.
+HALF_WIDTH = 1.96
+
+
+@dataclass(frozen=True)
+class Row:
+    """
+    One parameter.
+
+    Attributes
+    ----------
+    name, joint, unit : str
+        Which.
+    rigid : bool
+        Whether it belongs to a link, and not to an effect.
+    value, reach, described : float
+        Estimate, half width of its 95 % interval, and the description's value; an effect of
+        which a description has zero is one that it does not know.
+
+    """
+
+    name: str
+    joint: str
+    unit: str
+    rigid: bool
+    value: float
+    reach: float
+    described: float
+
+    @property
+    def known(self) -> bool:
+        """Whether the description has a value of it."""
+        return self.rigid or self.described != 0.0
+
+    @property
+    def text(self) -> tuple[str, str, str]:
+        """Estimate and half width, to the digit that the half width leaves; described value."""
+        described = f'{self.described:.3g}' if self.known else 'none'
+        if not (np.isfinite(self.reach) and self.reach > 0.0):
+            return f'{self.value:.4g}', '0', described
+        decimals = max(0, 1 - int(np.floor(np.log10(self.reach))))
+        if decimals > 7 or max(abs(self.value), self.reach) >= 1e7:
+            return f'{self.value:.3g}', f'{self.reach:.2g}', described
+        return f'{self.value:.{decimals}f}', f'{self.reach:.{decimals}f}', described
+
+    @property
+    def changed(self) -> bool:
+        """Whether the description's value is outside the interval."""
+        return self.known and abs(self.value - self.described) > self.reach
+
+    @property
+    def relative(self) -> str:
+        """Half width as a share of the value, or that it is larger."""
+        if abs(self.value) <= self.reach:
+            return '> 100 %'
+        return f'{digits(100.0 * self.reach / abs(self.value))} %'
+
+    def place(self, number: float) -> float:
+        """Return where a number is on the row's own axis, 0 to 100, zero at 50."""
+        span = max(abs(self.value) + self.reach, abs(self.described)) or 1.0
+        return round(50.0 + 48.0 * float(np.clip(number / span, -1.0, 1.0)), 2)
+
+
+@dataclass(frozen=True)
+class Parameters(Section):
+    """
+    Every parameter against the description's.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        P parameters.
+    described : ndarray, shape (P,)
+        Values of the description; zero for effects it does not know.
+
+    """
+
+    title: ClassVar[str] = 'Parameters'
+    template: ClassVar[str] = 'parameters.html'
+
+    estimate: Estimate
+    described: FloatArray
+
+    @property
+    def families(self) -> Sequence[tuple[str, str, Sequence[Row]]]:
+        """Heading, unit and rows of each kind."""
+        names, values = self.estimate.parameters, self.estimate.values
+        reach = HALF_WIDTH * self.estimate.std
+        families = []
+        for title, members in parameter_families(names).items():
+            rows = [
+                Row(
+                    names[k].name,
+                    names[k].joint,
+                    pretty(names[k].unit),
+                    is_rigid(names[k]),
+                    float(values[k]),
+                    float(reach[k]),
+                    float(self.described[k]),
+                )
+                for k in members
+            ]
+            families.append((title, rows[0].unit, rows))
+        return families
+
+    @property
+    def changed(self) -> int:
+        """Number of parameters whose interval leaves out the description's value."""
+        return sum(row.changed for _, _, rows in self.families for row in rows)
+
+    @property
+    def described_count(self) -> int:
+        """Number of parameters of which the description has a value."""
+        return sum(row.known for _, _, rows in self.families for row in rows)

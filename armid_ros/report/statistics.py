@@ -1,0 +1,143 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What residuals, correlations and excitation say, in numbers to be drawn or put in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification import Fit, Identification
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Two-sided 99 % point of the normal distribution.
+POINT_99 = 2.576
+#: Samples of the motion that the sensitivity of the torque is averaged over.
+_SAMPLES = 300
+
+
+@dataclass(frozen=True)
+class Trend:
+    """
+    Mean of a residual in bins of something else.
+
+    Attributes
+    ----------
+    centre, mean : ndarray, shape (B,)
+        Mean abscissa and mean residual of each bin, equally many samples in each.
+    share : float
+        Share of the residual's variance that the means explain beyond chance, 0 to 1.
+
+    """
+
+    centre: FloatArray
+    mean: FloatArray
+    share: float
+
+    @staticmethod
+    def of(x: FloatArray, residual: FloatArray, bins: int = 20) -> Trend:
+        """Average a residual, shape (N,), in bins of x, shape (N,)."""
+        groups = np.array_split(np.argsort(x, kind='stable'), max(1, min(bins, len(x) // 25)))
+        centre = np.array([x[group].mean() for group in groups])
+        mean = np.array([residual[group].mean() for group in groups])
+        sizes = np.array([len(group) for group in groups])
+        total = float(np.sum((residual - residual.mean()) ** 2))
+        between = float(np.sum(sizes * (mean - residual.mean()) ** 2))
+        freedom = len(x) - len(groups)
+        if total <= 0.0 or freedom <= 0:
+            return Trend(centre, mean, 0.0)
+        noise = (total - between) / freedom
+        return Trend(centre, mean, max(0.0, (between - (len(groups) - 1) * noise) / total))
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """
+    Autocorrelation of a residual.
+
+    Attributes
+    ----------
+    lag : ndarray, shape (L,)
+        Lags from one sample on [s].
+    correlation : ndarray, shape (L,)
+        Autocorrelation at each.
+    band : float
+        Half width of the band in which 99 % of the lags of white noise lie.
+
+    """
+
+    lag: FloatArray
+    correlation: FloatArray
+    band: float
+
+    @property
+    def outside(self) -> float:
+        """Share of the lags outside the band; 0.01 for white noise."""
+        return float(np.mean(np.abs(self.correlation) > self.band))
+
+    @staticmethod
+    def of(fits: Sequence[Fit], joint: int, lags: int = 40) -> Whiteness:
+        """Correlate the residual of a joint with itself, within unbroken stretches."""
+        longest = max(fits, key=lambda fit: len(fit.motion)).motion
+        period = float(np.median(np.diff(longest.t)))
+        products = np.zeros(max(2, min(lags + 1, len(longest) // 4)))
+        count = 0
+        for fit in fits:
+            residual = np.where(fit.informative[:, joint], fit.residual[:, joint], 0.0)
+            residual = residual - residual.mean()
+            count += int(fit.informative[:, joint].sum())
+            for lag in range(len(products)):
+                products[lag] += residual[lag:] @ residual[: max(0, len(residual) - lag)]
+        correlation = products[1:] / max(float(products[0]), 1e-300)
+        lag_times = np.asarray(period * np.arange(1, len(products)))
+        return Whiteness(lag_times, correlation, POINT_99 / np.sqrt(max(count, 1)))
+
+
+@dataclass(frozen=True)
+class Direction:
+    """
+    A combination of parameters and how well it is known.
+
+    Attributes
+    ----------
+    uncertainty : float
+        Standard deviation of the combination as the torque it makes on this motion, in standard
+        deviations of the residual.
+    parts : tuple of (ParameterName, float)
+        The parameters that make it up and their shares of it, largest first.
+
+    """
+
+    uncertainty: float
+    parts: tuple[tuple[ParameterName, float], ...]
+
+
+def torque_scale(result: Identification) -> FloatArray:
+    """Return the torque one unit of each parameter makes, in residual deviations, shape (r,)."""
+    motion = max(result.training, key=lambda fit: len(fit.motion)).motion
+    chosen = np.unique(np.linspace(0, len(motion) - 1, _SAMPLES).astype(np.intp))
+    columns = result.arm.columns(motion.select(chosen))[:, :, result.base.independent]
+    noise = np.where(result.joint_std > 0.0, result.joint_std, 1.0)
+    return np.asarray(np.sqrt(np.mean((columns / noise[:, np.newaxis]) ** 2, axis=(0, 1))))
+
+
+def directions(estimate: Estimate, scale: FloatArray) -> tuple[Direction, ...]:
+    """Return independent combinations of the parameters, the worst known first."""
+    covariance = estimate.covariance * np.outer(scale, scale)
+    variances, vectors = np.linalg.eigh(covariance)
+    found = []
+    for column in np.argsort(-variances):
+        weights = vectors[:, column] ** 2
+        order = np.argsort(-weights)
+        enough = 1 + int(np.searchsorted(np.cumsum(weights[order]), 0.8))
+        parts = tuple((estimate.parameters[k], float(weights[k])) for k in order[:enough][:6])
+        found.append(Direction(float(np.sqrt(max(variances[column], 0.0))), parts))
+    return tuple(found)
+
+
+def correlations(estimate: Estimate) -> FloatArray:
+    """Return the correlation of every pair of parameters, shape (P, P)."""
+    std = np.where(estimate.std > 0.0, estimate.std, 1.0)
+    return np.asarray(np.clip(estimate.covariance / np.outer(std, std), -1.0, 1.0))

@@ -1,0 +1,78 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Charts are small, true to the data, and cannot break out of their script."""
+
+import json
+import re
+
+from armid_ros.report import Bar, BarChart, Chart, Series, thinned
+from armid_ros.report.charts import joined, joined_time, rounded
+import numpy as np
+
+
+def data_of(html):
+    """Return the data that a chart holds."""
+    return json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
+
+
+def test_thinning_keeps_every_peak():
+    rng = np.random.default_rng(2)
+    y = rng.standard_normal(200_000)
+    y[123_456] = 40.0
+    y[7_890] = -35.0
+    kept = thinned(y, most=2000)
+    assert len(kept) <= 2002
+    assert {123_456, 7_890, 0, len(y) - 1} <= set(kept)
+    assert np.all(np.diff(kept) > 0)
+    for samples in np.array_split(np.arange(len(y)), 500):
+        inside = y[kept[np.isin(kept, samples)]]
+        assert (inside.min(), inside.max()) == (y[samples].min(), y[samples].max())
+
+
+def test_thinning_leaves_short_series_alone():
+    np.testing.assert_array_equal(thinned(np.zeros(3000), np.ones(3000)), np.arange(3000))
+
+
+def test_thinning_keeps_breaks():
+    y = np.sin(np.arange(50_000.0))
+    y[30_000] = np.nan
+    assert 30_000 in thinned(y, most=500)
+
+
+def test_stretches_are_joined_with_a_break():
+    t = joined_time([np.array([0.0, 1.0]), np.array([5.0, 6.0])])
+    y = joined([np.array([1.0, 2.0]), np.array([3.0, 4.0])])
+    np.testing.assert_array_equal(t, [0.0, 1.0, 1.0, 5.0, 6.0])
+    np.testing.assert_array_equal(y, [1.0, 2.0, np.nan, 3.0, 4.0])
+
+
+def test_rounding_is_far_below_a_pixel():
+    values = 1e-4 * np.random.default_rng(3).standard_normal(1000) + 7.0
+    error = np.abs(np.array(rounded(values)) - values).max()
+    assert error < 1e-4 * np.ptp(values)
+    assert rounded([np.nan, np.inf, 0.0]) == [None, None, 0.0]
+    assert rounded([]) == []
+
+
+def test_a_name_cannot_end_the_script_of_a_chart():
+    name = '</script><script>alert("&")</script>\u2028'
+    chart = Chart(np.arange(3.0), [Series(name, np.arange(3.0))], 'x', name)
+    html = str(chart.html())
+    assert html.count('<script') == html.count('</script>') == 1
+    assert data_of(html)['series'][0]['label'] == name
+    assert data_of(html)['ylabel'] == name
+
+
+def test_bars_are_as_long_as_their_values():
+    chart = BarChart(
+        [('a', [Bar(1.0, 'before'), Bar(0.25, 'after')]), ('b', [Bar(2.0, 'before')])], 'N m'
+    )
+    widths = re.findall(r'width: ([0-9.]+)%', chart.html())
+    assert [float(width) for width in widths] == [50.0, 12.5, 100.0]
+    assert '0.25 N m' in chart.html()
+
+
+def test_bars_of_nothing_have_no_length():
+    chart = BarChart([('<b>', [Bar(0.0, 'floor')])], 'N m')
+    assert 'width: 0.0%' in chart.html()
+    assert '<b>' not in chart.html() and '&lt;b&gt;' in chart.html()

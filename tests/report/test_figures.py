@@ -1,0 +1,113 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Figures for documents show what they are given, with names and units."""
+
+from armid_ros.excitation import DesignSettings, Problem
+from armid_ros.report.figures import (
+    convergence_figure,
+    excitation_figure,
+    parameter_figure,
+    save_figure,
+    torque_figure,
+)
+from armid_ros.robots import collision_model
+import matplotlib
+import numpy as np
+import pytest
+
+
+def texts(figure):
+    """Return everything that is written in a figure."""
+    figure.canvas.draw()
+    return [text.get_text() for text in figure.findobj(matplotlib.text.Text)]
+
+
+def drawn(axes):
+    """Return the data of all curves."""
+    return [np.asarray(line.get_ydata(), dtype=float) for line in axes.lines]
+
+
+def test_torque_figure_draws_measured_predicted_and_residual_of_every_joint(case):
+    (fits,) = case.validation.values()
+    figure = torque_figure(case.description.robot, fits)
+    assert len(figure.axes) == 2 * len(fits[0].motion.joints)
+    for joint, name in enumerate(fits[0].motion.joints):
+        torque, residual = (
+            axes
+            for axes in figure.axes
+            if axes.get_shared_x_axes().joined(axes, figure.axes[2 * joint])
+        )
+        assert torque.get_title(loc='left') == name
+        assert torque.get_ylabel() == 'torque [N m]'
+        measured, predicted = drawn(torque)[:2]
+        np.testing.assert_array_equal(measured, fits[0].motion.tau[:, joint])
+        np.testing.assert_array_equal(drawn(residual)[0], measured - predicted)
+
+
+def test_parameter_figure_counts_the_intervals_that_contain_the_reference(case):
+    estimate = case.result.estimate
+    reference = estimate.values + 1.9 * estimate.std
+    reference[:3] += 0.2 * estimate.std[:3]
+    written = texts(parameter_figure(estimate, reference))
+    count = len(reference)
+    assert any(f'{count - 3} of {count} intervals contain the truth' in text for text in written)
+    assert {'kg m²', 'N m', 'elbow_pitch'} <= {text.split(';')[0] for text in written}
+
+
+def test_parameter_figure_has_a_bar_for_every_parameter(case):
+    estimate = case.result.estimate
+    figure = parameter_figure(estimate, estimate.values)
+    ticks = [tick for axes in figure.axes for tick in axes.get_yticks()]
+    assert len(ticks) == len(estimate.parameters)
+
+
+def test_convergence_figure_shows_all_parameters_and_says_the_unit(case):
+    estimate = case.result.estimate
+    t = np.linspace(0.5, 10.0, 50)
+    std = estimate.std * np.sqrt(10.0 / t)[:, np.newaxis]
+    figure = convergence_figure(
+        t, estimate.values + std, std, estimate.values, estimate.parameters
+    )
+    written = texts(figure)
+    assert f'All {len(estimate.parameters)} parameters' in written
+    assert 'kg m²' in written and 'time [s]' in written
+    assert figure.axes[-1].get_yscale() == 'log'
+
+
+@pytest.fixture(scope='module')
+def excitation_drawing(case):
+    robot = case.truth.robot
+    rng = np.random.default_rng(1)
+    problem = Problem.of(case.truth, DesignSettings(period=8.0), rng)
+    information = problem.information(case.excitation.motion(20.0), 1000)
+    return excitation_figure(
+        robot,
+        case.excitation,
+        collision=collision_model(robot),
+        margin=0.01,
+        information=information,
+    )
+
+
+def test_excitation_figure_keeps_the_limits_in_sight(case, excitation_drawing):
+    robot = case.truth.robot
+    for joint in range(robot.n_joints):
+        axes = excitation_drawing.axes[joint]
+        assert axes.get_title(loc='left') == robot.joints[joint]
+        bottom, top = axes.get_ylim()
+        assert bottom < robot.lower[joint] and top > robot.upper[joint]
+
+
+def test_excitation_figure_says_the_smallest_clearance(case, excitation_drawing):
+    path = case.excitation.at(np.linspace(0.0, case.excitation.duration, 400)).q
+    smallest = 100.0 * collision_model(case.truth.robot).path_clearance(path).min()
+    title = excitation_drawing.axes[case.truth.robot.n_joints].get_title(loc='left')
+    assert f'never less than {smallest:.1f} cm' in title
+
+
+@pytest.mark.parametrize('suffix', ['.png', '.svg', '.pdf'])
+def test_figures_are_saved_without_a_display(case, tmp_path, suffix):
+    path = tmp_path / f'figure{suffix}'
+    save_figure(parameter_figure(case.result.estimate, case.result.estimate.values), path)
+    assert path.stat().st_size > 5000
+    assert 'matplotlib.pyplot' not in __import__('sys').modules

@@ -1,0 +1,251 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report is one file that is safe to open, complete, and works in a real browser."""
+
+from dataclasses import replace
+from html.parser import HTMLParser
+import re
+
+from armid_ros.report import hash_files, identification_report, Provenance, versions
+import pytest
+
+HOSTILE = '<script>alert(1)</script>'
+TITLES = [
+    'What was asked',
+    'Data quality',
+    'Fit',
+    'Where the residual lives',
+    'Parameters',
+    'Correlations',
+    'Excitation',
+    'Whiteness',
+    'What to do next',
+    'Provenance',
+]
+
+
+class Reader(HTMLParser):
+    """Collects tags with what they load, headings and visible text."""
+
+    def __init__(self):
+        super().__init__()
+        self.loads, self.open, self.text, self.headings = [], [], '', []
+        self.scripts = 0
+
+    def handle_starttag(self, tag, attributes):
+        """Note what a tag loads."""
+        if tag not in ('meta', 'link', 'img', 'input', 'br', 'i'):
+            self.open.append(tag)
+        self.scripts += tag == 'script'
+        for name, value in attributes:
+            if name in ('src', 'href', 'srcset', 'data', 'action') and not value.startswith('#'):
+                self.loads.append(value)
+
+    def handle_endtag(self, tag):
+        """Leave a tag; tags have to nest."""
+        if tag != 'i':
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        """Collect the text."""
+        if self.open and self.open[-1] not in ('script', 'style'):
+            self.text += data
+            if self.open[-1] == 'h2':
+                self.headings.append(data)
+
+
+def report_of(case, **changes):
+    """Return the report of a case, or of one with something changed."""
+    given = {
+        'description': case.description,
+        'robot': 'humanoid_arm',
+        'recordings': case.recordings[:1],
+        'validation': case.validation,
+        'validation_recordings': case.recordings[1:],
+        'provenance': Provenance(
+            hash_files([recording.source for recording in case.recordings]), versions(), seed=5
+        ),
+        **changes,
+    }
+    return identification_report(given.pop('result', case.result), **given)
+
+
+@pytest.fixture(scope='module')
+def html(case):
+    return report_of(case)
+
+
+@pytest.fixture(scope='module')
+def page(html):
+    reader = Reader()
+    reader.feed(html)
+    assert not reader.open
+    return reader
+
+
+@pytest.fixture(scope='module')
+def hostile(case):
+    """Return the report of a robot with a joint and a bag that are named like a script."""
+    robot = replace(case.result.arm.robot, joints=(HOSTILE, *case.result.arm.robot.joints[1:]))
+    names = tuple(
+        replace(name, joint=HOSTILE) if name.joint == 'shoulder_pitch' else name
+        for name in case.result.estimate.parameters
+    )
+
+    def renamed(fits):
+        motions = [replace(fit.motion, joints=robot.joints) for fit in fits]
+        return tuple(
+            replace(fit, source=HOSTILE, motion=motion)
+            for fit, motion in zip(fits, motions, strict=True)
+        )
+
+    result = replace(
+        case.result,
+        arm=replace(
+            case.result.arm,
+            robot=robot,
+            effects=tuple(type(effect).on(robot) for effect in case.result.arm.effects),
+        ),
+        estimate=replace(case.result.estimate, parameters=names),
+        training=renamed(case.result.training),
+    )
+    ((_, fits),) = case.validation.items()
+    recordings = [replace(recording, source=HOSTILE) for recording in case.recordings]
+    return report_of(
+        case,
+        result=result,
+        robot=HOSTILE,
+        validation={HOSTILE: renamed(fits)},
+        recordings=recordings[:1],
+        validation_recordings=recordings[1:],
+        provenance=Provenance(settings={HOSTILE: HOSTILE}, command=HOSTILE),
+    )
+
+
+def test_sections_are_in_order(page):
+    assert page.headings == TITLES
+
+
+def test_verdict_comes_first_and_is_a_sentence(page):
+    assert page.text.index('of motion.') < page.text.index('What was asked\n', 600)
+    assert re.search(
+        r'On 1 held-out recording the predicted torque is off by [0-9.]+ %', page.text
+    )
+
+
+def test_everything_asked_for_is_there(case, page):
+    for joint in case.result.arm.robot.joints:
+        assert joint in page.text
+    for parameter in case.result.estimate.parameters:
+        assert parameter.name in page.text or parameter.joint in page.text
+    for file in hash_files([case.recordings[0].source]):
+        assert file.sha256 in page.text
+    assert case.recordings[0].report.describe() in page.text
+    assert f'{case.result.condition_number:.3g}' in page.text
+
+
+def test_nothing_is_loaded(page, html):
+    assert {value.split(':')[0] for value in page.loads} == {'data'}
+    assert '@import' not in html
+    assert not re.search(r'url\(', html)
+    assert "default-src 'none'" in html
+
+
+def test_report_is_small(html):
+    assert len(html.encode()) < 1_000_000
+
+
+def test_report_of_an_hour_is_below_the_limit(case):
+    ((source, fits),) = case.validation.items()
+    fit = fits[0]
+    copies = 3600 // int(fit.motion.t[-1])
+    long = tuple(
+        replace(fit, motion=replace(fit.motion, t=fit.motion.t + 20.0 * k)) for k in range(copies)
+    )
+    text = report_of(case, validation={source: long})
+    assert len(text.encode()) < 5_000_000
+
+
+def test_names_that_are_scripts_stay_names(page, hostile):
+    reader = Reader()
+    reader.feed(hostile)
+    assert HOSTILE in reader.text
+    assert HOSTILE not in hostile
+    assert reader.scripts == page.scripts
+
+
+def test_without_held_out_data_the_report_says_so(case):
+    text = report_of(case, validation={}, validation_recordings=())
+    assert 'unproven' in text and 'no data were held out' in text
+
+
+def test_prose_knows_one_from_many(case, page):
+    assert '1 training recording ' in page.text and '1 recordings' not in page.text
+
+
+@pytest.mark.parametrize('width', [1280, 390])
+@pytest.mark.parametrize('dark', [False, True])
+def test_browser_draws_every_chart_without_complaint(browser, tmp_path, html, width, dark):
+    path = tmp_path / 'report.html'
+    path.write_text(html, encoding='utf-8')
+    browser.open(path, width, dark=dark)
+    browser.run('document.querySelectorAll("details").forEach(d => { d.open = true; })')
+    browser.run('new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))')
+    assert browser.complaints == []
+    assert all(url.startswith(('file:', 'data:')) for url in browser.requested)
+    charts = html.count('<figure class="chart"')
+    assert charts > 20
+    drawn = browser.run(
+        '[...document.querySelectorAll("figure.chart canvas")].filter(canvas => '
+        'new Set(canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height)'
+        '.data).size > 8).length'
+    )
+    assert drawn == charts
+
+
+@pytest.mark.parametrize('width', [1280, 390])
+def test_page_is_not_wider_than_the_screen(browser, tmp_path, html, hostile, width):
+    for number, text in enumerate((html, hostile)):
+        path = tmp_path / f'report{number}.html'
+        path.write_text(text, encoding='utf-8')
+        browser.open(path, width)
+        browser.run('document.querySelectorAll("details").forEach(d => { d.open = true; })')
+        assert browser.run('document.documentElement.scrollWidth') <= width
+        assert browser.complaints == []
+
+
+def test_zoom_is_shared_by_torque_and_residual_and_can_be_undone(browser, tmp_path, html):
+    path = tmp_path / 'report.html'
+    path.write_text(html, encoding='utf-8')
+    browser.open(path, 1280)
+    browser.run('document.querySelector("#fit figure.chart").scrollIntoView()')
+    box = browser.run(
+        '(() => { const b = document.querySelector("#fit .u-over").getBoundingClientRect();'
+        ' return [b.left, b.top, b.width, b.height]; })()'
+    )
+    y = box[1] + box[3] / 2
+    buttons = '[...document.querySelectorAll("#fit .panel")][0].querySelectorAll(".reset")'
+    hidden = f'[...{buttons}].map(button => button.hidden)'
+    assert browser.run(hidden) == [True, True]
+    drag = (
+        ('mouseMoved', 0.3),
+        ('mousePressed', 0.3),
+        ('mouseMoved', 0.5),
+        ('mouseMoved', 0.6),
+        ('mouseReleased', 0.6),
+    )
+    for kind, share in drag:
+        browser.call(
+            'Input.dispatchMouseEvent',
+            type=kind,
+            x=box[0] + share * box[2],
+            y=y,
+            button='left',
+            clickCount=1,
+        )
+    browser.run('new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))')
+    assert browser.run(hidden) == [False, False]
+    browser.run(f'{buttons}[1].click()')
+    browser.run('new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))')
+    assert browser.run(hidden) == [True, True]
+    assert browser.complaints == []

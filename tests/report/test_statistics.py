@@ -1,0 +1,110 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a report says of residuals is there when it should be and not when it should not."""
+
+from dataclasses import replace
+
+from armid_ros.identification import Fit
+from armid_ros.motion import Motion
+from armid_ros.report.judgement import judge
+from armid_ros.report.statistics import correlations, directions, torque_scale, Trend, Whiteness
+import numpy as np
+import pytest
+
+
+def fit_with(residual):
+    """Return a fit of one joint whose residual is given, shape (N,)."""
+    count = len(residual)
+    zero = np.zeros((count, 1))
+    motion = Motion(('joint',), 0.01 * np.arange(count), zero, zero, zero, residual[:, np.newaxis])
+    return Fit('bag', motion, zero, np.ones((count, 1), dtype=bool))
+
+
+def test_noise_goes_with_nothing():
+    rng = np.random.default_rng(4)
+    shares = [
+        Trend.of(rng.standard_normal(2000), rng.standard_normal(2000)).share for _ in range(50)
+    ]
+    assert max(shares) < 0.03
+
+
+def test_a_residual_that_follows_a_variable_is_found_with_its_share():
+    rng = np.random.default_rng(5)
+    x = rng.uniform(-1.0, 1.0, 20_000)
+    trend = Trend.of(x, np.sign(x) + rng.standard_normal(20_000))
+    assert trend.share == pytest.approx(0.5, abs=0.02)
+    np.testing.assert_allclose(trend.mean, np.sign(trend.centre), atol=0.15)
+
+
+def test_constant_residual_has_no_share():
+    assert Trend.of(np.arange(100.0), np.ones(100)).share == 0.0
+
+
+def test_white_noise_stays_in_its_band():
+    rng = np.random.default_rng(6)
+    outside = [Whiteness.of([fit_with(rng.standard_normal(1000))], 0).outside for _ in range(200)]
+    assert np.mean(outside) == pytest.approx(0.01, abs=0.006)
+
+
+def test_autocorrelation_of_a_sine_is_a_cosine():
+    t = 0.01 * np.arange(20_000)
+    whiteness = Whiteness.of([fit_with(np.sin(2.0 * np.pi * 5.0 * t))], 0)
+    expected = np.cos(2.0 * np.pi * 5.0 * whiteness.lag)
+    np.testing.assert_allclose(whiteness.correlation, expected, atol=0.01)
+    assert whiteness.outside > 0.8
+
+
+def test_worst_known_direction_is_the_largest_variance_of_the_torque(case):
+    estimate, scale = case.result.estimate, torque_scale(case.result)
+    found = directions(estimate, scale)
+    scaled = estimate.covariance * np.outer(scale, scale)
+    assert found[0].uncertainty == pytest.approx(np.sqrt(np.linalg.norm(scaled, 2)))
+    values = [direction.uncertainty for direction in found]
+    assert values == sorted(values, reverse=True) and len(values) == case.result.base.rank
+
+
+def test_correlations_are_one_with_itself_and_never_more(case):
+    rho = correlations(case.result.estimate)
+    np.testing.assert_allclose(np.diag(rho), 1.0)
+    assert np.abs(rho).max() <= 1.0
+
+
+def test_verdict_is_good_when_held_out_data_are_predicted(case):
+    judgement = judge(case.result, case.validation, case.recordings)
+    assert judgement.grade == 'good'
+    assert 'held-out' in judgement.sentences[1]
+
+
+def test_without_held_out_data_nothing_is_proven(case):
+    judgement = judge(case.result, {}, case.recordings)
+    assert judgement.grade == 'unproven'
+    assert any('held out' in line for line in judgement.beware)
+    assert any('validate' in step for step in judgement.next_steps)
+
+
+def test_a_joint_that_is_predicted_badly_is_named(case):
+    ((source, fits),) = case.validation.items()
+    rng = np.random.default_rng(7)
+    predicted = np.array(fits[0].predicted)
+    predicted[:, 3] = rng.standard_normal(len(predicted))
+    worse = replace(fits[0], predicted=predicted)
+    judgement = judge(case.result, {source: (worse,)}, case.recordings)
+    assert judgement.grade != 'good'
+    assert any('elbow_pitch' in line for line in judgement.beware)
+    assert any('elbow_pitch' in step for step in judgement.next_steps)
+
+
+def test_missing_friction_is_seen_in_the_residual(case):
+    ((source, fits),) = case.validation.items()
+    coulomb = 0.1 * np.sign(fits[0].motion.dq)
+    worse = replace(fits[0], predicted=fits[0].predicted - coulomb)
+    judgement = judge(case.result, {source: (worse,)}, case.recordings)
+    speed = [line for line in judgement.beware if 'goes with its speed' in line]
+    assert len(speed) == len(case.result.arm.robot.joints)
+
+
+def test_what_reading_met_is_said(case):
+    report = replace(case.recordings[0].report, duplicates=17)
+    dirty = replace(case.recordings[0], report=report)
+    judgement = judge(case.result, case.validation, [dirty])
+    assert any('17' in line and dirty.source in line for line in judgement.beware)
