@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from armid_ros.identification import Fit, Identification, Score
@@ -98,7 +98,7 @@ def judge(
     return Judgement(
         grade=_grade(held_out),
         sentences=_sentences(result, training, held_out, len(validation), len(recordings)),
-        beware=tuple(finding.text for finding in findings),
+        beware=tuple(finding.text for finding in findings if finding.text),
         next_steps=tuple(dict.fromkeys(steps)),
     )
 
@@ -142,7 +142,7 @@ def _data_findings(recordings: Sequence[Recording]) -> list[Finding]:
     return [
         Finding(f'{recording.source or "A recording"}: {recording.report.describe()}')
         for recording in recordings
-        if not recording.report.clean
+        if not unharmed(recording)
     ]
 
 
@@ -151,12 +151,7 @@ def _error_findings(
 ) -> list[Finding]:
     findings = []
     if held_out is None:
-        findings.append(
-            Finding(
-                'Nothing was held out, so nothing is proven.',
-                'Record another motion and validate with it.',
-            )
-        )
+        findings.append(Finding('', 'Record another motion and validate with it.'))
     else:
         ratio = held_out.relative_error_percent / max(training.relative_error_percent, 1e-9)
         if ratio > _OVERFIT:
@@ -186,15 +181,19 @@ def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Find
     findings = []
     coloured = []
     for joint, name in enumerate(result.arm.robot.joints):
-        for variable, share in explained_shares(fits, joint).items():
-            if share > TELLING_SHARE:
-                findings.append(
-                    Finding(
-                        f'{name}: {100.0 * share:.0f} % of the residual goes with {variable}.',
-                        'Diagnose what the residual that follows a variable is due to, and add '
-                        'it to the effects.',
-                    )
+        shares = explained_shares(fits, joint)
+        telling = [
+            key for key in sorted(shares, key=lambda k: -shares[k]) if shares[key] > TELLING_SHARE
+        ]
+        if telling:
+            parts = ', '.join(f'{key} ({100.0 * shares[key]:.0f} %)' for key in telling)
+            findings.append(
+                Finding(
+                    f'The residual of {name} goes with {parts}.',
+                    'Diagnose what the residual that follows a variable is due to, and add it to '
+                    'the effects.',
                 )
+            )
         if Whiteness.of(fits, joint).outside > COLOURED_SHARE:
             coloured.append(name)
     if coloured:
@@ -230,6 +229,11 @@ def _excitation_findings(result: Identification) -> list[Finding]:
             )
         )
     return findings
+
+
+def unharmed(recording: Recording) -> bool:
+    """Whether reading lost and repaired nothing; velocities are not needed."""
+    return replace(recording.report, absent=()).clean
 
 
 def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:

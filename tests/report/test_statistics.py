@@ -78,7 +78,7 @@ def test_verdict_is_good_when_held_out_data_are_predicted(case):
 def test_without_held_out_data_nothing_is_proven(case):
     judgement = judge(case.result, {}, case.recordings)
     assert judgement.grade == 'unproven'
-    assert any('held out' in line for line in judgement.beware)
+    assert 'no data were held out' in judgement.sentences[1]
     assert any('validate' in step for step in judgement.next_steps)
 
 
@@ -99,7 +99,7 @@ def test_missing_friction_is_seen_in_the_residual(case):
     coulomb = 0.1 * np.sign(fits[0].motion.dq)
     worse = replace(fits[0], predicted=fits[0].predicted - coulomb)
     judgement = judge(case.result, {source: (worse,)}, case.recordings)
-    speed = [line for line in judgement.beware if 'goes with its speed' in line]
+    speed = [line for line in judgement.beware if 'goes with its speed (' in line]
     assert len(speed) == len(case.result.arm.robot.joints)
 
 

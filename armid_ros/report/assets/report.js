@@ -80,9 +80,10 @@
     };
   }
 
-  function axis(label, side) {
+  function axis(label, side, whole = false) {
     const vertical = side === 3;
     return {
+      ...(whole ? {incrs: [1, 2, 5, 10, 20, 50, 100]} : {}),
       label: label || null, side, font, labelFont: font, labelSize: 18, labelGap: 0, gap: 4,
       stroke: () => colour.soft,
       size: vertical ? (u, values) => 16 + 6.4 * Math.max(6, ...(values || []).map((v) => v.length)) : 26,
@@ -191,7 +192,7 @@
     const plot = new uPlot({
       width: figure.clientWidth, height: spec.height, series, bands, padding: [8, 12, 0, 0],
       scales: {x: {time: false, range: rangeX(spec)}, y: {range: rangeY(spec)}},
-      axes: [axis(spec.xlabel, 2), axis(spec.ylabel, 3)],
+      axes: [axis(spec.xlabel, 2, spec.x.every(Number.isInteger)), axis(spec.ylabel, 3)],
       legend: {show: spec.legend, markers: {width: 3}},
       cursor: {y: false, drag: {x: true, y: false}, points: {size: 6},
         ...(spec.link ? {sync: {key: spec.link, scales: ['x', null]}} : {})},

@@ -95,7 +95,7 @@ def _draw(axes: Axes, estimate: Estimate, target: FloatArray, members: list[int]
     labels = [short_label(estimate.parameters[member]) for member in members]
     axes.set_yticks(rows, labels)
     axes.set_ylim(len(members) - 0.4, -0.6)
-    if np.abs(values).max() > 30.0 * np.median(np.abs(values) + reach):
+    if np.abs(values).max() > 12.0 * np.median(np.abs(values) + reach):
         _signed_log(axes, float(np.median(reach)))
     else:
         axes.xaxis.set_major_locator(MaxNLocator(5))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.recording import Recording
+from armid_ros.report.judgement import unharmed
 from armid_ros.report.page import Section
 import numpy as np
 
@@ -64,7 +65,7 @@ class RecordingQuality:
             longest_gap=float(steps.max()),
             clock=recording.clock,
             description=recording.report.describe(),
-            clean=recording.report.clean,
+            clean=unharmed(recording),
         )
 
 
