@@ -214,38 +214,84 @@ def test_page_is_not_wider_than_the_screen(browser, tmp_path, html, hostile, wid
         assert browser.complaints == []
 
 
-def test_zoom_is_shared_by_torque_and_residual_and_can_be_undone(browser, tmp_path, html):
-    path = tmp_path / 'report.html'
-    path.write_text(html, encoding='utf-8')
-    browser.open(path, 1280)
-    browser.run('document.querySelector("#fit figure.chart").scrollIntoView()')
-    box = browser.run(
-        '(() => { const b = document.querySelector("#fit .u-over").getBoundingClientRect();'
-        ' return [b.left, b.top, b.width, b.height]; })()'
-    )
-    y = box[1] + box[3] / 2
-    buttons = '[...document.querySelectorAll("#fit .panel")][0].querySelectorAll(".reset")'
-    hidden = f'[...{buttons}].map(button => button.hidden)'
-    assert browser.run(hidden) == [True, True]
-    drag = (
-        ('mouseMoved', 0.3),
-        ('mousePressed', 0.3),
-        ('mouseMoved', 0.5),
-        ('mouseMoved', 0.6),
-        ('mouseReleased', 0.6),
-    )
+FRAMES = 'new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))'
+BUTTONS = 'document.querySelector("#fit .panel").querySelectorAll(".reset")'
+HIDDEN = f'[...{BUTTONS}].map(button => button.hidden)'
+
+
+@pytest.fixture
+def first_plot(browser, tmp_path, html):
+    """Open the report at a width and return where its first plot is: left, middle, width."""
+
+    def opened(width):
+        path = tmp_path / 'report.html'
+        path.write_text(html, encoding='utf-8')
+        browser.open(path, width)
+        browser.run('document.querySelector("#fit figure.chart").scrollIntoView()')
+        return browser.run(
+            '(() => { const box = document.querySelector("#fit .u-over").getBoundingClientRect();'
+            ' return [box.left, box.top + box.height / 2, box.width]; })()'
+        )
+
+    return opened
+
+
+def test_dragging_zooms_torque_and_residual_and_the_button_undoes_it(browser, first_plot):
+    left, middle, width = first_plot(1280)
+    assert browser.run(HIDDEN) == [True, True]
+    drag = (('Moved', 0.3), ('Pressed', 0.3), ('Moved', 0.5), ('Moved', 0.6), ('Released', 0.6))
     for kind, share in drag:
         browser.call(
             'Input.dispatchMouseEvent',
-            type=kind,
-            x=box[0] + share * box[2],
-            y=y,
+            type=f'mouse{kind}',
+            x=left + share * width,
+            y=middle,
             button='left',
             clickCount=1,
         )
-    browser.run('new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))')
-    assert browser.run(hidden) == [False, False]
-    browser.run(f'{buttons}[1].click()')
-    browser.run('new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))')
-    assert browser.run(hidden) == [True, True]
+    browser.run(FRAMES)
+    assert browser.run(HIDDEN) == [False, False]
+    browser.run(f'{BUTTONS}[1].click()')
+    browser.run(FRAMES)
+    assert browser.run(HIDDEN) == [True, True]
+    assert browser.complaints == []
+
+
+def test_two_fingers_zoom_and_a_double_tap_undoes_it(browser, first_plot):
+    left, middle, width = first_plot(390)
+
+    def touch(kind, *shares):
+        points = [
+            {'x': left + share * width, 'y': middle, 'id': number}
+            for number, share in enumerate(shares)
+        ]
+        browser.call('Input.dispatchTouchEvent', type=f'touch{kind}', touchPoints=points)
+
+    touch('Start', 0.45)
+    touch('Start', 0.45, 0.55)
+    touch('Move', 0.3, 0.7)
+    touch('Move', 0.2, 0.8)
+    touch('End')
+    browser.run(FRAMES)
+    assert browser.run(HIDDEN) == [False, False]
+    for _ in range(2):
+        touch('Start', 0.5)
+        touch('End')
+    browser.run(FRAMES)
+    assert browser.run(HIDDEN) == [True, True]
+    assert browser.complaints == []
+
+
+def test_print_shows_what_is_folded_and_folds_it_again(browser, first_plot):
+    first_plot(1280)
+    count = 'document.querySelectorAll("details[open]").length'
+    browser.run(
+        'addEventListener("beforeprint", () => {'
+        f' window.printed = [{count}, document.querySelectorAll("details").length]; }})'
+    )
+    before = browser.run(count)
+    sheet = browser.call('Page.printToPDF', preferCSSPageSize=True)['data']
+    shown, folds = browser.run('window.printed')
+    assert shown == folds > before == browser.run(count)
+    assert len(sheet) > 100_000
     assert browser.complaints == []
