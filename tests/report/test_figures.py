@@ -51,7 +51,7 @@ def test_parameter_figure_counts_the_intervals_that_contain_the_reference(case):
     written = texts(parameter_figure(estimate, reference))
     count = len(reference)
     assert any(f'{count - 3} of {count} intervals contain the truth' in text for text in written)
-    assert {'kg m²', 'N m', 'elbow_pitch'} <= {text.split(';')[0] for text in written}
+    assert {'kg m²', 'N m', 'elbow_pitch'} <= {text.split(' (')[0] for text in written}
 
 
 def test_parameter_figure_has_a_bar_for_every_parameter(case):

@@ -7,6 +7,8 @@ from html.parser import HTMLParser
 import re
 
 from armid_ros.report import hash_files, identification_report, Provenance, versions
+from armid_ros.report.sections.fit import FitSection
+import numpy as np
 import pytest
 
 HOSTILE = '<script>alert(1)</script>'
@@ -172,6 +174,19 @@ def test_names_that_are_scripts_stay_names(page, hostile):
     assert HOSTILE in reader.text
     assert HOSTILE not in hostile
     assert reader.scripts == page.scripts
+
+
+def test_residual_at_rest_is_drawn_apart(case):
+    ((source, fits),) = case.validation.items()
+    informative = fits[0].informative.copy()
+    informative[10:20, 2] = False
+    resting = replace(fits[0], informative=informative)
+    section = FitSection(case.result.arm.robot, {}, {source: (resting,)})
+    still, moving = section.shown[0].joints[2].residual.series
+    residual = resting.residual[:, 2]
+    np.testing.assert_array_equal(still.y[10:20], residual[10:20])
+    assert np.isnan(moving.y[10:20]).all() and np.isnan(still.y).sum() == len(residual) - 10
+    assert section.rests and 'does not count' in section.html()
 
 
 def test_without_held_out_data_the_report_says_so(case):

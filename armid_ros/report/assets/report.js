@@ -6,7 +6,7 @@
   const root = document.documentElement;
   const roles = ['measured', 'predicted', 'residual', 'before', 'after', 'floor', 'trend', 'faint',
     'ink', 'soft', 'line', 'grid'];
-  const widths = {measured: 3, faint: 1, trend: 2};
+  const widths = {measured: 3, faint: 1.3, trend: 2};
   const font = '11px system-ui, sans-serif';
   const charts = new Map();  // figure -> {plot, spec}
   let colour = {};
@@ -87,7 +87,7 @@
       label: label || null, side, font, labelFont: font, labelSize: 18, labelGap: 0, gap: 4,
       stroke: () => colour.soft,
       size: vertical ? (u, values) => 16 + 6.4 * Math.max(6, ...(values || []).map((v) => v.length)) : 26,
-      space: vertical ? 22 : 55,
+      space: vertical ? 18 : 55,
       values: (u, splits) => splits.map((value) => (value == null ? '' : String(Number(value.toPrecision(6))))),
       grid: {stroke: () => colour.grid, width: 1},
       ticks: {stroke: () => colour.line, width: 1, size: 4},

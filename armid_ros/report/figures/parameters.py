@@ -65,7 +65,9 @@ def parameter_figure(
             axes.grid(False, axis='y')
     assert axes is not None
     axes.errorbar([], [], xerr=[], **_marks(RESIDUAL), label='estimate, 95 % interval')
-    axes.errorbar([], [], xerr=[], **_marks(PREDICTED), label=f'... without the {reference_label}')
+    axes.errorbar(
+        [], [], xerr=[], **_marks(PREDICTED), label=f'... that leaves out the {reference_label}'
+    )
     axes.plot([], [], '|', color=MEASURED, markersize=9, label=reference_label)
     legend(figure, axes)
     inside = np.count_nonzero(_contains(estimate, target))
@@ -96,7 +98,7 @@ def _draw(axes: Axes, estimate: Estimate, target: FloatArray, members: list[int]
     axes.set_yticks(rows, labels)
     axes.set_ylim(len(members) - 0.4, -0.6)
     if np.abs(values).max() > 12.0 * np.median(np.abs(values) + reach):
-        _signed_log(axes, float(np.median(reach)))
+        _signed_log(axes, float(np.quantile(reach, 0.25)))
     else:
         axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.axvline(0.0, color='#cccccc', linewidth=0.8, zorder=0)
@@ -106,6 +108,7 @@ def _signed_log(axes: Axes, near_zero: float) -> None:
     """Make the axis logarithmic either side of a linear stretch as wide as the intervals."""
     linear = 10.0 ** float(np.ceil(np.log10(near_zero)))
     axes.set_xscale('symlog', linthresh=linear, linscale=0.8)
+    axes.margins(x=0.06)
     lowest, highest = axes.get_xlim()
     place = axes.xaxis.get_transform().transform
     apart = 0.19 * float(place(highest) - place(lowest))
@@ -120,7 +123,7 @@ def _signed_log(axes: Axes, near_zero: float) -> None:
     axes.xaxis.set_major_locator(FixedLocator(sorted(ticks)))
     axes.xaxis.set_minor_locator(NullLocator())
     exponent = f'$10^{{{round(np.log10(linear))}}}$'
-    axes.set_xlabel(f'{axes.get_xlabel()}; logarithmic beyond ± {exponent}')
+    axes.set_xlabel(f'{axes.get_xlabel()} (log beyond ± {exponent})')
 
 
 def _balanced(sizes: list[int]) -> list[list[int]]:

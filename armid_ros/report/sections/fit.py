@@ -14,6 +14,7 @@ from armid_ros.report.charts import Chart, joined, joined_time, Role, Series, th
 from armid_ros.report.notation import digits, torque_unit
 from armid_ros.report.page import Section
 from armid_ros.robots import Robot
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,12 @@ class FitSection(Section):
         return rows
 
     @property
+    def rests(self) -> bool:
+        """Whether a joint is held by friction somewhere."""
+        groups = (*self.training.values(), *self.validation.values())
+        return not all(bool(fit.informative.all()) for fits in groups for fit in fits)
+
+    @property
     def shown(self) -> list[Shown]:
         """The worst held-out recording, and the worst of the training data."""
         chosen = []
@@ -139,6 +146,7 @@ def fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[C
     measured = joined([fit.motion.tau[:, joint] for fit in fits if fit.motion.tau is not None])
     predicted = joined([fit.predicted[:, joint] for fit in fits])
     residual = measured - predicted
+    counts = joined([fit.informative[:, joint].astype(float) for fit in fits]) == 1.0
     kept = thinned(measured, residual)
     torque_chart = Chart(
         t[kept],
@@ -153,10 +161,13 @@ def fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[C
     )
     residual_chart = Chart(
         t[kept],
-        [Series('residual', residual[kept], 'residual')],
+        [
+            Series('at rest, not counted', np.where(counts, np.nan, residual)[kept], 'faint'),
+            Series('residual', np.where(counts, residual, np.nan)[kept], 'residual'),
+        ],
         'time [s]',
         f'residual [{unit}]',
-        height=130,
+        height=145,
         link=link,
         symmetric=True,
         legend=False,
