@@ -43,10 +43,11 @@ OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'repor
 
 @click.command(epilog='Example: armid demo --gravity earth --out demo')
 @click.option('--gravity', type=click.Choice(['moon', 'earth']), default='moon', show_default=True)
+@click.option('--rate', default=500.0, show_default=True, help='Joint states per second.')
 @options.folder
 @options.seed
 @options.as_json
-def demo(gravity: str, out: Path, seed: int, as_json: bool) -> None:
+def demo(gravity: str, rate: float, out: Path, seed: int, as_json: bool) -> None:
     """Excite, move, identify online, record, identify offline, and compare with the truth."""
     from armid_ros.nodes.lockstep import Progress, replay_lockstep, run_lockstep
 
@@ -68,7 +69,9 @@ def demo(gravity: str, out: Path, seed: int, as_json: bool) -> None:
             table.show(now.t, now.duration, now.estimate, now.real_time_factor)
 
         plant = SimulatedArm(truth, rng=rng, sensors=SENSORS)
-        end = run_lockstep(plant, excitation, identifier, out / 'bag', on_progress=watch)
+        end = run_lockstep(
+            plant, excitation, identifier, out / 'bag', rate=rate, on_progress=watch
+        )
     again = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
     with progress('playing the bag back') as tick:
         replay = replay_lockstep(

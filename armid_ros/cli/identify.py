@@ -19,6 +19,7 @@ from armid_ros.identification import (
 from armid_ros.identification import (
     identify as run,
 )
+from armid_ros.report import hash_files, identification_report, Provenance, versions
 import click
 import numpy as np
 
@@ -82,6 +83,21 @@ def identify(
     out.mkdir(parents=True, exist_ok=True)
     source = options.kept_source(robot_source, robot, out)
     save_model(out / 'model.yaml', result.arm, source, result.estimate)
+    page = identification_report(
+        result,
+        description=arm,
+        robot=robot_source,
+        recordings=recordings,
+        validation=validation,
+        validation_recordings=held_out,
+        provenance=Provenance(
+            files=hash_files([*bags, *validate]),
+            versions=versions(),
+            settings={name: str(value) for name, value in document['settings'].items()},
+            seed=seed,
+        ),
+    )
+    (out / 'report.html').write_text(page, encoding='utf-8')
     (out / 'identification.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
     if as_json:
         click.echo(json.dumps(document))
@@ -95,4 +111,4 @@ def identify(
     say(f'relative error {fitted:.2f} % on the data it was fitted to')
     for entry in document['validation']:
         say(f'relative error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
-    say(f'{out}: model.yaml, identification.json')
+    say(f'{out}: model.yaml, identification.json, report.html')

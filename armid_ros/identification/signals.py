@@ -132,9 +132,10 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
         )
     period = 1.0 / used.rate_hz
     shortest = 2 * _HALF_TAPS * used.decimation + 10 * used.rate_hz / used.cutoff_hz
-    breaks = np.flatnonzero(np.diff(recording.t) > GAP_PERIODS * period) + 1
+    longest = GAP_PERIODS * max(period, recording.period)
+    breaks = np.flatnonzero(np.diff(recording.t) > longest) + 1
     for part in np.split(np.arange(len(recording.t)), breaks):
-        if len(part) > shortest:
+        if len(part) > 3 and recording.t[part[-1]] - recording.t[part[0]] > shortest * period:
             t, q, tau = _even(recording.t[part], recording.q[part], recording.tau[part], period)
             yield _differentiated(recording.joints, t, q, tau, used)
 

@@ -63,6 +63,17 @@ def test_jittered_stamps_are_used_as_they_are(arm):
     np.testing.assert_allclose(motion.dq[:, 0], truth, atol=2e-3)
 
 
+def test_a_recording_at_another_rate_goes_through_the_same_filter():
+    """Validation data at 200 Hz, training data at 1 kHz."""
+    t, q = sine(rate=200.0)
+    recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
+    (motion,) = segments(recording, Conditioning(1000.0, 50.0, 10))
+    inner = motion.select(slice(100, -100))
+    assert len(motion) > 5 * len(t) * 0.9
+    truth = 2 * np.pi * np.cos(2 * np.pi * inner.t)
+    np.testing.assert_allclose(inner.dq[:, 0], truth, atol=1e-3)
+
+
 def test_a_gap_splits_a_recording(arm):
     t, q = sine()
     keep = (t < 4.0) | (t > 4.5)
