@@ -4,16 +4,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
-from armid_ros.effects import Action, DryFriction, Effect
+from armid_ros.effects import Action, Displacement, Effect, merge_actions, TorqueLaw, TorqueReading
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.model import (
     BaseParameters,
     group_columns,
     inverse_dynamics,
+    inverse_dynamics_derivatives,
     random_motion,
     regressor,
     rigid_parameter_names,
@@ -23,11 +24,16 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
+#: Step of the differences along a change of motion [rad or m, rad/s or m/s].
+_STEP = 1e-6
+
 
 @dataclass(frozen=True)
 class ArmModel:
     """
     A rigid body plus effects: tau = Y pi + sum over effects of tau_e(motion; theta_e).
+
+    Motions are as recorded: effects of the sensors are part of the arm.
 
     Attributes
     ----------
@@ -87,41 +93,51 @@ class ArmModel:
         parts = np.split(theta, cuts)[:-1]
         return replace(self, robot=self.robot.with_inertias(parts[0]), values=tuple(parts[1:]))
 
-    def effect_columns(self, motion: Motion) -> FloatArray:
-        """Return the sensitivities of the effects, shape (N, n, P - 10 n)."""
-        blocks = [effect.columns(motion, self) for effect in self.effects]
-        empty = np.empty((len(motion), motion.n_joints, 0))
-        return np.concatenate([empty, *blocks], axis=2)
-
-    def columns(self, motion: Motion) -> FloatArray:
-        """Return the sensitivities of the torques to ``parameters``, shape (N, n, P)."""
-        rigid = regressor(self.robot, self._felt(motion))
-        return np.concatenate([rigid, self.effect_columns(motion)], axis=2)
+    def values_of(self, effect: Effect) -> FloatArray:
+        """Return the values of an effect, shape (P_e,); zeros if the arm does not have it."""
+        for own, values in zip(self.effects, self.values, strict=True):
+            if own == effect:
+                return values
+        return np.zeros(len(effect.parameters(self.robot)))
 
     def action(self) -> Action:
-        """Return how the robot and all effects together act on the plant."""
+        """Return how the robot and all effects together act on plant and sensors."""
+        return self._acting
+
+    @cached_property
+    def _acting(self) -> Action:
         robot = self.robot
-        actions = []
-        for effect, values in zip(self.effects, self.values, strict=True):
-            actions.append(effect.action(values, replace(self, robot=robot)))
-            robot = actions[-1].robot or robot
-        torques = [a.torque for a in actions if a.torque is not None]
+        pairs = list(zip(self.effects, self.values, strict=True))
+        for effect, values in pairs:
+            if effect.changes_body:
+                robot = effect.action(values, ArmModel(robot)).robot or robot
+        bare = ArmModel(robot, quasi_static=self.quasi_static)
+        actions = [e.action(values, bare) for e, values in pairs if not e.changes_body]
+        return merge_actions(robot, actions)
 
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.asarray(sum(f(t, q, dq) for f in torques))
+    @property
+    def body(self) -> Robot:
+        """The rigid body as the effects make it: with payload, under the gravity that is there."""
+        assert self._acting.robot is not None
+        return self._acting.robot
 
-        zero = np.zeros((robot.n_joints, robot.n_joints))
-        return Action(
-            damping=sum((a.damping for a in actions if a.damping is not None), zero),
-            inertia=sum((a.inertia for a in actions if a.inertia is not None), zero),
-            dry_friction=_merge([a.dry_friction for a in actions if a.dry_friction is not None]),
-            torque=torque if torques else None,
-            robot=robot,
+    def link_motion(self, motion: Motion) -> Motion:
+        """Return the true motion of the links where another one was recorded."""
+        displacement = self._acting.displacement
+        if displacement is None:
+            return motion
+        change = displacement(motion)
+        return replace(
+            motion, q=motion.q + change.q, dq=motion.dq + change.dq, ddq=motion.ddq + change.ddq
         )
 
-    def torque(self, motion: Motion) -> FloatArray:
+    def load(self, motion: Motion) -> FloatArray:
+        """Return what the rigid body takes along a motion of the links, shape (N, n) [N m]."""
+        return inverse_dynamics(self.body, self.felt(motion))
+
+    def joint_torque(self, motion: Motion) -> FloatArray:
         """
-        Predict the joint torques of a motion, all effects included exactly.
+        Return the true torques of a recorded motion: what sensors of no error would read.
 
         Returns
         -------
@@ -129,18 +145,165 @@ class ArmModel:
             Actuator torque [N m].
 
         """
-        action = self.action()
-        assert action.robot is not None and action.damping is not None
-        assert action.inertia is not None
-        tau = inverse_dynamics(action.robot, self._felt(motion))
-        tau += motion.dq @ action.damping.T + motion.ddq @ action.inertia.T
+        action, link = self._acting, self.link_motion(motion)
+        load = self.load(link)
+        tau = load.copy()
+        if action.damping is not None:
+            tau += motion.dq @ action.damping.T
+        if action.inertia is not None:
+            tau += motion.ddq @ action.inertia.T
         if action.dry_friction is not None:
-            tau += action.dry_friction.torque(motion.dq)
+            tau += action.dry_friction.torque(motion.dq, load)
+        if action.hysteresis is not None:
+            tau += action.hysteresis.torque(action.hysteresis.along(motion.q, motion.dq))
         if action.torque is not None:
             tau += action.torque(motion.t, motion.q, motion.dq)
+        if action.link_torque is not None:
+            tau += action.link_torque(link.t, link.q, link.dq)
         return tau
 
-    def _felt(self, motion: Motion) -> Motion:
+    def torque(self, motion: Motion) -> FloatArray:
+        """
+        Predict what the torque sensors read along a recorded motion, all effects included.
+
+        Parameters
+        ----------
+        motion : Motion
+            As the position sensors have it. Its torque, if it has one, counts only for drives
+            that report more than they give.
+
+        Returns
+        -------
+        ndarray, shape (N, n)
+            Actuator torque as read [N m].
+
+        """
+        tau = self.joint_torque(motion)
+        reading = self._acting.reading
+        return tau if reading is None else reading(motion, tau)
+
+    def rigid_columns(self, motion: Motion) -> FloatArray:
+        """Return the sensitivities to the rigid parameters, shape (N, n, 10 n)."""
+        link = self.link_motion(motion)
+        columns = regressor(self.body, self.felt(link))
+        return self._as_read(motion, self._with_load_friction(motion, columns))
+
+    def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
+        """
+        Return the sensitivities of what is read to the parameters of an effect.
+
+        Parameters
+        ----------
+        effect : Effect
+            One that the arm has, or one that it may be lacking.
+        motion : Motion
+            As recorded; a whole unbroken stretch unless the effect is instantaneous.
+
+        Returns
+        -------
+        ndarray, shape (N, n, P_e)
+            Derivative of ``torque`` at the arm as it is.
+
+        """
+        columns = effect.columns(motion, self)
+        if effect.changes_body:
+            columns = self._with_load_friction(motion, columns)
+        return self._as_read(motion, columns, effect)
+
+    def effect_columns(self, motion: Motion) -> FloatArray:
+        """Return the sensitivities of the effects, shape (N, n, P - 10 n)."""
+        blocks = [self.columns_of(effect, motion) for effect in self.effects]
+        empty = np.empty((len(motion), motion.n_joints, 0))
+        return np.concatenate([empty, *blocks], axis=2)
+
+    def columns(self, motion: Motion) -> FloatArray:
+        """
+        Return the sensitivities to all ``parameters``, shape (N, n, P).
+
+        They are the derivative of ``torque``. An effect that depends on the load of a joint takes
+        it from the arm as it is.
+
+        """
+        return np.concatenate([self.rigid_columns(motion), self.effect_columns(motion)], axis=2)
+
+    def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
+        """
+        Differentiate the true torque by changes of the links' motion.
+
+        Parameters
+        ----------
+        motion : Motion
+            As recorded.
+        change : Displacement
+            Directions, arrays of shape (N, n, P).
+
+        Returns
+        -------
+        ndarray, shape (N, n, P)
+
+        """
+        link = self.link_motion(motion)
+        by_q, by_dq, by_ddq = inverse_dynamics_derivatives(self.body, self.felt(link))
+        columns = by_q @ change.q
+        if not self.quasi_static:
+            columns += by_dq @ change.dq + by_ddq @ change.ddq
+        columns = self._with_load_friction(motion, columns)
+        law = self._acting.link_torque
+        if law is not None:
+            columns += _directional(law, link, change)
+        return columns
+
+    def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
+        """Return the torque that an effect of the sensors is given to read, shape (N, n) [N m]."""
+        tau = self.joint_torque(motion)
+        for own, values in self._readings:
+            if own == effect:
+                break
+            tau = own.read(values, motion, tau)
+        return tau
+
+    @property
+    def settling_time(self) -> float:
+        """How far back in time what is read depends on the torque [s]."""
+        return self._acting.reading_memory
+
+    @property
+    def _readings(self) -> list[tuple[TorqueReading, FloatArray]]:
+        pairs = zip(self.effects, self.values, strict=True)
+        return [(e, values) for e, values in pairs if isinstance(e, TorqueReading)]
+
+    def _as_read(
+        self, motion: Motion, columns: FloatArray, after: Effect | None = None
+    ) -> FloatArray:
+        """Pass columns through the torque sensors: all of them, or those after an effect."""
+        readings = self._readings
+        if isinstance(after, TorqueReading):
+            known = [own for own, _ in readings]
+            first = known.index(after) + 1 if after in known else len(known)
+        else:
+            first = 0
+        if not any(np.any(values) for _, values in readings[first:]):
+            return columns
+        tau = self.joint_torque(motion)
+        for position, (own, values) in enumerate(readings):
+            if position >= first:
+                columns = own.transfer(values, motion, tau, columns)
+            tau = own.read(values, motion, tau)
+        return columns
+
+    def _with_load_friction(self, motion: Motion, columns: FloatArray) -> FloatArray:
+        """Add to changes of the load what friction in proportion to it adds."""
+        friction = self._acting.dry_friction
+        if friction is None or friction.load_share is None:
+            return columns
+        along = friction.directions.T
+        load = self.load(self.link_motion(motion))
+        gain = friction.load_share * np.sign(load @ along) * np.sign(motion.dq @ along)
+        changes = np.einsum('nm,jm,njp->nmp', gain, along, columns)
+        return np.asarray(columns + np.einsum('im,nmp->nip', along, changes))
+
+    def felt(self, motion: Motion) -> Motion:
+        """Return what the rigid body feels of a motion of the links: all, or its weight alone."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(self, rng: np.random.Generator) -> BaseParameters:
@@ -150,16 +313,12 @@ class ArmModel:
         return group_columns(columns.reshape(-1, columns.shape[-1]), self.parameters)
 
 
-def _merge(elements: Sequence[DryFriction]) -> DryFriction | None:
-    """Stack friction elements; those along the same direction become one with summed levels."""
-    if not elements:
-        return None
-    directions = np.vstack([e.directions for e in elements])
-    lower = np.concatenate([e.lower for e in elements])
-    upper = np.concatenate([e.upper for e in elements])
-    unique, inverse = np.unique(directions, axis=0, return_inverse=True)
-    sums = np.zeros((2, len(unique)))
-    np.add.at(sums[0], inverse.ravel(), lower)
-    np.add.at(sums[1], inverse.ravel(), upper)
-    active = np.any(sums != 0.0, axis=0)
-    return DryFriction(unique[active], sums[0, active], sums[1, active])
+def _directional(law: TorqueLaw, link: Motion, change: Displacement) -> FloatArray:
+    """Differentiate a torque law along directions, by central differences, (N, n, P)."""
+    columns = np.empty(change.q.shape)
+    for index in range(columns.shape[2]):
+        q, dq = change.q[:, :, index], change.dq[:, :, index]
+        step = _STEP / max(float(np.max(np.abs(q))), float(np.max(np.abs(dq))), _STEP)
+        ends = [law(link.t, link.q + s * q, link.dq + s * dq) for s in (step, -step)]
+        columns[:, :, index] = (ends[0] - ends[1]) / (2.0 * step)
+    return columns

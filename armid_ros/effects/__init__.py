@@ -2,15 +2,33 @@
 # SPDX-License-Identifier: Apache-2.0
 """What acts on the joints of an arm beside its rigid body, one family a file."""
 
-from armid_ros.effects.base import Action, DryFriction, Effect, Quantity
+from armid_ros.effects.action import (
+    Action,
+    Displacement,
+    DryFriction,
+    Hysteresis,
+    merge_actions,
+    TorqueLaw,
+    Transmission,
+)
+from armid_ros.effects.base import Effect, Quantity, Shape
 from armid_ros.effects.catalogue import CATALOGUE, make_effect, parse_effect
+from armid_ros.effects.readings import Displacing, TorqueReading
 
 __all__ = [
     'CATALOGUE',
-    'Action',
-    'DryFriction',
-    'Effect',
-    'Quantity',
     'make_effect',
     'parse_effect',
+    'Effect',
+    'Quantity',
+    'Shape',
+    'Displacing',
+    'TorqueReading',
+    'Action',
+    'Displacement',
+    'DryFriction',
+    'Hysteresis',
+    'Transmission',
+    'TorqueLaw',
+    'merge_actions',
 ]

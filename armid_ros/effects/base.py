@@ -8,20 +8,25 @@ identifier how the torques depend on its parameters (``columns``), the diagnosis
 dependence explains a residual. An effect of the joints has its quantities once per joint; an
 effect of the whole arm has no joints and its quantities once.
 
+Quantities are amplitudes: the torque is linear in them, or nearly so. What it is not linear in,
+such as a Stribeck velocity, is a shape: it belongs to the effect itself, which has columns and
+acts with the shape that it has.
+
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import ClassVar, TYPE_CHECKING
 
+from armid_ros.effects.action import Action
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
+import numpy.typing as npt
 
 if TYPE_CHECKING:
     from armid_ros.arm import ArmModel
@@ -30,7 +35,13 @@ if TYPE_CHECKING:
 _PRISMATIC_UNITS = {
     'N m': 'N',
     'N m s/rad': 'N s/m',
+    'N m s^2/rad^2': 'N s^2/m^2',
+    'N m/rad': 'N/m',
+    'rad/(N m)': 'm/N',
     'kg m^2': 'kg',
+    'rad': 'm',
+    'rad/s': 'm/s',
+    '1/rev': '1/(2 pi m)',
 }
 
 
@@ -47,6 +58,8 @@ class Quantity:
         SI unit on a revolute joint.
     lower, upper : float
         What is physically possible.
+    typical : tuple of float, or None
+        Smallest and largest size that arms of 1 to 10 kg have, where it matters; a sign does not.
 
     """
 
@@ -54,68 +67,35 @@ class Quantity:
     unit: str
     lower: float = -np.inf
     upper: float = np.inf
+    typical: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
-class DryFriction:
+class Shape:
     """
-    Friction that can hold: a torque of any size between two levels while its velocity is zero.
+    One parameter that the torque does not depend on linearly, per owner of an effect.
 
     Attributes
     ----------
-    directions : ndarray, shape (m, n)
-        Velocity of each of m friction elements as a combination of the joint velocities.
-    lower, upper : ndarray, shape (m,)
-        Torque while the element moves backwards, and forwards [N m]; lower <= upper.
+    name : str
+        Standard term, such as 'stribeck_velocity'.
+    unit : str
+        SI unit on a revolute joint.
+    lower, upper : float
+        What is physically possible.
+    default : float
+        Value of an effect that was given none.
+    grid : tuple of float
+        Where a search starts from; values between which the best one is refined.
 
     """
 
-    directions: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-
-    def torque(self, dq: FloatArray) -> FloatArray:
-        """
-        Return the joint torques for moving joints; the middle of the levels for one at rest.
-
-        Parameters
-        ----------
-        dq : ndarray, shape (..., n)
-            Joint velocities.
-
-        """
-        half, middle = (self.upper - self.lower) / 2, (self.upper + self.lower) / 2
-        return np.asarray((half * np.sign(dq @ self.directions.T) + middle) @ self.directions)
-
-
-@dataclass(frozen=True)
-class Action:
-    """
-    How effects with given values act on the plant; what is not used stays None.
-
-    The actuator has to supply damping @ dq + inertia @ ddq + dry friction + torque(t, q, dq) on
-    top of the rigid body's torque.
-
-    Attributes
-    ----------
-    damping : ndarray, shape (n, n), or None
-        Viscous matrix [N m s/rad].
-    inertia : ndarray, shape (n, n), or None
-        Constant inertia seen by the joints only [kg m^2].
-    dry_friction : DryFriction, or None
-        Friction with a sticking phase.
-    torque : callable (t, q, dq) -> ndarray (..., n), or None
-        Anything else that depends smoothly on the state [N m].
-    robot : Robot, or None
-        The rigid body that takes the place of the nominal one.
-
-    """
-
-    damping: FloatArray | None = None
-    inertia: FloatArray | None = None
-    dry_friction: DryFriction | None = None
-    torque: Callable[[FloatArray, FloatArray, FloatArray], FloatArray] | None = None
-    robot: Robot | None = None
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    default: float
+    grid: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -127,16 +107,44 @@ class Effect(ABC):
     ----------
     joints : tuple of str
         The joints it acts on; empty for an effect of the whole arm.
+    shape : tuple of float
+        Shape parameters, owner by owner; the defaults if none are given.
 
     """
 
-    joints: tuple[str, ...] = field(default=())
+    joints: tuple[str, ...] = ()
+    shape: tuple[float, ...] = ()
 
     name: ClassVar[str]
     summary: ClassVar[str]
     quantities: ClassVar[tuple[Quantity, ...]]
+    shapes: ClassVar[tuple[Shape, ...]] = ()
     #: Whether the torque of a joint at rest is anything between two levels, and so says nothing.
     holds_at_rest: ClassVar[bool] = False
+    #: Whether the torque is linear in the quantities; to the first order only where it is not.
+    linear: ClassVar[bool] = True
+    #: Whether the columns of a sample depend on that sample alone, or on those around it as well.
+    instantaneous: ClassVar[bool] = True
+    #: Whether it acts by changing the rigid body or its gravity.
+    changes_body: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        """Fill in the default shape and check what was given."""
+        defaults = tuple(s.default for s in self.shapes) * len(self.owners)
+        values = tuple(float(value) for value in self.shape) or defaults
+        if len(values) != len(defaults):
+            raise ModelError(
+                f'{self.name}: {len(values)} shape values for {len(self.owners)} times '
+                f'{", ".join(s.name for s in self.shapes) or "no shape"}'
+            )
+        for index, value in enumerate(values):
+            shape = self.shapes[index % len(self.shapes)]
+            if not shape.lower <= value <= shape.upper:
+                raise ModelError(
+                    f'{self.name}: {shape.name} has to be from {shape.lower:g} to '
+                    f'{shape.upper:g} {shape.unit}, not {value:g}'
+                )
+        object.__setattr__(self, 'shape', values)
 
     @classmethod
     def on(cls, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
@@ -156,11 +164,83 @@ class Effect(ABC):
                 f"{cls.name}: {robot.name} has no joint '{unknown[0]}'; "
                 f'its joints are {", ".join(robot.joints)}'
             )
-        return cls(tuple(chosen))
+        effect = cls(tuple(chosen))
+        return effect.with_shape(effect._default_shape(robot)) if cls.shapes else effect
 
     @classmethod
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         return robot.joints
+
+    def _default_shape(self, robot: Robot) -> FloatArray:
+        """Return a shape to begin with on this robot, shape (number of owners, S)."""
+        return self.shape_values
+
+    @property
+    def shape_values(self) -> FloatArray:
+        """Shape parameters, shape (number of owners, S)."""
+        return np.array(self.shape).reshape(len(self.owners), len(self.shapes))
+
+    def shape_over_joints(self, robot: Robot) -> FloatArray:
+        """Return every shape over the joints of a robot, defaults elsewhere, shape (S, n)."""
+        spread = np.tile([[s.default] for s in self.shapes], robot.n_joints)
+        spread[:, self.indices(robot.joints)] = self.shape_values.T
+        return spread
+
+    def with_shape(self, values: npt.ArrayLike) -> Effect:
+        """
+        Return the effect with another shape.
+
+        Parameters
+        ----------
+        values : array_like, shape (S,) or (number of owners, S)
+            Shape parameters, the same for every owner or for each its own.
+
+        Raises
+        ------
+        ModelError
+            If a value is not possible.
+
+        """
+        size = (len(self.owners), len(self.shapes))
+        try:
+            spread = np.broadcast_to(np.asarray(values, dtype=float), size)
+        except ValueError:
+            raise ModelError(
+                f'{self.name}: the shape of {size[0]} owners with '
+                f'{", ".join(s.name for s in self.shapes) or "no shape"} has size {size}, '
+                f'not {np.shape(values)}'
+            ) from None
+        return replace(self, shape=tuple(spread.ravel().tolist()))
+
+    def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
+        """Name the shape parameters, owner by owner."""
+        return tuple(
+            ParameterName(s.name, owner, joint_unit(s.unit, owner, robot))
+            for owner in self.owners
+            for s in self.shapes
+        )
+
+    def shape_grids(
+        self, motion: Motion, arm: ArmModel, residual: FloatArray | None = None
+    ) -> tuple[FloatArray, ...]:
+        """
+        Return where a search for the shape should start.
+
+        Parameters
+        ----------
+        motion : Motion
+            The data that the shape is to explain.
+        arm : ArmModel
+            The arm without the effect.
+        residual : ndarray, shape (N, n), optional
+            What the arm does not explain of the measured torque [N m].
+
+        Returns
+        -------
+        tuple of ndarray, one per shape, each of shape (number of owners, G)
+
+        """
+        return tuple(np.tile(s.grid, (len(self.owners), 1)) for s in self.shapes)
 
     @property
     def owners(self) -> tuple[str, ...]:
@@ -184,12 +264,20 @@ class Effect(ABC):
     @abstractmethod
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """
-        Differentiate the joint torques by the parameters, at the arm as it is.
+        Differentiate the torques by the parameters, at the arm as it is.
+
+        Parameters
+        ----------
+        motion : Motion
+            As recorded; of a whole unbroken stretch, unless the effect is instantaneous.
+        arm : ArmModel
+            The arm as it is, with or without this effect.
 
         Returns
         -------
         ndarray, shape (N, n, P)
-            dtau/dtheta, exact for an effect that is linear in its parameters.
+            dtau/dtheta, exact for an effect that is linear in its parameters. What torque sensors
+            make of it is not in it yet: see ``ArmModel.columns_of``.
 
         """
 

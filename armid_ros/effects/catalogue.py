@@ -8,16 +8,24 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from armid_ros.effects.base import Effect
-from armid_ros.effects.drive import RotorInertia
+from armid_ros.effects.drive import ActuatorSaturation, RotorInertia, TorqueRipple
 from armid_ros.effects.friction import (
     AsymmetricFriction,
     CoulombFriction,
-    CoupledJointFriction,
+    QuadraticFriction,
+    StribeckFriction,
+    ThermalFriction,
     ViscousFriction,
 )
 from armid_ros.effects.gravity import BaseTilt, GravityMagnitude
-from armid_ros.effects.load import Payload
-from armid_ros.effects.sensing import TorqueOffset
+from armid_ros.effects.hysteresis import LoadDependentFriction, PreslidingHysteresis
+from armid_ros.effects.interaction import HumanInteraction, InterfaceSlack
+from armid_ros.effects.load import LinkInertia, Payload
+from armid_ros.effects.pairs import CoupledJointFriction, JointCoupling, TorqueCrosstalk
+from armid_ros.effects.sensing import EncoderOffset, TorqueDrift, TorqueGain, TorqueOffset
+from armid_ros.effects.springs import JointSpring, SoftLimit
+from armid_ros.effects.timing import TimeDelay, TorqueLag
+from armid_ros.effects.transmission import Backlash, JointElasticity
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -26,13 +34,34 @@ import numpy as np
 _EFFECTS: tuple[type[Effect], ...] = (
     ViscousFriction,
     CoulombFriction,
+    StribeckFriction,
     AsymmetricFriction,
+    QuadraticFriction,
+    LoadDependentFriction,
+    PreslidingHysteresis,
+    ThermalFriction,
     CoupledJointFriction,
     TorqueOffset,
+    TorqueDrift,
+    TorqueGain,
+    TorqueCrosstalk,
+    TorqueLag,
+    TimeDelay,
+    EncoderOffset,
     RotorInertia,
     Payload,
+    LinkInertia,
     GravityMagnitude,
     BaseTilt,
+    JointElasticity,
+    Backlash,
+    TorqueRipple,
+    JointSpring,
+    JointCoupling,
+    SoftLimit,
+    ActuatorSaturation,
+    HumanInteraction,
+    InterfaceSlack,
 )
 
 CATALOGUE: Mapping[str, type[Effect]] = MappingProxyType({e.name: e for e in _EFFECTS})
@@ -68,29 +97,38 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
     Parameters
     ----------
     text : str
-        'coulomb_friction:coulomb_torque=0.2', or 'payload@wrist:payload_m=0.3,payload_mz=0.01'.
-        Every joint of the effect gets the values; what is not given is zero.
+        'coulomb_friction:coulomb_torque=0.2', or 'payload@wrist:payload_m=0.3,payload_mz=0.01', or
+        with a shape 'stribeck_friction:stribeck_torque=0.1,stribeck_velocity=0.05'. Every joint of
+        the effect gets the values; a quantity not given is zero, a shape as it is by default.
     robot : Robot
         The arm it acts on.
 
     Raises
     ------
     ModelError
-        If effect, joint or quantity do not exist or a value is not a number.
+        If effect, joint, quantity or shape do not exist or a value is not a number.
 
     """
     head, _, assignments = text.partition(':')
     effect = make_effect(head, robot)
-    known = [quantity.name for quantity in effect.quantities]
-    values = np.zeros((len(effect.owners), len(known)))
+    quantities = [quantity.name for quantity in effect.quantities]
+    shapes = [shape.name for shape in effect.shapes]
+    values = np.zeros((len(effect.owners), len(quantities)))
+    shape_values = effect.shape_values
     for assignment in filter(None, assignments.split(',')):
-        key, _, number = assignment.partition('=')
-        if key.strip() not in known:
-            raise ModelError(f"{effect.name} has no '{key.strip()}'; it has {', '.join(known)}")
+        key, _, number = (part.strip() for part in assignment.partition('='))
         try:
-            values[:, known.index(key.strip())] = float(number)
+            value = float(number)
         except ValueError:
             raise ModelError(
-                f"{text}: '{number}' is not a number; write {effect.name}:{key.strip()}=0.1"
+                f"{text}: '{number}' is not a number; write {effect.name}:{key}=0.1"
             ) from None
-    return effect, values.ravel()
+        if key in quantities:
+            values[:, quantities.index(key)] = value
+        elif key in shapes:
+            shape_values[:, shapes.index(key)] = value
+        else:
+            raise ModelError(
+                f"{effect.name} has no '{key}'; it has {', '.join(quantities + shapes)}"
+            )
+    return effect.with_shape(shape_values), values.ravel()

@@ -1,18 +1,31 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The drive train: the inertia of what turns before the gear."""
+"""The drives: what turns before the gear, the ripple of motor and gear, the end of their range."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armid_ros.effects.base import Action, Effect, joint_columns, Quantity, scatter
+from armid_ros.effects.action import Action
+from armid_ros.effects.base import Effect, joint_columns, Quantity, scatter, Shape
+from armid_ros.effects.readings import TorqueReading
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
 if TYPE_CHECKING:
     from armid_ros.arm import ArmModel
+    from armid_ros.robots import Robot
+
+#: Orders between which ripple is looked for [1/rev], and how many peaks a search starts from.
+_ORDERS = (2.0, 400.0)
+_PEAKS = 5
+#: Samples of an order spectrum; orders per resolution of the range of motion.
+_SPECTRUM_SAMPLES = 8000
+_OVERSAMPLING = 4.0
+#: A drive that gives nothing beyond its level cannot be asked for more than it gives: without a
+#: report of what it was asked for, this share of the excess is the most that it can lose.
+_MOST_LOST = 0.99
 
 
 @dataclass(frozen=True)
@@ -28,7 +41,7 @@ class RotorInertia(Effect):
 
     name = 'rotor_inertia'
     summary = 'inertia of rotor and gear, seen by its own joint only'
-    quantities = (Quantity('rotor_inertia', 'kg m^2', lower=0.0),)
+    quantities = (Quantity('rotor_inertia', 'kg m^2', lower=0.0, typical=(0.001, 1.1)),)
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/dIa = ddq [rad/s^2], shape (N, n, P)."""
@@ -38,3 +51,181 @@ class RotorInertia(Effect):
         """Return the inertia on the diagonal."""
         (inertia,) = scatter(self, values, arm.robot)
         return Action(inertia=np.diag(inertia))
+
+
+@dataclass(frozen=True)
+class TorqueRipple(Effect):
+    """
+    Torque that repeats at a fixed angle, tau = A sin(n q) + B cos(n q).
+
+    Cogging of a motor with N_c cycles per turn behind a gear of ratio N has n = N N_c per turn of
+    the joint; the kinematic error of a strain-wave gear n = 2 N. A line at a fixed order whatever
+    the speed: search for it before filters of fixed frequency take it away. Confounded with
+    joint_spring and gravity at orders of 1 and below.
+    Source: Taghirad and Belanger 1998.
+
+    """
+
+    name = 'torque_ripple'
+    summary = 'torque that repeats at a fixed angle of the joint: cogging, gear error'
+    quantities = (
+        Quantity('ripple_sine', 'N m', typical=(0.002, 2.0)),
+        Quantity('ripple_cosine', 'N m', typical=(0.002, 2.0)),
+    )
+    shapes = (
+        Shape('ripple_order', '1/rev', 0.1, 1e5, 20.0, (4.0, 6.0, 8.0, 12.0, 20.0, 50.0, 100.0)),
+    )
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return dtau/d(A, B) = (sin(n q), cos(n q)) [-], shape (N, n, P)."""
+        (order,) = self.shape_over_joints(arm.robot)
+        angle = order * motion.q
+        return joint_columns(self, motion, np.sin(angle), np.cos(angle))
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the torque."""
+        (order,) = self.shape_over_joints(arm.robot)
+        sine, cosine = scatter(self, values, arm.robot)
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            return np.asarray(sine * np.sin(order * q) + cosine * np.cos(order * q))
+
+        return Action(torque=torque)
+
+    def shape_grids(
+        self, motion: Motion, arm: ArmModel, residual: FloatArray | None = None
+    ) -> tuple[FloatArray, ...]:
+        """Return the orders at which the residual's spectrum over the angle has its peaks."""
+        if residual is None:
+            return super().shape_grids(motion, arm)
+        rows = [_peaks(motion.q[:, j], residual[:, j]) for j in self.indices(motion.joints)]
+        return (np.array(rows),)
+
+
+def order_spectrum(q: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """
+    Transform the torque of a joint over its angle instead of time.
+
+    Parameters
+    ----------
+    q, residual : ndarray, shape (N,)
+        Position [rad] and torque [N m] of one joint.
+
+    Returns
+    -------
+    orders : ndarray, shape (K,)
+        Cycles per turn, as fine as the range of motion resolves.
+    amplitude : ndarray, shape (K,)
+        Amplitude of the ripple that each would be alone [N m].
+
+    """
+    stride = max(1, len(q) // _SPECTRUM_SAMPLES)
+    q, torque = q[::stride], residual[::stride]
+    step = 2.0 * np.pi / max(float(np.ptp(q)), 1e-3) / _OVERSAMPLING
+    orders = np.arange(_ORDERS[0], max(_ORDERS[1], _ORDERS[0] + 8.0 * step), step)
+    torque = torque - np.polyval(np.polyfit(q, torque, 1), q)
+    rotation = np.exp(-1j * step * q)
+    phasor = np.exp(-1j * orders[0] * q) * torque
+    amplitude = np.empty(len(orders))
+    for index in range(len(orders)):
+        amplitude[index] = 2.0 * abs(phasor.mean())
+        phasor *= rotation
+    return orders, amplitude
+
+
+def _peaks(q: FloatArray, residual: FloatArray) -> FloatArray:
+    """Return the orders of the highest peaks of the spectrum, highest first, shape (_PEAKS,)."""
+    orders, amplitude = order_spectrum(q, residual)
+    padded = np.concatenate([[0.0], amplitude, [0.0]])
+    peaks = np.flatnonzero((amplitude >= padded[:-2]) & (amplitude > padded[2:]))
+    highest = peaks[np.argsort(amplitude[peaks])[::-1][:_PEAKS]]
+    return np.resize(orders[highest] if len(highest) else orders[:1], _PEAKS)
+
+
+@dataclass(frozen=True)
+class ActuatorSaturation(TorqueReading):
+    """
+    Torque beyond a level that a drive does not give, or that its report does not show.
+
+    With e(x) = sign(x) max(|x| - L, 0), what is beyond the level L:
+
+        reading = tau + lost e(reported) - clipped e(tau),
+
+    where the drive reports what it was asked for and gives tau = reported - lost e(reported):
+    lost = 1 is a hard limit of the torque, a smaller one a motor constant that sinks at high
+    current; clipped = 1 is a report that ends at L. The column of ``lost`` is taken from the
+    measured torque, where a recording has one: it is linear there, and explains what lies beyond
+    L only. Confounded with quadratic_friction where high torque means high speed, with torque_gain
+    if L is low; a sweep of amplitudes tells them apart.
+
+    """
+
+    name = 'actuator_saturation'
+    summary = 'torque beyond a level that the drive does not give, or does not report'
+    quantities = (
+        Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
+        Quantity('clipped_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
+    )
+    shapes = (Shape('saturation_torque', 'N m', 1e-6, 1e6, 10.0, (0.3, 1.0, 3.0, 10.0, 30.0)),)
+
+    def _default_shape(self, robot: Robot) -> FloatArray:
+        limits = robot.torque_limit[self.indices(robot.joints)][:, np.newaxis]
+        known = np.isfinite(limits) & (limits > 0.0)
+        return np.where(known, 0.8 * limits, self.shape_values)
+
+    def shape_grids(
+        self, motion: Motion, arm: ArmModel, residual: FloatArray | None = None
+    ) -> tuple[FloatArray, ...]:
+        """Return shares of the highest torque that was measured."""
+        tau = arm.joint_torque(motion) if motion.tau is None else motion.tau
+        highest = np.maximum(np.max(np.abs(tau[:, self.indices(motion.joints)]), axis=0), 1e-3)
+        return (np.outer(highest, [0.5, 0.6, 0.7, 0.8, 0.9, 0.95]),)
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return what the drives give of what they are asked for, and the reading."""
+        lost = scatter(self, values, arm.robot)[0]
+        (level,) = self.shape_over_joints(arm.robot)
+
+        def drive(tau: FloatArray) -> FloatArray:
+            return np.asarray(tau - lost * _beyond(tau, level))
+
+        reading = super().action(values, arm)
+        return Action(drive=drive if np.any(lost) else None, reading=reading.reading)
+
+    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return what is reported of the torque, shape (N, n) [N m]."""
+        lost, clipped, level = self._spread(values, motion)
+        hidden = clipped * _beyond(tau, level)
+        if motion.tau is None:
+            return np.asarray(tau + lost / (1.0 - lost) * _beyond(tau, level) - hidden)
+        return np.asarray(tau + lost * _beyond(motion.tau, level) - hidden)
+
+    def transfer(
+        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
+    ) -> FloatArray:
+        """Scale columns where the torque is beyond the level."""
+        lost, clipped, level = self._spread(values, motion)
+        slope = (lost / (1.0 - lost) if motion.tau is None else 0.0) - clipped
+        return np.asarray((1.0 + slope * (np.abs(tau) > level))[:, :, np.newaxis] * columns)
+
+    def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return what is beyond the level, of the report and of the torque, shape (N, n, P)."""
+        lost, _, level = self._spread(values, motion)
+        beyond = _beyond(tau, level)
+        asked = beyond / (1.0 - lost) ** 2 if motion.tau is None else _beyond(motion.tau, level)
+        return joint_columns(self, motion, asked, -beyond)
+
+    def _spread(self, values: FloatArray, motion: Motion) -> tuple[FloatArray, ...]:
+        """Return both shares and the level over the joints of a motion, each of shape (n,)."""
+        spread = np.zeros((3, motion.n_joints))
+        spread[2] = np.inf
+        columns = self.indices(motion.joints)
+        spread[:2, columns] = values.reshape(-1, 2).T
+        spread[2, columns] = self.shape_values[:, 0]
+        if motion.tau is None:
+            spread[0] = np.minimum(spread[0], _MOST_LOST)
+        return spread[0], spread[1], spread[2]
+
+
+def _beyond(tau: FloatArray, level: FloatArray) -> FloatArray:
+    return np.asarray(np.sign(tau) * np.maximum(np.abs(tau) - level, 0.0))

@@ -1,16 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Friction of the joints: viscous, Coulomb, asymmetric, and between two coupled joints."""
+"""Friction that depends on velocity: viscous, Coulomb, and what these two leave out."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armid_ros.effects.base import Action, DryFriction, Effect, joint_columns, Quantity, scatter
-from armid_ros.errors import ModelError
+from armid_ros.effects.action import Action, DryFriction
+from armid_ros.effects.base import Effect, joint_columns, Quantity, scatter, Shape
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import Robot
 import numpy as np
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ class ViscousFriction(Effect):
 
     name = 'viscous_friction'
     summary = 'torque proportional to joint velocity'
-    quantities = (Quantity('viscous_coefficient', 'N m s/rad', lower=0.0),)
+    quantities = (Quantity('viscous_coefficient', 'N m s/rad', lower=0.0, typical=(0.004, 10.0)),)
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/dFv = dq [rad/s], shape (N, n, P)."""
@@ -54,7 +53,7 @@ class CoulombFriction(Effect):
 
     name = 'coulomb_friction'
     summary = 'constant torque against the direction of motion; holds at rest'
-    quantities = (Quantity('coulomb_torque', 'N m', lower=0.0),)
+    quantities = (Quantity('coulomb_torque', 'N m', lower=0.0, typical=(0.005, 10.0)),)
     holds_at_rest = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
@@ -81,8 +80,8 @@ class AsymmetricFriction(Effect):
     name = 'asymmetric_friction'
     summary = 'friction that differs between the two directions of motion'
     quantities = (
-        Quantity('coulomb_asymmetry', 'N m'),
-        Quantity('viscous_asymmetry', 'N m s/rad'),
+        Quantity('coulomb_asymmetry', 'N m', typical=(0.005, 2.0)),
+        Quantity('viscous_asymmetry', 'N m s/rad', typical=(0.002, 5.0)),
     )
     holds_at_rest = True
 
@@ -102,78 +101,109 @@ class AsymmetricFriction(Effect):
 
 
 @dataclass(frozen=True)
-class CoupledJointFriction(Effect):
+class QuadraticFriction(Effect):
     """
-    Friction and inertia of a shaft that turns with the sum of two joints, as in a wrist drive.
+    Friction torque that grows with the square of the joint velocity, tau = Fq dq |dq|.
 
-    The joints are pairs (i, k), one after the other. With the shaft's velocity dq_i + dq_k,
-
-        tau_i = Ia ddq_k + Fv dq_k + Fc sign(dq_i + dq_k),
-        tau_k = Ia ddq_i + Fv dq_i + Fc sign(dq_i + dq_k);
-
-    the parts of Ia and Fv that act on a joint from its own motion belong to rotor_inertia and
-    viscous_friction.
-    Source: the model of the Staubli TX40's wrist in Janot, Vandanjon and Gautier 2014.
+    Drag of air or oil where Fq is positive; with viscous friction, a negative one is the
+    flattening at high speed that grease in strain-wave gears shows. Confounded with
+    stribeck_friction, whose curvature lies at low speed, and with saturation of the drive; a wider
+    range of speeds tells.
+    Source: Armstrong-Helouvry, Dupont and Canudas de Wit 1994, section 3.
 
     """
 
-    name = 'coupled_joint_friction'
-    summary = 'friction and inertia of a shaft that turns with the sum of two joints'
-    quantities = (
-        Quantity('coupled_inertia', 'kg m^2'),
-        Quantity('coupled_viscous_coefficient', 'N m s/rad'),
-        Quantity('coupled_coulomb_torque', 'N m', lower=0.0),
+    name = 'quadratic_friction'
+    summary = 'friction that grows with the square of the velocity, or flattens'
+    quantities = (Quantity('quadratic_coefficient', 'N m s^2/rad^2', typical=(0.0004, 1.0)),)
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return dtau/dFq = dq |dq| [rad^2/s^2], shape (N, n, P)."""
+        return joint_columns(self, motion, motion.dq * np.abs(motion.dq))
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the torque."""
+        (quadratic,) = scatter(self, values, arm.robot)
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            return np.asarray(quadratic * dq * np.abs(dq))
+
+        return Action(torque=torque)
+
+
+@dataclass(frozen=True)
+class StribeckFriction(Effect):
+    """
+    Friction beyond Coulomb's that lubrication takes away as the joint gets faster.
+
+    tau = dFs exp(-|dq / vs|^d) sign(dq), where dFs = Fs - Fc is the breakaway torque beyond the
+    Coulomb torque. The hump lies below 3 vs. Confounded with presliding_hysteresis, with the
+    curvature of quadratic_friction, and with a velocity that was filtered too much at reversals;
+    constant velocities from 0.01 to 2 rad/s in both directions tell them apart.
+    Source: Bo and Pavelescu 1982; Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
+
+    """
+
+    name = 'stribeck_friction'
+    summary = 'breakaway torque beyond Coulomb friction, gone at higher velocity'
+    quantities = (Quantity('stribeck_torque', 'N m', lower=0.0, typical=(0.001, 10.0)),)
+    shapes = (
+        Shape('stribeck_velocity', 'rad/s', 1e-4, 20.0, 0.1, (0.01, 0.03, 0.1, 0.3, 1.0)),
+        Shape('stribeck_exponent', '', 0.3, 4.0, 2.0, (1.0, 2.0)),
     )
     holds_at_rest = True
 
-    def __post_init__(self) -> None:
-        """Check that the joints are pairs."""
-        if not self.joints or len(self.joints) % 2:
-            raise ModelError(
-                f'{self.name}: joints come in pairs, such as joint_5 and joint_6; '
-                f'got {", ".join(self.joints) or "none"}'
-            )
-
-    @classmethod
-    def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
-        if robot.n_joints < 2:
-            raise ModelError(f'{cls.name}: {robot.name} has one joint only, nothing to couple')
-        return robot.joints[-2:]
-
-    @property
-    def owners(self) -> tuple[str, ...]:
-        """First joint of every pair."""
-        return self.joints[::2]
-
-    def _pairs(self, joints: tuple[str, ...]) -> list[tuple[int, int]]:
-        columns = self.indices(joints)
-        return list(zip(columns[::2], columns[1::2], strict=True))
-
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
-        """Return dtau/d(Ia, Fv, Fc) of every pair, shape (N, n, P)."""
-        columns = np.zeros((len(motion), motion.n_joints, 3 * len(self.owners)))
-        for position, (i, k) in enumerate(self._pairs(motion.joints)):
-            direction = np.sign(motion.dq[:, i] + motion.dq[:, k])
-            for row, other in ((i, k), (k, i)):
-                columns[:, row, 3 * position] = motion.ddq[:, other]
-                columns[:, row, 3 * position + 1] = motion.dq[:, other]
-                columns[:, row, 3 * position + 2] = direction
-        return columns
+        """Return dtau/ddFs = exp(-|dq / vs|^d) sign(dq) [-], shape (N, n, P)."""
+        return joint_columns(self, motion, self._left(motion.dq, arm) * np.sign(motion.dq))
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
-        """Return inertia and damping between the joints, and dry friction of the shaft."""
-        n = arm.robot.n_joints
-        inertia, damping = np.zeros((n, n)), np.zeros((n, n))
-        pairs = self._pairs(arm.robot.joints)
-        directions = np.zeros((len(pairs), n))
-        coulomb = np.empty(len(pairs))
-        for position, (i, k) in enumerate(pairs):
-            shaft_inertia, viscous, coulomb[position] = values.reshape(-1, 3)[position]
-            inertia[i, k] = inertia[k, i] = shaft_inertia
-            damping[i, k] = damping[k, i] = viscous
-            directions[position, [i, k]] = 1.0
-        return Action(
-            damping=damping,
-            inertia=inertia,
-            dry_friction=DryFriction(directions, -coulomb, coulomb),
-        )
+        """Return dry friction of the breakaway torque, and what motion takes away of it."""
+        (breakaway,) = scatter(self, values, arm.robot)
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            return np.asarray(breakaway * (self._left(dq, arm) - 1.0) * np.sign(dq))
+
+        dry = DryFriction(np.eye(len(breakaway)), -breakaway, breakaway)
+        return Action(dry_friction=dry, torque=torque)
+
+    def _left(self, dq: FloatArray, arm: ArmModel) -> FloatArray:
+        """Return which share of the breakaway torque is left at a velocity."""
+        velocity, exponent = self.shape_over_joints(arm.robot)
+        return np.asarray(np.exp(-(np.abs(dq / velocity) ** exponent)))
+
+
+@dataclass(frozen=True)
+class ThermalFriction(Effect):
+    """
+    Viscous friction that changes while the joint warms up, tau = dFv (1 - exp(-t / T)) dq.
+
+    Time counts from the beginning of the recording; dFv is negative where grease gets thin, by 20
+    to 60 % of the cold coefficient. Two equal periods differ by it, which tells it from every
+    effect that depends on velocity alone; torque_drift differs as well, but not with velocity.
+    Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010, in the form of one time
+    constant.
+
+    """
+
+    name = 'thermal_friction'
+    summary = 'viscous friction that changes while the joint warms up'
+    quantities = (Quantity('viscous_change', 'N m s/rad', typical=(0.001, 6.0)),)
+    shapes = (Shape('warm_up_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return dtau/ddFv = (1 - exp(-t / T)) dq [rad/s], shape (N, n, P)."""
+        return joint_columns(self, motion, self._warm(motion.t, arm) * motion.dq)
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the torque."""
+        (change,) = scatter(self, values, arm.robot)
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            return np.asarray(change * self._warm(t, arm) * dq)
+
+        return Action(torque=torque)
+
+    def _warm(self, t: FloatArray, arm: ArmModel) -> FloatArray:
+        (constant,) = self.shape_over_joints(arm.robot)
+        return np.asarray(-np.expm1(-np.asarray(t)[..., np.newaxis] / constant))

@@ -12,7 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armid_ros.effects.base import Action, Effect, Quantity
+from armid_ros.effects.action import Action
+from armid_ros.effects.base import Effect, Quantity
 from armid_ros.errors import ModelError
 from armid_ros.model import gravity_sensitivity
 from armid_ros.motion import FloatArray, Motion
@@ -23,9 +24,14 @@ from scipy.spatial.transform import Rotation
 if TYPE_CHECKING:
     from armid_ros.arm import ArmModel
 
+#: Step of the differences of a rotation [rad].
+_STEP = 1e-5
+
 
 class _GravityEffect(Effect):
     """An effect of the whole arm."""
+
+    changes_body = True
 
     @classmethod
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
@@ -35,6 +41,7 @@ class _GravityEffect(Effect):
         """Refuse joints."""
         if self.joints:
             raise ModelError(f'{self.name} belongs to the whole arm, not to {self.joints[0]}')
+        super().__post_init__()
 
 
 @dataclass(frozen=True)
@@ -49,12 +56,12 @@ class GravityMagnitude(_GravityEffect):
 
     name = 'gravity_magnitude'
     summary = 'gravity stronger or weaker than in the model'
-    quantities = (Quantity('gravity_difference', 'm/s^2'),)
+    quantities = (Quantity('gravity_difference', 'm/s^2', typical=(0.05, 10.0)),)
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/dg along gravity [N m per m/s^2], shape (N, n, 1)."""
         direction = _unit(arm.robot.gravity)[:, np.newaxis]
-        return np.asarray(gravity_sensitivity(arm.robot, motion.q) @ direction)
+        return np.asarray(gravity_sensitivity(arm.body, arm.link_motion(motion).q) @ direction)
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the robot under the changed gravity."""
@@ -75,19 +82,33 @@ class BaseTilt(_GravityEffect):
 
     name = 'base_tilt'
     summary = 'base mounted at an angle to gravity that the model does not have'
-    quantities = (Quantity('tilt_x', 'rad'), Quantity('tilt_y', 'rad'))
+    quantities = tuple(
+        Quantity(name, 'rad', lower=-1.6, upper=1.6, typical=(0.003, 0.1))
+        for name in ('tilt_x', 'tilt_y')
+    )
+    linear = False
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
-        """Return dtau/dtilt [N m/rad], shape (N, n, 2); first order."""
-        gravity = arm.robot.gravity
-        turned = np.cross(gravity, _horizontal_axes(gravity))
-        return np.asarray(gravity_sensitivity(arm.robot, motion.q) @ turned.T)
+        """Return dtau/dtilt [N m/rad], shape (N, n, 2), at the tilt that the arm has."""
+        values = arm.values_of(self)
+        turned = [
+            (_turned(arm.robot.gravity, values + step) - _turned(arm.robot.gravity, values - step))
+            / (2.0 * _STEP)
+            for step in _STEP * np.eye(2)
+        ]
+        return np.asarray(
+            gravity_sensitivity(arm.body, arm.link_motion(motion).q) @ np.transpose(turned)
+        )
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the robot under gravity as the tilted base sees it."""
-        gravity = arm.robot.gravity
-        tilt = Rotation.from_rotvec(values @ _horizontal_axes(gravity))
-        return Action(robot=arm.robot.with_gravity(tilt.inv().apply(np.array(gravity))))
+        return Action(robot=arm.robot.with_gravity(_turned(arm.robot.gravity, values)))
+
+
+def _turned(gravity: FloatArray, tilt: FloatArray) -> FloatArray:
+    """Return gravity as a base sees it that is turned by a rotation vector, (2,) [rad]."""
+    rotation = Rotation.from_rotvec(tilt @ _horizontal_axes(gravity))
+    return np.asarray(rotation.inv().apply(np.array(gravity)))
 
 
 def _unit(gravity: FloatArray) -> FloatArray:

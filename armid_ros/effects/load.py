@@ -1,13 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an arm carries."""
+"""Bodies: what an arm carries, and links that are not as described."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armid_ros.effects.base import Action, Effect, Quantity
+from armid_ros.effects.action import Action
+from armid_ros.effects.base import Effect, Quantity
 from armid_ros.model import LINK_PARAMETERS, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -20,7 +21,29 @@ _UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 
 @dataclass(frozen=True)
-class Payload(Effect):
+class _LinkBody(Effect):
+    """Ten inertial parameters about the frame of a link's joint, added to the link's own."""
+
+    changes_body = True
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return the links' own columns of the regressor, shape (N, n, P)."""
+        felt = arm.felt(arm.link_motion(motion))
+        return regressor(arm.body, felt)[:, :, self._rows(arm.robot)]
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the robot with the parameters added to its links."""
+        parameters = arm.robot.rigid_parameters.copy()
+        parameters[self._rows(arm.robot)] += values
+        return Action(robot=arm.robot.with_inertias(parameters))
+
+    def _rows(self, robot: Robot) -> list[int]:
+        size = len(LINK_PARAMETERS)
+        return [size * joint + i for joint in self.indices(robot.joints) for i in range(size)]
+
+
+@dataclass(frozen=True)
+class Payload(_LinkBody):
     """
     A body fixed to a link, the last one by default: mass, first moments and inertia.
 
@@ -33,7 +56,12 @@ class Payload(Effect):
     name = 'payload'
     summary = 'a body fixed to a link'
     quantities = tuple(
-        Quantity(f'payload_{name}', unit, lower=0.0 if name == 'm' else -np.inf)
+        Quantity(
+            f'payload_{name}',
+            unit,
+            lower=0.0 if name == 'm' else -np.inf,
+            typical=(0.05, 10.0) if name == 'm' else None,
+        )
         for name, unit in zip(LINK_PARAMETERS, _UNITS, strict=True)
     )
 
@@ -41,16 +69,21 @@ class Payload(Effect):
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         return robot.joints[-1:]
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
-        """Return the link's own columns of the regressor, shape (N, n, P)."""
-        return regressor(arm.robot, motion)[:, :, self._rows(arm.robot)]
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
-        """Return the robot with the body added to its link."""
-        parameters = arm.robot.rigid_parameters.copy()
-        parameters[self._rows(arm.robot)] += values
-        return Action(robot=arm.robot.with_inertias(parameters))
+@dataclass(frozen=True)
+class LinkInertia(_LinkBody):
+    """
+    Difference of a link's mass, first moments and inertia from the description's.
 
-    def _rows(self, robot: Robot) -> list[int]:
-        size = len(LINK_PARAMETERS)
-        return [size * joint + i for joint in self.indices(robot.joints) for i in range(size)]
+    The same directions as the rigid parameters themselves: visible against a model whose other
+    values are trusted, and swallowed by a fit of all of them. For a body put onto the last link
+    see payload; a first moment turned about the joint's axis is an encoder_offset as well.
+
+    """
+
+    name = 'link_inertia'
+    summary = 'mass, centre or inertia of a link other than described'
+    quantities = tuple(
+        Quantity(f'{name}_difference', unit)
+        for name, unit in zip(LINK_PARAMETERS, _UNITS, strict=True)
+    )

@@ -1,13 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a torque reading contains that the arm does not need."""
+"""What a reading of a torque or of a position contains that the arm does not need."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armid_ros.effects.base import Action, Effect, joint_columns, Quantity, scatter
+from armid_ros.effects.action import Action, Displacement
+from armid_ros.effects.base import Effect, joint_columns, Quantity, scatter, Shape
+from armid_ros.effects.readings import Displacing, TorqueReading
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
@@ -28,7 +30,7 @@ class TorqueOffset(Effect):
 
     name = 'torque_offset'
     summary = 'constant torque, in motion and at rest'
-    quantities = (Quantity('torque_offset', 'N m'),)
+    quantities = (Quantity('torque_offset', 'N m', typical=(0.004, 2.0)),)
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/doffset = 1 [-], shape (N, n, P)."""
@@ -42,3 +44,94 @@ class TorqueOffset(Effect):
             return np.broadcast_to(offset, np.shape(dq))
 
         return Action(torque=torque)
+
+
+@dataclass(frozen=True)
+class TorqueGain(TorqueReading):
+    """
+    Torque readings that are too large by a share, reading = (1 + epsilon) tau.
+
+    A motor constant or a sensor scale that is not what it is taken for. The same share in all
+    joints is the same as all masses, inertias and friction scaled by it, exactly; one known
+    payload tells.
+
+    """
+
+    name = 'torque_gain'
+    summary = 'torque readings too large or too small by a share'
+    quantities = (Quantity('gain_error', '', lower=-0.95, typical=(0.005, 0.3)),)
+
+    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return the scaled torque, shape (N, n) [N m]."""
+        return np.asarray(tau * self._gain(values, motion))
+
+    def transfer(
+        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
+    ) -> FloatArray:
+        """Scale columns."""
+        return np.asarray(columns * self._gain(values, motion)[:, np.newaxis])
+
+    def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return the torque [N m], shape (N, n, P)."""
+        return joint_columns(self, motion, tau)
+
+    def _gain(self, values: FloatArray, motion: Motion) -> FloatArray:
+        gain = np.ones(motion.n_joints)
+        gain[self.indices(motion.joints)] += values
+        return gain
+
+
+@dataclass(frozen=True)
+class TorqueDrift(TorqueReading):
+    """
+    Torque readings that drift while sensor or electronics warm up, d (1 - exp(-t / T)).
+
+    Time counts from the beginning of the recording. Independent of the motion, unlike
+    thermal_friction; equal periods differ by it. Confounded with torque_offset where the recording
+    is long after the warming, and, seen over one short recording, with a payload that slips.
+
+    """
+
+    name = 'torque_drift'
+    summary = 'torque reading that drifts with time, whatever the motion'
+    quantities = (Quantity('drift', 'N m', typical=(0.01, 5.0)),)
+    shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
+
+    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return the torque with the drift, shape (N, n) [N m]."""
+        return np.asarray(tau + self.sensitivity(values, motion, tau) @ values)
+
+    def transfer(
+        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
+    ) -> FloatArray:
+        """Return the columns as they are."""
+        return columns
+
+    def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return 1 - exp(-t / T) [-], shape (N, n, P)."""
+        constants = np.ones(motion.n_joints)
+        constants[self.indices(motion.joints)] = self.shape_values[:, 0]
+        return joint_columns(self, motion, -np.expm1(-motion.t[:, np.newaxis] / constants))
+
+
+@dataclass(frozen=True)
+class EncoderOffset(Displacing):
+    """
+    Zero of an encoder that is off, q = reading + offset.
+
+    The first order is dtau/dq times the offset, the same offset at all loads. Confounded with
+    base_tilt (exactly, for the first joint of a planar arm), and with the direction of the link's
+    first moment: free rigid parameters of a planar arm swallow the second joint's offset exactly.
+    Hard stops, or centres of mass known from drawings, tell.
+
+    """
+
+    name = 'encoder_offset'
+    summary = 'zero of a position encoder that is off'
+    quantities = (Quantity('encoder_offset', 'rad', typical=(0.001, 0.1)),)
+    linear = False
+
+    def displacements(self, motion: Motion, arm: ArmModel) -> Displacement:
+        """Return 1 in the position of each joint and 0 in velocity and acceleration."""
+        shift = joint_columns(self, motion, np.ones_like(motion.q))
+        return Displacement(shift, np.zeros_like(shift), np.zeros_like(shift))

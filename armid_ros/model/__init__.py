@@ -12,7 +12,9 @@ from armid_ros.model.base_parameters import (
 from armid_ros.model.rigid_body import (
     gravity_sensitivity,
     inverse_dynamics,
+    inverse_dynamics_derivatives,
     LINK_PARAMETERS,
+    point_motion,
     random_motion,
     regressor,
     rigid_parameter_names,
@@ -25,6 +27,8 @@ __all__ = [
     'gravity_sensitivity',
     'group_columns',
     'inverse_dynamics',
+    'inverse_dynamics_derivatives',
+    'point_motion',
     'random_motion',
     'regressor',
     'regroup',

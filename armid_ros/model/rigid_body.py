@@ -14,6 +14,7 @@ from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
 #: Inertial parameters of one link in Pinocchio's order: mass, first moments, inertia about the
@@ -55,6 +56,31 @@ def inverse_dynamics(robot: Robot, motion: Motion) -> FloatArray:
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
         tau[k] = pin.rnea(model, data, q, dq, ddq)
     return tau
+
+
+def inverse_dynamics_derivatives(
+    robot: Robot, motion: Motion
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Differentiate the joint torques that a motion takes by the motion.
+
+    Returns
+    -------
+    by_q, by_dq, by_ddq : ndarray, shape (N, n, n)
+        dtau/dq [N m/rad], dtau/ddq, and the inertia matrix [kg m^2].
+
+    Notes
+    -----
+    Source: Carpentier and Mansard 2018; Pinocchio's computeRNEADerivatives.
+
+    """
+    model = robot.model
+    data = model.createData()
+    n = robot.n_joints
+    by_q, by_dq, by_ddq = np.empty((3, len(motion), n, n))
+    for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
+        by_q[k], by_dq[k], by_ddq[k] = pin.computeRNEADerivatives(model, data, q, dq, ddq)
+    return by_q, by_dq, by_ddq
 
 
 def regressor(robot: Robot, motion: Motion) -> FloatArray:
@@ -104,6 +130,46 @@ def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
         for k, position in enumerate(q):
             columns[k, :, axis] = pin.computeGeneralizedGravity(model, data, position)
     return columns
+
+
+def point_motion(
+    robot: Robot, joint: str, offset: npt.ArrayLike, q: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Follow a point of a link.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm.
+    joint : str
+        The joint that moves the link.
+    offset : array_like, shape (3,)
+        The point in the frame of that joint [m].
+    q : ndarray, shape (N, n)
+        Joint positions.
+
+    Returns
+    -------
+    position : ndarray, shape (N, 3)
+        In the base frame [m].
+    jacobian : ndarray, shape (N, 3, n)
+        Derivative by the joint positions.
+
+    """
+    model = robot.model
+    data = model.createData()
+    identity, local = model.getJointId(joint), np.asarray(offset, dtype=np.float64)
+    positions = np.empty((len(q), 3))
+    jacobians = np.empty((len(q), 3, robot.n_joints))
+    for k, configuration in enumerate(q):
+        pin.computeJointJacobians(model, data, configuration)
+        placement = data.oMi[identity]
+        aligned = pin.getJointJacobian(model, data, identity, pin.LOCAL_WORLD_ALIGNED)
+        lever = placement.rotation @ local
+        positions[k] = placement.translation + lever
+        jacobians[k] = aligned[:3] - pin.skew(lever) @ aligned[3:]
+    return positions, jacobians
 
 
 def random_motion(robot: Robot, n_samples: int, rng: np.random.Generator) -> Motion:

@@ -1,0 +1,315 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+How effects act: on the joints of the plant, and on what its sensors say of them.
+
+A plant has two sides where its transmissions are elastic: the motors with everything that rubs
+and turns there, and the links with the rigid body and what is attached to it. Without elasticity
+they are one.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+
+#: Torque of the actuators [N m] as a function of time, position and velocity.
+TorqueLaw = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+
+
+class Displacement(NamedTuple):
+    """A change of a motion: of position, velocity and acceleration, each of shape (N, n, ...)."""
+
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+
+
+@dataclass(frozen=True)
+class DryFriction:
+    """
+    Friction that can hold: a torque of any size between two levels while its velocity is zero.
+
+    Attributes
+    ----------
+    directions : ndarray, shape (m, n)
+        Velocity of each of m friction elements as a combination of the joint velocities.
+    lower, upper : ndarray, shape (m,)
+        Torque while the element moves backwards, and forwards [N m]; lower <= upper.
+    load_share : ndarray, shape (m,), or None
+        By how much both levels move apart per torque that the rigid body takes [-].
+
+    """
+
+    directions: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    load_share: FloatArray | None = None
+
+    def torque(self, dq: FloatArray, load: FloatArray | None = None) -> FloatArray:
+        """
+        Return the joint torques for moving joints; the middle of the levels for one at rest.
+
+        Parameters
+        ----------
+        dq : ndarray, shape (..., n)
+            Joint velocities.
+        load : ndarray, shape (..., n), optional
+            Torque of the rigid body [N m], where friction depends on it.
+
+        """
+        half, middle = (self.upper - self.lower) / 2, (self.upper + self.lower) / 2
+        if load is not None:
+            half = half + self.widening(load)
+        return np.asarray((half * np.sign(dq @ self.directions.T) + middle) @ self.directions)
+
+    def widening(self, load: FloatArray) -> FloatArray:
+        """Return by how much load moves the levels apart, shape (..., m) [N m]."""
+        if self.load_share is None:
+            return np.zeros((*load.shape[:-1], len(self.lower)))
+        return np.asarray(self.load_share * np.abs(load @ self.directions.T))
+
+
+@dataclass(frozen=True)
+class Hysteresis:
+    """
+    Friction that grows with the way since the last reversal: m springs that slip.
+
+    The state h of an element, from -1 to 1, follows dh = (1 - h sign(dx)) |dx| / distance along
+    its way x, whatever the speed. Its torque is level * h.
+    Source: Dahl 1968 with exponent 1.
+
+    Attributes
+    ----------
+    directions : ndarray, shape (m, n)
+        Way of each element as a combination of the joint positions.
+    level : ndarray, shape (m,)
+        Torque after a long way [N m].
+    distance : ndarray, shape (m,)
+        Way after which 1 - 1/e of the level is reached, from rest [rad or m].
+
+    """
+
+    directions: FloatArray
+    level: FloatArray
+    distance: FloatArray
+
+    def start(self, dq: FloatArray) -> FloatArray:
+        """Return the state of an arm that has moved like this for long, or rests relaxed (m,)."""
+        return np.asarray(np.sign(self.directions @ dq))
+
+    def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
+        """Return the state, (m,), after a displacement of the joints, (n,), in one direction."""
+        way = self.directions @ dq
+        end = np.sign(way)
+        return np.asarray(end - (end - state) * np.exp(-np.abs(way) / self.distance))
+
+    def torque(self, state: FloatArray) -> FloatArray:
+        """Return the joint torques, shape (..., n) [N m], of states of shape (..., m)."""
+        return np.asarray((self.level * state) @ self.directions)
+
+    def along(self, q: FloatArray, dq: FloatArray) -> FloatArray:
+        """
+        Return the states along a path, shape (N, m).
+
+        Parameters
+        ----------
+        q, dq : ndarray, shape (N, n)
+            Joint positions, in order of time, and velocities.
+
+        """
+        way = q @ self.directions.T
+        states = np.empty_like(way)
+        states[0] = self.start(dq[0])
+        for element, distance in enumerate(self.distance):
+            _slip(way[:, element], states[:, element], float(distance))
+        return states
+
+
+def _slip(way: FloatArray, state: FloatArray, distance: float) -> None:
+    """Fill in the states of one element, from reversal to reversal; the first is given."""
+    step = np.sign(np.diff(way))
+    turns = np.flatnonzero(np.diff(step)) + 1
+    for first, last in zip(np.append(0, turns), np.append(turns, len(step)), strict=True):
+        if last > first:
+            end = step[first]
+            decay = np.exp(-np.abs(way[first + 1 : last + 1] - way[first]) / distance)
+            state[first + 1 : last + 1] = end - (end - state[first]) * decay
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """
+    What is between motors and links, where that is not rigid.
+
+    The link of joint j is twisted against its motor by x = q_motor - q_link, which carries the
+    torque K (x - gap) + D dx beyond the gap and none within it. Position readings are those of
+    the motors.
+
+    Attributes
+    ----------
+    stiffness : ndarray, shape (n,)
+        K [N m/rad]; infinite where the transmission is rigid.
+    damping : ndarray, shape (n,)
+        D [N m s/rad].
+    gap : ndarray, shape (n,)
+        Free play to either side, half the backlash [rad].
+
+    """
+
+    stiffness: FloatArray
+    damping: FloatArray
+    gap: FloatArray
+
+
+@dataclass(frozen=True)
+class Action:
+    """
+    How effects with given values act on the plant and its sensors; what is not used stays None.
+
+    The actuators have to supply damping @ dq + inertia @ ddq + dry friction + hysteresis +
+    torque(t, q, dq) on the side of the motors, and the rigid body's torque + link_torque(t, q, dq)
+    on that of the links.
+
+    Attributes
+    ----------
+    damping : ndarray, shape (n, n), or None
+        Viscous matrix [N m s/rad].
+    inertia : ndarray, shape (n, n), or None
+        Constant inertia seen by the joints only [kg m^2].
+    dry_friction : DryFriction, or None
+        Friction with a sticking phase.
+    hysteresis : Hysteresis, or None
+        Friction with a state.
+    torque, link_torque : callable (t, q, dq) -> ndarray (..., n), or None
+        Anything else that depends smoothly on the state [N m].
+    robot : Robot, or None
+        The rigid body that takes the place of the nominal one.
+    transmission : Transmission, or None
+        Springs and gaps between motors and links.
+    drive : callable ndarray (..., n) -> ndarray (..., n), or None
+        From the torque that a drive is asked for, which is what it reports, to what it gives.
+    displacement : callable Motion -> Displacement, or None
+        What the true motion of the links is beyond the recorded one.
+    reading : callable (Motion, ndarray (N, n)) -> ndarray (N, n), or None
+        From the true torque along a motion to what the sensors read. The motion's own torque, if
+        it has one, is what the drives report.
+    reading_memory : float
+        How far back in time a reading depends on the torque [s].
+
+    """
+
+    damping: FloatArray | None = None
+    inertia: FloatArray | None = None
+    dry_friction: DryFriction | None = None
+    hysteresis: Hysteresis | None = None
+    torque: TorqueLaw | None = None
+    link_torque: TorqueLaw | None = None
+    robot: Robot | None = None
+    transmission: Transmission | None = None
+    drive: Callable[[FloatArray], FloatArray] | None = None
+    displacement: Callable[[Motion], Displacement] | None = None
+    reading: Callable[[Motion, FloatArray], FloatArray] | None = None
+    reading_memory: float = 0.0
+
+
+def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
+    """
+    Join the actions of several effects on one robot.
+
+    Matrices and torques add up; dry friction along one direction becomes one element; what acts on
+    the recording acts in the order given.
+
+    """
+    zero = np.zeros((robot.n_joints, robot.n_joints))
+    readings = [a.reading for a in actions if a.reading is not None]
+    drives = [a.drive for a in actions if a.drive is not None]
+    displacements = [a.displacement for a in actions if a.displacement is not None]
+
+    def reading(motion: Motion, tau: FloatArray) -> FloatArray:
+        for read in readings:
+            tau = read(motion, tau)
+        return tau
+
+    def drive(tau: FloatArray) -> FloatArray:
+        for give in drives:
+            tau = give(tau)
+        return tau
+
+    def displacement(motion: Motion) -> Displacement:
+        parts = [displace(motion) for displace in displacements]
+        return Displacement(*(np.sum(arrays, axis=0) for arrays in zip(*parts, strict=True)))
+
+    return Action(
+        damping=sum((a.damping for a in actions if a.damping is not None), zero),
+        inertia=sum((a.inertia for a in actions if a.inertia is not None), zero),
+        dry_friction=_merge_friction([a.dry_friction for a in actions if a.dry_friction]),
+        hysteresis=_merge_hysteresis([a.hysteresis for a in actions if a.hysteresis]),
+        torque=_sum([a.torque for a in actions if a.torque is not None]),
+        link_torque=_sum([a.link_torque for a in actions if a.link_torque is not None]),
+        robot=robot,
+        transmission=_merge_transmissions([a.transmission for a in actions if a.transmission]),
+        drive=drive if drives else None,
+        displacement=displacement if displacements else None,
+        reading=reading if readings else None,
+        reading_memory=sum(a.reading_memory for a in actions),
+    )
+
+
+def _sum(laws: list[TorqueLaw]) -> TorqueLaw | None:
+    def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+        return np.asarray(sum(law(t, q, dq) for law in laws))
+
+    return torque if laws else None
+
+
+def _merge_friction(elements: list[DryFriction]) -> DryFriction | None:
+    """Stack friction elements; those along the same direction become one with summed levels."""
+    if not elements:
+        return None
+    directions = np.vstack([e.directions for e in elements])
+    unique, inverse = np.unique(directions, axis=0, return_inverse=True)
+    sums = np.zeros((3, len(unique)))
+    for row, values in enumerate(
+        (
+            [e.lower for e in elements],
+            [e.upper for e in elements],
+            [np.zeros(len(e.lower)) if e.load_share is None else e.load_share for e in elements],
+        )
+    ):
+        np.add.at(sums[row], inverse.ravel(), np.concatenate(values))
+    active = np.any(sums != 0.0, axis=0)
+    lower, upper, share = sums[:, active]
+    return DryFriction(unique[active], lower, upper, share if np.any(share) else None)
+
+
+def _merge_hysteresis(elements: list[Hysteresis]) -> Hysteresis | None:
+    if not elements:
+        return None
+    level = np.concatenate([e.level for e in elements])
+    active = level != 0.0
+    if not np.any(active):
+        return None
+    directions = np.vstack([e.directions for e in elements])
+    distance = np.concatenate([e.distance for e in elements])
+    return Hysteresis(directions[active], level[active], distance[active])
+
+
+def _merge_transmissions(parts: list[Transmission]) -> Transmission | None:
+    """Put transmissions in series: compliances and gaps add up."""
+    if not parts:
+        return None
+    compliance = np.sum([1.0 / part.stiffness for part in parts], axis=0)
+    with np.errstate(divide='ignore'):
+        stiffness = 1.0 / compliance
+    return Transmission(
+        stiffness,
+        np.sum([part.damping for part in parts], axis=0),
+        np.sum([part.gap for part in parts], axis=0),
+    )

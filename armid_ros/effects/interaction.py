@@ -1,0 +1,236 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What holds a link: a spring and a damper to a person, to another machine or to the world.
+
+The spring is between a point of a link (``attachment``, in the frame of its joint) and an anchor:
+a fixed point of the base frame, or one whose motion was recorded, such as a point of the leg of a
+person in an exoskeleton. The force of the spring works on the arm, the opposite one on the anchor.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from armid_ros.effects.action import Action
+from armid_ros.effects.base import Effect, Quantity, Shape
+from armid_ros.model import point_motion
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline
+
+if TYPE_CHECKING:
+    from armid_ros.arm import ArmModel
+
+#: Position and velocity, each of shape (N, 3) [m, m/s], of a point at times of shape (N,).
+Anchor = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+_AXES = ('x', 'y', 'z')
+_ATTACHMENT = tuple(
+    Shape(f'attachment_{axis}', 'm', -100.0, 100.0, 0.0, (-0.1, 0.0, 0.1)) for axis in _AXES
+)
+
+
+class RecordedPoint:
+    """
+    A point of another chain as an anchor, from that chain's recorded motion.
+
+    Parameters
+    ----------
+    robot : Robot
+        The other chain; its base frame has to be that of the arm.
+    motion : Motion
+        Its motion, on the time base of the arm's.
+    joint : str
+        The joint that moves the link with the point.
+    offset : array_like, shape (3,)
+        The point in the frame of that joint [m].
+
+    """
+
+    def __init__(
+        self, robot: Robot, motion: Motion, joint: str, offset: npt.ArrayLike = (0.0, 0.0, 0.0)
+    ) -> None:
+        position, jacobian = point_motion(robot, joint, offset, motion.q)
+        velocity = np.einsum('nxj,nj->nx', jacobian, motion.dq)
+        self._curve = CubicHermiteSpline(motion.t, position, velocity)
+
+    def __call__(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return position and velocity at times of shape (N,), each of shape (N, 3)."""
+        return np.asarray(self._curve(t)), np.asarray(self._curve(t, 1))
+
+
+@dataclass(frozen=True)
+class _Attached(Effect):
+    """An effect between a point of each link and an anchor; None is a fixed point."""
+
+    anchor: Anchor | None = None
+
+    def _default_shape(self, robot: Robot) -> FloatArray:
+        """Attach at the centres of mass."""
+        values = self.shape_values
+        for row, joint in zip(values, self.joints, strict=True):
+            row[:3] = robot.model.inertias[robot.model.getJointId(joint)].lever
+        return values
+
+    def shape_grids(
+        self, motion: Motion, arm: ArmModel, residual: FloatArray | None = None
+    ) -> tuple[FloatArray, ...]:
+        """Return the geometry as it is; other shapes have their grids."""
+        return tuple(
+            self.shape_values[:, [index]]
+            if shape.unit == 'm' and shape.lower < 0.0
+            else np.tile(shape.grid, (len(self.owners), 1))
+            for index, shape in enumerate(self.shapes)
+        )
+
+    def _points(self, robot: Robot, q: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """Return position and Jacobian of every attachment, along positions (N, n)."""
+        return [
+            point_motion(robot, joint, row[:3], q)
+            for joint, row in zip(self.joints, self.shape_values, strict=True)
+        ]
+
+    def _from(self, t: FloatArray, reference: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return position and velocity of the anchor of a link; of the reference if fixed."""
+        if self.anchor is None:
+            return reference, np.zeros(3)
+        return self.anchor(t)
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the torque against the springs."""
+        robot = arm.robot
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            times = np.broadcast_to(np.atleast_1d(t), (len(np.atleast_2d(q)),))
+            columns = self._columns(robot, times, np.atleast_2d(q), np.atleast_2d(dq))
+            return np.asarray((columns @ values).reshape(np.shape(q)))
+
+        return Action(link_torque=torque if np.any(values) else None)
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return the torque per quantity of every spring, shape (N, n, P)."""
+        link = arm.link_motion(motion)
+        return self._columns(arm.robot, link.t, link.q, link.dq)
+
+    def _columns(self, robot: Robot, t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class HumanInteraction(_Attached):
+    """
+    Spring and damper between a link and an anchor, tau = J^T (k (p - r) + d (v - w) - f).
+
+    p and v are position and velocity of the attachment, r and w those of the anchor. Without a
+    recorded anchor r is where the attachment is in the middle of the range of motion; a spring
+    fixed at r' has the force f = k (r' - r) there (see ``fixed_at``), so that an anchor nobody
+    knows is three linear parameters. Confounded with joint_spring on a single moving joint and
+    with the weight of the limb; the sum of the torques of a pair does not have it, their
+    difference does.
+    Source: the human-exoskeleton leg pair, springs between segments of equal number.
+
+    """
+
+    name = 'human_interaction'
+    summary = 'spring and damper from a link to a person, another machine or the world'
+    quantities = (
+        Quantity('interaction_stiffness', 'N/m', lower=0.0, typical=(50.0, 50000.0)),
+        Quantity('interaction_damping', 'N s/m', lower=0.0, typical=(0.5, 500.0)),
+        *(Quantity(f'interaction_force_{axis}', 'N', typical=(0.5, 200.0)) for axis in _AXES),
+    )
+    shapes = _ATTACHMENT
+
+    def fixed_at(
+        self, robot: Robot, point: npt.ArrayLike, stiffness: float, damping: float = 0.0
+    ) -> FloatArray:
+        """
+        Return the values of springs from every attachment to one fixed point.
+
+        Parameters
+        ----------
+        robot : Robot
+            The arm.
+        point : array_like, shape (3,)
+            The anchor in the base frame [m].
+        stiffness, damping : float
+            k [N/m] and d [N s/m].
+
+        """
+        rows = [
+            [stiffness, damping, *(stiffness * (np.asarray(point, dtype=float) - position[0]))]
+            for position, _ in self._points(robot, _middle(robot))
+        ]
+        return np.array(rows).ravel()
+
+    def _columns(self, robot: Robot, t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+        columns = np.zeros((*q.shape, 5 * len(self.joints)))
+        middle = self._points(robot, _middle(robot))
+        for owner, (position, jacobian) in enumerate(self._points(robot, q)):
+            reference, velocity = self._from(t, middle[owner][0][0])
+            block = columns[:, :, 5 * owner : 5 * owner + 5]
+            block[:, :, 0] = np.einsum('nxj,nx->nj', jacobian, position - reference)
+            relative = np.einsum('nxj,nj->nx', jacobian, dq) - velocity
+            block[:, :, 1] = np.einsum('nxj,nx->nj', jacobian, relative)
+            block[:, :, 2:] = -jacobian.transpose(0, 2, 1)
+        return columns
+
+
+@dataclass(frozen=True)
+class InterfaceSlack(_Attached):
+    """
+    Spring between a link and an anchor that pulls beyond a slack only, like a strap.
+
+    tau = k J^T e max(|x| - slack, 0), where x = p - r is the way from the anchor to the attachment
+    and e its direction. Without slack it is a human_interaction with a known anchor; different
+    tensions of the strap tell. The anchor is a shape: a point of the base frame, or an offset
+    from the recorded one.
+
+    """
+
+    name = 'interface_slack'
+    summary = 'spring from a link to an anchor that pulls beyond a slack only'
+    quantities = (Quantity('slack_stiffness', 'N/m', lower=0.0, typical=(50.0, 50000.0)),)
+    shapes = (
+        *_ATTACHMENT,
+        *(
+            Shape(f'anchor_{axis}', 'm', -100.0, 100.0, 0.0, (-0.3, -0.1, 0.0, 0.1, 0.3))
+            for axis in _AXES
+        ),
+        Shape('slack', 'm', 0.0, 1.0, 0.01, (0.0, 0.003, 0.01, 0.03, 0.1)),
+    )
+
+    def _default_shape(self, robot: Robot) -> FloatArray:
+        """Anchor each attachment where it is in the middle of the range of motion."""
+        values = super()._default_shape(robot)
+        if self.anchor is None:
+            placed = self.with_shape(values)
+            assert isinstance(placed, InterfaceSlack)
+            for row, (position, _) in zip(
+                values, placed._points(robot, _middle(robot)), strict=True
+            ):
+                row[3:6] = position[0]
+        return values
+
+    def _columns(self, robot: Robot, t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+        columns = np.zeros((*q.shape, len(self.joints)))
+        for owner, (position, jacobian) in enumerate(self._points(robot, q)):
+            anchor, slack = self.shape_values[owner, 3:6], self.shape_values[owner, 6]
+            reference, _ = self._from(t, np.zeros(3))
+            way = position - reference - anchor
+            length = np.linalg.norm(way, axis=1, keepdims=True)
+            pull = way * np.maximum(1.0 - slack / np.maximum(length, 1e-12), 0.0)
+            columns[:, :, owner] = np.einsum('nxj,nx->nj', jacobian, pull)
+        return columns
+
+
+def _middle(robot: Robot) -> FloatArray:
+    """Return the middle of the range of motion, 0 where there is none, shape (1, n)."""
+    limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
+    ends = np.where(limited, robot.lower, 0.0), np.where(limited, robot.upper, 0.0)
+    return np.asarray((ends[0] + ends[1]) / 2)[np.newaxis]

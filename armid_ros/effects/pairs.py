@@ -1,0 +1,220 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What ties two joints together: a shared shaft, a cable, torque sensors that hear each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from armid_ros.effects.action import Action, DryFriction
+from armid_ros.effects.base import Effect, joint_unit, Quantity
+from armid_ros.effects.readings import TorqueReading
+from armid_ros.errors import ModelError
+from armid_ros.estimate import ParameterName
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+
+if TYPE_CHECKING:
+    from armid_ros.arm import ArmModel
+
+
+@dataclass(frozen=True)
+class _Pairs(Effect):
+    """An effect of pairs of joints (i, k), one after the other in ``joints``."""
+
+    def __post_init__(self) -> None:
+        """Check that the joints are pairs."""
+        if not self.joints or len(self.joints) % 2:
+            raise ModelError(
+                f'{self.name}: joints come in pairs, such as joint_5 and joint_6; '
+                f'got {", ".join(self.joints) or "none"}'
+            )
+        pairs = list(zip(self.joints[::2], self.joints[1::2], strict=True))
+        for first, second in pairs:
+            if first == second or pairs.count((first, second)) > 1:
+                raise ModelError(
+                    f'{self.name}: {first} and {second} are no pair, or one that is there twice'
+                )
+        super().__post_init__()
+
+    @classmethod
+    def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
+        if robot.n_joints < 2:
+            raise ModelError(f'{cls.name}: {robot.name} has one joint only, nothing to couple')
+        return cls._default_pairs(robot.joints)
+
+    @classmethod
+    def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
+        return joints[-2:]
+
+    @property
+    def owners(self) -> tuple[str, ...]:
+        """First joint of every pair."""
+        return self.joints[::2]
+
+    def pairs(self, joints: tuple[str, ...]) -> list[tuple[int, int]]:
+        """Return the columns of every pair among the joints of a motion or robot."""
+        columns = self.indices(joints)
+        return list(zip(columns[::2], columns[1::2], strict=True))
+
+
+@dataclass(frozen=True)
+class CoupledJointFriction(_Pairs):
+    """
+    Friction and inertia of a shaft that turns with the sum of two joints, as in a wrist drive.
+
+    The joints are pairs (i, k), one after the other. With the shaft's velocity dq_i + dq_k,
+
+        tau_i = Ia ddq_k + Fv dq_k + Fc sign(dq_i + dq_k),
+        tau_k = Ia ddq_i + Fv dq_i + Fc sign(dq_i + dq_k);
+
+    the parts of Ia and Fv that act on a joint from its own motion belong to rotor_inertia and
+    viscous_friction.
+    Source: the model of the Staubli TX40's wrist in Janot, Vandanjon and Gautier 2014.
+
+    """
+
+    name = 'coupled_joint_friction'
+    summary = 'friction and inertia of a shaft that turns with the sum of two joints'
+    quantities = (
+        Quantity('coupled_inertia', 'kg m^2'),
+        Quantity('coupled_viscous_coefficient', 'N m s/rad'),
+        Quantity('coupled_coulomb_torque', 'N m', lower=0.0),
+    )
+    holds_at_rest = True
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return dtau/d(Ia, Fv, Fc) of every pair, shape (N, n, P)."""
+        columns = np.zeros((len(motion), motion.n_joints, 3 * len(self.owners)))
+        for position, (i, k) in enumerate(self.pairs(motion.joints)):
+            direction = np.sign(motion.dq[:, i] + motion.dq[:, k])
+            for row, other in ((i, k), (k, i)):
+                columns[:, row, 3 * position] = motion.ddq[:, other]
+                columns[:, row, 3 * position + 1] = motion.dq[:, other]
+                columns[:, row, 3 * position + 2] = direction
+        return columns
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return inertia and damping between the joints, and dry friction of the shaft."""
+        n = arm.robot.n_joints
+        inertia, damping = np.zeros((n, n)), np.zeros((n, n))
+        pairs = self.pairs(arm.robot.joints)
+        directions = np.zeros((len(pairs), n))
+        coulomb = np.empty(len(pairs))
+        for position, (i, k) in enumerate(pairs):
+            shaft_inertia, viscous, coulomb[position] = values.reshape(-1, 3)[position]
+            inertia[i, k] = inertia[k, i] = shaft_inertia
+            damping[i, k] = damping[k, i] = viscous
+            directions[position, [i, k]] = 1.0
+        return Action(
+            damping=damping,
+            inertia=inertia,
+            dry_friction=DryFriction(directions, -coulomb, coulomb),
+        )
+
+
+@dataclass(frozen=True)
+class JointCoupling(_Pairs):
+    """
+    Elastic coupling of two joints by a cable or a tendon, tau_i = -K q_k and tau_k = -K q_i.
+
+    That is what the energy K (q_i - q_k)^2 / 2 has between the two; its parts in one joint alone
+    belong to joint_spring. K is negative for a cable that is crossed. Confounded with
+    torque_crosstalk where gravity is all there is, and with the coupling of the links' weights.
+
+    """
+
+    name = 'joint_coupling'
+    summary = 'elastic coupling of two joints by a cable or tendon'
+    quantities = (Quantity('coupling_stiffness', 'N m/rad', typical=(0.1, 50.0)),)
+
+    def __post_init__(self) -> None:
+        """Check that no joint leads two pairs, as names would be the same."""
+        super().__post_init__()
+        twice = [joint for joint in self.owners if self.owners.count(joint) > 1]
+        if twice:
+            raise ModelError(
+                f'{self.name}: {twice[0]} leads two pairs; put it second in one of them'
+            )
+
+    @classmethod
+    def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(joint for pair in pairwise(joints) for joint in pair)
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return dtau/dK [rad], shape (N, n, P)."""
+        q = arm.link_motion(motion).q
+        columns = np.zeros((*q.shape, len(self.owners)))
+        for position, (i, k) in enumerate(self.pairs(motion.joints)):
+            columns[:, i, position] = -q[:, k]
+            columns[:, k, position] = -q[:, i]
+        return columns
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the torque of the cables."""
+        n = arm.robot.n_joints
+        stiffness = np.zeros((n, n))
+        for value, (i, k) in zip(values, self.pairs(arm.robot.joints), strict=True):
+            stiffness[i, k] -= value
+            stiffness[k, i] -= value
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            return np.asarray(q @ stiffness)
+
+        return Action(link_torque=torque)
+
+
+@dataclass(frozen=True)
+class TorqueCrosstalk(_Pairs, TorqueReading):
+    """
+    Torque sensors that hear those of other joints, reading_i = tau_i + sum of epsilon_ik tau_k.
+
+    The joints are pairs (i, k): the reading of i contains a share of the torque of k; all ordered
+    pairs by default. Confounded with first moments and products of inertia of the links; joint k
+    loaded and i still tells them apart.
+
+    """
+
+    name = 'torque_crosstalk'
+    summary = 'torque of one joint in the reading of another'
+    quantities = (Quantity('crosstalk', '', lower=-1.0, upper=1.0, typical=(0.001, 0.05)),)
+
+    @classmethod
+    def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(joint for i in joints for k in joints if i != k for joint in (i, k))
+
+    def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
+        """Name the shares: whose reading, and from which joint."""
+        (quantity,) = self.quantities
+        return tuple(
+            ParameterName(
+                f'{quantity.name}_from_{source}', reader, joint_unit(quantity.unit, reader, robot)
+            )
+            for reader, source in zip(self.joints[::2], self.joints[1::2], strict=True)
+        )
+
+    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return the torque with shares of the others, shape (N, n) [N m]."""
+        return tau + tau @ self._shares(values, motion).T
+
+    def transfer(
+        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
+    ) -> FloatArray:
+        """Apply the same to columns."""
+        return np.asarray(columns + self._shares(values, motion) @ columns)
+
+    def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return the torque of the other joint in the row of the reader, shape (N, n, P)."""
+        columns = np.zeros((*tau.shape, len(values)))
+        for position, (i, k) in enumerate(self.pairs(motion.joints)):
+            columns[:, i, position] = tau[:, k]
+        return columns
+
+    def _shares(self, values: FloatArray, motion: Motion) -> FloatArray:
+        shares = np.zeros((motion.n_joints, motion.n_joints))
+        for value, pair in zip(values, self.pairs(motion.joints), strict=True):
+            shares[pair] = value
+        return shares

@@ -1,0 +1,106 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Two kinds of effects that act on what is recorded, as each other one acts on the arm.
+
+A recording is the motion of an arm seen through position sensors and its torque seen through
+torque sensors. The torque that a model predicts for a recorded motion is
+
+    reading(torque(motion + displacement)),
+
+where the displacement is what the position sensors do not show.
+
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from armid_ros.effects.action import Action, Displacement
+from armid_ros.effects.base import Effect
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+
+if TYPE_CHECKING:
+    from armid_ros.arm import ArmModel
+
+
+@dataclass(frozen=True)
+class Displacing(Effect):
+    """An effect that makes the true motion of the links differ from the recorded one."""
+
+    @abstractmethod
+    def displacements(self, motion: Motion, arm: ArmModel) -> Displacement:
+        """
+        Return true minus recorded motion per unit of each parameter.
+
+        Returns
+        -------
+        Displacement
+            Arrays of shape (N, n, P).
+
+        """
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return dtau/dtheta along the displacements, shape (N, n, P)."""
+        return arm.torque_change(motion, self.displacements(motion, arm))
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the displacement in proportion to the values."""
+
+        def displacement(motion: Motion) -> Displacement:
+            parts = self.displacements(motion, arm)
+            return Displacement(*(part @ values for part in parts))
+
+        return Action(displacement=displacement if np.any(values) else None)
+
+
+@dataclass(frozen=True)
+class TorqueReading(Effect):
+    """An effect that makes the recorded torque differ from the true one."""
+
+    @abstractmethod
+    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """
+        Return what is read where the true torque along a motion is tau, shape (N, n) [N m].
+
+        Parameters
+        ----------
+        values : ndarray, shape (P,)
+            Parameter values; zero reads the truth.
+        motion : Motion
+            Gives the time base and, where it was measured, the torque that the drives report.
+        tau : ndarray, shape (N, n)
+            True torque [N m].
+
+        """
+
+    @abstractmethod
+    def transfer(
+        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
+    ) -> FloatArray:
+        """Apply the derivative of the reading by the torque to columns, shape (N, n, Q)."""
+
+    @abstractmethod
+    def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Differentiate the reading by the values, shape (N, n, P)."""
+
+    def memory(self, values: FloatArray) -> float:
+        """Return how far back in time the reading depends on the torque [s]."""
+        return 0.0
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return the derivative of the reading, at the torque that it is given (N, n, P)."""
+        return self.sensitivity(arm.values_of(self), motion, arm.torque_before(self, motion))
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the reading."""
+        if not np.any(values):
+            return Action()
+
+        def reading(motion: Motion, tau: FloatArray) -> FloatArray:
+            return self.read(values, motion, tau)
+
+        return Action(reading=reading, reading_memory=self.memory(values))

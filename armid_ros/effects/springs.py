@@ -1,0 +1,112 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Springs from the base to a joint: cables, balancers, bumpers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from armid_ros.effects.action import Action
+from armid_ros.effects.base import Effect, joint_columns, Quantity, scatter, Shape
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+
+if TYPE_CHECKING:
+    from armid_ros.arm import ArmModel
+
+#: Where bumpers begin by default: this share of the range of motion from either end ...
+_BUMPER = 0.15
+#: ... and shares of the range that was moved through between which a search looks for them.
+_EDGES = (0.02, 0.05, 0.1, 0.2, 0.3)
+
+
+@dataclass(frozen=True)
+class JointSpring(Effect):
+    """
+    Spring on a joint, such as a cable, a hose or a balancer, tau = k q + preload.
+
+    The preload is the torque at q = 0, which is -k times the position of rest. It depends on
+    position alone, whatever the speed, the payload and gravity; without the stiffness it is a
+    torque_offset. Confounded with the first moment of the link over a small range; tilting the
+    base, or unplugging the hose, tells.
+
+    """
+
+    name = 'joint_spring'
+    summary = 'spring on a joint: cable, hose, balancer'
+    quantities = (
+        Quantity('spring_stiffness', 'N m/rad', typical=(0.05, 50.0)),
+        Quantity('spring_preload', 'N m', typical=(0.01, 50.0)),
+    )
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return dtau/d(k, preload) = (q, 1), shape (N, n, P)."""
+        return joint_columns(self, motion, arm.link_motion(motion).q, np.ones_like(motion.q))
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the torque of the springs."""
+        stiffness, preload = scatter(self, values, arm.robot)
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            return np.asarray(stiffness * q + preload)
+
+        return Action(link_torque=torque)
+
+
+@dataclass(frozen=True)
+class SoftLimit(Effect):
+    """
+    Bumpers that push back beyond a position at either end of the range of motion.
+
+    tau = k_up max(q - q_up, 0) - k_low max(q_low - q, 0); nothing between q_low and q_up.
+    Confounded with a hardening joint_spring; motion that keeps out of the zone tells.
+
+    """
+
+    name = 'soft_limit'
+    summary = 'bumper or end stop that gives way'
+    quantities = (
+        Quantity('lower_stiffness', 'N m/rad', lower=0.0, typical=(2.0, 2000.0)),
+        Quantity('upper_stiffness', 'N m/rad', lower=0.0, typical=(2.0, 2000.0)),
+    )
+    shapes = (
+        Shape('lower_position', 'rad', -1e4, 1e4, -1.0, (-2.0, -1.5, -1.0, -0.5)),
+        Shape('upper_position', 'rad', -1e4, 1e4, 1.0, (0.5, 1.0, 1.5, 2.0)),
+    )
+
+    def _default_shape(self, robot: Robot) -> FloatArray:
+        joints = self.indices(robot.joints)
+        lower, upper = robot.lower[joints], robot.upper[joints]
+        known = np.isfinite(lower) & np.isfinite(upper)
+        margin = _BUMPER * np.where(known, upper - lower, 0.0)
+        edges = np.stack([lower + margin, upper - margin], axis=1)
+        return np.where(known[:, np.newaxis], edges, self.shape_values)
+
+    def shape_grids(
+        self, motion: Motion, arm: ArmModel, residual: FloatArray | None = None
+    ) -> tuple[FloatArray, ...]:
+        """Return positions near the ends of what was moved through."""
+        q = arm.link_motion(motion).q[:, self.indices(motion.joints)]
+        lowest, highest = q.min(axis=0)[:, np.newaxis], q.max(axis=0)[:, np.newaxis]
+        depth = (highest - lowest) * np.array(_EDGES)
+        return lowest + depth, highest - depth
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return how deep each bumper is pressed, with its sign [rad], shape (N, n, P)."""
+        return joint_columns(self, motion, *self._pressed(arm.link_motion(motion).q, arm))
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the torque of the bumpers."""
+        at_lower, at_upper = scatter(self, values, arm.robot)
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            low, high = self._pressed(q, arm)
+            return np.asarray(at_lower * low + at_upper * high)
+
+        return Action(link_torque=torque)
+
+    def _pressed(self, q: FloatArray, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
+        lower, upper = self.shape_over_joints(arm.robot)
+        return -np.maximum(lower - q, 0.0), np.maximum(q - upper, 0.0)

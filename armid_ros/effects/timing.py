@@ -1,0 +1,161 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Torque readings that come late: by a delay, or through a low-pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.effects.base import joint_columns, Quantity
+from armid_ros.effects.readings import TorqueReading
+from armid_ros.errors import ModelError
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.signal import lfilter
+
+#: Time constants after which a low-pass has forgotten what went in.
+_FORGOTTEN = 20.0
+#: Factor between two lags whose difference is the derivative.
+_MORE = 1.0001
+
+
+@dataclass(frozen=True)
+class TimeDelay(TorqueReading):
+    """
+    Torque readings older than the positions they are recorded with, reading(t) = tau(t - delay).
+
+    Of the whole arm by default, where one clock or one bus is behind; of joints that are named,
+    each has its own. The first order is -dtau/dt. At low frequency it looks like viscous friction
+    where the joint is loaded, at high frequency like negative one; confounded with torque_lag,
+    which attenuates as well, with joint_elasticity and with clocks that disagree. Two frequencies,
+    or the slope of the phase, tell.
+
+    """
+
+    name = 'time_delay'
+    summary = 'torque readings older than the positions they are recorded with'
+    quantities = (Quantity('delay', 's', lower=-0.1, upper=0.1, typical=(0.0005, 0.02)),)
+    linear = False
+    instantaneous = False
+
+    @classmethod
+    def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
+        return ()
+
+    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return the torque of earlier, shape (N, n) [N m]."""
+        return self._shifted(values, motion, tau)
+
+    def transfer(
+        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
+    ) -> FloatArray:
+        """Return the columns of earlier."""
+        return self._shifted(values, motion, columns)
+
+    def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return -dtau/dt of earlier [N m/s], shape (N, n, P)."""
+        slope = -self._shifted(values, motion, tau, derivative=1)
+        return _by_owner(self, motion, slope)
+
+    def memory(self, values: FloatArray) -> float:
+        """Return the longest delay [s]."""
+        return float(np.max(np.abs(values)))
+
+    def _shifted(
+        self, values: FloatArray, motion: Motion, x: FloatArray, derivative: int = 0
+    ) -> FloatArray:
+        curve = CubicHermiteSpline(motion.t, x, rate_of_change(motion.t, x))
+        shifted = curve(motion.t, derivative) if derivative else x.copy()
+        groups = [[j] for j in self.indices(motion.joints)] or [list(range(motion.n_joints))]
+        for delay, rows in zip(values, groups, strict=True):
+            if delay:
+                shifted[:, rows] = curve(motion.t - delay, derivative)[:, rows]
+        return np.asarray(shifted)
+
+
+@dataclass(frozen=True)
+class TorqueLag(TorqueReading):
+    """
+    Torque readings through a low-pass of the first order, T dreading/dt + reading = tau.
+
+    A current loop, or the filter of a sensor. The first order is -dtau/dt, as of time_delay;
+    beyond it the lag attenuates by 1 / sqrt(1 + (omega T)^2), which motion up to half its
+    bandwidth shows.
+
+    """
+
+    name = 'torque_lag'
+    summary = 'torque readings behind a low-pass: sensor filter, current loop'
+    quantities = (Quantity('lag', 's', lower=0.0, upper=0.2, typical=(0.0005, 0.02)),)
+    linear = False
+    instantaneous = False
+
+    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return the filtered torque, shape (N, n) [N m]."""
+        return self._filtered(values, motion, tau)
+
+    def transfer(
+        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
+    ) -> FloatArray:
+        """Return the columns filtered alike."""
+        return self._filtered(values, motion, columns)
+
+    def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return dreading/dT [N m/s], which is -dtau/dt where the lag is zero, (N, n, P)."""
+        columns = self.indices(motion.joints)
+        rates = -rate_of_change(motion.t, tau)
+        for lag, joint in zip(values, columns, strict=True):
+            if lag > 0.0:
+                ends = [low_pass(motion.t, tau[:, joint], lag * s) for s in (_MORE, 1 / _MORE)]
+                rates[:, joint] = (ends[0] - ends[1]) / (lag * (_MORE - 1 / _MORE))
+        return _by_owner(self, motion, rates)
+
+    def memory(self, values: FloatArray) -> float:
+        """Return the time after which the slowest filter has forgotten [s]."""
+        return _FORGOTTEN * float(np.max(np.abs(values)))
+
+    def _filtered(self, values: FloatArray, motion: Motion, x: FloatArray) -> FloatArray:
+        result = x.copy()
+        for lag, joint in zip(values, self.indices(motion.joints), strict=True):
+            if lag:
+                result[:, joint] = low_pass(motion.t, x[:, joint], float(lag))
+        return result
+
+
+def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
+    """Differentiate samples along the first axis."""
+    if len(t) < 2:
+        raise ModelError(
+            'delay, lag, elasticity and backlash depend on how the torque changes: they need a '
+            'motion of two samples or more'
+        )
+    return np.asarray(np.gradient(x, t, axis=0))
+
+
+def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
+    """
+    Filter samples on an even time base, T dy/dt + y = x, from a start in steady change.
+
+    As y = x - T v, where v is the filtered rate of x, with the rate linear between samples: right
+    to second order in the step for lags longer and shorter than it. A negative lag leads.
+
+    """
+    rate = rate_of_change(t, x)
+    if lag <= 0.0:
+        return np.asarray(x - lag * rate)
+    step = float(t[-1] - t[0]) / (len(t) - 1) / lag
+    decay, mean = np.exp(-step), -np.expm1(-step) / step
+    numerator, denominator = [1.0 - mean, mean - decay], [1.0, -decay]
+    filtered = rate.copy()
+    before = (decay + numerator[1]) * rate[:1]
+    filtered[1:], _ = lfilter(numerator, denominator, rate[1:], axis=0, zi=before)
+    return np.asarray(x - lag * filtered)
+
+
+def _by_owner(effect: TorqueReading, motion: Motion, values: FloatArray) -> FloatArray:
+    """Place sensitivities (N, n): in a column per joint, or in one for the whole arm."""
+    if effect.joints:
+        return joint_columns(effect, motion, values)
+    return values[:, :, np.newaxis]
