@@ -213,7 +213,7 @@ def identify(
             f'the motion tells {base.rank} of {theory.rank} parameters apart; '
             'the others are grouped',
         )
-    solution = solve(problem, settings.method)
+    solution = solve(problem, settings.method, _bounds(arm, base))
     if solution.outliers:
         notes += (f'{solution.outliers} torque samples were weighted down as outliers',)
     return Identification(
@@ -233,6 +233,16 @@ def _fits(problem: Sequence[Regression], values: FloatArray) -> tuple[Fit, ...]:
     return tuple(
         Fit(part.source, part.motion, part.columns @ values, part.informative) for part in problem
     )
+
+
+def _bounds(arm: ArmModel, base: BaseParameters) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of base parameters; one that stands for a group has none."""
+    free = np.full(len(arm.robot.rigid_parameters), np.inf)
+    effects = [effect.bounds() for effect in arm.effects]
+    lower = np.concatenate([-free, *(bounds[0] for bounds in effects)])[base.independent]
+    upper = np.concatenate([free, *(bounds[1] for bounds in effects)])[base.independent]
+    alone = np.count_nonzero(base.grouping, axis=1) == 1
+    return np.where(alone, lower, -np.inf), np.where(alone, upper, np.inf)
 
 
 def _positions(theory: BaseParameters, base: BaseParameters) -> list[int]:

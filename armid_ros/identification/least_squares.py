@@ -20,6 +20,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
+import scipy.optimize
 
 Method = Literal['ols', 'wls', 'irls']
 
@@ -56,7 +57,11 @@ class Solution:
     outliers: int
 
 
-def solve(problem: Sequence[Regression], method: Method = 'wls') -> Solution:
+def solve(
+    problem: Sequence[Regression],
+    method: Method = 'wls',
+    bounds: tuple[FloatArray, FloatArray] | None = None,
+) -> Solution:
     """
     Fit parameters to one or more stretches of motion.
 
@@ -67,6 +72,8 @@ def solve(problem: Sequence[Regression], method: Method = 'wls') -> Solution:
     method : {'ols', 'wls', 'irls'}
         All joints alike; every joint by its own residual; that, with outliers weighted down
         (Huber's function).
+    bounds : tuple of two ndarray, each of shape (r,), optional
+        What is physically possible, lower and upper. The covariance is that without bounds.
 
     Returns
     -------
@@ -97,6 +104,8 @@ def solve(problem: Sequence[Regression], method: Method = 'wls') -> Solution:
         values, triangle = _weighted(w, y, weights)
         if settled:
             break
+    if bounds is not None:
+        values = _within(values, triangle, bounds)
     residual = y - w @ values
     joint_std = np.sqrt(freedom * np.sum(residual**2, axis=0, where=used) / counts)
     relative = np.where(used, weights / np.max(weights, axis=0).clip(1e-300), 1.0)
@@ -107,6 +116,19 @@ def solve(problem: Sequence[Regression], method: Method = 'wls') -> Solution:
         condition_number=float(np.linalg.cond(triangle)),
         outliers=int(np.sum(relative**2 < 0.5)),
     )
+
+
+def _within(
+    values: FloatArray, triangle: FloatArray, bounds: tuple[FloatArray, FloatArray]
+) -> FloatArray:
+    """Return the best fit within bounds: the one whose predictions differ least from the free."""
+    if np.all((values >= bounds[0]) & (values <= bounds[1])):
+        return values
+    scale = np.linalg.norm(triangle, axis=0)
+    solution = scipy.optimize.lsq_linear(
+        triangle / scale, triangle @ values, (bounds[0] * scale, bounds[1] * scale), method='bvls'
+    )
+    return np.clip(solution.x / scale, *bounds)
 
 
 def _robust_scale(residual: FloatArray, used: npt.NDArray[np.bool_]) -> FloatArray:

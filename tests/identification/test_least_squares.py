@@ -86,3 +86,17 @@ def test_two_stretches_are_one_problem():
 
     halves = solve([part(slice(0, 500)), part(slice(500, 1000))])
     np.testing.assert_allclose(halves.values, solve([data]).values, rtol=1e-9)
+
+
+def test_bounds_hold_and_the_others_make_up_for_it():
+    """With the second parameter held at zero, the fit is that without its column."""
+    data = [problem(np.random.default_rng(4))]
+    bounds = (np.array([-np.inf, 0.0, -np.inf]), np.full(3, np.inf))
+    bounded = solve(data, 'wls', bounds)
+    assert bounded.values[1] == 0.0
+    free = solve(data)
+    np.testing.assert_array_equal(solve(data, 'wls', (-bounds[1], bounds[1])).values, free.values)
+    weights = 1.0 / free.joint_std
+    columns = (data[0].columns * weights[:, None])[:, :, [0, 2]].reshape(-1, 2)
+    expected = np.linalg.lstsq(columns, (data[0].tau * weights).ravel(), rcond=None)[0]
+    np.testing.assert_allclose(bounded.values[[0, 2]], expected, rtol=1e-3)

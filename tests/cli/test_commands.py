@@ -1,0 +1,132 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The command line: what it writes, prints and refuses."""
+
+import json
+
+from armid_ros.arm import ArmModel, load_model
+from armid_ros.cli import main
+from armid_ros.cli.commands import COMMANDS
+from armid_ros.effects import CATALOGUE, make_effect
+from armid_ros.excitation import load_excitation
+from armid_ros.motion import Motion
+from armid_ros.recording import read_joint_trajectory, read_recording, write_recording
+from armid_ros.robots import load_robot
+from click.testing import CliRunner
+import numpy as np
+import pytest
+
+ROBOT = 'humanoid_arm'
+
+
+def armid(*arguments, code=0):
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def bag_of(path, arm, seed, duration=20.0):
+    """Write what sensors would record of a motion in closed form."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(200 * duration)) / 200.0
+    q, dq, ddq = np.zeros((3, len(t), 6))
+    for hz, size in ((0.15, 0.5), (0.4, 0.25), (0.9, 0.08)):
+        w = 2 * np.pi * hz
+        angle = w * t[:, None] + rng.uniform(0, 2 * np.pi, 6)
+        q += size * np.sin(angle)
+        dq += size * w * np.cos(angle)
+        ddq -= size * w * w * np.sin(angle)
+    motion = Motion(arm.robot.joints, t, q, dq, ddq)
+    noise = 0.01 * rng.normal(size=q.shape)
+    measured = motion.with_torque(arm.torque(motion) + noise)
+    write_recording(path, measured, robot_description=arm.robot.urdf)
+    return path
+
+
+@pytest.fixture(scope='module')
+def bags(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('bags')
+    arm = ArmModel(load_robot(ROBOT))
+    arm = arm.with_effect(make_effect('viscous_friction', arm.robot), np.full(6, 0.1))
+    return [bag_of(folder / name, arm, seed) for seed, name in enumerate(('train', 'held_out'))]
+
+
+@pytest.mark.parametrize('command', COMMANDS)
+def test_every_command_explains_itself_with_an_example(command):
+    assert 'Example: armid ' in armid(command, '--help').output
+
+
+def test_robots_and_effects_are_listed_for_people_and_programs():
+    assert ROBOT in armid('robots').output
+    listed = json.loads(armid('effects', '--json').output)
+    assert [row['name'] for row in listed] == list(CATALOGUE)
+
+
+def test_identify_writes_model_numbers_and_page(bags, tmp_path):
+    out = tmp_path / 'out'
+    result = armid('identify', bags[0], '--robot', '-', '--validate', bags[1], '--out', out)
+    assert 'held out' in result.output
+    document = json.loads((out / 'identification.json').read_text())
+    assert document['schema'] == 'armid/identification/1'
+    assert document['validation'][0]['relative_error_percent'] < 3.0
+    assert {'name', 'joint', 'value', 'std', 'unit'} == set(document['parameters'][0])
+    arm = load_model(out / 'model.yaml')  # its robot came with the bag and lies beside it
+    viscous = arm.values[arm.effects.index(make_effect('viscous_friction', arm.robot))]
+    np.testing.assert_allclose(viscous, 0.1, atol=0.01)
+    assert (out / 'report.html').stat().st_size > 10_000
+
+
+def test_identify_prints_json_and_nothing_else(bags, tmp_path):
+    result = armid('identify', bags[0], '--robot', ROBOT, '--out', tmp_path / 'o', '--json')
+    assert json.loads(result.stdout)['robot'] == ROBOT
+
+
+def test_excite_simulate_identify_in_three_lines(tmp_path):
+    plan, run = tmp_path / 'plan', tmp_path / 'run'
+    armid('excite', '--robot', ROBOT, '--gravity', 'moon', '--duration', 10, '--out', plan)
+    excitation = load_excitation(plan / 'excitation.yaml')
+    np.testing.assert_allclose(excitation.duration, 10.0)
+    robot = load_robot(ROBOT, gravity='moon')
+    assert read_joint_trajectory(plan / 'trajectory', joints=robot.joints).joints == robot.joints
+    effect = 'viscous_friction:viscous_coefficient=0.05'
+    arguments = ('--robot', ROBOT, '--gravity', 'moon', '--effect', effect, '--rate', 200)
+    trajectory = plan / 'excitation.yaml'
+    armid('simulate', *arguments, '--trajectory', trajectory, '--out', run)
+    assert len(read_recording(run, joints=robot.joints)) == 2001
+    out = tmp_path / 'out'
+    armid('identify', run, '--robot', '-', '--gravity', 'moon', '--out', out)
+    model = out / 'model.yaml'
+    again = tmp_path / 'again'
+    armid('simulate', '--robot', ROBOT, '--model', model, '--rate', 200, '--out', again)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (('identify', 'no.mcap', '--robot', ROBOT, '--out', 'o'), 'no.mcap'),
+        (('identify', 'no.mcap', '--robot', 'robbie', '--out', 'o'), 'shipped are humanoid_arm'),
+        (
+            ('identify', '{bag}', '--robot', ROBOT, '--effects', 'stiction', '--out', 'o'),
+            'viscous_friction, coulomb_friction',
+        ),
+        (
+            ('identify', '{bag}', '--robot', ROBOT, '--joints', 'elbow', '--out', 'o'),
+            'elbow_pitch',
+        ),
+        (('identify', '{bag}', '--robot', ROBOT, '--topic', '/x', '--out', 'o'), '/joint_states'),
+        (('simulate', '--robot', ROBOT, '--gravity', 'mars', '--out', 'o'), 'mars'),
+        (('simulate', '--robot', ROBOT, '--effect', 'payload:m=1', '--out', 'o'), 'payload_m'),
+        (('simulate', '--robot', ROBOT, '--model', 'none.yaml', '--out', 'o'), 'none.yaml'),
+        (('simulate', '--robot', ROBOT, '--out', '{bag}'), '{bag}'),
+        (('recover', 'no.mcap', '--out', 'o'), 'no.mcap'),
+        (('excite', '--robot', ROBOT, '--clearance', '5', '--out', 'o'), 'clearance'),
+    ],
+)
+def test_bad_input_is_one_line_with_the_answer(arguments, message, bags, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = armid(*(str(a).format(bag=bags[0]) for a in arguments), code=2)
+    lines = result.stderr.strip().splitlines()
+    assert len(lines) == 1
+    assert lines[0].startswith('armid: ')
+    assert message.format(bag=bags[0]) in lines[0]
+    assert not (tmp_path / 'o').exists()
