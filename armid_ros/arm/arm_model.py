@@ -145,22 +145,9 @@ class ArmModel:
             Actuator torque [N m].
 
         """
-        action, link = self._acting, self.link_motion(motion)
+        link = self.link_motion(motion)
         load = self.load(link)
-        tau = load.copy()
-        if action.damping is not None:
-            tau += motion.dq @ action.damping.T
-        if action.inertia is not None:
-            tau += motion.ddq @ action.inertia.T
-        if action.dry_friction is not None:
-            tau += action.dry_friction.torque(motion.dq, load)
-        if action.hysteresis is not None:
-            tau += action.hysteresis.torque(action.hysteresis.along(motion.q, motion.dq))
-        if action.torque is not None:
-            tau += action.torque(motion.t, motion.q, motion.dq)
-        if action.link_torque is not None:
-            tau += action.link_torque(link.t, link.q, link.dq)
-        return tau
+        return load + self._acting.effort(motion, link, load)
 
     def torque(self, motion: Motion) -> FloatArray:
         """

@@ -218,6 +218,33 @@ class Action:
     reading: Callable[[Motion, FloatArray], FloatArray] | None = None
     reading_memory: float = 0.0
 
+    def effort(self, motors: Motion, links: Motion, load: FloatArray) -> FloatArray:
+        """
+        Return what the actuators supply beside the rigid body's torque, shape (N, n) [N m].
+
+        Parameters
+        ----------
+        motors, links : Motion
+            True motion on either side of the transmissions; the same where they are rigid.
+        load : ndarray, shape (N, n)
+            Torque of the rigid body [N m].
+
+        """
+        tau = np.zeros_like(load)
+        if self.damping is not None:
+            tau += motors.dq @ self.damping.T
+        if self.inertia is not None:
+            tau += motors.ddq @ self.inertia.T
+        if self.dry_friction is not None:
+            tau += self.dry_friction.torque(motors.dq, load)
+        if self.hysteresis is not None:
+            tau += self.hysteresis.torque(self.hysteresis.along(motors.q, motors.dq))
+        if self.torque is not None:
+            tau += self.torque(motors.t, motors.q, motors.dq)
+        if self.link_torque is not None:
+            tau += self.link_torque(links.t, links.q, links.dq)
+        return tau
+
 
 def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
     """

@@ -56,7 +56,7 @@ class Trace:
     q, dq : ndarray, shape (N, n)
         State at the beginning of each step.
     ddq, tau : ndarray, shape (N, n)
-        Mean acceleration and actuator torque of each step.
+        Mean acceleration, and the torque that the drives were asked for, of each step.
     state : State
         The state after the last step.
     torque : ndarray, shape (n,)
@@ -103,9 +103,10 @@ def run(
 
     """
     q, dq, ddq, tau = np.empty((4, len(targets), len(torque)))
+    drive = plant.action.drive
     for k in range(len(targets)):
         q[k], dq[k], tau[k] = state.q, state.dq, torque
-        state = step(plant, state, torque)
+        state = step(plant, state, torque if drive is None else drive(torque))
         ddq[k] = state.ddq
         torque = command(plant, controller, state, targets, k)
     return Trace(q, dq, ddq, tau, state, torque)

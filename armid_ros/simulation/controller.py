@@ -101,14 +101,9 @@ class ComputedTorque(Controller):
     def feedforward(self, desired: Motion) -> FloatArray:
         """Return damping, dry friction and other torques at the reference, shape (N, n)."""
         action = self.arm.action()
-        tau = np.zeros_like(desired.q)
-        if action.damping is not None:
-            tau += desired.dq @ action.damping.T
-        if action.dry_friction is not None:
-            tau += action.dry_friction.torque(desired.dq)
-        if action.torque is not None:
-            tau += action.torque(desired.t, desired.q, desired.dq)
-        return tau
+        depends = action.dry_friction is not None and action.dry_friction.load_share is not None
+        load = self.arm.load(desired) if depends else np.zeros_like(desired.q)
+        return action.effort(desired, desired, load) - desired.ddq @ self._inertia.T
 
     def torque(
         self,

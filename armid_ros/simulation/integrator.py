@@ -45,22 +45,33 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
     model, data, dq = plant.robot.model, plant.data, state.dq
     q_middle = state.q + half * dq
     dq_middle = dq + half * state.ddq
-    force = torque - pin.nonLinearEffects(model, data, q_middle, dq_middle)
+    weight = pin.nonLinearEffects(model, data, q_middle, dq_middle)
+    force = torque - weight
     force -= plant.constant
     force -= plant.damping.dot(dq)
     if plant.torque is not None:
         force -= plant.torque(np.asarray(state.t + half), q_middle, dq_middle)
-    inertia = pin.crba(model, data, q_middle) + plant.inertia
+    memory, slipping = state.memory, plant.action.hysteresis
+    if slipping is not None:
+        force -= slipping.torque(slipping.advance(memory, half * dq))
+    mass = pin.crba(model, data, q_middle)
+    contacts, load = plant.contacts, None
+    if contacts.friction is not None:
+        load = weight + mass.dot(state.ddq)
+        contacts = contacts.under(load)
+    inertia = mass + plant.inertia
 
-    solution = _solve(inertia, force, plant.contacts.directions)
+    solution = _solve(inertia, force, contacts.directions)
     dq_next, modes = dq + dt * solution[:, 0], state.modes
     if modes:
-        dq_next, modes = _rub(plant.contacts, dt * solution[:, 1:], dq_next, modes)
+        dq_next, modes = _rub(contacts, dt * solution[:, 1:], dq_next, modes)
     q_next = q_middle + half * dq_next
     if plant.hard_stops and not _inside(plant.stops, q_next):
-        q_next, dq_next, modes = _stop(plant, inertia, force, state, q_middle, q_next)
+        q_next, dq_next, modes = _stop(plant, inertia, force, state, q_middle, q_next, load)
+    if slipping is not None:
+        memory = slipping.advance(memory, q_next - state.q)
     steps = state.steps + 1
-    return State(steps, steps * plant.dt, q_next, dq_next, (dq_next - dq) / dt, modes)
+    return State(steps, steps * plant.dt, q_next, dq_next, (dq_next - dq) / dt, modes, memory)
 
 
 def _solve(inertia: FloatArray, force: FloatArray, directions: FloatArray) -> FloatArray:
@@ -118,12 +129,15 @@ def _stop(
     state: State,
     q_middle: FloatArray,
     q_next: FloatArray,
+    load: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray, Modes]:
     """Repeat the step with the stops that it ran into."""
     robot, count = plant.robot, len(state.modes)
     at_upper, at_lower = q_next > robot.upper, q_next < robot.lower
     while True:
         contacts = plant.contacts_at(at_lower, at_upper)
+        if load is not None:
+            contacts = contacts.under(load)
         solution = _solve(inertia, force, contacts.directions)
         dq_free = state.dq + plant.dt * solution[:, 0]
         guess = state.modes + (0,) * (len(contacts.axes) - count)

@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import DryFriction
+from armid_ros.effects import Action, DryFriction, TorqueLaw
 from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
@@ -45,6 +44,8 @@ class State:
         Mean acceleration of the step that led here.
     modes : tuple of int, length m
         What each dry friction element did: 1 slipped forwards, -1 backwards, 0 stuck.
+    memory : ndarray, shape (h,)
+        States of the friction that has some.
 
     """
 
@@ -54,6 +55,7 @@ class State:
     dq: FloatArray
     ddq: FloatArray
     modes: Modes
+    memory: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,18 +71,30 @@ class Contacts:
         What torques they take.
     axes : tuple of int, length m
         The joint that an element acts on alone; -1 if it acts on several.
+    friction : DryFriction
+        What they are without a load, where the load matters.
 
     """
 
     directions: FloatArray
     law: BoxLaw
     axes: tuple[int, ...]
+    friction: DryFriction | None = None
 
     @classmethod
     def of(cls, friction: DryFriction) -> Contacts:
         """Return the contacts of friction elements."""
         axes = tuple(_axis(direction) for direction in friction.directions)
-        return cls(friction.directions, BoxLaw(friction.lower, friction.upper), axes)
+        law = BoxLaw(friction.lower, friction.upper)
+        loaded = None if friction.load_share is None else friction
+        return cls(friction.directions, law, axes, loaded)
+
+    def under(self, load: FloatArray) -> Contacts:
+        """Return the contacts as they are under a torque of the rigid body, shape (n,) [N m]."""
+        if self.friction is None:
+            return self
+        more = self.friction.widening(load)
+        return replace(self, law=BoxLaw(self.friction.lower - more, self.friction.upper + more))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +123,8 @@ class Plant:
         Constant torque that the actuators have to supply [N m].
     torque : callable (t, q, dq) -> ndarray (n,), or None
         Anything else that they have to supply.
+    action : Action
+        What the effects do, to the arm and to its sensors.
     spans : tuple of ndarray, each of shape ()
         The step and half of it [s]; numpy multiplies by these in half the time of a float.
     torque_limit : ndarray, shape (n,)
@@ -126,9 +142,8 @@ class Plant:
     hard_stops: bool = True
     robot: Robot = field(init=False)
     contacts: Contacts = field(init=False, repr=False)
-    torque: Callable[[FloatArray, FloatArray, FloatArray], FloatArray] | None = field(
-        init=False, repr=False
-    )
+    torque: TorqueLaw | None = field(init=False, repr=False)
+    action: Action = field(init=False, repr=False)
     data: pin.Data = field(init=False, repr=False)
     damping: FloatArray = field(init=False, repr=False)
     constant: FloatArray = field(init=False, repr=False)
@@ -162,7 +177,8 @@ class Plant:
             'torque_limit': robot.torque_limit,
             'stops': list(zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)),
             'data': data,
-            'torque': action.torque,
+            'torque': _both(action.torque, action.link_torque),
+            'action': action,
             'damping': damping,
             'constant': constant,
             'inertia': inertia + weight * self.dt * damping,
@@ -194,7 +210,9 @@ class Plant:
         if self.hard_stops:
             position = self._within_stops(position)
         modes = tuple(np.sign(self.contacts.directions @ velocity).astype(int).tolist())
-        return State(steps, steps * self.dt, position, velocity, acceleration, modes)
+        slipping = self.action.hysteresis
+        memory = np.empty(0) if slipping is None else slipping.start(velocity)
+        return State(steps, steps * self.dt, position, velocity, acceleration, modes, memory)
 
     def _within_stops(self, q: FloatArray) -> FloatArray:
         lower, upper = self.robot.lower, self.robot.upper
@@ -228,6 +246,9 @@ class Plant:
                     np.vstack([friction.directions, np.eye(self.robot.n_joints)[hit]]),
                     np.append(friction.law.lower, np.where(at_lower[hit], -np.inf, 0.0)),
                     np.append(friction.law.upper, np.where(at_upper[hit], np.inf, 0.0)),
+                    None
+                    if friction.friction is None or friction.friction.load_share is None
+                    else np.append(friction.friction.load_share, np.zeros(len(hit))),
                 )
             )
         return self._at_stops[key]
@@ -263,13 +284,26 @@ def _split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFri
             'dry friction that pushes: the torque of an element forwards is less than backwards '
             f'({friction.upper} against {friction.lower}); friction torques have to be positive'
         )
-    constant = friction.lower == friction.upper
+    share = np.zeros(len(friction.lower)) if friction.load_share is None else friction.load_share
+    constant = (friction.lower == friction.upper) & (share == 0.0)
     sticking = DryFriction(
         np.ascontiguousarray(friction.directions[~constant]),
         friction.lower[~constant],
         friction.upper[~constant],
+        None if friction.load_share is None else share[~constant],
     )
     return sticking, np.asarray(friction.lower[constant] @ friction.directions[constant])
+
+
+def _both(motors: TorqueLaw | None, links: TorqueLaw | None) -> TorqueLaw | None:
+    """Add the torques of two sides that a rigid transmission makes one."""
+    if motors is None or links is None:
+        return motors or links
+
+    def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+        return np.asarray(motors(t, q, dq) + links(t, q, dq))
+
+    return torque
 
 
 def _axis(direction: FloatArray) -> int:

@@ -13,6 +13,7 @@ from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.simulation.closed_loop import command, run, Targets
 from armid_ros.simulation.controller import ComputedTorque, Controller
 from armid_ros.simulation.plant import Plant
+from armid_ros.simulation.readings import readings
 from armid_ros.simulation.reference import Reference
 from armid_ros.simulation.sensors import Sensors
 import numpy as np
@@ -131,14 +132,16 @@ def simulate(
         for name in ('q', 'dq', 'ddq', 'tau')
     )
     saturated = np.mean(np.abs(tau) >= plant.torque_limit, axis=0)
-    ddq, tau = (np.concatenate([x[:1], (x[1:] + x[:-1]) / 2]) for x in (ddq, tau))
+    given = tau if plant.action.drive is None else plant.action.drive(tau)
+    ddq, given, asked = (np.concatenate([x[:1], (x[1:] + x[:-1]) / 2]) for x in (ddq, given, tau))
+    truth = Motion(plant.robot.joints, plant.times(0, last + 1), q, dq, ddq, given)
+    q, dq, asked = readings(plant.action, truth, asked)
     rows = np.arange(0, last + 1, stride)
-    t = np.asarray(plant.dt * rows, dtype=np.float64)
-    truth = Motion(plant.robot.joints, t, q[rows], dq[rows], ddq[rows], tau[rows])
-    late = tau[np.maximum(rows - sensors.torque_delay, 0)]
-    readings = sensors.measure(truth.q, truth.dq, late, stride * plant.dt, rng)
-    desired = curve.sample(t)
-    return SimulatedRun(truth.joints, t, *readings, truth, desired, saturated)
+    late = asked[np.maximum(rows - sensors.torque_delay, 0)]
+    measured = sensors.measure(q[rows], dq[rows], late, stride * plant.dt, rng)
+    truth = truth.select(rows)
+    desired = curve.sample(truth.t)
+    return SimulatedRun(truth.joints, truth.t, *measured, truth, desired, saturated)
 
 
 def whole_steps(time: float, dt: float, what: str) -> int:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
@@ -13,6 +12,7 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.simulation.closed_loop import command, run, Targets, Trace
 from armid_ros.simulation.controller import ComputedTorque, Controller
 from armid_ros.simulation.plant import middle_position, Plant, State
+from armid_ros.simulation.readings import RecentPast
 from armid_ros.simulation.reference import Reference
 from armid_ros.simulation.sensors import Sensors
 import numpy as np
@@ -122,7 +122,8 @@ class SimulatedArm:
         self._previous: FloatArray | None = None
         position = self._state.q
         self._follow(Reference(self.joints, np.zeros(1), position[np.newaxis]))
-        self._readings = deque([self._torque], maxlen=1 + self.sensors.torque_delay)
+        delay = self.sensors.torque_delay
+        self._past = RecentPast(self.plant, self._state, self._torque, delay)
 
     def set_trajectory(self, reference: Reference) -> None:
         """
@@ -196,22 +197,14 @@ class SimulatedArm:
         return replace(motion, t=self.plant.times(first, count))
 
     def _record(self, trace: Trace) -> None:
-        """Keep where the arm is, and the torques that the sensor has yet to read."""
+        """Keep where the arm is, and what the sensors have yet to read."""
         self._state, self._torque = trace.state, trace.torque
-        recent = trace.tau[-1 - self.sensors.torque_delay :]
-        self._readings.extend((recent[1:] + recent[:-1]) / 2)
-        self._readings.append((recent[-1] + self._torque) / 2)
+        self._past.extend(trace)
 
     def _read(self, dt: float) -> Sample:
         state = self._state
-        q, dq, tau = self.sensors.measure(
-            state.q[np.newaxis],
-            state.dq[np.newaxis],
-            self._readings[0][np.newaxis],
-            dt,
-            self._rng,
-            self._previous,
-        )
+        q, dq, tau = (row[np.newaxis] for row in self._past.latest())
+        q, dq, tau = self.sensors.measure(q, dq, tau, dt, self._rng, self._previous)
         self._previous = q[0]
         return Sample(state.steps, state.t, q[0], dq[0], tau[0])
 
