@@ -24,6 +24,8 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
+#: Samples to either side that rates of change of rates of change are taken from.
+_STENCIL = 4
 #: Step of the differences along a change of motion [rad or m, rad/s or m/s].
 _STEP = 1e-6
 
@@ -249,10 +251,12 @@ class ArmModel:
             tau = own.read(values, motion, tau)
         return tau
 
-    @property
-    def settling_time(self) -> float:
-        """How far back in time what is read depends on the torque [s]."""
-        return self._acting.reading_memory
+    def neighbours(self, period: float) -> int:
+        """Return how many samples to either side what is read depends on, a period [s] apart."""
+        action = self._acting
+        if action.displacement is None and action.reading_memory == 0.0:
+            return 0
+        return int(np.ceil(action.reading_memory / period)) + _STENCIL
 
     @property
     def _readings(self) -> list[tuple[TorqueReading, FloatArray]]:
@@ -303,7 +307,7 @@ class ArmModel:
 def _directional(law: TorqueLaw, link: Motion, change: Displacement) -> FloatArray:
     """Differentiate a torque law along directions, by central differences, (N, n, P)."""
     columns = np.empty(change.q.shape)
-    for index in range(columns.shape[2]):
+    for index in range(change.q.shape[-1]):
         q, dq = change.q[:, :, index], change.dq[:, :, index]
         step = _STEP / max(float(np.max(np.abs(q))), float(np.max(np.abs(dq))), _STEP)
         ends = [law(link.t, link.q + s * q, link.dq + s * dq) for s in (step, -step)]

@@ -5,7 +5,8 @@ model.yaml: an arm model as a file that a person can read and a simulator can lo
 
 Schema armid/model/1: ``robot`` (shipped name or path of the description), ``gravity`` [m/s^2],
 ``rigid_parameters`` and ``effects``, each a list of parameters with name, joint, value, std, unit.
-A std of null says that the data did not determine the parameter on its own.
+A std of null says that the data did not determine the parameter on its own. An effect has
+``shapes`` as well if the torque is not linear in all that describes it.
 
 """
 
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.arm.arm_model import ArmModel
-from armid_ros.effects import CATALOGUE
+from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.motion import FloatArray
@@ -68,7 +69,10 @@ def model_document(arm: ArmModel, robot: str, estimate: Estimate | None = None) 
     effects, start = [], size
     for effect, values in zip(arm.effects, arm.values, strict=True):
         rows = table[start : start + len(values)]
-        effects.append({'name': effect.name, 'joints': list(effect.joints), 'parameters': rows})
+        entry = {'name': effect.name, 'joints': list(effect.joints), 'parameters': rows}
+        if effect.shapes:
+            entry['shapes'] = _shape_table(effect, arm.robot, known)
+        effects.append(entry)
         start += len(values)
     return {
         'schema': SCHEMA,
@@ -77,6 +81,14 @@ def model_document(arm: ArmModel, robot: str, estimate: Estimate | None = None) 
         'rigid_parameters': table[:size],
         'effects': effects,
     }
+
+
+def _shape_table(
+    effect: Effect, robot: Robot, known: dict[tuple[str, str], float]
+) -> list[dict[str, Any]]:
+    names = effect.shape_parameters(robot)
+    std = [known.get((name.name, name.joint)) for name in names]
+    return parameter_table(names, np.array(effect.shape), std)
 
 
 def save_model(
@@ -137,6 +149,9 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
                 f"no effect '{entry['name']}'; the catalogue has {', '.join(CATALOGUE)}"
             )
         effect = CATALOGUE[entry['name']].on(robot, tuple(entry['joints']))
+        if 'shapes' in entry:
+            shape = _values(entry['shapes'], effect.shape_parameters(robot))
+            effect = effect.with_shape(shape.reshape(effect.shape_values.shape))
         arm = arm.with_effect(effect, _values(entry['parameters'], effect.parameters(robot)))
     return arm
 

@@ -7,12 +7,12 @@ from armid_ros.effects.action import (
     Displacement,
     DryFriction,
     Hysteresis,
-    merge_actions,
     TorqueLaw,
     Transmission,
 )
 from armid_ros.effects.base import Effect, Quantity, Shape
 from armid_ros.effects.catalogue import CATALOGUE, make_effect, parse_effect
+from armid_ros.effects.merge import merge_actions
 from armid_ros.effects.readings import Displacing, TorqueReading
 
 __all__ = [

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Effect, joint_columns, Quantity, scatter, Shape
+from armid_ros.effects.base import Effect, Quantity, Shape
+from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np

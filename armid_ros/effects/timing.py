@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.effects.base import joint_columns, Quantity
+from armid_ros.effects.base import Quantity
+from armid_ros.effects.layout import joint_columns
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.signals import (
@@ -96,23 +97,110 @@ def regressions(
     """
     total = sum(len(recording.t) for recording in recordings)
     done = 0
+
+    def tick(samples: int) -> None:
+        nonlocal done
+        done += samples
+        if progress is not None:
+            progress(min(1.0, done / total))
+
     result = []
     for recording in recordings:
         for motion in segments(recording, used):
-            blocks = []
-            for samples in _overlapping(len(motion), used):
-                part = motion.select(samples)
-                blocks.append(decimate(arm.columns(part)[:, :, columns], used))
-                done += len(part)
-                if progress is not None:
-                    progress(min(1.0, done / total))
             kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
             assert motion.tau is not None
             decimated = motion.select(kept).with_torque(decimate(motion.tau, used))
             informative = ~_at_rest(arm, motion)[kept]
-            stacked = np.concatenate(blocks)
+            stacked = filtered_columns(arm, columns, motion, used, tick)
             result.append(Regression(decimated, stacked, informative, recording.source))
     return result
+
+
+def filtered_columns(
+    arm: ArmModel,
+    columns: npt.NDArray[np.intp],
+    motion: Motion,
+    used: Conditioning,
+    tick: Callable[[int], None] = lambda samples: None,
+) -> FloatArray:
+    """
+    Filter and decimate some columns of an arm's regressor along one unbroken stretch.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Rigid body and effects.
+    columns : ndarray of int, shape (r,)
+        Which of ``arm.parameters`` to keep.
+    motion : Motion
+        The stretch at the full rate.
+    used : Conditioning
+        Filters.
+    tick : callable, optional
+        Told how many samples were done since it was last told.
+
+    Returns
+    -------
+    ndarray, shape (M, n, r)
+
+    """
+    result = np.empty((len(decimated_samples(len(motion), used)), motion.n_joints, len(columns)))
+    sources = _sources(arm, columns)
+    for source in sources:
+        if not source.instantaneous:
+            whole = source.columns(motion)[:, :, source.inner]
+            result[:, :, source.outer] = decimate(whole, used)
+    margin = arm.neighbours(1.0 / used.rate_hz)
+    first = 0
+    for samples in _overlapping(len(motion), used):
+        around = slice(max(0, samples.start - margin), samples.stop + margin)
+        part = motion.select(around)
+        inside = slice(samples.start - around.start, samples.stop - around.start)
+        count = len(decimated_samples(samples.stop - samples.start, used))
+        for source in sources:
+            if source.instantaneous:
+                block = source.columns(part)[inside, :, source.inner]
+                result[first : first + count, :, source.outer] = decimate(block, used)
+        first += count
+        tick(samples.stop - samples.start)
+    return result
+
+
+@dataclass(frozen=True)
+class _Source:
+    """
+    Where some of the columns come from: the rigid body, or one effect.
+
+    Attributes
+    ----------
+    columns : callable Motion -> ndarray (N, n, P)
+        Its columns.
+    inner, outer : ndarray of int
+        Which of them are wanted, and where they go.
+    instantaneous : bool
+        Whether a part of the motion will do.
+
+    """
+
+    columns: Callable[[Motion], FloatArray]
+    inner: npt.NDArray[np.intp]
+    outer: npt.NDArray[np.intp]
+    instantaneous: bool
+
+
+def _sources(arm: ArmModel, columns: npt.NDArray[np.intp]) -> list[_Source]:
+    """Return where the wanted columns come from, without what is not wanted at all."""
+    sizes = [len(arm.robot.rigid_parameters), *(len(values) for values in arm.values)]
+    functions: list[Callable[[Motion], FloatArray]] = [arm.rigid_columns]
+    functions.extend(partial(arm.columns_of, effect) for effect in arm.effects)
+    instantaneous = [True, *(effect.instantaneous for effect in arm.effects)]
+    sources, start = [], 0
+    for size, function, local in zip(sizes, functions, instantaneous, strict=True):
+        outer = np.flatnonzero((columns >= start) & (columns < start + size))
+        if len(outer):
+            sources.append(_Source(function, columns[outer] - start, outer, local))
+        start += size
+    return sources
 
 
 def _at_rest(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:

@@ -1,0 +1,51 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where the parameters of an effect are among those of all joints."""
+
+from __future__ import annotations
+
+from armid_ros.effects.base import Effect
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+
+
+def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> FloatArray:
+    """
+    Place the sensitivities of an effect that acts on each of its joints alone.
+
+    Parameters
+    ----------
+    effect : Effect
+        Gives the joints.
+    motion : Motion
+        Gives the joint order.
+    *quantities : ndarray, shape (N, n)
+        One array per quantity of the effect: dtau_j / dtheta_j for all joints of the motion.
+
+    Returns
+    -------
+    ndarray, shape (N, n, P)
+        Zero where a parameter belongs to another joint.
+
+    """
+    count = len(quantities)
+    columns = np.zeros((len(motion), motion.n_joints, count * len(effect.joints)))
+    for position, joint in enumerate(effect.indices(motion.joints)):
+        for offset, values in enumerate(quantities):
+            columns[:, joint, count * position + offset] = values[:, joint]
+    return columns
+
+
+def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
+    """
+    Spread the values of a joint effect over all joints of the robot, zero elsewhere.
+
+    Returns
+    -------
+    ndarray, shape (number of quantities, n)
+
+    """
+    spread = np.zeros((len(effect.quantities), robot.n_joints))
+    spread[:, effect.indices(robot.joints)] = values.reshape(len(effect.joints), -1).T
+    return spread
