@@ -1,0 +1,65 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What travels through the hidden-effect generator: arrays of joint signals over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Signals:
+    """
+    Joint signals as a perfect instrument would show them, on the time base of the plant.
+
+    Attributes
+    ----------
+    t : ndarray, shape (N,)
+        Time [s], evenly spaced.
+    q, dq, ddq : ndarray, shape (N, n)
+        Position, velocity, acceleration of the joints, before the gear's elasticity.
+    tau : ndarray, shape (N, n)
+        Torque that the torque sensor is to show [N m].
+    command : ndarray, shape (N, n)
+        Torque that the drives are asked for [N m].
+
+    """
+
+    t: FloatArray
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+    tau: FloatArray
+    command: FloatArray
+
+    @property
+    def dt(self) -> float:
+        """Time between samples [s]."""
+        return float(self.t[1] - self.t[0])
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """
+    A true parameter of a hidden effect.
+
+    Attributes
+    ----------
+    name, unit : str
+        As in the catalogue of effects.
+    joint : str
+        The joint it belongs to; empty for the whole arm.
+    value : float
+        True value.
+
+    """
+
+    name: str
+    joint: str
+    value: float
+    unit: str

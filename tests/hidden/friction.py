@@ -1,0 +1,287 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Hidden friction: MuJoCo's own damping and dry friction, their levels moved step by step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+from armid_ros.robots import Robot
+import mujoco
+import numpy as np
+
+from tests.hidden.arrays import Parameter
+from tests.hidden.base import HiddenEffect, Live, pick, Setting
+
+
+@dataclass(frozen=True)
+class _JointFriction(HiddenEffect):
+    """Friction of one joint with one coefficient that the gap goes by."""
+
+    joint: str
+    index: int
+    value: float
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return (self.joint,)
+
+    def scaled(self, factor: float) -> Self:
+        return replace(self, value=self.value * factor)
+
+
+class ViscousFriction(_JointFriction):
+    """The arm supplies value * dq: native damping."""
+
+    name = 'viscous_friction'
+    replaces = ('viscous_friction',)
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        value = 0.05 * setting.drive[j] / setting.speed[j]
+        return cls(setting.robot.joints[j], j, value)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('viscous_coefficient', self.joint, self.value, 'N m s/rad'),)
+
+    def prepare(self, live: Live) -> None:
+        live.model.dof_damping[live.dofs[self.index]] += self.value
+
+
+class CoulombFriction(_JointFriction):
+    """The arm supplies value * sign(dq), and holds at rest: native dry friction."""
+
+    name = 'coulomb_friction'
+    replaces = ('coulomb_friction',)
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        return cls(setting.robot.joints[j], j, 0.03 * setting.drive[j])
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('coulomb_torque', self.joint, self.value, 'N m'),)
+
+    def prepare(self, live: Live) -> None:
+        live.model.dof_frictionloss[live.dofs[self.index]] += self.value
+
+
+@dataclass(frozen=True)
+class StribeckFriction(_JointFriction):
+    """Dry friction that is higher by value * exp(-(dq / velocity)^2) at low speed."""
+
+    name = 'stribeck_friction'
+    needs = ('coulomb_friction',)
+    acts = True
+    velocity: float = 0.1
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        velocity = setting.speed[j] * rng.uniform(0.04, 0.12)
+        return cls(setting.robot.joints[j], j, 0.03 * setting.drive[j], velocity)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter('stribeck_torque', self.joint, self.value, 'N m'),
+            Parameter('stribeck_velocity', self.joint, self.velocity, 'rad/s'),
+        )
+
+    def act(self, live: Live) -> None:
+        speed = live.data.qvel[live.dofs[self.index]]
+        live.friction[self.index] += self.value * np.exp(-((speed / self.velocity) ** 2))
+
+
+@dataclass(frozen=True)
+class AsymmetricFriction(_JointFriction):
+    """Coulomb and viscous friction that differ between the directions."""
+
+    name = 'asymmetric_friction'
+    needs = ('coulomb_friction', 'viscous_friction')
+    acts = True
+    coulomb_share: float = 0.3
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        value = rng.choice([-1.0, 1.0]) * 0.03 * setting.drive[j] / setting.speed[j]
+        return cls(setting.robot.joints[j], j, value, float(setting.speed[j]) * 0.2)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter('coulomb_asymmetry', self.joint, self.value * self.coulomb_share, 'N m'),
+            Parameter('viscous_asymmetry', self.joint, self.value, 'N m s/rad'),
+        )
+
+    def act(self, live: Live) -> None:
+        speed = abs(live.data.qvel[live.dofs[self.index]])
+        live.applied[self.index] -= self.value * (self.coulomb_share + speed)
+
+
+class QuadraticFriction(_JointFriction):
+    """Drag that grows with the square of the speed."""
+
+    name = 'quadratic_friction'
+    acts = True
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        return cls(setting.robot.joints[j], j, 0.05 * setting.drive[j] / setting.speed[j] ** 2)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('quadratic_coefficient', self.joint, self.value, 'N m s^2/rad^2'),)
+
+    def act(self, live: Live) -> None:
+        speed = live.data.qvel[live.dofs[self.index]]
+        live.applied[self.index] -= self.value * speed * abs(speed)
+
+
+class LoadDependentFriction(_JointFriction):
+    """Dry friction that is higher by a share of the torque the rigid arm takes."""
+
+    name = 'load_dependent_friction'
+    acts = True
+    largest_factor = 8.0
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        loaded = np.flatnonzero(setting.torque > 0.05 * setting.torque.max())
+        j = int(rng.choice(loaded))
+        return cls(setting.robot.joints[j], j, 0.08)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('load_coefficient', self.joint, self.value, ''),)
+
+    def act(self, live: Live) -> None:
+        live.friction[self.index] += self.value * abs(live.load[self.index])
+
+
+@dataclass(frozen=True)
+class PreslidingHysteresis(_JointFriction):
+    """Dahl friction: a spring that slips, with its state integrated exactly over each step."""
+
+    name = 'presliding_hysteresis'
+    acts = True
+    distance: float = 0.01
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        distance = (setting.high[j] - setting.low[j]) * rng.uniform(0.02, 0.06)
+        return cls(setting.robot.joints[j], j, 0.03 * setting.drive[j], distance)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter('presliding_torque', self.joint, self.value, 'N m'),
+            Parameter('breakaway_distance', self.joint, self.distance, 'rad'),
+        )
+
+    def act(self, live: Live) -> None:
+        state = live.memory.setdefault(id(self), np.zeros(1))
+        way = live.data.qvel[live.dofs[self.index]] * live.dt
+        live.applied[self.index] -= self.value * state[0]
+        target = np.sign(way)
+        state[0] = target + (state[0] - target) * np.exp(-abs(way) / self.distance)
+
+
+@dataclass(frozen=True)
+class ThermalFriction(_JointFriction):
+    """Viscous friction that gets less as the joint warms up."""
+
+    name = 'thermal_friction'
+    needs = ('viscous_friction',)
+    acts = True
+    repeats = False
+    time_constant: float = 10.0
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        value = -0.02 * setting.drive[j] / setting.speed[j]
+        return cls(setting.robot.joints[j], j, value, rng.uniform(6.0, 15.0))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter('viscous_change', self.joint, self.value, 'N m s/rad'),
+            Parameter('warm_up_time', self.joint, self.time_constant, 's'),
+        )
+
+    def act(self, live: Live) -> None:
+        warmth = 1.0 - np.exp(-live.t / self.time_constant)
+        speed = live.data.qvel[live.dofs[self.index]]
+        live.applied[self.index] -= self.value * warmth * speed
+
+
+@dataclass(frozen=True)
+class CoupledJointFriction(HiddenEffect):
+    """
+    A shaft that turns with the sum of the last two joints: a tendon with friction and damping.
+
+    What the shaft's damping adds to each joint from its own motion is taken off the joint.
+
+    """
+
+    name = 'coupled_joint_friction'
+    needs = ('viscous_friction',)
+    pair: tuple[str, str]
+    viscous: float
+    coulomb: float
+    most_viscous: float
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        drive = float(setting.drive[-2:].min())
+        viscous = 0.005 * drive / float(setting.robot.velocity_limit[-2:].max())
+        return cls(setting.robot.joints[-2:], viscous, 0.02 * drive, 1.6 * viscous)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return self.pair
+
+    def scaled(self, factor: float) -> Self:
+        viscous = min(self.viscous * factor, self.most_viscous)  # less than the joint's own
+        return replace(self, viscous=viscous, coulomb=self.coulomb * factor)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        joint = self.pair[0]
+        return (
+            Parameter('coupled_inertia', joint, 0.0, 'kg m^2'),
+            Parameter('coupled_viscous_coefficient', joint, self.viscous, 'N m s/rad'),
+            Parameter('coupled_coulomb_torque', joint, self.coulomb, 'N m'),
+        )
+
+    def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
+        tendon = spec.add_tendon(name='shaft')
+        for joint in self.pair:
+            tendon.wrap_joint(joint, 1.0)
+        tendon.frictionloss = self.coulomb
+        tendon.damping = [self.viscous, 0.0, 0.0]
+
+    def prepare(self, live: Live) -> None:
+        for joint in self.pair:
+            live.model.dof_damping[live.dofs[live.robot.index(joint)]] -= self.viscous
+
+
+FRICTION = (
+    ViscousFriction,
+    CoulombFriction,
+    StribeckFriction,
+    AsymmetricFriction,
+    QuadraticFriction,
+    LoadDependentFriction,
+    PreslidingHysteresis,
+    ThermalFriction,
+    CoupledJointFriction,
+)

@@ -1,0 +1,151 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What no catalogue has: effects that should be called unknown, and shown where they live."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from tests.hidden.arrays import Parameter
+from tests.hidden.base import HiddenEffect, Live, pick, Setting
+
+
+@dataclass(frozen=True)
+class _Outside(HiddenEffect):
+    joint: str
+    index: int
+    value: float
+    acts = True
+    in_catalogue = False
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return (self.joint,)
+
+    def scaled(self, factor: float) -> Self:
+        return replace(self, value=self.value * factor)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('torque', self.joint, self.value, 'N m'),)
+
+    def act(self, live: Live) -> None:
+        live.applied[self.index] += self.value * self.shape(
+            live.t, live.data.qpos[live.dofs[self.index]], live.data.qvel[live.dofs[self.index]]
+        )
+
+    def shape(self, t: float, q: float, dq: float) -> float:
+        """Return the torque per value."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class DeadPatch(_Outside):
+    """A place in the gear that pushes one way where it is entered, the other way where left."""
+
+    name = 'dead_patch'
+    centre: float = 0.0
+    width: float = 0.1
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        low, high = setting.low[j], setting.high[j]
+        centre = float(rng.uniform(0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high))
+        return cls(
+            setting.robot.joints[j], j, 0.05 * setting.drive[j], centre, 0.06 * (high - low)
+        )
+
+    def shape(self, t: float, q: float, dq: float) -> float:
+        x = (q - self.centre) / self.width
+        return float(x * np.exp(-(x**2)))
+
+
+@dataclass(frozen=True)
+class Chirp(_Outside):
+    """A machine nearby that speeds up while the arm moves."""
+
+    name = 'chirp'
+    repeats = False
+    low: float = 0.5
+    rate: float = 0.2
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        return cls(
+            setting.robot.joints[j], j, 0.02 * setting.drive[j], *rng.uniform([0.3, 0.1], [1, 0.3])
+        )
+
+    def shape(self, t: float, q: float, dq: float) -> float:
+        return float(np.sin(2.0 * np.pi * (self.low + 0.5 * self.rate * t) * t))
+
+
+@dataclass(frozen=True)
+class RandomContact(_Outside):
+    """Knocks at times that have nothing to do with the motion."""
+
+    name = 'random_contact'
+    repeats = False
+    times: tuple[float, ...] = ()
+    lengths: tuple[float, ...] = ()
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        times = np.sort(rng.uniform(1.0, 20.0, 8))
+        lengths = rng.uniform(0.1, 0.5, 8) * rng.choice([-1.0, 1.0], 8)
+        return cls(
+            setting.robot.joints[j],
+            j,
+            0.05 * setting.drive[j],
+            tuple(times.tolist()),
+            tuple(lengths.tolist()),
+        )
+
+    def shape(self, t: float, q: float, dq: float) -> float:
+        push = 0.0
+        for begin, length in zip(self.times, self.lengths, strict=True):
+            x = (t - begin) / abs(length)
+            if 0.0 < x < 1.0:
+                push += np.sign(length) * np.sin(np.pi * x)
+        return float(push)
+
+
+@dataclass(frozen=True)
+class Muscle(_Outside):
+    """A person who works along: stronger in the middle of the range, tired as time goes on."""
+
+    name = 'muscle'
+    repeats = False
+    centre: float = 0.0
+    width: float = 1.0
+    speed: float = 1.0
+    rhythm: tuple[float, ...] = ()
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        low, high = setting.low[j], setting.high[j]
+        return cls(
+            setting.robot.joints[j],
+            j,
+            0.05 * setting.drive[j],
+            (low + high) / 2.0,
+            0.3 * (high - low),
+            float(setting.speed[j]),
+            tuple(rng.uniform(0.3, 1.1, 3).tolist()),
+        )
+
+    def shape(self, t: float, q: float, dq: float) -> float:
+        a, b, c = self.rhythm
+        activation = max(np.sin(7.0 * a * t) + np.sin(11.0 * b * t + 1.0) * np.sin(3.0 * c * t), 0)
+        length = np.exp(-(((q - self.centre) / self.width) ** 2))
+        shortening = 1.0 / (1.0 + np.exp(4.0 * dq / self.speed))
+        return float(activation * length * shortening)
+
+
+OUTSIDE: tuple[type[HiddenEffect], ...] = (DeadPatch, Chirp, RandomContact, Muscle)

@@ -1,0 +1,226 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Hidden faults of what is measured: torque readings, their timing, and encoders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+from armid_ros.robots import Robot
+import numpy as np
+from scipy.signal import lfilter
+
+from tests.hidden.arrays import FloatArray, Parameter, Signals
+from tests.hidden.base import HiddenEffect, pick, Setting
+
+
+@dataclass(frozen=True)
+class _Reading(HiddenEffect):
+    """A fault of one torque reading or encoder."""
+
+    joint: str
+    index: int
+    value: float
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return (self.joint,)
+
+    def scaled(self, factor: float) -> Self:
+        return replace(self, value=self.value * factor)
+
+    def distort(self, signals: Signals, robot: Robot) -> Signals:
+        tau = signals.tau.copy()
+        tau[:, self.index] = self.reading(signals.t, tau[:, self.index])
+        return replace(signals, tau=tau)
+
+    def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
+        """Return what is read, shape (N,), for a true torque."""
+        raise NotImplementedError
+
+
+class TorqueOffset(_Reading):
+    """The reading is too high by a constant."""
+
+    name = 'torque_offset'
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        return cls(setting.robot.joints[j], j, rng.choice([-1.0, 1.0]) * 0.02 * setting.drive[j])
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('torque_offset', self.joint, self.value, 'N m'),)
+
+    def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
+        return tau + self.value
+
+
+@dataclass(frozen=True)
+class TorqueDrift(_Reading):
+    """The reading creeps towards a new zero while the sensor warms up."""
+
+    name = 'torque_drift'
+    repeats = False
+    time_constant: float = 10.0
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng)
+        value = rng.choice([-1.0, 1.0]) * 0.02 * setting.drive[j]
+        return cls(setting.robot.joints[j], j, value, rng.uniform(6.0, 15.0))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter('drift', self.joint, self.value, 'N m'),
+            Parameter('drift_time', self.joint, self.time_constant, 's'),
+        )
+
+    def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
+        return tau + self.value * (1.0 - np.exp(-t / self.time_constant))
+
+
+class TorqueGain(_Reading):
+    """The reading is too large by a share."""
+
+    name = 'torque_gain'
+    largest_factor = 6.0
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        loaded = np.flatnonzero(setting.torque > 0.05 * setting.torque.max())
+        j = int(rng.choice(loaded))
+        return cls(setting.robot.joints[j], j, 0.05)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('gain_error', self.joint, self.value, ''),)
+
+    def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
+        return (1.0 + self.value) * tau
+
+
+@dataclass(frozen=True)
+class TorqueCrosstalk(HiddenEffect):
+    """The reading of one joint contains a share of another's torque."""
+
+    name = 'torque_crosstalk'
+    pair: tuple[str, str]
+    share: float
+    largest_factor = 15.0
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        order = np.argsort(setting.torque)[::-1]
+        loud = int(order[rng.integers(0, 2)])
+        quiet = int(rng.choice([j for j in range(len(order)) if j != loud]))
+        share = rng.choice([-1.0, 1.0]) * 0.02
+        return cls((setting.robot.joints[quiet], setting.robot.joints[loud]), share)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return self.pair
+
+    def scaled(self, factor: float) -> Self:
+        return replace(self, share=self.share * factor)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('crosstalk', self.pair[0], self.share, ''),)
+
+    def distort(self, signals: Signals, robot: Robot) -> Signals:
+        tau = signals.tau.copy()
+        listener, source = (robot.index(joint) for joint in self.pair)
+        tau[:, listener] += self.share * signals.tau[:, source]
+        return replace(signals, tau=tau)
+
+
+@dataclass(frozen=True)
+class _WholeArm(HiddenEffect):
+    """A timing fault of all torque readings."""
+
+    value: float
+
+    def scaled(self, factor: float) -> Self:
+        return replace(self, value=self.value * factor)
+
+
+class TimeDelay(_WholeArm):
+    """Torque readings are older than the positions they come with: interpolated back."""
+
+    name = 'time_delay'
+    largest_factor = 5.0
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        return cls(0.004)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('delay', '', self.value, 's'),)
+
+    def distort(self, signals: Signals, robot: Robot) -> Signals:
+        past = signals.t - self.value
+        tau = np.column_stack([np.interp(past, signals.t, column) for column in signals.tau.T])
+        return replace(signals, tau=tau)
+
+
+class TorqueLag(_Reading):
+    """The reading is low-passed, first order, exact for a torque linear between the steps."""
+
+    name = 'torque_lag'
+    largest_factor = 3.0
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        loaded = np.flatnonzero(setting.torque > 0.05 * setting.torque.max())
+        j = int(rng.choice(loaded))
+        return cls(setting.robot.joints[j], j, 0.01)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('lag', self.joint, self.value, 's'),)
+
+    def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
+        ratio = (t[1] - t[0]) / self.value
+        decay = np.exp(-ratio)
+        slope = 1.0 - (1.0 - decay) / ratio  # weight of the newest sample
+        numerator = np.array([slope, 1.0 - decay - slope])
+        start = [tau[0] * (1.0 - slope)]
+        return lfilter(numerator, [1.0, -decay], tau, zi=start)[0]
+
+
+class EncoderOffset(_Reading):
+    """The encoder reads too little by a constant."""
+
+    name = 'encoder_offset'
+    rigid = True
+    largest_factor = 5.0
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick(setting, rng, first=1)
+        return cls(setting.robot.joints[j], j, rng.choice([-1.0, 1.0]) * 0.02)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('encoder_offset', self.joint, self.value, 'rad'),)
+
+    def distort(self, signals: Signals, robot: Robot) -> Signals:
+        q = signals.q.copy()
+        q[:, self.index] -= self.value
+        return replace(signals, q=q)
+
+
+SENSING = (
+    TorqueOffset,
+    TorqueDrift,
+    TorqueGain,
+    TorqueCrosstalk,
+    TorqueLag,
+    TimeDelay,
+    EncoderOffset,
+)

@@ -1,0 +1,110 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is recorded: encoders that count, torques with coloured noise, stamps that jitter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.recording import Recording
+import numpy as np
+from scipy.signal import lfilter
+
+from tests.hidden.arrays import FloatArray, Signals
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """
+    The instruments of an arm.
+
+    Attributes
+    ----------
+    rate : float
+        Samples per second [Hz].
+    resolution : float
+        Step of the encoders [rad].
+    position_noise : float
+        Standard deviation of the position before it is counted [rad].
+    torque_noise : ndarray, shape (n,)
+        Standard deviation of the torque [N m]; half of its variance is white, the other half
+        has the correlation time.
+    correlation_time : float
+        Of the coloured half [s].
+    jitter : float
+        Standard deviation of the difference between a stamp and when the sample was taken [s].
+
+    """
+
+    rate: float
+    resolution: float
+    position_noise: float
+    torque_noise: FloatArray
+    correlation_time: float
+    jitter: float
+
+    @classmethod
+    def draw(
+        cls, torque: FloatArray, drive: FloatArray, rng: np.random.Generator, scale: float = 1.0
+    ) -> Sensors:
+        """
+        Draw instruments for an arm.
+
+        Parameters
+        ----------
+        torque : ndarray, shape (n,)
+            Rms torque of the joints [N m].
+        drive : ndarray, shape (n,)
+            Size of the drives [N m], below a thousandth of which nobody measures.
+        rng : Generator
+            Source of randomness.
+        scale : float
+            Factor on the torque noise.
+
+        """
+        level = scale * np.exp(rng.uniform(np.log(0.005), np.log(0.03)))
+        return cls(
+            rate=200.0,
+            resolution=2.0 * np.pi / 2.0 ** int(rng.integers(17, 21)),
+            position_noise=float(np.exp(rng.uniform(np.log(5e-6), np.log(5e-5)))),
+            torque_noise=level * torque + scale * 1e-3 * drive,
+            correlation_time=float(rng.uniform(0.005, 0.02)),
+            jitter=float(rng.choice([0.0, 5e-5, 2e-4])),
+        )
+
+    def record(
+        self, signals: Signals, joints: tuple[str, ...], rng: np.random.Generator
+    ) -> Recording:
+        """Sample the signals as these instruments do."""
+        stamps = np.arange(int(signals.t[-1] * self.rate) - 1) / self.rate
+        taken = np.clip(stamps + self.jitter * rng.normal(size=len(stamps)), 0.0, signals.t[-1])
+        q, dq, tau = (_at(taken, signals.t, x) for x in (signals.q, signals.dq, signals.tau))
+        noisy = q + self.position_noise * rng.normal(size=q.shape)
+        counted = self.resolution * np.round(noisy / self.resolution)
+        speed_noise = (self.position_noise + 0.3 * self.resolution) * self.rate
+        return Recording(
+            joints=joints,
+            t=stamps,
+            q=counted,
+            dq=dq + speed_noise * rng.normal(size=dq.shape),
+            tau=tau + self.torque_noise * self._coloured(tau.shape, rng),
+            start_ns=1_700_000_000_000_000_000,
+        )
+
+    def perfect(self, signals: Signals, joints: tuple[str, ...]) -> Recording:
+        """Return what instruments without noise, steps and jitter would record."""
+        stamps = np.arange(int(signals.t[-1] * self.rate) - 1) / self.rate
+        q, dq, tau = (_at(stamps, signals.t, x) for x in (signals.q, signals.dq, signals.tau))
+        return Recording(joints=joints, t=stamps, q=q, dq=dq, tau=tau)
+
+    def _coloured(self, shape: tuple[int, int], rng: np.random.Generator) -> FloatArray:
+        """Return noise of variance 1, shape (N, n)."""
+        decay = np.exp(-1.0 / (self.rate * self.correlation_time))
+        start = rng.normal(size=(1, shape[1]))
+        steps = np.sqrt(1.0 - decay**2) * rng.normal(size=shape)
+        slow, _ = lfilter([1.0], [1.0, -decay], steps, axis=0, zi=decay * start)
+        return np.sqrt(0.5) * (slow + rng.normal(size=shape))
+
+
+def _at(times: FloatArray, t: FloatArray, values: FloatArray) -> FloatArray:
+    return np.column_stack([np.interp(times, t, column) for column in values.T])
