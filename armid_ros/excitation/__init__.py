@@ -3,13 +3,17 @@
 """
 Excitation: trajectories that make the parameters of an arm visible.
 
-`design` finds a `FourierTrajectory` inside the `Limits` of a robot that shows the parameters of
-an `ArmModel` best; an `Excitation` runs through it from rest to rest.
+`design` finds a `FourierTrajectory` inside the `Limits` of a robot, clear of itself and of
+every `Obstacle`, that shows the parameters of an `ArmModel` best; an `Excitation` runs through it
+from rest to rest.
 
 """
 
+from armid_ros.excitation.clearance import Approach, ClearanceModel
 from armid_ros.excitation.criteria import CRITERIA, Information
-from armid_ros.excitation.design import Design, design, evaluate, Progress
+from armid_ros.excitation.design import Design, design, design_speeds, evaluate, Progress
+from armid_ros.excitation.environment import load_environment, Obstacle, with_obstacles
+from armid_ros.excitation.feasibility import excitation_faults, Faults, trajectory_faults
 from armid_ros.excitation.files import load_excitation, save_excitation
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.limits import (
@@ -19,18 +23,23 @@ from armid_ros.excitation.limits import (
     SPEED_CLASSES,
     Violation,
 )
-from armid_ros.excitation.problem import DesignSettings, Problem, TARGETS
-from armid_ros.excitation.random import random_feasible
+from armid_ros.excitation.problem import Problem
+from armid_ros.excitation.random_trajectory import random_feasible
 from armid_ros.excitation.schedule import Excitation
+from armid_ros.excitation.settings import DesignSettings, TARGETS
 
 __all__ = [
+    'Approach',
     'CRITERIA',
+    'ClearanceModel',
     'Design',
     'DesignSettings',
     'Excitation',
+    'Faults',
     'FourierTrajectory',
     'Information',
     'Limits',
+    'Obstacle',
     'Problem',
     'Progress',
     'SPEED_CLASSES',
@@ -38,9 +47,14 @@ __all__ = [
     'Violation',
     'check_limits',
     'design',
+    'design_speeds',
     'evaluate',
+    'excitation_faults',
+    'load_environment',
     'load_excitation',
     'random_feasible',
     'require_within',
     'save_excitation',
+    'trajectory_faults',
+    'with_obstacles',
 ]

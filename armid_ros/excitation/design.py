@@ -4,16 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+import time
 
 from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation.clearance import ClearanceModel
 from armid_ros.excitation.criteria import Information
+from armid_ros.excitation.environment import Obstacle, with_obstacles
 from armid_ros.excitation.fourier import FourierTrajectory
-from armid_ros.excitation.limits import require_within
-from armid_ros.excitation.problem import DesignSettings, Problem
-from armid_ros.excitation.random import random_feasible
+from armid_ros.excitation.limits import Limits, SPEED_CLASSES
+from armid_ros.excitation.parallel import search_all, Task
+from armid_ros.excitation.placing import placed
+from armid_ros.excitation.problem import Problem
 from armid_ros.excitation.schedule import Excitation
+from armid_ros.excitation.search import exact_cost, Found
+from armid_ros.excitation.settings import DesignSettings
 from armid_ros.motion import FloatArray
 from armid_ros.robots import CollisionModel
 import numpy as np
@@ -29,7 +36,7 @@ class Progress:
     done : float
         Share of the work done, 0 ... 1.
     cost : float
-        Cost of the best feasible trajectory so far; see `Information.cost`.
+        Cost of the best feasible trajectory so far; see `SpectralCriterion`.
 
     """
 
@@ -47,18 +54,26 @@ class Design:
     excitation : Excitation
         The run.
     information : Information
-        What the whole run, all periods recorded, tells about the parameters, prior included.
+        What the whole run, all periods recorded, tells about the base parameters, what was known
+        before included.
     cost : float
-        What was made small; see `Information.cost`.
+        What was made small; see `SpectralCriterion`.
+    limits : Limits
+        The limits it keeps.
     settings : DesignSettings
         What was asked for.
+    stopped : str
+        '' when every search ran to its end; 'time budget' or 'interrupted' when the best so far
+        was taken, which the same seed need not give again.
 
     """
 
     excitation: Excitation
     information: Information
     cost: float
+    limits: Limits
     settings: DesignSettings
+    stopped: str = ''
 
 
 def design(
@@ -67,8 +82,11 @@ def design(
     rng: np.random.Generator,
     *,
     collision: CollisionModel | None = None,
+    obstacles: Sequence[Obstacle] = (),
     prior_information: FloatArray | None = None,
+    rival: ArmModel | None = None,
     progress: Callable[[Progress], None] | None = None,
+    clock: Callable[[], float] = time.monotonic,
 ) -> Design:
     """
     Find the trajectory that shows the parameters best.
@@ -83,48 +101,144 @@ def design(
         Source of randomness; the same state gives the same trajectory.
     collision : CollisionModel, optional
         Bodies to keep apart by ``settings.clearance``, such as ``collision_model(arm.robot)``.
+    obstacles : sequence of Obstacle, optional
+        What stands around the arm; needs ``collision``.
     prior_information : ndarray, shape (r, r), optional
-        Information of what was recorded before, over the same base parameters.
+        Information of what was recorded before, over the same base parameters: the sum of
+        ``Problem.information(motion).matrix`` of the recordings.
+    rival : ArmModel, optional
+        With criterion 'T': the model to tell ``arm`` from.
     progress : callable, optional
         Told after every step.
+    clock : callable, optional
+        Time [s] for the time budget.
+
+    Returns
+    -------
+    Design
+        The best found. KeyboardInterrupt ends the searches and the best so far is returned.
 
     Raises
     ------
     TrajectoryError
-        If nothing feasible was found; says which limit of which joint stands in the way.
+        If nothing is feasible; says which limit of which joint, or which bodies, stand in the
+        way.
 
     """
-    problem = Problem.of(arm, settings, rng)
-    total = settings.starts * settings.candidates
-    best: Design | None = None
-    for count in range(1, total + 1):
-        trajectory = random_feasible(
+    problem = Problem.of(arm, settings, rng, rival)
+    clearance = _clearance(collision, obstacles)
+    prior = _checked_prior(problem, prior_information, rival)
+
+    def watch(done: float, found: Found) -> None:
+        if progress is not None:
+            progress(Progress(done, found.cost))
+
+    outcome = search_all(Task(problem, clearance, prior), rng.spawn(settings.starts), watch, clock)
+    excitation = placed(problem, outcome.found.trajectory, clearance)
+    return evaluate(problem, excitation, prior, stopped=outcome.stopped)
+
+
+def design_speeds(
+    arm: ArmModel,
+    settings: DesignSettings,
+    rng: np.random.Generator,
+    *,
+    speeds: Sequence[str | float] = tuple(SPEED_CLASSES),
+    collision: CollisionModel | None = None,
+    obstacles: Sequence[Obstacle] = (),
+    progress: Callable[[str | float, Progress], None] | None = None,
+) -> dict[str | float, Design]:
+    """
+    Design one trajectory for every speed class; see `design`.
+
+    Returns
+    -------
+    dict
+        A design for every speed, in the order given.
+
+    """
+    if settings.limits is not None:
+        raise TrajectoryError(
+            'speed classes are shares of the limits of the robot; give no limits'
+        )
+    designs: dict[str | float, Design] = {}
+    for speed in speeds:
+
+        def tell(step: Progress, speed: str | float = speed) -> None:
+            if progress is not None:
+                progress(speed, step)
+
+        designs[speed] = design(
             arm,
-            problem.limits,
-            settings.period,
-            settings.harmonics,
+            replace(settings, speed=speed),
             rng,
             collision=collision,
-            margin=settings.clearance,
+            obstacles=obstacles,
+            progress=tell,
         )
-        candidate = evaluate(problem, trajectory, prior_information)
-        if best is None or candidate.cost < best.cost:
-            best = candidate
-        if progress is not None:
-            progress(Progress(count / total, best.cost))
-    assert best is not None
-    run = best.excitation.motion(settings.rate)
-    require_within(problem.limits, run, arm.torque(run))
-    return best
+    return designs
 
 
 def evaluate(
-    problem: Problem, trajectory: FourierTrajectory, prior_information: FloatArray | None = None
+    problem: Problem,
+    excitation: Excitation | FourierTrajectory,
+    prior_information: FloatArray | None = None,
+    *,
+    stopped: str = '',
 ) -> Design:
-    """Say what a trajectory is worth."""
+    """
+    Say what a run, or a trajectory with the settings of a problem, is worth.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is wanted.
+    excitation : Excitation or FourierTrajectory
+        What is to be run.
+    prior_information : ndarray, shape (r, r), optional
+        Information that is there already.
+    stopped : str
+        See `Design`.
+
+    """
     settings = problem.settings
-    excitation = Excitation(trajectory, settings.n_periods, settings.run_in, settings.start)
-    motion = trajectory.one_period(settings.samples)
-    recorded = settings.rate * settings.period * settings.n_periods
-    information = problem.information(motion, recorded).plus(prior_information)
-    return Design(excitation, information, information.cost(settings.criterion), settings)
+    if isinstance(excitation, FourierTrajectory):
+        excitation = Excitation(excitation, settings.n_periods, settings.run_in, settings.start)
+    trajectory = excitation.trajectory
+    recorded = settings.rate * trajectory.period * excitation.n_periods
+    motion = trajectory.one_period(4 * settings.samples)
+    information = problem.information(motion, recorded)
+    if prior_information is not None:
+        information = replace(information, matrix=information.matrix + prior_information)
+    cost = exact_cost(problem, trajectory, prior_information)
+    return Design(excitation, information, cost, problem.limits, settings, stopped)
+
+
+def _clearance(
+    collision: CollisionModel | None, obstacles: Sequence[Obstacle]
+) -> ClearanceModel | None:
+    if collision is None:
+        if obstacles:
+            raise TrajectoryError(
+                f"obstacle '{obstacles[0].name}': the collision bodies of the robot are needed "
+                'to keep clear of it'
+            )
+        return None
+    return ClearanceModel.of(with_obstacles(collision, obstacles))
+
+
+def _checked_prior(
+    problem: Problem, prior: FloatArray | None, rival: ArmModel | None
+) -> FloatArray | None:
+    if prior is None:
+        return None
+    prior = np.asarray(prior, dtype=float)
+    expected = (problem.base.rank,) * 2
+    if rival is not None or prior.shape != expected:
+        raise TrajectoryError(
+            f'prior information: a matrix {expected} over the base parameters of the arm is '
+            f"needed, and none with criterion 'T'; got {prior.shape}"
+        )
+    if not np.all(np.isfinite(prior)):
+        raise TrajectoryError('prior information: not all entries are finite numbers')
+    return prior

@@ -1,116 +1,43 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a design is for: the parameters to see, the noise to see them through."""
+"""A design problem: which parameters to see, through which noise, within which limits."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.effects import Effect
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation.criteria import CRITERIA, Information
+from armid_ros.excitation.criteria import (
+    Criterion,
+    Information,
+    RivalCriterion,
+    SpectralCriterion,
+    SubsetCriterion,
+)
 from armid_ros.excitation.limits import Limits
+from armid_ros.excitation.settings import DesignSettings
 from armid_ros.model import BaseParameters, group_columns, random_motion, regressor
 from armid_ros.motion import FloatArray, Motion, read_only
 import numpy as np
+import numpy.typing as npt
 
-#: Which parameters a design is for.
-TARGETS = {
-    'all': 'all base parameters of the rigid body, and those of the effects',
-    'gravity': 'masses and first moments, as an arm moving slowly shows them',
-    'effects': 'those of the effects alone, the rigid body being known',
-}
-
-
-@dataclass(frozen=True)
-class DesignSettings:
-    """
-    What to design.
-
-    Attributes
-    ----------
-    period : float
-        Period of the trajectory [s].
-    harmonics : int
-        Number of harmonics per joint.
-    n_periods : int
-        How often the period is run through.
-    run_in : float
-        Duration of the run-in and of the run-out [s].
-    start : ndarray, shape (n,), or None
-        Pose to start from and to end in [rad or m]; None: poses on the trajectory.
-    speed : str or float
-        'slow', 'medium', 'fast' or a share of the velocity and acceleration limits.
-    limits : Limits or None
-        Limits in place of those of the robot; ``speed`` does not apply to them.
-    clearance : float
-        Distance to keep between bodies that may touch [m].
-    criterion : str
-        'D', 'A', 'E' or 'condition'.
-    target : str
-        'all', 'gravity' or 'effects'.
-    noise : ndarray, shape (n,), or None
-        Standard deviation of the torque noise of each joint [N m or N]; None: 1 % of the torque
-        limit, or of the largest such limit where a joint has none.
-    rate : float
-        Samples per second that the noise refers to [Hz], for the predicted deviations.
-    samples : int
-        Samples of one period at which the criterion is computed.
-    starts : int
-        Number of random trajectories the search sets out from.
-    candidates : int
-        Number of random feasible trajectories that each start is the best of.
-
-    """
-
-    period: float = 20.0
-    harmonics: int = 5
-    n_periods: int = 2
-    run_in: float = 2.0
-    start: FloatArray | None = None
-    speed: str | float = 'fast'
-    limits: Limits | None = None
-    clearance: float = 0.01
-    criterion: str = 'D'
-    target: str = 'all'
-    noise: FloatArray | None = None
-    rate: float = 100.0
-    samples: int = 100
-    starts: int = 4
-    candidates: int = 25
-
-    def __post_init__(self) -> None:
-        """Check names and numbers."""
-        if self.criterion not in CRITERIA:
-            raise TrajectoryError(
-                f"no criterion '{self.criterion}'; there are {', '.join(CRITERIA)}"
-            )
-        if self.target not in TARGETS:
-            raise TrajectoryError(f"no target '{self.target}'; there are {', '.join(TARGETS)}")
-        for name in ('harmonics', 'n_periods', 'samples', 'starts', 'candidates'):
-            if getattr(self, name) < 1:
-                raise TrajectoryError(f'{name}: {getattr(self, name)}; at least 1 is needed')
-        for name in ('period', 'run_in', 'rate'):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise TrajectoryError(f'{name}: {getattr(self, name)}; it has to be positive')
-        if self.samples < 4 * self.harmonics:
-            raise TrajectoryError(
-                f'{self.samples} samples of a period cannot show {self.harmonics} harmonics; '
-                f'take {4 * self.harmonics} or more'
-            )
+#: Share of the torque limit that a sensor's noise is taken to be when nothing is known of it.
+NOISE_SHARE = 0.01
 
 
 @dataclass(frozen=True)
 class Problem:
     """
-    A design problem with everything that does not change while it is being solved.
+    What a design is for, with everything that does not change while it is being solved.
 
     Attributes
     ----------
     arm : ArmModel
-        Prior model: rigid body, and effects whose parameters are to be seen.
+        Prior model: rigid body, and all effects whose columns count.
     settings : DesignSettings
-        What to design.
+        What was asked for.
     limits : Limits
         Limits in force.
     base : BaseParameters
@@ -119,6 +46,11 @@ class Problem:
         Standard deviation of the torque noise [N m or N].
     scale : ndarray, shape (r,)
         See `Information`.
+    selected : ndarray of int, shape (r,)
+        Columns of ``arm.parameters`` that the criterion looks at: those of ``base``, or for a
+        comparison of two models the rival's and what it lacks.
+    criterion : SpectralCriterion, SubsetCriterion or RivalCriterion
+        The cost.
 
     """
 
@@ -128,33 +60,74 @@ class Problem:
     base: BaseParameters
     noise: FloatArray = field(repr=False)
     scale: FloatArray = field(repr=False)
+    selected: npt.NDArray[np.intp] = field(repr=False)
+    criterion: Criterion = field(repr=False)
 
     @classmethod
-    def of(cls, arm: ArmModel, settings: DesignSettings, rng: np.random.Generator) -> Problem:
-        """Derive limits, base parameters and noise; TrajectoryError where they do not exist."""
+    def of(
+        cls,
+        arm: ArmModel,
+        settings: DesignSettings,
+        rng: np.random.Generator,
+        rival: ArmModel | None = None,
+    ) -> Problem:
+        """
+        Derive limits, noise, base parameters and criterion.
+
+        Raises
+        ------
+        TrajectoryError
+            If the arm has no such parameter, or no motion can tell it from the rival.
+
+        """
         limits = settings.limits or Limits.of(arm.robot, speed=settings.speed)
         noise = _noise(arm, settings)
-        base = _base_parameters(arm, settings.target, rng)
-        columns = target_columns(arm, settings.target, random_motion(arm.robot, 200, rng))
-        weighted = columns[:, :, base.independent] / noise[:, np.newaxis]
-        scale = 1.0 / np.sqrt(np.mean(weighted**2, axis=(0, 1)))
-        return cls(arm, settings, limits, base, read_only(noise), read_only(scale))
+        if (settings.criterion == 'T') != (rival is not None):
+            raise TrajectoryError(
+                "criterion 'T' compares two models: it needs a rival, and a rival needs it"
+            )
+        whole = arm if rival is None else _joined(arm, rival)
+        motion = random_motion(arm.robot, 40 * arm.robot.n_joints, rng)
+        columns = target_columns(whole, settings.target, motion)
+        if not columns.any():
+            raise TrajectoryError(
+                f"target '{settings.target}': {arm.robot.name} has no such parameter to see"
+            )
+        columns = (columns / noise[:, np.newaxis]).reshape(-1, columns.shape[-1])
+        base = group_columns(columns, whole.parameters)
+        selected = base.independent
+        if rival is not None:
+            selected = _selection_against(whole, rival, columns)
+        size = np.sqrt(np.sum(columns**2, axis=0) / len(motion))
+        scale = 1.0 / size[base.independent]
+        criterion: Criterion
+        if rival is not None:
+            criterion = _rival_criterion(whole, rival, selected, columns[:, selected])
+        elif settings.focus:
+            criterion = SubsetCriterion(_wanted(whole, settings.focus, selected), scale)
+        else:
+            criterion = SpectralCriterion(settings.criterion, scale, settings.balance)
+        return cls(
+            whole, settings, limits, base, read_only(noise), read_only(scale), selected, criterion
+        )
+
+    def columns(self, motion: Motion) -> FloatArray:
+        """Return the weighted columns of all parameters, shape (N n, P)."""
+        columns = target_columns(self.arm, self.settings.target, motion)
+        return (columns / self.noise[:, np.newaxis]).reshape(-1, columns.shape[-1])
 
     def weighted_regressor(self, motion: Motion) -> FloatArray:
-        """Return W, shape (N n, r), of a motion."""
-        columns = target_columns(self.arm, self.settings.target, motion)
-        return (columns[:, :, self.base.independent] / self.noise[:, np.newaxis]).reshape(
-            -1, self.base.rank
-        )
+        """Return W, shape (N n, r): the base parameters, rows divided by the noise."""
+        return self.columns(motion)[:, self.base.independent]
 
     def information(self, motion: Motion, n_recorded: float | None = None) -> Information:
         """
-        Return what a motion tells.
+        Return what a motion tells about the base parameters.
 
         Parameters
         ----------
         motion : Motion
-            Samples that stand for the whole run.
+            Samples that stand for the whole run, or a motion that was recorded.
         n_recorded : float, optional
             Number of samples that will be recorded; by default those of the motion.
 
@@ -162,26 +135,6 @@ class Problem:
         w = self.weighted_regressor(motion)
         weight = 1.0 if n_recorded is None else n_recorded / len(motion)
         return Information(self.base.parameters, weight * (w.T @ w), self.scale)
-
-
-def _noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
-    n = arm.robot.n_joints
-    if settings.noise is not None:
-        noise = np.asarray(settings.noise, dtype=float)
-        if noise.shape != (n,) or not np.all(np.isfinite(noise) & (noise > 0.0)):
-            raise TrajectoryError(f'noise: {n} positive numbers are needed, got {noise}')
-        return noise
-    limit = arm.robot.torque_limit
-    finite = np.isfinite(limit)
-    fallback = limit[finite].max() if finite.any() else 100.0
-    return np.asarray(0.01 * np.where(finite, limit, fallback))
-
-
-def _base_parameters(arm: ArmModel, target: str, rng: np.random.Generator) -> BaseParameters:
-    columns = target_columns(arm, target, random_motion(arm.robot, 40 * arm.robot.n_joints, rng))
-    if not columns.any():
-        raise TrajectoryError(f"target '{target}': {arm.robot.name} has no such parameter to see")
-    return group_columns(columns.reshape(-1, columns.shape[-1]), arm.parameters)
 
 
 def target_columns(arm: ArmModel, target: str, motion: Motion) -> FloatArray:
@@ -203,3 +156,76 @@ def target_columns(arm: ArmModel, target: str, motion: Motion) -> FloatArray:
     else:
         rigid = regressor(arm.robot, motion)
     return np.concatenate([rigid, effects], axis=2)
+
+
+def _noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
+    n = arm.robot.n_joints
+    if settings.noise is not None:
+        noise = np.asarray(settings.noise, dtype=float)
+        if noise.shape != (n,) or not np.all(np.isfinite(noise) & (noise > 0.0)):
+            raise TrajectoryError(f'noise: {n} positive numbers are needed, got {noise}')
+        return noise
+    limit = arm.robot.torque_limit
+    finite = np.isfinite(limit)
+    fallback = limit[finite].max() if finite.any() else 100.0
+    return np.asarray(NOISE_SHARE * np.where(finite, limit, fallback))
+
+
+def _key(effect: Effect) -> tuple[str, tuple[str, ...]]:
+    return effect.name, effect.joints
+
+
+def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
+    """Return the rival's effects and those it lacks, these last."""
+    known = {_key(effect) for effect in rival.effects}
+    joined = replace(rival, robot=arm.robot)
+    for effect, values in zip(arm.effects, arm.values, strict=True):
+        if _key(effect) not in known:
+            joined = joined.with_effect(effect, values)
+    return joined
+
+
+def _selection_against(
+    whole: ArmModel, rival: ArmModel, columns: FloatArray
+) -> npt.NDArray[np.intp]:
+    """Columns the rival can use, as many as are independent, then what it lacks."""
+    own = len(rival.parameters)
+    usable = group_columns(columns[:, :own], whole.parameters[:own]).independent
+    return np.concatenate([usable, np.arange(own, columns.shape[1])])
+
+
+def _rival_criterion(
+    whole: ArmModel, rival: ArmModel, selected: npt.NDArray[np.intp], columns: FloatArray
+) -> RivalCriterion:
+    own = selected < len(rival.parameters)
+    values = np.where(own, 0.0, whole.theta[selected])
+    torque = columns @ values
+    fitted = columns[:, own] @ np.linalg.lstsq(columns[:, own], torque, rcond=None)[0]
+    if np.linalg.norm(torque - fitted) <= 1e-9 * max(float(np.linalg.norm(torque)), 1e-300):
+        names = ', '.join(e.name for e in whole.effects[len(rival.effects) :]) or 'nothing'
+        raise TrajectoryError(
+            f'no motion can tell the two models apart: what the rival lacks is {names}, with '
+            f'parameters {np.array2string(values[~own], precision=3)}, and it can make the same '
+            'torques'
+        )
+    return RivalCriterion(own.astype(float), values)
+
+
+def _wanted(arm: ArmModel, focus: tuple[str, ...], selected: npt.NDArray[np.intp]) -> FloatArray:
+    """Mark the parameters of the effects in focus among those selected."""
+    names = [effect.name for effect in arm.effects]
+    unknown = [name for name in focus if name not in names]
+    if unknown:
+        raise TrajectoryError(
+            f"focus: the arm has no effect '{unknown[0]}'; it has {', '.join(names) or 'none'}"
+        )
+    marks = [np.zeros(len(arm.robot.rigid_parameters))]
+    for effect in arm.effects:
+        marks.append(np.full(len(effect.parameters(arm.robot)), float(effect.name in focus)))
+    wanted = np.concatenate(marks)[selected]
+    if not wanted.any():
+        raise TrajectoryError(
+            f'focus: {", ".join(focus)} cannot be told from the rigid body by any motion; take '
+            "target 'effects', where the rigid body counts as known"
+        )
+    return wanted

@@ -1,0 +1,190 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What stands around the arm: boxes, spheres, cylinders, meshes and planes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.robots import CollisionModel
+import coal
+import numpy as np
+import pinocchio as pin
+import yaml
+
+#: Kinds of obstacle and the numbers that each one's size is made of.
+KINDS: Mapping[str, tuple[str, ...]] = {
+    'box': ('x', 'y', 'z'),
+    'sphere': ('radius',),
+    'cylinder': ('radius', 'length'),
+    'mesh': ('scale',),
+    'plane': (),
+}
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """
+    A body that does not move.
+
+    Attributes
+    ----------
+    name : str
+        What messages call it.
+    kind : str
+        'box', 'sphere', 'cylinder' (along z), 'mesh' (its convex hull) or 'plane' (the half
+        space below z = 0 of its own frame).
+    size : tuple of float
+        Full edges of the box, radius, radius and length [m], or the scale of the mesh.
+    position : tuple of float
+        Origin in the robot's base frame [m].
+    rpy : tuple of float
+        Roll, pitch and yaw, as in a URDF [rad].
+    mesh : Path or None
+        File of a mesh.
+    ignore : tuple of str
+        Links that may touch it, such as the one that stands on it.
+
+    """
+
+    name: str
+    kind: str
+    size: tuple[float, ...] = ()
+    position: tuple[float, ...] = (0.0, 0.0, 0.0)
+    rpy: tuple[float, ...] = (0.0, 0.0, 0.0)
+    mesh: Path | None = None
+    ignore: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Check kind and numbers."""
+        if self.kind not in KINDS:
+            raise TrajectoryError(
+                f"obstacle '{self.name}': no kind '{self.kind}'; there are {', '.join(KINDS)}"
+            )
+        wanted = KINDS[self.kind]
+        size = self.size or ((1.0,) if self.kind == 'mesh' else ())
+        object.__setattr__(self, 'size', tuple(float(value) for value in size))
+        if len(self.size) != len(wanted) or not all(0.0 < v < np.inf for v in self.size):
+            raise TrajectoryError(
+                f"obstacle '{self.name}': the size of a {self.kind} is "
+                f'{", ".join(wanted) or "nothing"}, positive; got {self.size}'
+            )
+        for name in ('position', 'rpy'):
+            values = tuple(float(value) for value in getattr(self, name))
+            object.__setattr__(self, name, values)
+            if len(values) != 3 or not np.isfinite(values).all():
+                raise TrajectoryError(f"obstacle '{self.name}': {name} is 3 numbers, got {values}")
+        if (self.kind == 'mesh') != (self.mesh is not None):
+            raise TrajectoryError(f"obstacle '{self.name}': a mesh, and only a mesh, has a file")
+
+    def geometry(self) -> coal.CollisionGeometry:
+        """Return the shape in its own frame."""
+        if self.kind == 'box':
+            return coal.Box(*self.size)
+        if self.kind == 'sphere':
+            return coal.Sphere(self.size[0])
+        if self.kind == 'cylinder':
+            return coal.Cylinder(*self.size)
+        if self.kind == 'plane':
+            return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        try:
+            mesh = coal.MeshLoader().load(str(self.mesh), np.full(3, self.size[0]))
+            mesh.buildConvexHull(True, 'Qt')
+        except (RuntimeError, ValueError) as error:
+            raise TrajectoryError(
+                f"obstacle '{self.name}': {self.mesh} cannot be read as a mesh: {error}"
+            ) from error
+        return mesh.convex
+
+
+def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
+    """
+    Return the collision bodies of a robot together with what stands around it.
+
+    Every body that moves is checked against every obstacle, except for the links the obstacle
+    ignores.
+
+    Raises
+    ------
+    TrajectoryError
+        If an obstacle ignores a link that the robot does not have, or two have one name.
+
+    """
+    if not obstacles:
+        return collision
+    geometry = collision.geometry.copy()
+    bodies = list(geometry.geometryObjects)
+    links = [str(collision.robot.model.frames[body.parentFrame].name) for body in bodies]
+    names = [obstacle.name for obstacle in obstacles]
+    for obstacle in obstacles:
+        if names.count(obstacle.name) > 1:
+            raise TrajectoryError(f"two obstacles are named '{obstacle.name}'")
+        unknown = [link for link in obstacle.ignore if link not in links]
+        if unknown:
+            raise TrajectoryError(
+                f"obstacle '{obstacle.name}' ignores link '{unknown[0]}', which has no collision "
+                f'body; those with one are {", ".join(dict.fromkeys(links))}'
+            )
+        rotation = pin.rpy.rpyToMatrix(*obstacle.rpy)
+        placement = pin.SE3(rotation, np.array(obstacle.position))
+        number = geometry.addGeometryObject(
+            pin.GeometryObject(obstacle.name, 0, 0, placement, obstacle.geometry())
+        )
+        for other, (body, link) in enumerate(zip(bodies, links, strict=True)):
+            if body.parentJoint > 0 and link not in obstacle.ignore:
+                geometry.addCollisionPair(pin.CollisionPair(other, number))
+    return replace(collision, geometry=geometry)
+
+
+def load_environment(path: str | Path) -> tuple[Obstacle, ...]:
+    """
+    Read obstacles from a YAML file: a list of mappings with the attributes of `Obstacle`.
+
+    Raises
+    ------
+    TrajectoryError
+        If the file cannot be read or an entry is not an obstacle.
+
+    """
+    path = Path(path)
+    try:
+        entries: Any = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except OSError as error:
+        raise TrajectoryError(f'{path}: cannot be read: {error.strerror}') from error
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise TrajectoryError(f'{path}: {error}') from error
+    if not isinstance(entries, list):
+        raise TrajectoryError(f'{path}: has to be a list of obstacles')
+    return tuple(_obstacle(path, number, entry) for number, entry in enumerate(entries, start=1))
+
+
+def _obstacle(path: Path, number: int, entry: Any) -> Obstacle:
+    known = tuple(Obstacle.__dataclass_fields__)
+    if not isinstance(entry, dict) or not {'name', 'kind'} <= entry.keys() <= set(known):
+        raise TrajectoryError(
+            f'{path}: obstacle {number} needs name and kind, and may have {", ".join(known[2:])}'
+        )
+    values: dict[str, Any] = {
+        key: tuple(v) if isinstance(v, list) else v for key, v in entry.items()
+    }
+    if isinstance(values.get('size'), (int, float)):
+        values['size'] = (values['size'],)
+    if 'mesh' in values:
+        values['mesh'] = path.parent / str(values['mesh'])
+    try:
+        return Obstacle(**values)
+    except TrajectoryError as error:
+        raise TrajectoryError(f'{path}: {error}') from error
+    except (TypeError, ValueError) as error:
+        raise TrajectoryError(f'{path}: obstacle {number}: {error}') from error
+
+
+def body_name(collision: CollisionModel, number: int) -> str:
+    """Return the link, or the obstacle, that a collision body belongs to."""
+    body = collision.geometry.geometryObjects[number]
+    frame = int(body.parentFrame)
+    return str(body.name) if frame == 0 else str(collision.robot.model.frames[frame].name)

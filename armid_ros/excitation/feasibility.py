@@ -1,0 +1,154 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether a trajectory is fit to run: looked at so closely that nothing fits between the samples.
+
+Position, velocity, acceleration and torque are sampled densely and what a curve can gain between
+two samples is added; the clearance is proven on every interval.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.excitation.clearance import Approach, ClearanceModel
+from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.limits import check_limits, Limits, Violation
+from armid_ros.excitation.schedule import Excitation
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+
+#: Samples per period and harmonic.
+_DENSITY = 200
+
+#: Poses per period and harmonic with which the proof of clearance begins.
+_INTERVALS = 20
+
+
+@dataclass(frozen=True)
+class Faults:
+    """
+    What stands against running a trajectory.
+
+    Attributes
+    ----------
+    violations : tuple of Violation
+        Limits exceeded.
+    approaches : tuple of Approach
+        Bodies too near each other.
+
+    """
+
+    violations: tuple[Violation, ...] = ()
+    approaches: tuple[Approach, ...] = ()
+
+    def __bool__(self) -> bool:
+        """Return whether there is any."""
+        return bool(self.violations or self.approaches)
+
+    def __str__(self) -> str:
+        """List them all in a line."""
+        return '; '.join(map(str, (*self.violations, *self.approaches)))
+
+    @property
+    def first(self) -> str:
+        """Name the first one without its numbers."""
+        if self.violations:
+            return f'{self.violations[0].limit} of joint {self.violations[0].joint}'
+        if self.approaches:
+            return f'clearance of {self.approaches[0].first} and {self.approaches[0].second}'
+        return 'nothing'
+
+
+def trajectory_faults(
+    arm: ArmModel,
+    limits: Limits,
+    trajectory: FourierTrajectory,
+    clearance: ClearanceModel | None,
+    margin: float,
+) -> Faults:
+    """
+    Look for anything wrong anywhere on a periodic trajectory.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Prior model, for the torque.
+    limits : Limits
+        What is allowed.
+    trajectory : FourierTrajectory
+        What is to be run.
+    clearance : ClearanceModel or None
+        Bodies to keep apart.
+    margin : float
+        Clearance to keep [m].
+
+    """
+    motion = trajectory.one_period(_DENSITY * trajectory.harmonics)
+    violations = _violations(arm, limits, motion, periodic=True)
+    if clearance is None:
+        return Faults(violations)
+    times = np.linspace(0.0, trajectory.period, _INTERVALS * trajectory.harmonics + 1)
+    _, acceleration, _ = trajectory.bounds()
+    approach = clearance.first_fault(trajectory.motion, acceleration, times, margin)
+    return Faults(violations, () if approach is None else (approach,))
+
+
+def excitation_faults(
+    arm: ArmModel,
+    limits: Limits,
+    excitation: Excitation,
+    clearance: ClearanceModel | None,
+    margin: float,
+) -> Faults:
+    """Look for anything wrong on the way in and out of a trajectory; see trajectory_faults."""
+    step = excitation.trajectory.period / (_DENSITY * excitation.trajectory.harmonics)
+    ways: list[Motion] = []
+    ends = (0.0, excitation.duration - excitation.run_in)
+    count = max(int(np.ceil(excitation.run_in / step)), 20)
+    for start in ends:
+        ways.append(excitation.at(start + np.linspace(0.0, excitation.run_in, count + 1)))
+    violations = tuple(v for way in ways for v in _violations(arm, limits, way, periodic=False))
+    if clearance is None or excitation.start is None:
+        return Faults(violations)
+    approaches = []
+    for start, way in zip(ends, ways, strict=True):
+        times = start + np.linspace(0.0, excitation.run_in, count // 5 + 1)
+        acceleration = 1.5 * np.abs(way.ddq).max(axis=0)
+        approach = clearance.first_fault(excitation.at, acceleration, times, margin)
+        if approach is not None:
+            approaches.append(approach)
+    return Faults(violations, tuple(approaches))
+
+
+def _violations(
+    arm: ArmModel, limits: Limits, motion: Motion, *, periodic: bool
+) -> tuple[Violation, ...]:
+    torque = arm.torque(motion) if np.isfinite(limits.torque).any() else None
+    widened = Motion(
+        motion.joints,
+        motion.t,
+        *(_outward(values, periodic) for values in (motion.q, motion.dq, motion.ddq)),
+    )
+    return check_limits(limits, widened, None if torque is None else _outward(torque, periodic))
+
+
+def _outward(values: FloatArray, periodic: bool) -> FloatArray:
+    """
+    Move samples away from their mean by what a curve can gain between two of them.
+
+    A curve with second derivative below M leaves its samples by h^2 M / 8 at most; M is read off
+    the second differences, which jump where dry friction does: there nothing is added.
+
+    """
+    if periodic:
+        bend = np.roll(values, -1, axis=0) - 2.0 * values + np.roll(values, 1, axis=0)
+    else:
+        bend = np.zeros_like(values)
+        bend[1:-1] = values[2:] - 2.0 * values[1:-1] + values[:-2]
+    size = np.abs(bend)
+    typical = 20.0 * np.median(size, axis=0)
+    size = np.where(size > typical, 0.0, size)
+    return np.asarray(values + np.sign(values - values.mean(axis=0)) * size / 8.0)

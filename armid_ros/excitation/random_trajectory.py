@@ -1,0 +1,207 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Random trajectories within the limits: where a search starts, and what it has to beat."""
+
+from __future__ import annotations
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation.clearance import ClearanceModel
+from armid_ros.excitation.feasibility import trajectory_faults
+from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.limits import Limits
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import CollisionModel
+import numpy as np
+
+#: Trajectories drawn before the rest is looked for around single poses.
+_ATTEMPTS = 60
+
+#: Poses tried when no trajectory was found.
+_POSES = 2000
+
+#: Factors by which a trajectory is made smaller until it fits.
+_SHRINK, _SHRINKS = 0.75, 6
+
+#: Samples per period and harmonic at which a drawn trajectory is looked at first.
+_SAMPLES = 40
+
+#: Half range that a joint without position limits is given [rad or m].
+UNLIMITED_HALF_RANGE = np.pi
+
+
+def random_feasible(
+    arm: ArmModel,
+    limits: Limits,
+    period: float,
+    harmonics: int,
+    rng: np.random.Generator,
+    *,
+    collision: CollisionModel | ClearanceModel | None = None,
+    margin: float = 0.0,
+) -> FourierTrajectory:
+    """
+    Draw a random trajectory that keeps the limits and hits nothing, at and between all samples.
+
+    Coefficients are normal, position amplitudes equal over the harmonics; each joint is scaled
+    to a random share of the most that its limits allow, about a random centre, and all of them
+    made smaller until nothing is wrong.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Prior model, for the torque.
+    limits : Limits
+        What is allowed.
+    period : float
+        Period [s].
+    harmonics : int
+        Number of harmonics.
+    rng : Generator
+        Source of randomness.
+    collision : CollisionModel or ClearanceModel, optional
+        Bodies to keep apart.
+    margin : float
+        Clearance to keep [m].
+
+    Raises
+    ------
+    TrajectoryError
+        If there is none; names the limit of the joint, or the bodies, in the way.
+
+    """
+    clearance = (
+        ClearanceModel.of(collision) if isinstance(collision, CollisionModel) else collision
+    )
+    for _ in range(_ATTEMPTS):
+        trajectory = _draw(limits, period, harmonics, rng)
+        found = _shrunk(arm, limits, trajectory, clearance, margin, _SHRINKS)
+        if found is not None:
+            return found
+    centre = feasible_pose(arm, limits, rng, clearance, margin)
+    trajectory = _draw(limits, period, harmonics, rng)
+    around = FourierTrajectory(limits.joints, period, centre, trajectory.a, trajectory.b)
+    found = _shrunk(arm, limits, around, clearance, margin, 8 * _SHRINKS)
+    if found is None:
+        raise TrajectoryError(
+            f'nothing but standing still is possible about {np.array2string(centre, precision=3)}:'
+            f' {trajectory_faults(arm, limits, around.scaled(0.01), clearance, margin)}'
+        )
+    return found
+
+
+def feasible_pose(
+    arm: ArmModel,
+    limits: Limits,
+    rng: np.random.Generator,
+    clearance: ClearanceModel | None,
+    margin: float,
+) -> FloatArray:
+    """
+    Find a pose that the arm can hold clear of everything, as clear as any that was tried.
+
+    Raises
+    ------
+    TrajectoryError
+        If there is none; names the limit of the joint, or the bodies, in the way.
+
+    """
+    lower, upper = position_range(limits)
+    q = rng.uniform(lower, upper, (_POSES, len(lower)))
+    rest = np.zeros_like(q)
+    motion = Motion(limits.joints, np.arange(_POSES, dtype=float), q, rest, rest)
+    load = np.abs(arm.torque(motion)) / limits.torque
+    for j in np.flatnonzero(load.min(axis=0) > 1.0):
+        least = float(load[:, j].min() * limits.torque[j])
+        raise TrajectoryError(
+            f'joint {limits.joints[j]}: torque limit {limits.torque[j]:.4g} '
+            f'{limits.unit("torque", int(j))}, but holding still takes {least:.4g} or more in '
+            'every pose'
+        )
+    held = load.max(axis=1) <= 1.0
+    if not held.any():
+        worst = limits.joints[int(np.argmax(load.min(axis=0)))]
+        raise TrajectoryError(
+            f'no pose keeps all torque limits at once; that of joint {worst} is the tightest'
+        )
+    if clearance is None:
+        best = np.flatnonzero(held)[int(np.argmin(load[held].max(axis=1)))]
+        return np.asarray(q[best])
+    apart = np.where(held, clearance.smallest(q, reach=margin + 1.0), -np.inf)
+    best = int(np.argmax(apart))
+    if apart[best] <= margin:
+        nearest = clearance.closest(motion.select(np.array([best])))
+        raise TrajectoryError(
+            f'no pose keeps a clearance of {margin:g} m; in the best one '
+            f'{nearest.first} and {nearest.second} are {nearest.distance:.4f} m apart'
+            if nearest
+            else 'no pose is clear'
+        )
+    return np.asarray(q[best])
+
+
+def position_range(limits: Limits) -> tuple[FloatArray, FloatArray]:
+    """Return the position limits, those of an unlimited joint half a turn either way."""
+    lower = np.where(np.isfinite(limits.lower), limits.lower, -UNLIMITED_HALF_RANGE)
+    upper = np.where(np.isfinite(limits.upper), limits.upper, UNLIMITED_HALF_RANGE)
+    return lower, upper
+
+
+def _draw(
+    limits: Limits, period: float, harmonics: int, rng: np.random.Generator
+) -> FourierTrajectory:
+    n = len(limits.joints)
+    k = np.arange(1, harmonics + 1)
+    raw = FourierTrajectory(
+        limits.joints,
+        period,
+        np.zeros(n),
+        k * rng.normal(size=(n, harmonics)),
+        k * rng.normal(size=(n, harmonics)),
+    )
+    motion = raw.one_period(_SAMPLES * harmonics)
+    low, high = motion.q.min(axis=0), motion.q.max(axis=0)
+    lower, upper = position_range(limits)
+    largest = np.minimum.reduce(
+        [
+            (upper - lower) / (high - low),
+            limits.velocity / np.abs(motion.dq).max(axis=0),
+            limits.acceleration / np.abs(motion.ddq).max(axis=0),
+        ]
+    )
+    factor = largest * rng.uniform(0.3, 0.98, n)
+    centre = rng.uniform(lower - factor * low, upper - factor * high)
+    scaled = raw.scaled(factor)
+    return FourierTrajectory(limits.joints, period, centre, scaled.a, scaled.b)
+
+
+def _shrunk(
+    arm: ArmModel,
+    limits: Limits,
+    trajectory: FourierTrajectory,
+    clearance: ClearanceModel | None,
+    margin: float,
+    shrinks: int,
+) -> FourierTrajectory | None:
+    """Make a trajectory smaller about its centre until nothing is wrong with it."""
+    for _ in range(shrinks):
+        if _looks_clear(trajectory, clearance, margin) and not trajectory_faults(
+            arm, limits, trajectory, clearance, margin
+        ):
+            return trajectory
+        trajectory = trajectory.scaled(_SHRINK)
+    return None
+
+
+def _looks_clear(
+    trajectory: FourierTrajectory, clearance: ClearanceModel | None, margin: float
+) -> bool:
+    """Look at a few samples, which most trajectories that collide do not pass."""
+    if clearance is None:
+        return True
+    centre = trajectory.q0[np.newaxis]
+    coarse = trajectory.one_period(_SAMPLES * trajectory.harmonics).q
+    return bool(
+        clearance.smallest(centre, reach=margin + 1e-6).min() > margin
+        and clearance.smallest(coarse, reach=margin + 1e-6).min() > margin
+    )

@@ -1,0 +1,134 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What to design, and how hard to try."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation.criteria import CRITERIA
+from armid_ros.excitation.limits import Limits
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Which parameters a design is for.
+TARGETS = {
+    'all': 'all base parameters of the rigid body, and those of the effects',
+    'gravity': 'masses and first moments as an arm moving slowly shows them, and the effects',
+    'effects': 'those of the effects alone, the rigid body being known',
+}
+
+
+@dataclass(frozen=True)
+class DesignSettings:
+    """
+    What to design.
+
+    Attributes
+    ----------
+    period : float
+        Period of the trajectory [s].
+    harmonics : int
+        Number of harmonics per joint.
+    n_periods : int
+        How often the period is run through.
+    run_in : float
+        Shortest duration of the run-in and of the run-out [s]; they are made longer where the
+        limits need it.
+    start : ndarray, shape (n,), or None
+        Pose to start from and to end in [rad or m]; None: poses on the trajectory.
+    speed : str or float
+        'slow', 'medium', 'fast' or a share of the velocity and acceleration limits.
+    limits : Limits or None
+        Limits in place of those of the robot; ``speed`` does not apply to them.
+    clearance : float
+        Distance to keep between bodies that may touch [m].
+    criterion : str
+        'D', 'A', 'E', 'condition', or 'T' to tell the arm from a rival.
+    balance : float
+        Criterion 'D' minimises -log det / r + balance * log(condition number), r parameters: of
+        trajectories that tell about equally much it takes the one without a blind direction. 0:
+        D-optimality and nothing else.
+    target : str
+        'all', 'gravity' or 'effects'.
+    focus : tuple of str
+        Names of effects: see these as well as possible, the other parameters being fitted too.
+        Empty: see all alike. With criterion 'D' only.
+    noise : ndarray, shape (n,), or None
+        Standard deviation of the torque noise of each joint [N m or N]; None: 1 % of the torque
+        limit, or of the largest such limit where a joint has none.
+    rate : float
+        Samples per second that the noise refers to [Hz], for the predicted deviations.
+    samples : int
+        Samples of one period at which a search looks.
+    starts : int
+        Number of searches, each from the best of ``candidates`` random trajectories.
+    candidates : int
+        Number of random feasible trajectories that each search begins with.
+    iterations : int
+        Iterations of each search. This, not the time, decides between results.
+    time_budget : float
+        Searches that take longer are stopped [s]; the same seed then need not give the same
+        trajectory, and the design says so. Infinite by default.
+    processes : int
+        Searches at a time, each in a process of its own; 1: in this process.
+
+    """
+
+    period: float = 20.0
+    harmonics: int = 5
+    n_periods: int = 2
+    run_in: float = 2.0
+    start: FloatArray | None = None
+    speed: str | float = 'fast'
+    limits: Limits | None = None
+    clearance: float = 0.01
+    criterion: str = 'D'
+    balance: float = 1.0
+    target: str = 'all'
+    focus: tuple[str, ...] = ()
+    noise: FloatArray | None = None
+    rate: float = 100.0
+    samples: int = 100
+    starts: int = 4
+    candidates: int = 25
+    iterations: int = 200
+    time_budget: float = np.inf
+    processes: int = 2
+
+    def __post_init__(self) -> None:
+        """Check names and numbers."""
+        for kind, name, known in (
+            ('criterion', self.criterion, CRITERIA),
+            ('target', self.target, TARGETS),
+        ):
+            if name not in known:
+                raise TrajectoryError(f"no {kind} '{name}'; there are {', '.join(known)}")
+        if self.focus and self.criterion != 'D':
+            raise TrajectoryError(
+                f"focus goes with criterion 'D', not '{self.criterion}': it is the determinant of "
+                'what is learned about the parameters in focus'
+            )
+        for name in (
+            'harmonics',
+            'n_periods',
+            'samples',
+            'starts',
+            'candidates',
+            'iterations',
+            'processes',
+        ):
+            if getattr(self, name) < 1:
+                raise TrajectoryError(f'{name}: {getattr(self, name)}; at least 1 is needed')
+        for name in ('period', 'run_in', 'rate'):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise TrajectoryError(f'{name}: {getattr(self, name)}; it has to be positive')
+        for name in ('time_budget', 'clearance', 'balance'):
+            if not getattr(self, name) >= 0.0:
+                raise TrajectoryError(f'{name}: {getattr(self, name)}; it cannot be negative')
+        if self.samples < 8 * self.harmonics:
+            raise TrajectoryError(
+                f'{self.samples} samples of a period cannot show {self.harmonics} harmonics; '
+                f'take {8 * self.harmonics} or more'
+            )
