@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 import time
 from typing import Any
@@ -33,6 +34,11 @@ class BagPlayerNode(ArmidNode):
 
     With use_sim_time it keeps step with /clock: a message is due when as much time has passed
     since the first /clock as passed since the first message of the bag.
+
+    Attributes
+    ----------
+    published : Counter of str
+        Messages published of each topic.
 
     """
 
@@ -87,7 +93,7 @@ class BagPlayerNode(ArmidNode):
         self._position = self._begin
         self._anchor: int | None = None
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
-        self.played = 0
+        self.published: Counter[str] = Counter()
         clock_rate = self.value('clock_rate')
         self._clock_period = int(1e9 / clock_rate) if clock_rate else 0
         self._clock_due = self._begin
@@ -102,6 +108,16 @@ class BagPlayerNode(ArmidNode):
     def finished(self) -> bool:
         """Whether all was played."""
         return self._next is None
+
+    @property
+    def waiting(self) -> bool:
+        """Whether it has yet to begin: for subscribers, or for /clock."""
+        return self._anchor is None and not self.finished
+
+    @property
+    def position(self) -> float:
+        """Bag time played, since its first message [s]."""
+        return (self._position - self._first) * 1e-9
 
     def play(self) -> None:
         """Publish what is due."""
@@ -126,12 +142,11 @@ class BagPlayerNode(ArmidNode):
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say how far it has played."""
-        waiting = self._anchor is None and not self.finished
         values = {
-            'messages': self.played,
-            'position': (self._position - self._first) * 1e-9,
+            'messages': self.published.total(),
+            'position': self.position,
         }
-        return ('waiting for subscribers' if waiting else ''), values
+        return ('waiting for subscribers' if self.waiting else ''), values
 
     def close(self) -> None:
         """Let go of the bag."""
@@ -168,9 +183,9 @@ class BagPlayerNode(ArmidNode):
 
     def _publish(self, message: RawMessage) -> None:
         topic = self._topics[message.topic]
-        self.played += 1
         if message.log_time_ns >= self._begin:
             topic.publish(message.cdr)
+            self.published[message.topic] += 1
 
     def _advance(self) -> None:
         self._next = next(self._messages, None)

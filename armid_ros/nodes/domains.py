@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 import os
 import socket
 
@@ -14,12 +14,18 @@ from rclpy.context import Context
 
 #: Domains whose ports Linux does not hand out otherwise; 0 is everybody's.
 _DOMAINS = range(1, 102)
+_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 
 
 @contextmanager
-def private_context() -> Iterator[Context]:
+def private_context(domain: int | None = None) -> Iterator[Context]:
     """
-    Open a ROS context on a domain of this machine that no other private context is on.
+    Open a ROS context that only this machine hears.
+
+    Parameters
+    ----------
+    domain : int, optional
+        Its domain; by default one that no other private context is on.
 
     Raises
     ------
@@ -27,13 +33,28 @@ def private_context() -> Iterator[Context]:
         If all domains are taken.
 
     """
-    with _reserved_domain() as domain:
+    with _reserved_domain() if domain is None else nullcontext(domain) as chosen:
         context = Context()
-        context.init(args=[], domain_id=domain)
+        with _localhost_only():
+            context.init(args=[], domain_id=chosen)
         try:
             yield context
         finally:
             context.try_shutdown()
+
+
+@contextmanager
+def _localhost_only() -> Iterator[None]:
+    # rmw reads it when a context is made; there is no argument for it
+    before = os.environ.get(_RANGE)
+    os.environ[_RANGE] = 'LOCALHOST'
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_RANGE]
+        else:
+            os.environ[_RANGE] = before
 
 
 @contextmanager

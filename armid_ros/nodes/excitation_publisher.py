@@ -81,6 +81,11 @@ class ExcitationPublisherNode(ArmidNode):
         return float(self.value('approach') + self._motion.t[-1])
 
     @property
+    def readers(self) -> int:
+        """Number of subscriptions to joint_trajectory."""
+        return int(self._publisher.get_subscription_count())
+
+    @property
     def elapsed(self) -> float | None:
         """Time since the run began, approach included [s]; None when there is no run."""
         if self._begun_ns is None:
@@ -92,7 +97,7 @@ class ExcitationPublisherNode(ArmidNode):
         """Begin when somebody listens; give up waiting after a while."""
         if not self._waiting:
             return
-        if self._publisher.get_subscription_count():
+        if self.readers:
             self.start()
         elif time.monotonic() > self._deadline:
             self._waiting = False
@@ -106,8 +111,7 @@ class ExcitationPublisherNode(ArmidNode):
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
         self._send(self._motion, self.value('approach'))
-        readers = self._publisher.get_subscription_count()
-        return self._tell(f'a run of {self.duration:g} s, sent to {readers} subscribers')
+        return self._tell(f'a run of {self.duration:g} s, sent to {self.readers} subscribers')
 
     def stop(self) -> str:
         """Bring the arm to rest on the path it is on."""

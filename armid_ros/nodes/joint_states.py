@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from armid_ros.errors import RecordingError
@@ -67,9 +68,9 @@ class JointStateReader:
             if message.name != self._names:
                 self._order = self._joints.map(message.name)
                 self._names = list(message.name)
-            q = self._field(message, 'position')
-            dq = self._field(message, 'velocity') if message.velocity else None
-            tau = self._field(message, 'effort')
+            q = self._values(message, 'position')
+            dq = self._values(message, 'velocity') if message.velocity else None
+            tau = self._values(message, 'effort')
         except RecordingError as error:
             self._complaints.say('joint_states', str(error))
             return None
@@ -90,15 +91,16 @@ class JointStateReader:
             self._epoch = stamp.sec
         return float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec
 
-    def _field(self, message: JointState, name: str) -> FloatArray:
-        values = np.array(getattr(message, name))
-        if len(values) != len(message.name):
+    def _values(self, message: JointState, name: str) -> FloatArray:
+        field = getattr(message, name)
+        if len(field) != len(message.name):
             hint = '; identification needs measured torque' if name == 'effort' else ''
             raise RecordingError(
-                f'joint states with {len(message.name)} names but {len(values)} of {name}{hint}'
+                f'joint states with {len(message.name)} names but {len(field)} of {name}{hint}'
             )
-        values = values[self._order]
-        if not np.isfinite(values.sum()):
+        values = np.frombuffer(field)[self._order]
+        # a plain sum of a few numbers is quicker than numpy; joints left out may well be NaN
+        if not math.isfinite(sum(field)) and not np.all(np.isfinite(values)):
             joint = self._joints.joints[int(np.argmin(np.isfinite(values)))]
             raise RecordingError(f"joint states where the {name} of '{joint}' is not a number")
         return values

@@ -97,6 +97,11 @@ class MatchedSubscription:
         self.subscription: Subscription | None = None
         self.match()
 
+    @property
+    def publishers(self) -> int:
+        """Number of publishers that it hears."""
+        return int(self.subscription.get_publisher_count()) if self.subscription else 0
+
     def match(self) -> None:
         """Look at the publishers, and subscribe anew where they offer something else."""
         publishers = self._node.get_publishers_info_by_topic(self.topic)

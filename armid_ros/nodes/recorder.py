@@ -40,7 +40,15 @@ class Channel:
 
 
 class RecorderNode(ArmidNode):
-    """Records topics into a rosbag2 MCAP directory."""
+    """
+    Records topics into a rosbag2 MCAP directory.
+
+    Attributes
+    ----------
+    last_stamps : dict of str to int
+        Header stamp of the last message of each topic that has one [ns].
+
+    """
 
     table = (
         NodeParameter(
@@ -66,6 +74,8 @@ class RecorderNode(ArmidNode):
         self._held: list[tuple[Channel, bytes]] = []
         self._bags = 0
         self._count = 0
+        self._simulated = bool(self.value('use_sim_time'))
+        self.last_stamps: dict[str, int] = {}
         self.offer('~/start', self.start)
         self.offer('~/stop', self.stop)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -85,9 +95,10 @@ class RecorderNode(ArmidNode):
         return self._count
 
     @property
-    def topics(self) -> tuple[str, ...]:
-        """Topics that are subscribed to."""
-        return tuple(self._subscriptions_by_topic)
+    def missing(self) -> tuple[str, ...]:
+        """Topics that are to be recorded and that nobody publishes."""
+        heard = {t for t, s in self._subscriptions_by_topic.items() if s.publishers}
+        return tuple(sorted(self._wanted - heard))
 
     def start(self) -> str:
         """Open a bag and record; RecordingError when it cannot be made or one is open."""
@@ -124,8 +135,7 @@ class RecorderNode(ArmidNode):
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say where the messages go and how many there are."""
-        missing = self._wanted - set(self._subscriptions_by_topic)
-        trouble = f'nobody publishes {", ".join(sorted(missing))}' if missing else ''
+        trouble = f'nobody publishes {", ".join(self.missing)}' if self.missing else ''
         values: dict[str, object] = {
             'recording': int(self.recording),
             'messages': self.message_count,
@@ -184,9 +194,12 @@ class RecorderNode(ArmidNode):
 
     def _write(self, writer: BagWriter, channel: Channel, data: bytes, now: int) -> None:
         sent = header_stamp(data) if channel.stamped else 0
+        if self._simulated:  # /clock comes now and then only, but nothing comes before it is sent
+            now = max(now, sent)
         try:
             writer.write(channel.topic, data, now, sent or now)
             self._count += 1
+            self.last_stamps[channel.topic] = sent
         except OSError as error:
             self.complaints.say('bag', f'{writer.path}: cannot be written: {error.strerror}')
 

@@ -55,6 +55,14 @@ class SimulatedArmNode(ArmidNode):
             lower=0.0,
             upper=1000.0,
         ),
+        NodeParameter(
+            'clock_rate',
+            100.0,
+            'Of /clock where it is published, at most that of joint_states; in simulated time.',
+            'Hz',
+            lower=0.1,
+            upper=100000.0,
+        ),
     )
 
     def __init__(
@@ -92,6 +100,7 @@ class SimulatedArmNode(ArmidNode):
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
         )
         self._message = JointState(name=list(self._arm.joints))
+        self._clock_due, self._clock_period = 0, round(1e9 / self.value('clock_rate'))
         self._clock_publisher = None
         if not self._follows and self._factor != 1.0:
             self._clock_publisher = self.create_publisher(ClockMessage, '/clock', STREAM)
@@ -116,6 +125,11 @@ class SimulatedArmNode(ArmidNode):
         return self._pending is not None or self._arm.state.t < self._arm.ends_at
 
     @property
+    def readers(self) -> int:
+        """Number of subscriptions to joint_states."""
+        return int(self._states.get_subscription_count())
+
+    @property
     def hardware(self) -> str:
         """Name of the robot."""
         return str(self._arm.plant.robot.name)
@@ -126,17 +140,23 @@ class SimulatedArmNode(ArmidNode):
             reference, self._pending = self._pending[1], None
             self._begin(reference)
         sample = self._arm.advance(self._stride)
-        stamp_ns = self.stamp_ns
-        stamp = Time(nanoseconds=stamp_ns).to_msg()
-        if self._clock_publisher is not None:
-            self._clock_publisher.publish(ClockMessage(clock=stamp))
-        message = self._message
-        message.header.stamp = stamp
+        message, stamp_ns = self._message, self.stamp_ns
+        stamp = message.header.stamp
+        stamp.sec, stamp.nanosec = divmod(stamp_ns, 10**9)
+        if self._clock_publisher is not None and stamp_ns >= self._clock_due:
+            self.publish_clock()
+            self._clock_due = stamp_ns + self._clock_period
         message.position = sample.q.tolist()
         message.velocity = sample.dq.tolist()
         message.effort = sample.tau.tolist()
         self._states.publish(message)
         return stamp_ns
+
+    def publish_clock(self) -> None:
+        """Say what time it is, where this node keeps the time."""
+        if self._clock_publisher is not None:
+            stamp = Time(nanoseconds=self.stamp_ns).to_msg()
+            self._clock_publisher.publish(ClockMessage(clock=stamp))
 
     def follow(self) -> None:
         """Move as far as /clock has."""

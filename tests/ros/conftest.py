@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-import os
 import time
 from typing import Any, TypeVar
 
@@ -125,13 +124,6 @@ class Bench:
     def diagnostics(self) -> list[DiagnosticArray]:
         """Return a list that fills with diagnostics."""
         return self.listen(DiagnosticArray, '/diagnostics')
-
-
-@pytest.fixture(scope='session', autouse=True)
-def _localhost_only() -> None:
-    """Keep the tests off the network."""
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ.pop('ROS_LOCALHOST_ONLY', None)
 
 
 @pytest.fixture

@@ -87,11 +87,23 @@ def test_in_simulated_time_messages_are_logged_at_it(bench, tmp_path):
     publisher = bench.matched_publisher(JointState, 'joint_states')
     publisher.publish(joint_state(0))  # before /clock begins: kept until it does
     bench.settle()
-    bench.tick(50 * SECOND)
+    bench.tick(150 * SECOND)
     publisher.publish(joint_state(1))
     bench.spin_until(lambda: recorder.message_count == 2)
     recorder.close()
-    assert [m.log_time_ns for m in iter_raw(tmp_path / 'bag')] == [50 * SECOND] * 2
+    assert [m.log_time_ns for m in iter_raw(tmp_path / 'bag')] == [150 * SECOND] * 2
+
+
+def test_in_simulated_time_nothing_is_logged_before_it_was_sent(bench, tmp_path):
+    recorder = bench.add(
+        RecorderNode, bag=str(tmp_path / 'bag'), topics=['joint_states'], use_sim_time=True
+    )
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    bench.tick(50 * SECOND)
+    record(bench, recorder, publisher, 3)
+    recorder.close()
+    logged = [m.log_time_ns for m in iter_raw(tmp_path / 'bag')]
+    assert logged == [100 * SECOND + k * 10**6 for k in range(3)]
 
 
 def test_an_existing_directory_is_not_touched(bench, tmp_path):

@@ -1,0 +1,112 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The nodes as processes of their own, over DDS, ended as `ros2 launch` ends them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+from armid_msgs.msg import ParameterEstimate
+from armid_ros.nodes.qos import LATCHED
+from armid_ros.recording import read_recording
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+PATIENCE = 60.0
+
+
+class Processes:
+    """Nodes as processes on the domain of a bench."""
+
+    def __init__(self, bench):
+        self._environment = {
+            **os.environ,
+            'ROS_DOMAIN_ID': str(bench.context.get_domain_id()),
+            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+            'PYTHONPATH': os.pathsep.join(p for p in sys.path if p),
+        }
+        self.running = []
+
+    def start(self, node, *parameters):
+        options = [part for p in parameters for part in ('-p', p)]
+        process = subprocess.Popen(
+            [sys.executable, '-m', f'armid_ros.nodes.{node}', '--ros-args', *options],
+            env=self._environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.running.append(process)
+        return process
+
+    def end(self, process, *signals):
+        for number in signals:
+            process.send_signal(number)
+        _, errors = process.communicate(timeout=PATIENCE)
+        return errors
+
+
+@pytest.fixture
+def processes(bench):
+    processes = Processes(bench)
+    yield processes
+    for process in processes.running:
+        if process.poll() is None:
+            process.kill()
+            process.communicate()
+
+
+def test_arm_identifier_recorder_and_player_work_together(bench, processes, tmp_path):
+    bag = tmp_path / 'bag'
+    estimates = bench.listen(ParameterEstimate, 'online_identifier/estimate', LATCHED)
+    recorder = processes.start('recorder', f'bag:={bag}', 'topics:=[joint_states]')
+    identifier = processes.start('online_identifier')
+    excitation = processes.start(
+        'excitation_publisher', 'duration:=8.0', 'speed:=slow', 'n_periods:=1'
+    )
+    arm = processes.start('simulated_arm', 'rate:=200.0')
+    bench.spin_until(lambda: estimates and estimates[-1].samples > 200, 'the estimates')
+    for process in (arm, identifier, excitation):
+        errors = processes.end(process, signal.SIGINT, signal.SIGINT)
+        assert process.returncode == 0 and 'Traceback' not in errors, errors
+    errors = processes.end(recorder, signal.SIGINT, signal.SIGTERM)
+    assert recorder.returncode == 0 and 'Traceback' not in errors, errors
+    joints = load_robot('humanoid_arm').joints
+    recording = read_recording(bag, joints=joints)
+    assert recording.report.clean and len(recording) > 200
+    assert np.ptp(recording.q, axis=0).max() > 0.01  # the excitation was taken
+
+    player = processes.start('bag_player', f'bag:={bag}', 'rate:=20.0', 'subscriber_timeout:=0.0')
+    _, errors = player.communicate(timeout=PATIENCE)
+    assert player.returncode == 0, errors
+
+
+def test_what_a_killed_recorder_leaves_is_read(bench, processes, tmp_path):
+    bag = tmp_path / 'bag'
+    recorder = processes.start('recorder', f'bag:={bag}', 'topics:=[joint_states]')
+    processes.start('simulated_arm', 'rate:=1000.0')
+    bench.spin_until(
+        lambda: any(f.stat().st_size > 50_000 for f in bag.glob('*.mcap')), 'the recording'
+    )
+    processes.end(recorder, signal.SIGKILL)
+    recording = read_recording(bag, joints=load_robot('humanoid_arm').joints)
+    assert len(recording) > 100 and recording.report.damage
+
+
+@pytest.mark.parametrize(
+    ('node', 'parameter', 'line'),
+    [
+        ('simulated_arm', 'rate:=100', 'use 100.0'),
+        ('simulated_arm', 'robot:=nowhere.urdf', 'neither a file nor a shipped robot'),
+        ('recorder', 'compression:=rar', 'not one of zstd, lz4, none'),
+    ],
+)
+def test_a_wrong_start_ends_with_one_clear_line(processes, node, parameter, line):
+    process = processes.start(node, parameter)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 2
+    assert line in errors and len(errors.strip().splitlines()) == 1, errors
