@@ -10,6 +10,8 @@ import subprocess
 import sys
 
 from armid_msgs.msg import ParameterEstimate
+from armid_ros.arm import ArmModel
+from armid_ros.excitation import Excitation, Limits, random_feasible, save_excitation
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
@@ -17,6 +19,12 @@ import numpy as np
 import pytest
 
 PATIENCE = 60.0
+
+
+def short_excitation():
+    robot = load_robot('humanoid_arm')
+    limits, rng = Limits.of(robot, speed='slow'), np.random.default_rng(4)
+    return Excitation(random_feasible(ArmModel(robot), limits, 4.0, 2, rng), 1, 1.0)
 
 
 class Processes:
@@ -63,13 +71,20 @@ def processes(bench):
 def test_arm_identifier_recorder_and_player_work_together(bench, processes, tmp_path):
     bag = tmp_path / 'bag'
     estimates = bench.listen(ParameterEstimate, 'online_identifier/estimate', LATCHED)
+    diagnostics = bench.diagnostics()
     recorder = processes.start('recorder', f'bag:={bag}', 'topics:=[joint_states]')
     identifier = processes.start('online_identifier')
-    excitation = processes.start(
-        'excitation_publisher', 'duration:=8.0', 'speed:=slow', 'n_periods:=1'
-    )
+    save_excitation(short_excitation(), tmp_path / 'run.yaml')
+    excitation = processes.start('excitation_publisher', f'file:={tmp_path / "run.yaml"}')
     arm = processes.start('simulated_arm', 'rate:=200.0')
+
+    def recorded():
+        statuses = [s for d in diagnostics for s in d.status if s.name == 'recorder: state']
+        values = {v.key: v.value for s in statuses for v in s.values}
+        return int(values.get('messages', 0))
+
     bench.spin_until(lambda: estimates and estimates[-1].samples > 200, 'the estimates')
+    bench.spin_until(lambda: recorded() > 600, 'the recording')
     for process in (arm, identifier, excitation):
         errors = processes.end(process, signal.SIGINT, signal.SIGINT)
         assert process.returncode == 0 and 'Traceback' not in errors, errors
