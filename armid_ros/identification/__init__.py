@@ -15,6 +15,7 @@ from armid_ros.identification.identify import (
     Score,
 )
 from armid_ros.identification.output import identification_document
+from armid_ros.identification.physical import PhysicalCertificate, PhysicalSettings
 from armid_ros.identification.signals import Conditioning, SignalSettings
 
 __all__ = [
@@ -22,6 +23,8 @@ __all__ = [
     'Fit',
     'Identification',
     'IdentificationSettings',
+    'PhysicalCertificate',
+    'PhysicalSettings',
     'Score',
     'SignalSettings',
     'identification_document',

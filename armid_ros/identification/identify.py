@@ -12,6 +12,11 @@ from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.checks import check_motion, check_torque
 from armid_ros.identification.least_squares import Method, solve
+from armid_ros.identification.physical import (
+    fit_bodies,
+    PhysicalCertificate,
+    PhysicalSettings,
+)
 from armid_ros.identification.regression import Regression, regressions
 from armid_ros.identification.signals import Conditioning, conditioning, SignalSettings
 from armid_ros.model import BaseParameters, group_columns, regroup
@@ -36,11 +41,14 @@ class IdentificationSettings:
         Ordinary least squares, weighted by the noise of each joint, or robust as well.
     signals : SignalSettings
         Filtering and decimation.
+    physical : PhysicalSettings or None
+        Fit among parameters that bodies have, and effects within their bounds.
 
     """
 
     method: Method = 'wls'
     signals: SignalSettings = field(default_factory=SignalSettings)
+    physical: PhysicalSettings | None = None
 
 
 @dataclass(frozen=True)
@@ -120,7 +128,8 @@ class Identification:
     base : BaseParameters
         What the data can tell apart, and how it groups the standard parameters.
     estimate : Estimate
-        Base and effect parameters with covariance.
+        Base and effect parameters with covariance; that of a fit among bodies is what the data
+        alone say.
     condition_number : float
         Of the weighted base regressor.
     joint_std : ndarray, shape (n,)
@@ -133,6 +142,8 @@ class Identification:
         What was asked.
     notes : tuple of str
         What a person should know: joints at rest, outliers, grouped parameters.
+    physical : PhysicalCertificate or None
+        What shows that the links are bodies, where that was asked.
 
     """
 
@@ -145,6 +156,7 @@ class Identification:
     used: Conditioning
     settings: IdentificationSettings
     notes: tuple[str, ...]
+    physical: PhysicalCertificate | None = None
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
         """Predict the torques of other recordings, filtered like the training data."""
@@ -216,16 +228,25 @@ def identify(
     solution = solve(problem, settings.method, _bounds(arm, base))
     if solution.outliers:
         notes += (f'{solution.outliers} torque samples were weighted down as outliers',)
+    estimate = Estimate(base.parameters, solution.values, solution.covariance)
+    theta, certificate = base.lift(solution.values, arm.theta), None
+    if settings.physical is not None:
+        theta, certificate = fit_bodies(
+            arm, base, problem, solution.weights, estimate, settings.physical
+        )
+        estimate = Estimate(base.parameters, base.values(theta), solution.covariance)
+        notes += certificate.sentences()
     return Identification(
-        arm=arm.with_theta(base.lift(solution.values, arm.theta)),
+        arm=arm.with_theta(theta),
         base=base,
-        estimate=Estimate(base.parameters, solution.values, solution.covariance),
+        estimate=estimate,
         condition_number=solution.condition_number,
         joint_std=solution.joint_std,
-        training=_fits(problem, solution.values),
+        training=_fits(problem, estimate.values),
         used=used,
         settings=settings,
         notes=notes,
+        physical=certificate,
     )
 
 

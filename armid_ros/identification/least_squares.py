@@ -47,6 +47,8 @@ class Solution:
         Of the weighted regressor.
     outliers : int
         Samples whose weight was reduced below one half.
+    weights : ndarray, shape (N, n)
+        What every row was multiplied by, all stretches one after the other.
 
     """
 
@@ -55,6 +57,7 @@ class Solution:
     joint_std: FloatArray
     condition_number: float
     outliers: int
+    weights: FloatArray
 
 
 def solve(
@@ -115,6 +118,7 @@ def solve(
         joint_std=joint_std,
         condition_number=float(np.linalg.cond(triangle)),
         outliers=int(np.sum(relative**2 < 0.5)),
+        weights=weights,
     )
 
 

@@ -1,0 +1,346 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The fit among bodies: torque least squares over parameters that physics allows.
+
+The constraints are part of the fit. Moving an unconstrained estimate to the nearest body
+afterwards spoils the torques, for it is nearest in parameters of which they say nothing. What the
+data leave open comes from the description; how much that counts is decided by blocks of the
+training data that are left out in turn.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.physical_program import Box, PhysicalProgram
+from armid_ros.identification.regression import Regression
+from armid_ros.model import BaseParameters
+from armid_ros.model.pseudo_inertia import (
+    Consistency,
+    link_parameters,
+    PER_LINK,
+    pseudo_inertia,
+)
+from armid_ros.motion import FloatArray
+import numpy as np
+import scipy.linalg
+
+#: A fit better than this share of the torque is taken as that good: there is always some noise.
+FINEST_FIT = 1e-4
+#: Weights of the divergence that are tried. The fit is a mean of squares of about one.
+WEIGHTS = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
+#: The heaviest weight is taken whose held-out error is within this share of the least one.
+TOLERANCE = 1e-3
+#: A pseudo-inertia that has shrunk to this share of the description's in some direction is at the
+#: limit of what a body can be.
+ACTIVE_SHARE = 1e-3
+#: Smallest radius of gyration of a prior [m], for descriptions that give points for links.
+SMALLEST_RADIUS = 0.005
+#: Radius of gyration of a prior for a link of which the description says nothing [m].
+UNKNOWN_RADIUS = 0.05
+
+
+@dataclass(frozen=True)
+class PhysicalSettings:
+    """
+    What is known beside the recordings.
+
+    Attributes
+    ----------
+    total_mass : float or None
+        Mass of everything that the driven joints move [kg], as of a scale.
+    boxes : mapping of str to (sequence of float, sequence of float)
+        Joint, and two corners [m] of a box in its frame that contains the link.
+    blocks : int
+        Blocks of the training data that are left out in turn to choose the weight of the prior.
+    weights : tuple of float
+        Weights that are tried.
+
+    """
+
+    total_mass: float | None = None
+    boxes: Mapping[str, tuple[Sequence[float], Sequence[float]]] = field(default_factory=dict)
+    blocks: int = 5
+    weights: tuple[float, ...] = WEIGHTS
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        if self.total_mass is not None and not self.total_mass > 0.0:
+            raise IdentificationError(f'total mass {self.total_mass} kg: it has to be positive')
+        for joint, (lower, upper) in self.boxes.items():
+            if len(lower) != 3 or len(upper) != 3 or not np.all(np.less(lower, upper)):
+                raise IdentificationError(
+                    f"box of joint '{joint}': {tuple(lower)} has to be below {tuple(upper)} "
+                    'along x, y and z'
+                )
+        if self.blocks < 2 or not self.weights or not min(self.weights) > 0.0:
+            raise IdentificationError('a prior is weighed by 2 blocks or more, and is positive')
+
+
+@dataclass(frozen=True)
+class PhysicalCertificate:
+    """
+    What shows that an identified arm is made of bodies, and what it cost.
+
+    Attributes
+    ----------
+    links : tuple of Consistency
+        Eigenvalues of every pseudo-inertia, mass, centre, principal moments.
+    shares : ndarray, shape (n,)
+        Smallest size of each pseudo-inertia relative to the prior's, over all directions.
+    at_bound : tuple of ParameterName
+        Effect parameters that their bound holds.
+    weight : float
+        Weight of the prior.
+    tried : tuple of (float, float)
+        Weights that were tried, and the error on the blocks left out, relative to that of
+        unconstrained fits.
+    unconstrained : Estimate
+        The fit without constraints.
+    misfit_ratio : float
+        Weighted error on the training data, relative to the unconstrained fit's.
+    notes : tuple of str
+        What was assumed of links of which the description has no body.
+
+    """
+
+    links: tuple[Consistency, ...]
+    shares: FloatArray
+    at_bound: tuple[ParameterName, ...]
+    weight: float
+    tried: tuple[tuple[float, float], ...]
+    unconstrained: Estimate
+    misfit_ratio: float
+    notes: tuple[str, ...]
+
+    @property
+    def consistent(self) -> bool:
+        """Whether every link is a body."""
+        return all(link.consistent for link in self.links)
+
+    @property
+    def held_out_ratio(self) -> float:
+        """Error on blocks left out with the chosen weight, relative to unconstrained fits'."""
+        return dict(self.tried)[self.weight]
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Links that are at the limit of what a body can be."""
+        near = self.shares < ACTIVE_SHARE
+        return tuple(link.link for link, at in zip(self.links, near, strict=True) if at)
+
+    def sentences(self) -> tuple[str, ...]:
+        """Say in words what was found."""
+        least = min(self.links, key=lambda link: float(link.eigenvalues[0]))
+        said = [
+            f'every link is a body: the smallest eigenvalue of a pseudo-inertia is '
+            f'{least.eigenvalues[0]:.3g} ({least.link})',
+            f'constraints cost {100.0 * (self.misfit_ratio - 1.0):.2f} % of torque error on the '
+            f'training data and {100.0 * (self.held_out_ratio - 1.0):+.2f} % on blocks left out; '
+            f'weight of the description {self.weight:.0e}',
+        ]
+        if self.active:
+            said.append(
+                f'at the limit of what a body can be: {", ".join(self.active)}; '
+                'the model lacks an effect there, or the data say little'
+            )
+        if self.at_bound:
+            names = ', '.join(f'{p.name} of {p.joint}' for p in self.at_bound)
+            said.append(f'held by their bounds: {names}')
+        return (*said, *self.notes)
+
+
+def fit_bodies(
+    arm: ArmModel,
+    base: BaseParameters,
+    problem: Sequence[Regression],
+    weights: FloatArray,
+    unconstrained: Estimate,
+    settings: PhysicalSettings,
+) -> tuple[FloatArray, PhysicalCertificate]:
+    """
+    Fit the standard parameters of an arm to torques, all links being bodies.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Description: the prior of the links, bounds of the effects.
+    base : BaseParameters
+        Columns of the problem.
+    problem : sequence of Regression
+        Filtered columns and torques.
+    weights : ndarray, shape (N, n)
+        Weight of every row, as of the unconstrained fit.
+    unconstrained : Estimate
+        That fit.
+    settings : PhysicalSettings
+        What else is known.
+
+    Returns
+    -------
+    theta : ndarray, shape (P,)
+        Standard parameters.
+    certificate : PhysicalCertificate
+        Why to believe it.
+
+    """
+    prior, notes = bodily_prior(arm)
+    bounds = [effect.bounds() for effect in arm.effects]
+    lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in bounds)]) for k in (0, 1))
+    boxes: dict[int, Box] = {
+        arm.robot.index(joint): (np.array(low, dtype=float), np.array(high, dtype=float))
+        for joint, (low, high) in settings.boxes.items()
+    }
+    start = prior[len(prior) - len(lower) :]
+    prior[len(prior) - len(lower) :] = np.clip(start, lower, upper)
+    program = PhysicalProgram(base, prior, lower, upper, settings.total_mass, boxes)
+    blocks = compress(problem, weights, settings.blocks)
+    whole = np.concatenate(blocks)
+    least = float(np.linalg.norm(_residual(whole, unconstrained.values)))
+    least = max(least, FINEST_FIT * float(np.linalg.norm(whole[:, -1])))
+    rows = np.array_split(np.count_nonzero(weights, axis=1), settings.blocks)
+    share = np.array([part.sum() for part in rows], dtype=float)
+    counts = share / share.sum() * least**2  # so that the unconstrained fit's mean square is one
+
+    tried = _held_out_errors(program, blocks, counts, settings.weights)
+    best = min(error for _, error in tried)
+    weight = max(w for w, error in tried if error <= (1.0 + TOLERANCE) * best)
+    theta = program.solve(_triangle(whole), float(counts.sum()), weight)
+    rigid = theta[: len(theta) - len(lower)].reshape(-1, PER_LINK)
+    links = tuple(
+        Consistency.of(link, values) for link, values in zip(arm.robot.links, rigid, strict=True)
+    )
+    effects = theta[len(theta) - len(lower) :]
+    scale = 1e-6 * np.maximum(np.abs(effects).max(initial=0.0), 1e-9)
+    held = (effects - lower <= scale) | (upper - effects <= scale)
+    names = arm.parameters[len(theta) - len(lower) :]
+    misfit = float(np.linalg.norm(_residual(whole, base.values(theta))))
+    return theta, PhysicalCertificate(
+        links=links,
+        shares=np.array(
+            [
+                scipy.linalg.eigh(pseudo_inertia(own), pseudo_inertia(described))[0][0]
+                for own, described in zip(rigid, prior[: rigid.size].reshape(-1, 10), strict=True)
+            ]
+        ),
+        at_bound=tuple(name for name, at in zip(names, held, strict=True) if at),
+        weight=weight,
+        tried=tried,
+        unconstrained=unconstrained,
+        misfit_ratio=max(misfit / least, 1.0),
+        notes=notes,
+    )
+
+
+def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
+    """
+    Return the standard parameters of an arm with bodies where the description has none.
+
+    A link of no mass becomes a ball of the mean mass of the others; one that is a point, or whose
+    moments no body has, is given the least second moments that a body has there.
+
+    Returns
+    -------
+    theta : ndarray, shape (P,)
+        Standard parameters, those of every link positive definite.
+    notes : tuple of str
+        What was assumed.
+
+    """
+    theta = arm.theta.copy()
+    masses = [float(m) for m in theta[: PER_LINK * arm.robot.n_joints : PER_LINK] if m > 0.0]
+    typical = float(np.mean(masses)) if masses else 1.0
+    notes = []
+    for index, link in enumerate(arm.robot.links):
+        part = slice(PER_LINK * index, PER_LINK * (index + 1))
+        matrix = pseudo_inertia(theta[part])
+        mass = matrix[3, 3]
+        if mass <= 1e-6 * typical:
+            ball = np.diag([UNKNOWN_RADIUS**2] * 3 + [1.0]) * typical
+            theta[part] = link_parameters(ball)
+            notes.append(
+                f"link '{link}': the description has no mass; a ball of {typical:.3g} kg is the "
+                'prior where the data say nothing'
+            )
+            continue
+        center = matrix[:3, 3] / mass
+        second = matrix[:3, :3] - mass * np.outer(center, center)
+        values, axes = np.linalg.eigh(second)
+        floor = mass * SMALLEST_RADIUS**2
+        if values[0] < 1e-3 * floor or values[0] < 1e-4 * values[2]:
+            least = max(floor, 1e-2 * values[2])
+            second = (axes * np.maximum(values, least)) @ axes.T
+            matrix[:3, :3] = second + mass * np.outer(center, center)
+            theta[part] = link_parameters(matrix)
+            notes.append(
+                f"link '{link}': the description's inertia is hardly that of a body; the prior "
+                f'has a radius of gyration of {1e3 * np.sqrt(least / mass):.2g} mm at least'
+            )
+    return theta, tuple(notes)
+
+
+def compress(
+    problem: Sequence[Regression], weights: FloatArray, blocks: int
+) -> tuple[FloatArray, ...]:
+    """
+    Shrink the weighted problem to one triangular factor per block of successive samples.
+
+    Parameters
+    ----------
+    problem : sequence of Regression
+        Stretches with the same r columns.
+    weights : ndarray, shape (N, n)
+        Weight of every row.
+    blocks : int
+        How many.
+
+    Returns
+    -------
+    tuple of ndarray, each of shape (k, r + 1), k <= r + 1
+        Factor of columns and torque: all that least squares needs of a block.
+
+    """
+    columns = np.concatenate([part.columns for part in problem])
+    tau = np.concatenate([part.tau for part in problem])
+    factors = []
+    for rows in np.array_split(np.arange(len(tau)), blocks):
+        scaled = weights[rows, :, np.newaxis] * columns[rows]
+        stacked = np.concatenate([scaled, (weights * tau)[rows, :, np.newaxis]], axis=2)
+        factors.append(_triangle(stacked.reshape(-1, stacked.shape[2])))
+    return tuple(factors)
+
+
+def _held_out_errors(
+    program: PhysicalProgram,
+    blocks: Sequence[FloatArray],
+    counts: FloatArray,
+    weights: Sequence[float],
+) -> tuple[tuple[float, float], ...]:
+    """Return the error on blocks left out, per weight, relative to unconstrained fits."""
+    free = 0.0
+    squares = dict.fromkeys(weights, 0.0)
+    for left_out, block in enumerate(blocks):
+        others = [b for k, b in enumerate(blocks) if k != left_out]
+        triangle = _triangle(np.concatenate(others))
+        count = float(counts.sum() - counts[left_out])
+        values = np.asarray(np.linalg.lstsq(triangle[:, :-1], triangle[:, -1], rcond=1e-10)[0])
+        free += float(np.sum(_residual(block, values) ** 2))
+        for weight in weights:
+            theta = program.solve(triangle, count, weight)
+            squares[weight] += float(np.sum(_residual(block, program.base.values(theta)) ** 2))
+    floor = max(free, FINEST_FIT**2 * float(sum(np.sum(b[:, -1] ** 2) for b in blocks)))
+    return tuple((weight, float(np.sqrt(total / floor))) for weight, total in squares.items())
+
+
+def _triangle(rows: FloatArray) -> FloatArray:
+    return np.asarray(scipy.linalg.qr(rows, mode='r', check_finite=False)[0][: rows.shape[1]])
+
+
+def _residual(rows: FloatArray, values: FloatArray) -> FloatArray:
+    return np.asarray(rows[:, -1] - rows[:, :-1] @ values)

@@ -1,0 +1,266 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The convex program of a physically consistent fit.
+
+    minimise  |A theta - z|^2 / (2 N)  +  w  sum over links of  D(P || P0)
+
+over standard parameters theta with every link's pseudo-inertia P positive definite, effects
+within their bounds, and what else is known of masses and shapes. D is the divergence of the
+log-determinant,
+
+    D(P || P0) = log det P0 - log det P + tr(P0^-1 P) - 4,
+
+which is convex in the parameters, does not depend on frames or units, so that kilograms need not
+be weighed against kilogram metres squared, and grows beyond bounds towards inertias that no body
+has. Source: Lee, Wensing and Park 2020, section IV; the pseudo-inertia, Wensing, Kim and Slotine
+2018. Solved by an interior-point method in coordinates in which every P0 is the identity.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from armid_ros.errors import IdentificationError
+from armid_ros.model import BaseParameters
+from armid_ros.model.pseudo_inertia import link_parameters, PER_LINK, pseudo_inertia
+from armid_ros.motion import FloatArray
+import clarabel
+import numpy as np
+from scipy import sparse
+
+#: Pull of every effect to its prior value, against what no data and no other prior decides.
+_RIDGE = 1e-9
+#: Variables of a log-determinant: a triangle, then the logarithms of its diagonal.
+_TRIANGLE, _DIAGONAL = 10, 4
+_LOG_DETERMINANT = _TRIANGLE + _DIAGONAL
+
+Box = tuple[FloatArray, FloatArray]
+
+
+@dataclass(frozen=True)
+class PhysicalProgram:
+    """
+    What stays the same when data and weight change.
+
+    Attributes
+    ----------
+    base : BaseParameters
+        Grouping of P standard parameters, 10 n rigid ones first.
+    prior : ndarray, shape (P,)
+        Standard parameters of the description; rigid ones of bodies.
+    lower, upper : ndarray, shape (P - 10 n,)
+        Bounds of the effects.
+    total_mass : float or None
+        Mass of all links together [kg].
+    boxes : mapping of int to (ndarray, ndarray)
+        Link (0 is the first), and two corners, in the joint frame, of a box that contains it [m].
+
+    """
+
+    base: BaseParameters
+    prior: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    total_mass: float | None
+    boxes: Mapping[int, Box]
+
+    @property
+    def n_links(self) -> int:
+        """Number of links n."""
+        return (len(self.prior) - len(self.lower)) // PER_LINK
+
+    @property
+    def _rigid(self) -> int:
+        return PER_LINK * self.n_links
+
+    def solve(self, triangle: FloatArray, count: float, weight: float) -> FloatArray:
+        """
+        Find the parameters.
+
+        Parameters
+        ----------
+        triangle : ndarray, shape (k, r + 1)
+            Triangular factor of the weighted problem: base columns, then torque.
+        count : float
+            Number N of weighted rows that it stands for.
+        weight : float
+            Weight w of the divergence, positive.
+
+        Returns
+        -------
+        ndarray, shape (P,)
+            Standard parameters.
+
+        Raises
+        ------
+        IdentificationError
+            If nothing satisfies the constraints.
+
+        """
+        rank, size, rigid = self.base.rank, len(self.prior), self._rigid
+        columns = triangle[:, :rank] @ self.base.grouping / np.sqrt(count)
+        lengths = np.linalg.norm(columns[:, rigid:], axis=0)
+        change = self._whitening(1.0 / np.where(lengths > 0.0, lengths, 1.0))
+        origin = np.concatenate([np.zeros(rigid), self.prior[rigid:]])
+        a = columns @ change
+        z = triangle[:, rank] / np.sqrt(count) - columns @ origin
+
+        variables = size + _LOG_DETERMINANT * self.n_links
+        hessian = np.zeros((variables, variables))
+        hessian[:size, :size] = a.T @ a
+        hessian[range(rigid, size), range(rigid, size)] += _RIDGE
+        gradient = np.zeros(variables)
+        gradient[:size] = -a.T @ z
+        gradient[:rigid] += weight * np.tile(_svec(np.eye(4)), self.n_links)
+        for link in range(self.n_links):
+            gradient[self._first(link) + _TRIANGLE : self._first(link + 1)] = -weight
+        rows, offsets, cones = self._constraints(change, origin)
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        solution = clarabel.DefaultSolver(
+            sparse.triu(hessian, format='csc'), gradient, rows, offsets, cones, settings
+        ).solve()
+        if str(solution.status) not in ('Solved', 'AlmostSolved'):
+            raise IdentificationError(
+                f'no physically consistent parameters: the solver says {solution.status}; '
+                'check the total mass and the boxes of the links against each other'
+            )
+        theta = origin + change @ np.array(solution.x[:size])
+        theta[rigid:] = np.clip(theta[rigid:], self.lower, self.upper)
+        return np.asarray(theta)
+
+    def _whitening(self, effect_scale: FloatArray) -> FloatArray:
+        """Map symmetric matrices, of which the identity is the prior, and effects, to theta."""
+        change = np.zeros((len(self.prior), len(self.prior)))
+        change[: self._rigid, : self._rigid] = self._whitened_links
+        effects = range(self._rigid, len(self.prior))
+        change[effects, effects] = effect_scale
+        return change
+
+    @cached_property
+    def _whitened_links(self) -> FloatArray:
+        blocks = []
+        for link in range(self.n_links):
+            values = self.prior[PER_LINK * link : PER_LINK * (link + 1)]
+            root = np.linalg.cholesky(pseudo_inertia(values))
+            units = [root @ _smat(unit) @ root.T for unit in np.eye(PER_LINK)]
+            blocks.append(np.transpose([link_parameters(unit) for unit in units]))
+        return np.asarray(sparse.block_diag(blocks).toarray())
+
+    def _first(self, link: int) -> int:
+        """Return the first of the variables of a link's log-determinant."""
+        return len(self.prior) + _LOG_DETERMINANT * link
+
+    def _constraints(
+        self, change: FloatArray, origin: FloatArray
+    ) -> tuple[sparse.csc_matrix, FloatArray, list[Any]]:
+        """Return A, b and the cones K of b - A x in K."""
+        blocks: list[sparse.spmatrix] = []
+        offsets: list[FloatArray] = []
+        cones: list[Any] = []
+        empty = sparse.csr_matrix((1, _LOG_DETERMINANT * self.n_links))
+
+        def linear(cone: Any, normal: FloatArray, offset: FloatArray) -> None:
+            """Ask for normal @ theta + offset in a cone of that many rows."""
+            if len(normal):
+                side = sparse.vstack([empty] * len(normal))
+                blocks.append(sparse.hstack([-sparse.csr_matrix(normal @ change), side]))
+                offsets.append(normal @ origin + offset)
+                cones.append(cone(len(normal)))
+
+        if self.total_mass is not None:
+            masses = np.zeros((1, len(self.prior)))
+            masses[0, : self._rigid : PER_LINK] = 1.0
+            linear(clarabel.ZeroConeT, masses, np.array([-self.total_mass]))
+        unit = np.eye(len(self.prior))[self._rigid :]
+        for sign, bound in ((1.0, self.lower), (-1.0, self.upper)):
+            finite = np.isfinite(bound)
+            linear(clarabel.NonnegativeConeT, sign * unit[finite], -sign * bound[finite])
+        for link, box in self.boxes.items():
+            normal = np.zeros((9, len(self.prior)))
+            normal[:, PER_LINK * link : PER_LINK * (link + 1)] = box_conditions(box)
+            linear(clarabel.NonnegativeConeT, normal, np.zeros(9))
+        for link in range(self.n_links):
+            self._add_log_determinant(link, blocks, offsets, cones)
+        return sparse.vstack(blocks, format='csc'), np.concatenate(offsets), cones
+
+    def _add_log_determinant(
+        self, link: int, blocks: list[Any], offsets: list[FloatArray], cones: list[Any]
+    ) -> None:
+        """
+        Bound the logarithms u from above: sum u <= log det X, of the whitened X of a link.
+
+        X >= Z diag(Z)^-1 Z' for a lower triangle Z, and u <= log of its diagonal (Ben-Tal and
+        Nemirovski 2001, section 4.2).
+
+        """
+        first, width = self._first(link), len(self.prior) + _LOG_DETERMINANT * self.n_links
+        matrix = sparse.lil_matrix((36, width))
+        for index in range(PER_LINK):
+            matrix[index, PER_LINK * link + index] = -1.0
+        exponential = sparse.lil_matrix((3 * _DIAGONAL, width))
+        lower = [(i, j) for j in range(4) for i in range(j, 4)]
+        for index, (i, j) in enumerate(lower):
+            matrix[_packed(i, 4 + j), first + index] = -np.sqrt(2.0)
+            if i == j:
+                matrix[_packed(4 + j, 4 + j), first + index] = -1.0
+                exponential[3 * j + 2, first + index] = -1.0
+                exponential[3 * j, first + _TRIANGLE + j] = -1.0
+        blocks += [matrix, exponential]
+        offsets += [np.zeros(36), np.tile([0.0, 1.0, 0.0], _DIAGONAL)]
+        cones += [clarabel.PSDTriangleConeT(8), *[clarabel.ExponentialConeT()] * _DIAGONAL]
+
+
+def box_conditions(box: Box) -> FloatArray:
+    """
+    Return what has to be positive of a link inside a box.
+
+    The centre of mass is between the corners, and so is all mass: the integral of
+    (x - lower) (upper - x) dm is not negative along any axis.
+
+    Returns
+    -------
+    ndarray, shape (9, 10)
+        Rows to multiply the ten parameters by.
+
+    """
+    lower, upper = box
+    rows = np.zeros((9, PER_LINK))
+    units = pseudo_inertia(np.eye(PER_LINK))
+    mass, moments = units[:, 3, 3], units[:, :3, 3]
+    for axis in range(3):
+        rows[axis] = moments[:, axis] - lower[axis] * mass
+        rows[3 + axis] = upper[axis] * mass - moments[:, axis]
+        rows[6 + axis] = (
+            (lower[axis] + upper[axis]) * moments[:, axis]
+            - lower[axis] * upper[axis] * mass
+            - units[:, axis, axis]
+        )
+    return rows
+
+
+def _packed(i: int, j: int) -> int:
+    """Return where an entry of the upper triangle is when the columns are stacked."""
+    return j * (j + 1) // 2 + i
+
+
+def _smat(vector: FloatArray) -> FloatArray:
+    """Return the symmetric 4x4 matrix of a stacked triangle, off-diagonals times sqrt 2."""
+    matrix = np.zeros((4, 4))
+    for j in range(4):
+        for i in range(j + 1):
+            share = 1.0 if i == j else np.sqrt(0.5)
+            matrix[i, j] = matrix[j, i] = share * vector[_packed(i, j)]
+    return matrix
+
+
+def _svec(matrix: FloatArray) -> FloatArray:
+    """Return the stacked triangle of a symmetric 4x4 matrix; the inverse of `_smat`."""
+    return np.array(
+        [(1.0 if i == j else np.sqrt(2.0)) * matrix[i, j] for j in range(4) for i in range(j + 1)]
+    )

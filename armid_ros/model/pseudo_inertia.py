@@ -1,0 +1,164 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The pseudo-inertia of a link, and what it says of its being a body.
+
+Ten parameters are those of a body with positive mass density somewhere in space exactly if the
+4x4 matrix P = [[S, h], [h', m]] is positive definite; S is the second moment of the mass about
+the origin of the joint frame, h the first, m the mass. Positive mass, positive principal moments
+and their triangle inequalities are all contained in it.
+Source: Wensing, Kim and Slotine 2018, eqs. 9 to 13.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.errors import ModelError
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+
+#: Parameters of a link, in the order of ``LINK_PARAMETERS``.
+PER_LINK = 10
+
+
+def _basis() -> FloatArray:
+    """Return the pseudo-inertia of each unit parameter, shape (10, 4, 4)."""
+    basis = np.zeros((PER_LINK, 4, 4))
+    basis[0, 3, 3] = 1.0
+    for axis in range(3):
+        basis[1 + axis, axis, 3] = basis[1 + axis, 3, axis] = 1.0
+    for index, axis in ((4, 0), (6, 1), (9, 2)):
+        basis[index, :3, :3] = 0.5 * np.eye(3)
+        basis[index, axis, axis] = -0.5
+    for index, (row, column) in ((5, (0, 1)), (7, (0, 2)), (8, (1, 2))):
+        basis[index, row, column] = basis[index, column, row] = -1.0
+    basis.setflags(write=False)
+    return basis
+
+
+#: Pseudo-inertia of each unit parameter: it is linear in the ten.
+BASIS = _basis()
+
+
+def pseudo_inertia(parameters: npt.ArrayLike) -> FloatArray:
+    """
+    Return the pseudo-inertia of one link or of several.
+
+    Parameters
+    ----------
+    parameters : array_like, shape (..., 10)
+        m, first moments [kg m], inertia about the joint frame [kg m^2], as in
+        ``LINK_PARAMETERS``.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+        Second moments [kg m^2], first moments [kg m] and mass [kg].
+
+    """
+    return np.asarray(np.tensordot(np.asarray(parameters, dtype=float), BASIS, axes=(-1, 0)))
+
+
+def link_parameters(matrix: npt.ArrayLike) -> FloatArray:
+    """
+    Return the ten parameters of a pseudo-inertia; the inverse of `pseudo_inertia`.
+
+    Parameters
+    ----------
+    matrix : array_like, shape (..., 4, 4)
+        Symmetric.
+
+    Returns
+    -------
+    ndarray, shape (..., 10)
+
+    """
+    p = np.asarray(matrix, dtype=float)
+    second = p[..., :3, :3]
+    inertia = np.trace(second, axis1=-2, axis2=-1)[..., np.newaxis, np.newaxis] * np.eye(3)
+    inertia = inertia - second
+    rows, columns = [0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]
+    return np.concatenate([p[..., 3, 3:], p[..., :3, 3], inertia[..., rows, columns]], axis=-1)
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """
+    Whether the parameters of a link are those of a body.
+
+    Attributes
+    ----------
+    link : str
+        The link.
+    eigenvalues : ndarray, shape (4,)
+        Of its pseudo-inertia, ascending, [kg m^2] and [kg] mixed: their signs count.
+    mass : float
+        [kg]
+    center : ndarray, shape (3,)
+        Centre of mass in the joint frame [m]; NaN without mass.
+    moments : ndarray, shape (3,)
+        Principal moments about the centre of mass, ascending [kg m^2]; NaN without mass.
+
+    """
+
+    link: str
+    eigenvalues: FloatArray
+    mass: float
+    center: FloatArray
+    moments: FloatArray
+
+    @staticmethod
+    def of(link: str, parameters: npt.ArrayLike) -> Consistency:
+        """Examine ten parameters."""
+        matrix = pseudo_inertia(parameters)
+        mass = float(matrix[3, 3])
+        nothing = np.full(3, np.nan)
+        center = matrix[:3, 3] / mass if mass != 0.0 else nothing
+        moments: FloatArray = nothing
+        if mass != 0.0:
+            second = matrix[:3, :3] - mass * np.outer(center, center)
+            moments = np.asarray(np.linalg.eigvalsh(np.trace(second) * np.eye(3) - second))
+        return Consistency(
+            link, np.asarray(np.linalg.eigvalsh(matrix)), mass, np.asarray(center), moments
+        )
+
+    @property
+    def consistent(self) -> bool:
+        """Whether a body with positive density has these parameters."""
+        return bool(self.eigenvalues[0] > 0.0)
+
+    @property
+    def triangle_margin(self) -> float:
+        """How far the largest moment is below the sum of the others, as a share of it."""
+        low, middle, high = self.moments
+        return float((low + middle - high) / high)
+
+
+def require_consistent(links: tuple[str, ...], parameters: npt.ArrayLike) -> None:
+    """
+    Refuse parameters that no bodies have.
+
+    Parameters
+    ----------
+    links : tuple of str
+        n links.
+    parameters : array_like, shape (10 n,)
+        Rigid parameters.
+
+    Raises
+    ------
+    ModelError
+        Naming the first link that is none.
+
+    """
+    for link, values in zip(links, np.reshape(parameters, (-1, PER_LINK)), strict=True):
+        found = Consistency.of(link, values)
+        if not found.consistent:
+            raise ModelError(
+                f"link '{link}': no body has these inertial parameters (mass {found.mass:.4g} kg, "
+                f'smallest eigenvalue of the pseudo-inertia {found.eigenvalues[0]:.3g}); '
+                'identify with physical consistency'
+            )

@@ -1,0 +1,74 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+from armid_ros.errors import ModelError
+from armid_ros.model.pseudo_inertia import (
+    Consistency,
+    link_parameters,
+    pseudo_inertia,
+    require_consistent,
+)
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+
+def point_masses(masses, places):
+    """Return the ten parameters of point masses from their definition."""
+    inertia = sum(
+        m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, places, strict=True)
+    )
+    upper = [inertia[i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))]
+    return np.array([masses.sum(), *(masses @ places), *upper])
+
+
+@pytest.fixture
+def cloud():
+    rng = np.random.default_rng(0)
+    return rng.uniform(0.1, 1.0, 6), rng.normal(size=(6, 3))
+
+
+def test_pseudo_inertia_is_the_second_moment_of_homogeneous_coordinates(cloud):
+    masses, places = cloud
+    homogeneous = np.column_stack([places, np.ones(len(places))])
+    expected = np.einsum('k,ki,kj->ij', masses, homogeneous, homogeneous)
+    np.testing.assert_allclose(pseudo_inertia(point_masses(masses, places)), expected, rtol=1e-12)
+
+
+def test_link_parameters_are_the_inverse(cloud):
+    pi = np.array([point_masses(*cloud), 2.0 * point_masses(*cloud)])
+    np.testing.assert_allclose(link_parameters(pseudo_inertia(pi)), pi, rtol=1e-12)
+
+
+def test_any_cloud_of_points_is_a_body(cloud):
+    found = Consistency.of('cloud', point_masses(*cloud))
+    assert found.consistent
+    assert found.triangle_margin > 0.0
+
+
+def test_mass_centre_and_moments_are_those_about_the_centre(cloud):
+    masses, places = cloud
+    center = masses @ places / masses.sum()
+    found = Consistency.of('cloud', point_masses(masses, places))
+    central = Consistency.of('cloud', point_masses(masses, places - center))
+    np.testing.assert_allclose(found.center, center)
+    np.testing.assert_allclose(found.moments, central.moments)
+
+
+def test_a_violated_triangle_inequality_is_no_body():
+    """Moments 1, 1, 3 are positive, but no mass distribution has them."""
+    found = Consistency.of('plate', [1.0, 0, 0, 0, 1.0, 0, 1.0, 0, 0, 3.0])
+    assert not found.consistent
+    assert found.triangle_margin < 0.0
+
+
+def test_shipped_arm_is_made_of_bodies():
+    robot = load_robot('humanoid_arm')
+    require_consistent(robot.links, robot.rigid_parameters)
+
+
+def test_refusal_names_the_link_and_the_remedy():
+    robot = load_robot('humanoid_arm')
+    pi = robot.rigid_parameters.copy()
+    pi[20] = -0.1
+    with pytest.raises(ModelError, match=rf"link '{robot.links[2]}'.*mass -0.1.*consistency"):
+        require_consistent(robot.links, pi)
