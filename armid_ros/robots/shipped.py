@@ -16,6 +16,14 @@ _SHIPPED = {
         'humanoid_arm/humanoid_arm_loaded.urdf.xacro',
         'the humanoid arm with 0.3 kg in its hand',
     ),
+    'human_legs': (
+        'human_legs/human_legs.urdf',
+        'legs and trunk of a man of 70.5 kg in the sagittal plane, stance foot fixed',
+    ),
+    'exoskeleton_legs': (
+        'exoskeleton_legs/exoskeleton_legs.urdf',
+        'exoskeleton of 12.25 kg that human_legs wears, stance foot fixed',
+    ),
 }
 
 

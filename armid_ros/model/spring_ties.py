@@ -1,0 +1,165 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Two chains tied to each other by springs: geometry, forces, torques, derivatives.
+
+A tie is between a point of a link of one machine and a point of a link of the other, such as a
+strap between a shank and the shank of an exoskeleton. With D = p - r, the way from the other
+machine's point to the machine's own, a spring k pulls the machine with -k D and the other one
+with +k D: equal, opposite, and in one point of space as far as it is relaxed.
+Source: the human-exoskeleton leg pair, equations (16), (18), (23), (25), physical signs.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from armid_ros.model.rigid_body import point_motion
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
+import numpy as np
+
+#: Step of the central differences of spring columns [rad or m].
+_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class Tie:
+    """
+    Where one spring is.
+
+    Attributes
+    ----------
+    name : str
+        What it ties, such as 'swing_shank'.
+    joint, other_joint : str
+        The joints that move the two links.
+    point, other_point : tuple of float, length 3
+        The ends in the frames of those joints [m].
+
+    """
+
+    name: str
+    joint: str
+    other_joint: str
+    point: tuple[float, float, float]
+    other_point: tuple[float, float, float]
+
+
+class TieGeometry(NamedTuple):
+    """
+    Ties along a motion.
+
+    Attributes
+    ----------
+    way : ndarray, shape (N, S, 3)
+        D, from the point of the other machine to that of the machine [m].
+    position, other_position : ndarray, shape (N, S, 3)
+        The ends [m].
+    jacobian : ndarray, shape (N, S, 3, n)
+        Of the machine's end.
+    other_jacobian : ndarray, shape (N, S, 3, m)
+        Of the other machine's end.
+
+    """
+
+    way: FloatArray
+    position: FloatArray
+    other_position: FloatArray
+    jacobian: FloatArray
+    other_jacobian: FloatArray
+
+    @property
+    def columns(self) -> FloatArray:
+        """Torque of the machine's actuators per stiffness, J^T D, shape (N, n, S) [m^2]."""
+        return np.einsum('nsxj,nsx->njs', self.jacobian, self.way)
+
+    @property
+    def other_columns(self) -> FloatArray:
+        """Torque of the other machine's per stiffness, -J^T D, shape (N, m, S) [m^2]."""
+        return -np.einsum('nsxj,nsx->njs', self.other_jacobian, self.way)
+
+
+def centroid_ties(robot: Robot, other: Robot, joints: Sequence[tuple[str, str]]) -> list[Tie]:
+    """
+    Tie the centroids of links.
+
+    Parameters
+    ----------
+    robot, other : Robot
+        The machines; their base frames have to be one.
+    joints : sequence of (str, str)
+        Joint of the machine and joint of the other one for every tie.
+
+    Returns
+    -------
+    list of Tie
+        Named after the machine's links.
+
+    """
+    return [
+        Tie(
+            robot.links[robot.index(own)],
+            own,
+            far,
+            tuple(robot.model.inertias[robot.index(own) + 1].lever.tolist()),
+            tuple(other.model.inertias[other.index(far) + 1].lever.tolist()),
+        )
+        for own, far in joints
+    ]
+
+
+def tie_geometry(
+    robot: Robot, q: FloatArray, other: Robot, other_q: FloatArray, ties: Sequence[Tie]
+) -> TieGeometry:
+    """
+    Follow ties along positions of both machines, shapes (N, n) and (N, m).
+
+    Raises
+    ------
+    RobotError
+        If a tie names a joint that a machine does not have.
+
+    """
+    near = [point_motion(robot, _known(robot, t.joint), t.point, q) for t in ties]
+    far = [point_motion(other, _known(other, t.other_joint), t.other_point, other_q) for t in ties]
+    position = np.stack([p for p, _ in near], axis=1)
+    other_position = np.stack([p for p, _ in far], axis=1)
+    return TieGeometry(
+        position - other_position,
+        position,
+        other_position,
+        np.stack([j for _, j in near], axis=1),
+        np.stack([j for _, j in far], axis=1),
+    )
+
+
+def tie_columns_derivatives(
+    robot: Robot, q: FloatArray, other: Robot, other_q: FloatArray, ties: Sequence[Tie]
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Differentiate ``TieGeometry.columns`` by the positions of both machines.
+
+    Returns
+    -------
+    by_q : ndarray, shape (N, n, S, n)
+        By the machine's own positions, from central differences of 1e-5 rad.
+    by_other_q : ndarray, shape (N, n, S, m)
+        By the other machine's; exact, -J^T J of the two ends.
+
+    """
+    by_q = np.empty((len(q), robot.n_joints, len(ties), robot.n_joints))
+    for j, step in enumerate(_STEP * np.eye(robot.n_joints)):
+        after = tie_geometry(robot, q + step, other, other_q, ties).columns
+        before = tie_geometry(robot, q - step, other, other_q, ties).columns
+        by_q[..., j] = (after - before) / (2.0 * _STEP)
+    here = tie_geometry(robot, q, other, other_q, ties)
+    return by_q, -np.einsum('nsxi,nsxj->nisj', here.jacobian, here.other_jacobian)
+
+
+def _known(robot: Robot, joint: str) -> str:
+    robot.index(joint)
+    return joint
