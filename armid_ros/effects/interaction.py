@@ -11,6 +11,7 @@ person in an exoskeleton. The force of the spring works on the arm, the opposite
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 
 #: Position and velocity, each of shape (N, 3) [m, m/s], of a point at times of shape (N,).
 Anchor = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+#: A way so short that it has no direction [m].
+_SHORTEST = 1e-12
 
 _AXES = ('x', 'y', 'z')
 _ATTACHMENT = tuple(
@@ -56,9 +60,10 @@ class RecordedPoint:
     def __init__(
         self, robot: Robot, motion: Motion, joint: str, offset: npt.ArrayLike = (0.0, 0.0, 0.0)
     ) -> None:
-        position, jacobian = point_motion(robot, joint, offset, motion.q)
-        velocity = np.einsum('nxj,nj->nx', jacobian, motion.dq)
-        self._curve = CubicHermiteSpline(motion.t, position, velocity)
+        point = np.asarray(offset, dtype=float)[np.newaxis]
+        position, jacobian = point_motion(robot, [joint], point, motion.q)
+        velocity = np.einsum('nxj,nj->nx', jacobian[:, 0], motion.dq)
+        self._curve = CubicHermiteSpline(motion.t, position[:, 0], velocity)
 
     def __call__(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return position and velocity at times of shape (N,), each of shape (N, 3)."""
@@ -89,12 +94,9 @@ class _Attached(Effect):
             for index, shape in enumerate(self.shapes)
         )
 
-    def _points(self, robot: Robot, q: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-        """Return position and Jacobian of every attachment, along positions (N, n)."""
-        return [
-            point_motion(robot, joint, row[:3], q)
-            for joint, row in zip(self.joints, self.shape_values, strict=True)
-        ]
+    def _points(self, robot: Robot, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return positions (N, k, 3) and Jacobians (N, k, 3, n) of the attachments."""
+        return point_motion(robot, self.joints, self.shape_values[:, :3], q)
 
     def _from(self, t: FloatArray, reference: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return position and velocity of the anchor of a link; of the reference if fixed."""
@@ -102,24 +104,32 @@ class _Attached(Effect):
             return reference, np.zeros(3)
         return self.anchor(t)
 
+    def _reference(self, robot: Robot) -> FloatArray:
+        """Return the fixed points that the anchors are taken from, shape (k, 3) [m]."""
+        return np.zeros((len(self.joints), 3))
+
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the torque against the springs."""
-        robot = arm.robot
+        robot, reference = arm.robot, self._reference(arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
             times = np.broadcast_to(np.atleast_1d(t), (len(np.atleast_2d(q)),))
-            columns = self._columns(robot, times, np.atleast_2d(q), np.atleast_2d(dq))
+            motion = (times, np.atleast_2d(q), np.atleast_2d(dq))
+            columns = self._columns(robot, reference, *motion)
             return np.asarray((columns @ values).reshape(np.shape(q)))
 
         return Action(link_torque=torque if np.any(values) else None)
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return the torque per quantity of every spring, shape (N, n, P)."""
-        link = arm.link_motion(motion)
-        return self._columns(arm.robot, link.t, link.q, link.dq)
+        link, reference = arm.link_motion(motion), self._reference(arm.robot)
+        return self._columns(arm.robot, reference, link.t, link.q, link.dq)
 
-    def _columns(self, robot: Robot, t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-        raise NotImplementedError
+    @abstractmethod
+    def _columns(
+        self, robot: Robot, reference: FloatArray, t: FloatArray, q: FloatArray, dq: FloatArray
+    ) -> FloatArray:
+        """Return the columns along positions and velocities of the links."""
 
 
 @dataclass(frozen=True)
@@ -162,23 +172,25 @@ class HumanInteraction(_Attached):
             k [N/m] and d [N s/m].
 
         """
-        rows = [
-            [stiffness, damping, *(stiffness * (np.asarray(point, dtype=float) - position[0]))]
-            for position, _ in self._points(robot, _middle(robot))
-        ]
-        return np.array(rows).ravel()
+        forces = stiffness * (np.asarray(point, dtype=float) - self._reference(robot))
+        return np.concatenate([[stiffness, damping, *force] for force in forces])
 
-    def _columns(self, robot: Robot, t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-        columns = np.zeros((*q.shape, 5 * len(self.joints)))
-        middle = self._points(robot, _middle(robot))
-        for owner, (position, jacobian) in enumerate(self._points(robot, q)):
-            reference, velocity = self._from(t, middle[owner][0][0])
-            block = columns[:, :, 5 * owner : 5 * owner + 5]
-            block[:, :, 0] = np.einsum('nxj,nx->nj', jacobian, position - reference)
+    def _reference(self, robot: Robot) -> FloatArray:
+        return np.asarray(self._points(robot, _middle(robot))[0][0])
+
+    def _columns(
+        self, robot: Robot, reference: FloatArray, t: FloatArray, q: FloatArray, dq: FloatArray
+    ) -> FloatArray:
+        positions, jacobians = self._points(robot, q)
+        columns = np.empty((*q.shape, len(self.joints), 5))
+        for owner in range(len(self.joints)):
+            jacobian, block = jacobians[:, owner], columns[:, :, owner]
+            anchor, velocity = self._from(t, reference[owner])
+            block[:, :, 0] = np.einsum('nxj,nx->nj', jacobian, positions[:, owner] - anchor)
             relative = np.einsum('nxj,nj->nx', jacobian, dq) - velocity
             block[:, :, 1] = np.einsum('nxj,nx->nj', jacobian, relative)
             block[:, :, 2:] = -jacobian.transpose(0, 2, 1)
-        return columns
+        return columns.reshape(*q.shape, -1)
 
 
 @dataclass(frozen=True)
@@ -209,23 +221,21 @@ class InterfaceSlack(_Attached):
         """Anchor each attachment where it is in the middle of the range of motion."""
         values = super()._default_shape(robot)
         if self.anchor is None:
-            placed = self.with_shape(values)
-            assert isinstance(placed, InterfaceSlack)
-            for row, (position, _) in zip(
-                values, placed._points(robot, _middle(robot)), strict=True
-            ):
-                row[3:6] = position[0]
+            placed = point_motion(robot, self.joints, values[:, :3], _middle(robot))
+            values[:, 3:6] = placed[0][0]
         return values
 
-    def _columns(self, robot: Robot, t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-        columns = np.zeros((*q.shape, len(self.joints)))
-        for owner, (position, jacobian) in enumerate(self._points(robot, q)):
-            anchor, slack = self.shape_values[owner, 3:6], self.shape_values[owner, 6]
-            reference, _ = self._from(t, np.zeros(3))
-            way = position - reference - anchor
+    def _columns(
+        self, robot: Robot, reference: FloatArray, t: FloatArray, q: FloatArray, dq: FloatArray
+    ) -> FloatArray:
+        positions, jacobians = self._points(robot, q)
+        columns = np.empty((*q.shape, len(self.joints)))
+        for owner, shape in enumerate(self.shape_values):
+            anchor, _ = self._from(t, reference[owner])
+            way = positions[:, owner] - anchor - shape[3:6]
             length = np.linalg.norm(way, axis=1, keepdims=True)
-            pull = way * np.maximum(1.0 - slack / np.maximum(length, 1e-12), 0.0)
-            columns[:, :, owner] = np.einsum('nxj,nx->nj', jacobian, pull)
+            pull = way * np.maximum(1.0 - shape[6] / np.maximum(length, _SHORTEST), 0.0)
+            columns[:, :, owner] = np.einsum('nxj,nx->nj', jacobians[:, owner], pull)
         return columns
 
 

@@ -10,6 +10,8 @@ Everything here is linear in the gravity vector and in the inertial parameters o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -133,42 +135,44 @@ def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
 
 
 def point_motion(
-    robot: Robot, joint: str, offset: npt.ArrayLike, q: FloatArray
+    robot: Robot, joints: Sequence[str], offsets: npt.ArrayLike, q: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Follow a point of a link.
+    Follow points of links.
 
     Parameters
     ----------
     robot : Robot
         The arm.
-    joint : str
-        The joint that moves the link.
-    offset : array_like, shape (3,)
-        The point in the frame of that joint [m].
+    joints : sequence of str
+        The joints that move the links, one of each of k points.
+    offsets : array_like, shape (k, 3)
+        The points in the frames of those joints [m].
     q : ndarray, shape (N, n)
         Joint positions.
 
     Returns
     -------
-    position : ndarray, shape (N, 3)
+    positions : ndarray, shape (N, k, 3)
         In the base frame [m].
-    jacobian : ndarray, shape (N, 3, n)
-        Derivative by the joint positions.
+    jacobians : ndarray, shape (N, k, 3, n)
+        Derivatives by the joint positions.
 
     """
     model = robot.model
     data = model.createData()
-    identity, local = model.getJointId(joint), np.asarray(offset, dtype=np.float64)
-    positions = np.empty((len(q), 3))
-    jacobians = np.empty((len(q), 3, robot.n_joints))
+    links = [model.getJointId(joint) for joint in joints]
+    points = list(zip(links, np.asarray(offsets, dtype=np.float64), strict=True))
+    positions = np.empty((len(q), len(points), 3))
+    jacobians = np.empty((len(q), len(points), 3, robot.n_joints))
     for k, configuration in enumerate(q):
         pin.computeJointJacobians(model, data, configuration)
-        placement = data.oMi[identity]
-        aligned = pin.getJointJacobian(model, data, identity, pin.LOCAL_WORLD_ALIGNED)
-        lever = placement.rotation @ local
-        positions[k] = placement.translation + lever
-        jacobians[k] = aligned[:3] - pin.skew(lever) @ aligned[3:]
+        for i, (link, offset) in enumerate(points):
+            placement = data.oMi[link]
+            aligned = pin.getJointJacobian(model, data, link, pin.LOCAL_WORLD_ALIGNED)
+            lever = placement.rotation @ offset
+            positions[k, i] = placement.translation + lever
+            jacobians[k, i] = aligned[:3] - pin.skew(lever) @ aligned[3:]
     return positions, jacobians
 
 

@@ -1,0 +1,75 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The shipped arm, a smooth motion of it, and the arm with one effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.motion import Motion
+from armid_ros.robots import load_robot, Robot
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+
+@pytest.fixture(scope='session')
+def robot() -> Robot:
+    """Return the shipped arm on Earth."""
+    return load_robot('humanoid_arm')
+
+
+@pytest.fixture(scope='session')
+def sines(robot) -> Callable[..., Motion]:
+    """Return a maker of motions in sines, different ones in every joint, without torque."""
+
+    def make(duration: float = 0.5, rate: float = 200.0) -> Motion:
+        t = np.arange(0.0, duration, 1.0 / rate)
+        frequency = 2.0 * np.pi * np.linspace(0.4, 2.1, robot.n_joints)
+        phase = frequency * t[:, None] + np.arange(robot.n_joints)
+        middle = (robot.lower + robot.upper) / 2
+        amplitude = 0.45 * (robot.upper - robot.lower)
+        return Motion(
+            robot.joints,
+            t,
+            middle + amplitude * np.sin(phase),
+            amplitude * frequency * np.cos(phase),
+            -amplitude * frequency**2 * np.sin(phase),
+        )
+
+    return make
+
+
+@pytest.fixture(scope='session')
+def motion(sines) -> Motion:
+    """Return half a second at 200 Hz."""
+    return sines()
+
+
+@pytest.fixture(scope='session')
+def with_values(robot) -> Callable[..., ArmModel]:
+    """Return a maker of the arm with one effect; one value counts for all parameters."""
+
+    def make(text: str, values: npt.ArrayLike, shape: npt.ArrayLike | None = None) -> ArmModel:
+        effect = make_effect(text, robot)
+        if shape is not None:
+            effect = effect.with_shape(shape)
+        count = len(effect.parameters(robot))
+        return ArmModel(robot).with_effect(effect, np.resize(values, count))
+
+    return make
+
+
+@pytest.fixture(scope='session')
+def added(with_values) -> Callable[..., npt.NDArray[np.float64]]:
+    """Return a function that gives the torque that one effect adds along a motion."""
+
+    def add(
+        motion: Motion, text: str, values: npt.ArrayLike, shape: npt.ArrayLike | None = None
+    ) -> npt.NDArray[np.float64]:
+        arm = with_values(text, values, shape)
+        return np.asarray(arm.torque(motion) - ArmModel(arm.robot).torque(motion))
+
+    return add

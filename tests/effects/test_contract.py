@@ -1,0 +1,253 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What every effect of the catalogue keeps to, tested for each of them."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import CATALOGUE, make_effect, parse_effect
+from armid_ros.errors import ModelError
+from armid_ros.model import inverse_dynamics
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+DESIGNED = """
+    viscous_friction coulomb_friction stribeck_friction asymmetric_friction quadratic_friction
+    load_dependent_friction presliding_hysteresis thermal_friction coupled_joint_friction
+    torque_offset torque_drift torque_gain torque_crosstalk torque_lag time_delay encoder_offset
+    rotor_inertia payload link_inertia gravity_magnitude base_tilt joint_elasticity backlash
+    torque_ripple joint_spring joint_coupling soft_limit actuator_saturation human_interaction
+    interface_slack
+""".split()
+LINEAR = [name for name, effect in CATALOGUE.items() if effect.linear]
+#: These twist transmissions by the load of the arm as it is, which counts as given.
+LOADED = {'joint_elasticity', 'backlash'}
+#: Sizes that are far from zero where the typical ones would not do.
+SIZES = {'link_inertia': 0.02, 'payload': 0.05, 'interface_slack': 300.0, 'soft_limit': 20.0}
+
+
+def test_the_catalogue_has_every_name():
+    assert sorted(CATALOGUE) == sorted(DESIGNED)
+
+
+def derivative(function, values, parameter, lower):
+    """Differentiate by central differences; forwards, to second order, at the lower bound."""
+    step = 1e-6 * np.eye(len(values))[parameter]
+    if values[parameter] > lower:
+        return (function(values + step) - function(values - step)) / 2e-6
+    near, far = function(values + step), function(values + 2.0 * step)
+    return (4.0 * near - far - 3.0 * function(values)) / 2e-6
+
+
+def sizes(name, robot, rng):
+    """Draw values as large as is typical, of both signs where both are possible."""
+    effect = make_effect(name, robot)
+    typical = [np.sqrt(np.prod(q.typical)) if q.typical else 0.1 for q in effect.quantities]
+    size = np.resize(typical, len(effect.parameters(robot)))
+    size = np.full_like(size, SIZES[name]) if name in SIZES else size
+    lower = np.resize([q.lower for q in effect.quantities], len(size))
+    sign = np.where(lower < 0.0, rng.choice([-1.0, 1.0], len(size)), 1.0)
+    return sign * size * rng.uniform(0.7, 1.3, len(size))
+
+
+@pytest.mark.parametrize('name', CATALOGUE)
+@pytest.mark.parametrize('measured', [False, True], ids=['reference', 'measured'])
+def test_columns_are_the_derivative_of_what_is_read(robot, motion, with_values, name, measured):
+    """At the model without the effect."""
+    rng = np.random.default_rng(3)
+    if measured:
+        motion = motion.with_torque(rng.normal(scale=20.0, size=motion.q.shape))
+    effect = make_effect(name, robot)
+    columns = ArmModel(robot).columns_of(effect, motion)
+    lower, _ = effect.bounds()
+    zero = np.zeros(len(lower))
+    for parameter in range(len(zero)):
+        difference = derivative(
+            lambda values: with_values(name, values).torque(motion),
+            zero,
+            parameter,
+            lower[parameter],
+        )
+        scale = 1.0 + np.abs(columns[:, :, parameter]).max()
+        tolerance = (3e-7 if effect.linear else 1e-5) * scale
+        np.testing.assert_allclose(difference, columns[:, :, parameter], atol=tolerance)
+
+
+@pytest.mark.parametrize('name', CATALOGUE)
+def test_columns_are_the_derivative_at_any_size_and_of_the_rigid_body(
+    robot, motion, with_values, name
+):
+    rng = np.random.default_rng(4)
+    arm = with_values(name, sizes(name, robot, rng))
+    columns, theta = arm.columns(motion), arm.theta
+    rigid, n_effect = len(robot.rigid_parameters), len(theta) - len(robot.rigid_parameters)
+    chosen = rigid + rng.permutation(n_effect)[:12]
+    if name not in LOADED:
+        chosen = np.concatenate([rng.permutation(rigid)[:12], chosen])
+    for parameter in chosen:
+        difference = derivative(
+            lambda values: arm.with_theta(values).torque(motion), theta, parameter, -np.inf
+        )
+        scale = 1.0 + np.abs(columns[:, :, parameter]).max()
+        np.testing.assert_allclose(difference, columns[:, :, parameter], atol=2e-5 * scale)
+
+
+def test_columns_pass_through_sensors_that_come_after_one_another(robot, motion):
+    """Delay, gain, crosstalk and lag, one after the other, over an arm that rubs and twists."""
+    rng = np.random.default_rng(5)
+    arm = ArmModel(robot)
+    for name in (
+        'encoder_offset',
+        'load_dependent_friction',
+        'human_interaction',
+        'torque_gain',
+        'time_delay',
+        'torque_crosstalk',
+        'torque_lag',
+        'payload',
+    ):
+        arm = arm.with_effect(make_effect(name, robot), sizes(name, robot, rng))
+    columns, theta = arm.columns(motion), arm.theta
+    for parameter in rng.permutation(len(theta))[:60]:
+        difference = derivative(
+            lambda values: arm.with_theta(values).torque(motion), theta, parameter, -np.inf
+        )
+        scale = 1.0 + np.abs(columns[:, :, parameter]).max()
+        np.testing.assert_allclose(difference, columns[:, :, parameter], atol=3e-5 * scale)
+
+
+@pytest.mark.parametrize('name', LINEAR)
+def test_linear_effects_are_exact_far_from_zero(robot, motion, with_values, name):
+    rng = np.random.default_rng(6)
+    motion = motion.with_torque(rng.normal(scale=10.0, size=motion.q.shape))
+    values = sizes(name, robot, rng)
+    expected = (
+        inverse_dynamics(robot, motion)
+        + ArmModel(robot).columns_of(make_effect(name, robot), motion) @ values
+    )
+    np.testing.assert_allclose(with_values(name, values).torque(motion), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize('name', CATALOGUE)
+def test_an_effect_of_size_zero_changes_nothing(robot, motion, with_values, name):
+    tau = with_values(name, 0.0).torque(motion)
+    np.testing.assert_allclose(tau, inverse_dynamics(robot, motion), atol=1e-12)
+
+
+@pytest.mark.parametrize('name', CATALOGUE)
+def test_instantaneous_columns_are_those_of_each_sample_alone(robot, motion, name):
+    arm, effect = ArmModel(robot), make_effect(name, robot)
+    whole = arm.columns_of(effect, motion)[40:60]
+    if effect.instantaneous:
+        part = arm.columns_of(effect, motion.select(slice(40, 60)))
+        np.testing.assert_allclose(part, whole, atol=1e-9)
+    else:
+        assert np.any(np.abs(whole) > 0.0)
+
+
+@pytest.mark.parametrize('name', CATALOGUE)
+def test_every_effect_says_what_it_is(robot, name):
+    effect = CATALOGUE[name]
+    assert effect.name == name
+    assert effect.summary
+    assert effect.__doc__
+    assert len(effect.__doc__.strip().splitlines()) > 2
+    for quantity in effect.quantities:
+        assert quantity.lower < quantity.upper
+        if quantity.typical is not None:
+            assert 0.0 < quantity.typical[0] < quantity.typical[1]
+            assert quantity.typical[1] <= quantity.upper
+    names = [(p.name, p.joint) for p in make_effect(name, robot).parameters(robot)]
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize('name', [name for name, effect in CATALOGUE.items() if effect.shapes])
+def test_shapes_start_and_search_within_what_is_possible(robot, motion, name):
+    effect = make_effect(name, robot)
+    grids = effect.shape_grids(motion, ArmModel(robot), 0.1 * np.cos(20.0 * motion.q))
+    assert effect.shape_values.shape == (len(effect.owners), len(effect.shapes))
+    for column, (shape, grid) in enumerate(zip(effect.shapes, grids, strict=True)):
+        assert len(grid) == len(effect.owners)
+        for value in (effect.shape_values[:, column], grid):
+            assert np.all((shape.lower <= value) & (value <= shape.upper))
+
+
+def test_a_shape_belongs_to_each_joint(robot, motion):
+    effect = make_effect('stribeck_friction@elbow_pitch+wrist_pitch', robot)
+    effect = effect.with_shape([[0.1, 1.0], [0.4, 2.0]])
+    assert effect == effect.with_shape(effect.shape_values)
+    named = zip(effect.shape_parameters(robot), effect.shape, strict=True)
+    assert [(p.name, p.joint, p.unit, value) for p, value in named] == [
+        ('stribeck_velocity', 'elbow_pitch', 'rad/s', 0.1),
+        ('stribeck_exponent', 'elbow_pitch', '', 1.0),
+        ('stribeck_velocity', 'wrist_pitch', 'rad/s', 0.4),
+        ('stribeck_exponent', 'wrist_pitch', '', 2.0),
+    ]
+    columns = effect.columns(motion, ArmModel(robot))
+    dq = motion.dq[:, 5]
+    expected = np.exp(-((dq / 0.4) ** 2)) * np.sign(dq)
+    np.testing.assert_allclose(columns[:, 5, 1], expected)
+
+
+@pytest.mark.parametrize(
+    ('values', 'message'),
+    [([-1.0, 2.0], 'stribeck_velocity has to be from'), ([1.0, 2.0, 3.0], 'has size')],
+)
+def test_impossible_shapes_are_named(robot, values, message):
+    with pytest.raises(ModelError, match=message):
+        make_effect('stribeck_friction', robot).with_shape(values)
+
+
+def test_names_joints_and_units():
+    robot = load_robot('humanoid_arm')
+    effect = make_effect('viscous_friction@elbow_pitch+wrist_pitch', robot)
+    assert [(p.joint, p.unit) for p in effect.parameters(robot)] == [
+        ('elbow_pitch', 'N m s/rad'),
+        ('wrist_pitch', 'N m s/rad'),
+    ]
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('stiction', 'viscous_friction, coulomb_friction'),
+        ('viscous_friction@elbo', 'its joints are shoulder_pitch'),
+        ('coupled_joint_friction@elbow_pitch', 'pairs'),
+        ('gravity_magnitude@elbow_pitch', 'whole arm'),
+        ('torque_crosstalk@elbow_pitch+elbow_pitch', 'no pair'),
+        ('joint_coupling@elbow_pitch+wrist_pitch+elbow_pitch+forearm_yaw', 'leads two'),
+    ],
+)
+def test_errors_hold_the_answer(robot, text, message):
+    with pytest.raises(ModelError, match=message):
+        make_effect(text, robot)
+
+
+def test_values_are_parsed_for_every_joint(robot):
+    effect, values = parse_effect('asymmetric_friction:viscous_asymmetry=0.25', robot)
+    np.testing.assert_array_equal(values.reshape(6, 2), np.tile([0.0, 0.25], (6, 1)))
+    assert effect.joints == robot.joints
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('viscous_friction:fv=1', 'it has viscous_coefficient'),
+        ('viscous_friction:viscous_coefficient=much', 'not a number'),
+    ],
+)
+def test_wrong_values_are_named(robot, text, message):
+    with pytest.raises(ModelError, match=message):
+        parse_effect(text, robot)
+
+
+def test_shapes_are_parsed_with_the_values(robot):
+    text = 'stribeck_friction@elbow_pitch:stribeck_torque=0.3,stribeck_velocity=0.02'
+    effect, values = parse_effect(text, robot)
+    assert effect.shape == (0.02, 2.0)
+    np.testing.assert_array_equal(values, [0.3])
+
+
+def test_crosstalk_names_both_joints(robot):
+    effect = make_effect('torque_crosstalk@elbow_pitch+wrist_pitch', robot)
+    (parameter,) = effect.parameters(robot)
+    assert (parameter.name, parameter.joint) == ('crosstalk_from_wrist_pitch', 'elbow_pitch')

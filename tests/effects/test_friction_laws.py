@@ -1,0 +1,132 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Friction beyond Coulomb and viscous: humps, load, memory, warmth."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import Hysteresis, make_effect
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import Motion
+import numpy as np
+import pytest
+
+ELBOW = 3
+
+
+def elbow_path(robot, q, t=None):
+    """Move the elbow along a path and keep the rest still."""
+    t = np.arange(len(q)) * 1e-3 if t is None else t
+    path = np.tile((robot.lower + robot.upper) / 2, (len(q), 1))
+    path[:, ELBOW] = q
+    dq = np.gradient(path, t, axis=0)
+    return Motion(robot.joints, t, path, dq, np.zeros_like(path))
+
+
+def test_stribeck_friction_is_a_hump_with_a_falling_flank(robot, added):
+    dq = np.linspace(0.001, 1.0, 400)
+    still = np.zeros((400, 6))
+    motion = Motion(robot.joints, np.arange(400.0), still, np.tile(dq[:, None], 6), still)
+    hump = added(motion, 'stribeck_friction', 0.4, [0.1, 2.0])[:, ELBOW]
+    assert hump[0] == pytest.approx(0.4, rel=1e-3)
+    assert np.all(np.diff(hump[dq < 0.5]) < 0.0)
+    assert hump[np.searchsorted(dq, 0.1)] == pytest.approx(0.4 / np.e, rel=0.03)
+    assert np.all(hump[dq > 0.3] < 0.4 * np.exp(-8.9))
+
+
+@pytest.mark.parametrize('name', ['stribeck_friction', 'load_dependent_friction'])
+def test_dry_friction_always_takes_energy(motion, added, name):
+    power = added(motion, name, 0.3) * motion.dq
+    assert np.all(power >= 0.0)
+    assert power.max() > 0.01
+
+
+def test_friction_that_is_quadratic_is_odd(motion, added, robot):
+    back = Motion(robot.joints, motion.t, motion.q, -motion.dq, motion.ddq)
+    forth = added(motion, 'quadratic_friction', 0.2)
+    np.testing.assert_allclose(added(back, 'quadratic_friction', 0.2), -forth, atol=1e-12)
+    np.testing.assert_allclose(forth, 0.2 * motion.dq * np.abs(motion.dq), atol=1e-12)
+
+
+def test_friction_with_load_grows_with_the_load_and_only_with_it(robot, motion, added):
+    heavy = robot.with_inertias(2.0 * robot.rigid_parameters)
+    effect = make_effect('load_dependent_friction', robot)
+    columns = [ArmModel(r).columns_of(effect, motion) for r in (robot, heavy)]
+    np.testing.assert_allclose(columns[1], 2.0 * columns[0], atol=1e-12)
+    expected = 0.1 * np.abs(inverse_dynamics(robot, motion)) * np.sign(motion.dq)
+    friction = added(motion, 'load_dependent_friction', 0.1)
+    np.testing.assert_allclose(friction, expected, atol=1e-12)
+
+
+def test_a_payload_adds_to_the_friction_of_the_joints_that_carry_it(robot, motion):
+    rubbing = ArmModel(robot).with_effect(
+        make_effect('load_dependent_friction', robot), np.full(6, 0.1)
+    )
+    body = np.array([0.5, 0.0, 0.0, 0.05, *[0.0] * 6])
+    for first in (True, False):
+        payload = make_effect('payload', robot)
+        arm = ArmModel(robot).with_effect(payload, body) if first else rubbing
+        arm = arm.with_effect(
+            *((rubbing.effects[0], rubbing.values[0]) if first else (payload, body))
+        )
+        load = inverse_dynamics(arm.body, motion)
+        expected = load + 0.1 * np.abs(load) * np.sign(motion.dq)
+        np.testing.assert_allclose(arm.torque(motion), expected, atol=1e-12)
+
+
+def triangle(amplitude, rate, cycles=3):
+    """Go to and fro at a constant speed [rad/s], at 1 kHz."""
+    period = 4.0 * amplitude / rate
+    phase = np.arange(0.0, cycles * period, 1e-3) / period % 1.0
+    return 1.0 + amplitude * (1.0 - np.abs(4.0 * phase - 2.0))
+
+
+def test_presliding_loops_are_the_same_at_any_rate(robot, added):
+    loops = []
+    for rate in (0.02, 0.08):
+        q = triangle(0.02, rate)
+        torque = added(elbow_path(robot, q), 'presliding_hysteresis', 0.5, [0.005])[:, ELBOW]
+        last = slice(2 * len(q) // 3, None)
+        loops.append((q[last], torque[last]))
+    for end in (0.99, 1.0, 1.01):
+        levels = [np.sort(t[np.abs(q - end) < 1.5e-4])[[0, -1]] for q, t in loops]
+        np.testing.assert_allclose(levels[0], levels[1], atol=0.03)
+
+
+def test_presliding_takes_energy_in_every_loop(robot, added):
+    q = triangle(0.004, 0.04, cycles=6)
+    torque = added(elbow_path(robot, q), 'presliding_hysteresis', 0.5, [0.005])[:, ELBOW]
+    period = len(q) // 6
+    for start in range(period, len(q) - period, period):
+        loop = slice(start, start + period + 1)
+        assert np.trapezoid(torque[loop], q[loop]) > 1e-5
+
+
+def test_presliding_becomes_coulomb_friction_after_a_long_way(robot, added):
+    q = np.concatenate([np.linspace(0.5, 1.0, 500), np.linspace(1.0, 0.5, 500)])
+    motion = elbow_path(robot, q)
+    presliding = added(motion, 'presliding_hysteresis', 0.5, [0.005])[:, ELBOW]
+    coulomb = added(motion, 'coulomb_friction', 0.5)[:, ELBOW]
+    far = np.abs(q - 1.0) > 0.06
+    np.testing.assert_allclose(presliding[far], coulomb[far], atol=1e-5)
+    reversal = np.abs(q - 1.0) < 0.003
+    assert np.abs(presliding - coulomb)[reversal].max() > 0.5
+
+
+def test_a_path_gives_the_same_states_at_once_and_step_by_step():
+    rng = np.random.default_rng(0)
+    q = np.cumsum(rng.normal(scale=0.004, size=(200, 2)), axis=0)
+    q[50:60] = q[50]
+    friction = Hysteresis(np.array([[1.0, 0.0], [1.0, 1.0]]), np.ones(2), np.array([0.01, 0.003]))
+    states = friction.along(q, np.array([[1.0, -2.0]] * 200))
+    state = friction.start(np.array([1.0, -2.0]))
+    for k in range(200):
+        np.testing.assert_allclose(states[k], state, atol=1e-12)
+        if k < 199:
+            state = friction.advance(state, q[k + 1] - q[k])
+
+
+def test_warm_joints_have_another_viscous_friction(sines, added):
+    motion = sines(20.0, 50.0)
+    friction = added(motion, 'thermal_friction', -0.2, [5.0])
+    cold, warm = motion.t < 0.1, motion.t > 19.0
+    assert np.abs(friction[cold]).max() < 0.05 * np.abs(friction[warm]).max()
+    np.testing.assert_allclose(friction[warm], -0.2 * motion.dq[warm], rtol=0.03)

@@ -1,0 +1,173 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Springs of all kinds: on a joint, between joints, at the ends of the range, to the world."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.effects.interaction import RecordedPoint
+from armid_ros.model import point_motion
+from armid_ros.motion import Motion
+import numpy as np
+import pytest
+
+
+def closed_loop_path(robot, points=4000):
+    """Go round a closed curve in joint space, slowly."""
+    phase = np.linspace(0.0, 2.0 * np.pi, points)[:, None]
+    middle, span = (robot.lower + robot.upper) / 2, robot.upper - robot.lower
+    q = middle + 0.45 * span * np.sin(phase * np.array([1, 2, 1, 3, 2, 1]) + np.arange(6))
+    zero = np.zeros_like(q)
+    return Motion(robot.joints, phase[:, 0], q, zero, zero)
+
+
+def work(torque, q):
+    """Integrate the power along a path, shape (N - 1,)."""
+    return np.sum((torque[1:] + torque[:-1]) / 2 * np.diff(q, axis=0), axis=1)
+
+
+@pytest.mark.parametrize(
+    ('name', 'values'),
+    [
+        ('joint_spring', [3.0, 0.5]),
+        ('joint_coupling', 2.0),
+        ('soft_limit', 30.0),
+        ('human_interaction', [300.0, 0.0, 5.0, -2.0, 3.0]),
+        ('interface_slack', 300.0),
+        ('torque_ripple', [0.1, 0.2]),
+    ],
+)
+def test_springs_give_back_what_they_take(robot, added, name, values):
+    path = closed_loop_path(robot)
+    power = work(added(path, name, values), path.q)
+    assert np.abs(power).sum() > 0.1
+    assert abs(power.sum()) < 1e-4 * np.abs(power).sum()
+
+
+def test_the_preload_is_the_torque_at_zero(robot, motion, added):
+    expected = 4.0 * (motion.q - 0.25)
+    np.testing.assert_allclose(added(motion, 'joint_spring', [4.0, -1.0]), expected, atol=1e-12)
+
+
+def test_without_stiffness_a_spring_is_an_offset(robot, motion, added):
+    np.testing.assert_allclose(
+        added(motion, 'joint_spring', [0.0, 0.7]), added(motion, 'torque_offset', 0.7), atol=1e-12
+    )
+
+
+def test_a_coupling_is_symmetric(robot, motion, added):
+    torque = added(motion, 'joint_coupling@shoulder_pitch+elbow_pitch', 2.0)
+    expected = np.zeros_like(torque)
+    expected[:, 0], expected[:, 3] = -2.0 * motion.q[:, 3], -2.0 * motion.q[:, 0]
+    np.testing.assert_allclose(torque, expected, atol=1e-12)
+    swapped = added(motion, 'joint_coupling@elbow_pitch+shoulder_pitch', 2.0)
+    np.testing.assert_allclose(torque, swapped, atol=1e-12)
+
+
+def test_springs_on_both_joints_and_a_coupling_are_a_cable_between_them(robot, motion, added):
+    """Their energy is K (q_i - q_k)^2 / 2."""
+    pair = 'shoulder_pitch+elbow_pitch'
+    torque = added(motion, f'joint_spring@{pair}', [2.0, 0.0])
+    torque = torque + added(motion, f'joint_coupling@{pair}', 2.0)
+    difference = motion.q[:, 0] - motion.q[:, 3]
+    np.testing.assert_allclose(torque[:, 0], 2.0 * difference, atol=1e-12)
+    np.testing.assert_allclose(torque[:, 3], -2.0 * difference, atol=1e-12)
+
+
+def test_bumpers_do_nothing_inside_and_push_back_outside(robot, motion, added):
+    torque = added(motion, 'soft_limit', [50.0, 80.0])
+    margin = 0.15 * (robot.upper - robot.lower)
+    low, high = robot.lower + margin, robot.upper - margin
+    assert not np.any(torque[(motion.q >= low) & (motion.q <= high)])
+    above, below = motion.q > high, motion.q < low
+    assert above.any() and below.any()
+    np.testing.assert_allclose(torque[above], (80.0 * (motion.q - high))[above], atol=1e-9)
+    np.testing.assert_allclose(torque[below], (50.0 * (motion.q - low))[below], atol=1e-9)
+
+
+def test_ripple_repeats_at_its_order(robot, motion, added):
+    once = added(motion, 'torque_ripple', [0.1, 0.05], [12.0])
+    turned = Motion(robot.joints, motion.t, motion.q + 2.0 * np.pi / 12.0, motion.dq, motion.ddq)
+    np.testing.assert_allclose(
+        added(turned, 'torque_ripple', [0.1, 0.05], [12.0]), once, atol=1e-9
+    )
+    amplitude = np.hypot(0.1, 0.05)
+    assert np.abs(once).max() == pytest.approx(amplitude, rel=0.02)
+
+
+@pytest.mark.parametrize('order', [7.0, 31.0, 100.0])
+def test_the_order_of_a_ripple_is_found_at_any_speed(robot, sines, order):
+    motion = sines(8.0, 1000.0)
+    rng = np.random.default_rng(0)
+    residual = 0.05 * np.sin(order * motion.q + 0.4) + rng.normal(scale=0.05, size=motion.q.shape)
+    effect = make_effect('torque_ripple', robot)
+    (peaks,) = effect.shape_grids(motion, ArmModel(robot), residual)
+    resolution = 2.0 * np.pi / np.ptp(motion.q, axis=0)
+    assert np.all(np.abs(peaks[:, 0] - order) < 0.3 * resolution)
+
+
+def pull(robot, joint, offset, motion, anchor, stiffness):
+    """Return the torque against a spring, from its energy by differences."""
+    torque = np.empty_like(motion.q)
+    for j, step in enumerate(1e-6 * np.eye(6)):
+        ends = [
+            stiffness
+            / 2
+            * np.sum((point_motion(robot, [joint], [offset], q)[0][:, 0] - anchor) ** 2, axis=1)
+            for q in (motion.q + step, motion.q - step)
+        ]
+        torque[:, j] = (ends[0] - ends[1]) / 2e-6
+    return torque
+
+
+def test_a_spring_to_the_world_is_the_gradient_of_its_energy(robot, motion):
+    effect = make_effect('human_interaction@elbow_pitch', robot).with_shape([0.05, 0.0, 0.1])
+    anchor = np.array([0.3, 0.2, 0.4])
+    arm = ArmModel(robot).with_effect(effect, effect.fixed_at(robot, anchor, 400.0))
+    torque = arm.torque(motion) - ArmModel(robot).torque(motion)
+    expected = pull(robot, 'elbow_pitch', [0.05, 0.0, 0.1], motion, anchor, 400.0)
+    np.testing.assert_allclose(torque, expected, atol=1e-5)
+    assert not np.any(torque[:, 4:])
+
+
+def test_a_damper_takes_energy(robot, motion, added):
+    power = added(motion, 'human_interaction', [0.0, 20.0, 0.0, 0.0, 0.0]) * motion.dq
+    assert np.all(power.sum(axis=1) > 0.0)
+
+
+def test_without_slack_an_interface_is_a_spring(robot, motion):
+    anchor = np.array([0.3, 0.2, 0.4])
+    spring = make_effect('human_interaction@elbow_pitch', robot).with_shape([0.05, 0.0, 0.1])
+    strap = make_effect('interface_slack@elbow_pitch', robot)
+    strap = strap.with_shape([0.05, 0.0, 0.1, *anchor, 0.0])
+    arms = (
+        ArmModel(robot).with_effect(spring, spring.fixed_at(robot, anchor, 400.0)),
+        ArmModel(robot).with_effect(strap, [400.0]),
+    )
+    np.testing.assert_allclose(arms[0].torque(motion), arms[1].torque(motion), atol=1e-9)
+
+
+def test_a_slack_strap_does_not_pull(robot, added, motion):
+    shape = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    assert not np.any(added(motion, 'interface_slack@elbow_pitch', 400.0, shape))
+
+
+def test_two_chains_that_move_alike_do_not_pull_each_other(robot, motion):
+    """An anchor on a second arm, recorded; then the same arm a little behind."""
+    offset = [0.05, 0.0, 0.1]
+    effect = make_effect('human_interaction@elbow_pitch', robot).with_shape(offset)
+    other = RecordedPoint(robot, motion, 'elbow_pitch', offset)
+    tied = type(effect)(effect.joints, effect.shape, other)
+    arm = ArmModel(robot).with_effect(tied, [400.0, 10.0, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(arm.torque(motion), ArmModel(robot).torque(motion), atol=1e-9)
+
+    behind = Motion(robot.joints, motion.t, motion.q - 0.01, motion.dq, motion.ddq)
+    slow = type(effect)(
+        effect.joints, effect.shape, RecordedPoint(robot, behind, 'elbow_pitch', offset)
+    )
+    position, jacobian = point_motion(robot, ['elbow_pitch'], [offset], motion.q)
+    way = (position - point_motion(robot, ['elbow_pitch'], [offset], behind.q)[0])[:, 0]
+    arm = ArmModel(robot).with_effect(slow, [400.0, 0.0, 0.0, 0.0, 0.0])
+    expected = 400.0 * np.einsum('nxj,nx->nj', jacobian[:, 0], way)
+    np.testing.assert_allclose(
+        arm.torque(motion) - ArmModel(robot).torque(motion), expected, atol=1e-9
+    )

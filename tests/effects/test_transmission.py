@@ -1,0 +1,115 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Elastic joints and backlash, read at the motors."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import Motion
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+INERTIA = 0.3
+TURNTABLE = f"""
+<robot name="turntable"><link name="base"/>
+  <link name="table"><inertial><mass value="1"/>
+    <inertia ixx="0.1" iyy="0.1" izz="{INERTIA}" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="table"/>
+    <axis xyz="0 0 1"/><limit lower="-3" upper="3" velocity="100" effort="100"/></joint>
+</robot>"""
+
+
+def link_sine(omega, rate=2000.0):
+    """Turn a link in a sine, 0.2 rad, long enough for the edges not to matter."""
+    t = np.arange(0.0, 1.0, 1.0 / rate)[:, None]
+    return t[:, 0], 0.2 * np.array([1.0, omega, omega**2]), omega * t
+
+
+@pytest.mark.parametrize('frequency', [1.0, 3.0])
+def test_a_soft_joint_lets_the_motor_run_ahead_as_the_closed_form_says(frequency):
+    """
+    A link I behind a spring K, torque from the motor's position.
+
+    tau = -I w^2 q_motor / (1 - I w^2 / K), of which the first order in 1/K is right to
+    (I w^2 / K)^2.
+    """
+    robot = load_robot(TURNTABLE)
+    omega, stiffness = 2.0 * np.pi * frequency, 3000.0
+    t, scale, phase = link_sine(omega)
+    ratio = INERTIA * omega**2 / stiffness
+    motor = (1.0 - ratio) * scale
+    motion = Motion(
+        ('turn',),
+        t,
+        motor[0] * np.sin(phase),
+        motor[1] * np.cos(phase),
+        -motor[2] * np.sin(phase),
+    )
+    arm = ArmModel(robot).with_effect(make_effect('joint_elasticity', robot), [1.0 / stiffness])
+    true = -INERTIA * scale[2] * np.sin(phase)
+    inner = slice(20, -20)
+    error = np.abs(arm.torque(motion) - true)[inner].max()
+    assert error < 1.2 * ratio**2 * np.abs(true).max()
+    rigid = np.abs(ArmModel(robot).torque(motion) - true)[inner].max()
+    assert rigid > 0.9 * ratio * np.abs(true).max()
+
+
+def test_the_first_order_of_elasticity_is_that_of_the_dynamics(robot, sines):
+    """-(dtau/dq tau + dtau/ddq dtau/dt + M d^2tau/dt^2), against differences of the plant."""
+    fine = sines(1.0, 2000.0)
+    load = inverse_dynamics(robot, fine)
+    speed = np.gradient(load, fine.t, axis=0)
+    force = np.gradient(speed, fine.t, axis=0)
+    ends = [
+        inverse_dynamics(
+            robot,
+            Motion(
+                fine.joints, fine.t, fine.q - c * load, fine.dq - c * speed, fine.ddq - c * force
+            ),
+        )
+        for c in (1e-7, -1e-7)
+    ]
+    columns = ArmModel(robot).columns_of(make_effect('joint_elasticity', robot), fine).sum(axis=2)
+    expected = (ends[0] - ends[1]) / 2e-7
+    np.testing.assert_allclose(columns, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_the_plant_is_told_springs_dampers_and_gaps(robot):
+    arm = (
+        ArmModel(robot)
+        .with_effect(
+            make_effect('joint_elasticity@elbow_pitch', robot).with_shape([0.004]), [1 / 500.0]
+        )
+        .with_effect(make_effect('backlash@elbow_pitch+wrist_pitch', robot), [0.01, 0.02])
+    )
+    transmission = arm.action().transmission
+    rigid = [np.inf] * 3
+    np.testing.assert_allclose(transmission.stiffness, [*rigid, 500.0, np.inf, np.inf])
+    np.testing.assert_allclose(transmission.damping, [0, 0, 0, 2.0, 0, 0])
+    np.testing.assert_allclose(transmission.gap, [0, 0, 0, 0.005, 0, 0.01])
+
+
+def test_rotors_turn_with_the_motors_and_links_with_the_links():
+    robot = load_robot(TURNTABLE)
+    t, scale, phase = link_sine(2.0 * np.pi * 3.0)
+    motion = Motion(
+        ('turn',), t, scale[0] * np.sin(phase), scale[1] * np.cos(phase), -scale[2] * np.sin(phase)
+    )
+    arm = ArmModel(robot).with_effect(make_effect('joint_elasticity', robot), [1e-3])
+    rotor = arm.with_effect(make_effect('rotor_inertia', robot), [0.2])
+    np.testing.assert_allclose(
+        rotor.torque(motion) - arm.torque(motion), 0.2 * motion.ddq, atol=1e-9
+    )
+
+
+def test_backlash_moves_the_link_to_the_flank_that_carries_the_load(robot, sines, with_values):
+    """In slow motion, where the weight decides: half the play to either side."""
+    fine = sines(1.0, 500.0).at_rest()
+    arm = with_values('backlash', 0.01, [1e-3])
+    load = inverse_dynamics(robot, fine)
+    link = arm.link_motion(fine)
+    loaded = np.abs(load) > 0.01
+    np.testing.assert_allclose(
+        (fine.q - link.q)[loaded], (0.005 * np.sign(load))[loaded], atol=1e-9
+    )
