@@ -55,7 +55,7 @@ class Payload(HiddenEffect):
         )
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
-        body = spec.joint(self.joint).parent.add_body(name='payload', pos=self.centre)
+        body = spec.joint(self.joint).parent.add_body(name='payload', ipos=self.centre)
         body.mass = self.mass
         body.inertia = np.full(3, 0.4 * self.mass * self.radius**2)
         body.explicitinertial = True
@@ -98,7 +98,7 @@ class LinkInertia(HiddenEffect):
         )
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
-        body = spec.joint(self.joint).parent.add_body(name='difference', pos=self.centre)
+        body = spec.joint(self.joint).parent.add_body(name='difference', ipos=self.centre)
         body.mass = self.mass
         body.inertia = np.full(3, 0.1 * self.mass * 0.05**2)
         body.explicitinertial = True

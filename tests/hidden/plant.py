@@ -84,8 +84,10 @@ class Plant:
         for effect in self.effects:
             effect.edit(spec, self.robot)
         model = spec.compile()
-        model.dof_solref[:] = [2.0 * self.dt, 1.0]
-        model.dof_solimp[:] = [0.9999, 0.9999, 0.001, 0.5, 2.0]
+        for stiffness in (model.dof_solref, model.tendon_solref_fri):
+            stiffness[:] = [2.0 * self.dt, 1.0]  # dry friction as hard as it can be
+        for impedance in (model.dof_solimp, model.tendon_solimp_fri):
+            impedance[:] = [0.9999, 0.9999, 0.001, 0.5, 2.0]
         dofs = np.array([model.joint(joint).qposadr[0] for joint in self.robot.joints])
         live = Live(
             self.robot,

@@ -89,7 +89,8 @@ def case_list(name: str) -> tuple[CaseSpec, ...]:
         key = f'{name}/{key}'
         classes = [HIDDEN[effect] for effect in effects]
         exact = any(c.rigid for c in classes) or len(cases) % 2 == 0
-        bare = not any(c.needs for c in classes) and bool(rng.random() < 0.25)
+        needs = {need for c in classes for need in c.needs}
+        bare = bool(rng.random() < 0.25) and needs <= {'rotor_inertia'}
         sizes = tuple(float(gap * spread ** rng.uniform(-1.0, 1.0)) for gap in gaps)
         machine = machines[int(rng.integers(len(machines)))]
         seed = crc32(f'{rules["seed"]} {key}'.encode())

@@ -187,7 +187,7 @@ class Backlash(HiddenEffect):
         twist = add_twist(spec, self.joint)
         twist.limited = True
         twist.range = [-0.5 * self.width, 0.5 * self.width]
-        twist.solref_limit = [2.0 * spec.option.timestep, 1.0]
+        twist.solref_limit = [0.005, 1.0]  # teeth that do not bounce
         twist.solimp_limit = [0.999, 0.9999, 1e-5, 0.5, 2.0]
         twist.margin = 0.0
 
