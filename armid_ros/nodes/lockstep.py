@@ -89,7 +89,7 @@ def run_lockstep(
     bag: Path,
     *,
     topics: Sequence[str] = TOPICS,
-    rate: float = 500.0,
+    rate: float = 200.0,
     approach: float = 3.0,
     on_progress: OnProgress | None = None,
     period: float = 1.0,

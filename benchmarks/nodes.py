@@ -1,0 +1,211 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The nodes at speed: what is lost at 1 kHz and by a kill, update times, lock step.
+
+``python -m benchmarks.nodes [--seconds 60]``; the identifier runs in this process, the arm and the
+recorder in theirs. Losses are to be measured on an otherwise idle machine.
+
+"""
+
+import argparse
+from collections import deque
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.excitation import Excitation, Limits, random_feasible, save_excitation
+from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.nodes.domains import private_context
+from armid_ros.nodes.lockstep import run_lockstep
+from armid_ros.nodes.online_identifier import OnlineIdentifierNode
+from armid_ros.nodes.process import make_executor
+from armid_ros.recording import read_recording
+from armid_ros.robots import load_robot
+from armid_ros.simulation import Reference, SimulatedArm
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from benchmarks.real_recordings import example_robot
+
+EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
+MS = 10**6
+
+
+def panda():
+    """Return the path of a URDF with seven joints and a gripper."""
+    return str(example_robot('panda_description/urdf/panda.urdf'))
+
+
+def with_friction(robot):
+    """Return the arm with friction and offset to be estimated."""
+    arm = ArmModel(robot)
+    for name in EFFECTS:
+        arm = arm.with_effect(make_effect(name, robot))
+    return arm
+
+
+def short_run(robot, period, n_periods):
+    """Return a random feasible run."""
+    rng = np.random.default_rng(0)
+    limits = Limits.of(robot, speed='medium')
+    trajectory = random_feasible(ArmModel(robot), limits, period, 5, rng)
+    return Excitation(trajectory, n_periods, 2.0)
+
+
+@contextmanager
+def process(context, node, *parameters):
+    """Run a node as a process until the block ends."""
+    options = [part for p in parameters for part in ('-p', p)]
+    environment = {
+        **os.environ,
+        'ROS_DOMAIN_ID': str(context.get_domain_id()),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+    }
+    command = [sys.executable, '-m', f'armid_ros.nodes.{node}', '--ros-args', *options]
+    running = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL)
+    try:
+        yield running
+    finally:
+        running.send_signal(signal.SIGINT)
+        running.wait()
+
+
+def lost(first, last, count):
+    """Return how many of the messages between two stamps, 1 ms apart, are missing."""
+    return round((last - first) / MS) + 1 - count
+
+
+def at_one_kilohertz(seconds, folder):
+    """Identify and record an arm at 1 kHz; print what was lost and how long updates took."""
+    robot = load_robot(panda())
+    save_excitation(short_run(robot, 8.0, max(1, int(seconds / 8.0))), folder / 'run.yaml')
+    with private_context() as context:
+        executor = make_executor('events', context)
+        identifier = OnlineIdentifier(with_friction(robot), rng=np.random.default_rng(0))
+        node = OnlineIdentifierNode(identifier, context=context, use_global_arguments=False)
+        node.update_times = deque()
+        executor.add_node(node)
+        recorder = process(
+            context, 'recorder', f'bag:={folder / "bag"}', 'topics:=[joint_states]',
+            'executor:=events',
+        )  # fmt: skip
+        excitation = process(
+            context, 'excitation_publisher', f'robot:={panda()}', f'file:={folder / "run.yaml"}'
+        )
+        arm = process(context, 'simulated_arm', f'robot:={panda()}', 'executor:=events')
+        with recorder, excitation:
+            with arm:
+                while not node.received:
+                    executor.spin_once(timeout_sec=0.1)
+                first = node.last_stamp_ns
+                end = time.monotonic() + seconds
+                while time.monotonic() < end:
+                    executor.spin_once(timeout_sec=0.1)
+            for _ in range(1000):
+                executor.spin_once(timeout_sec=0.001)
+        missing = lost(first, node.last_stamp_ns, node.received)
+        executor.remove_node(node)
+        executor.shutdown()
+    recording = read_recording(folder / 'bag', joints=robot.joints)
+    span = round(recording.t[-1] * 1000) + 1
+    times = 1e6 * np.array(node.update_times)
+    print(f'1 kHz, {robot.n_joints} joints, {len(identifier.base.parameters)} parameters')
+    print(f'  lost by the identifier      {missing} of {node.received + missing} (wanted: 0)')
+    print(f'  lost by the recorder        {span - len(recording)} of {span} (wanted: 0)')
+    for name, some in (('every sample', times), ('rows that teach', times[times > 80.0])):
+        p50, p99 = np.percentile(some, (50, 99)) if len(some) else (0, 0)
+        print(f'  update, {name:19} p50 {p50:.0f} us, p99 {p99:.0f} us ({len(some)})')
+
+
+def in_lock_step(rate, folder):
+    """Print how much faster than real time the nodes are together."""
+    robot = load_robot('humanoid_arm', gravity='moon')
+    arm, run = with_friction(robot), short_run(robot, 10.0, 1)
+    rng = np.random.default_rng(0)
+    plant = SimulatedArm(arm, rng=rng, start=run.at([0.0]).q[0])
+    alone = SimulatedArm(arm, rng=rng, start=run.at([0.0]).q[0])
+    alone.set_trajectory(Reference.of(run.motion(100.0)))
+    begun = time.perf_counter()
+    for _ in range(1000):
+        alone.advance(10)
+    simulator = 10.0 / (time.perf_counter() - begun)
+    identifier, seconds = OnlineIdentifier(arm, rng=rng), []
+
+    def tell(_):
+        seconds.append(time.perf_counter())
+
+    end = run_lockstep(
+        plant, run, identifier, folder / f'bag_{rate:.0f}', rate=rate, on_progress=tell
+    )
+    best = 1.0 / np.diff(seconds).min()
+    print(
+        f'lock step, joint_states at {rate:5.0f} Hz   {end.real_time_factor:.1f} x real time, '
+        f'{best:.1f} in the best second (the simulator alone {simulator:.1f}; wanted: 8)'
+    )
+
+
+def killed(folder, number):
+    """Kill a recorder of three topics at 1 kHz each; return what was lost [s]."""
+    with private_context() as context:
+        executor = make_executor('events', context)
+        node = Node('source', context=context, use_global_arguments=False)
+        executor.add_node(node)
+        publishers = [
+            node.create_publisher(JointState, f'arm{k}/joint_states', 10) for k in range(3)
+        ]
+        message = JointState(name=[f'joint{k}' for k in range(7)])
+        message.position = message.velocity = message.effort = [0.1] * 7
+
+        def publish():
+            now = time.time_ns()
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(now, 10**9)
+            for publisher in publishers:
+                publisher.publish(message)
+
+        node.create_timer(0.001, publish)
+        bag = folder / f'killed_{number}'
+        names = ','.join(publisher.topic_name for publisher in publishers)
+        with process(
+            context, 'recorder', f'bag:={bag}', f'topics:=[{names}]', 'executor:=events'
+        ) as recorder:
+            while not all(p.get_subscription_count() for p in publishers):
+                executor.spin_once(timeout_sec=0.1)
+            end = time.monotonic() + 3.0 + 0.37 * number
+            while time.monotonic() < end:
+                executor.spin_once(timeout_sec=0.1)
+            recorder.kill()
+            at = time.time_ns()
+            recorder.wait()
+        executor.shutdown()
+    recording = read_recording(bag, joints=tuple(message.name), topic=publishers[0].topic_name)
+    return (at - recording.start_ns) * 1e-9 - float(recording.t[-1])
+
+
+def main():
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--seconds', type=float, default=60.0, help='at 1 kHz')
+    seconds = parser.parse_args().seconds
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        at_one_kilohertz(seconds, folder)
+        for rate in (200.0, 500.0, 1000.0):
+            in_lock_step(rate, folder)
+        losses = [killed(folder, number) for number in range(5)]
+        print(
+            f'recorder killed at 3 kHz: lost {max(losses):.2f} s at most in {len(losses)} kills '
+            '(wanted: 0.3)'
+        )
+
+
+if __name__ == '__main__':
+    main()
