@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Effect, Quantity, Shape
-from armid_ros.model import point_motion
+from armid_ros.model import point_motion, points_motion
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -60,10 +60,9 @@ class RecordedPoint:
     def __init__(
         self, robot: Robot, motion: Motion, joint: str, offset: npt.ArrayLike = (0.0, 0.0, 0.0)
     ) -> None:
-        point = np.asarray(offset, dtype=float)[np.newaxis]
-        position, jacobian = point_motion(robot, [joint], point, motion.q)
-        velocity = np.einsum('nxj,nj->nx', jacobian[:, 0], motion.dq)
-        self._curve = CubicHermiteSpline(motion.t, position[:, 0], velocity)
+        position, jacobian = point_motion(robot, joint, offset, motion.q)
+        velocity = np.einsum('nxj,nj->nx', jacobian, motion.dq)
+        self._curve = CubicHermiteSpline(motion.t, position, velocity)
 
     def __call__(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return position and velocity at times of shape (N,), each of shape (N, 3)."""
@@ -96,7 +95,7 @@ class _Attached(Effect):
 
     def _points(self, robot: Robot, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return positions (N, k, 3) and Jacobians (N, k, 3, n) of the attachments."""
-        return point_motion(robot, self.joints, self.shape_values[:, :3], q)
+        return points_motion(robot, self.joints, self.shape_values[:, :3], q)
 
     def _from(self, t: FloatArray, reference: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return position and velocity of the anchor of a link; of the reference if fixed."""
@@ -221,7 +220,7 @@ class InterfaceSlack(_Attached):
         """Anchor each attachment where it is in the middle of the range of motion."""
         values = super()._default_shape(robot)
         if self.anchor is None:
-            placed = point_motion(robot, self.joints, values[:, :3], _middle(robot))
+            placed = points_motion(robot, self.joints, values[:, :3], _middle(robot))
             values[:, 3:6] = placed[0][0]
         return values
 

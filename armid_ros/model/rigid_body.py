@@ -135,7 +135,37 @@ def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
 
 
 def point_motion(
-    robot: Robot, joints: Sequence[str], offsets: npt.ArrayLike, q: FloatArray
+    robot: Robot, joint: str, offset: npt.ArrayLike, q: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Follow a point of a link.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm.
+    joint : str
+        The joint that moves the link.
+    offset : array_like, shape (3,)
+        The point in the frame of that joint [m].
+    q : ndarray, shape (N, n)
+        Joint positions.
+
+    Returns
+    -------
+    position : ndarray, shape (N, 3)
+        In the base frame [m].
+    jacobian : ndarray, shape (N, 3, n)
+        Derivative by the joint positions.
+
+    """
+    point = np.asarray(offset, dtype=np.float64)[np.newaxis]
+    positions, jacobians = points_motion(robot, [joint], point, q)
+    return positions[:, 0], jacobians[:, 0]
+
+
+def points_motion(
+    robot: Robot, joints: Sequence[str], offsets: FloatArray, q: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
     Follow points of links.
@@ -146,7 +176,7 @@ def point_motion(
         The arm.
     joints : sequence of str
         The joints that move the links, one of each of k points.
-    offsets : array_like, shape (k, 3)
+    offsets : ndarray, shape (k, 3)
         The points in the frames of those joints [m].
     q : ndarray, shape (N, n)
         Joint positions.
@@ -162,7 +192,7 @@ def point_motion(
     model = robot.model
     data = model.createData()
     links = [model.getJointId(joint) for joint in joints]
-    points = list(zip(links, np.asarray(offsets, dtype=np.float64), strict=True))
+    points = list(zip(links, offsets, strict=True))
     positions = np.empty((len(q), len(points), 3))
     jacobians = np.empty((len(q), len(points), 3, robot.n_joints))
     for k, configuration in enumerate(q):

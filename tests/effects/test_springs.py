@@ -112,7 +112,7 @@ def pull(robot, joint, offset, motion, anchor, stiffness):
         ends = [
             stiffness
             / 2
-            * np.sum((point_motion(robot, [joint], [offset], q)[0][:, 0] - anchor) ** 2, axis=1)
+            * np.sum((point_motion(robot, joint, offset, q)[0] - anchor) ** 2, axis=1)
             for q in (motion.q + step, motion.q - step)
         ]
         torque[:, j] = (ends[0] - ends[1]) / 2e-6
@@ -164,10 +164,10 @@ def test_two_chains_that_move_alike_do_not_pull_each_other(robot, motion):
     slow = type(effect)(
         effect.joints, effect.shape, RecordedPoint(robot, behind, 'elbow_pitch', offset)
     )
-    position, jacobian = point_motion(robot, ['elbow_pitch'], [offset], motion.q)
-    way = (position - point_motion(robot, ['elbow_pitch'], [offset], behind.q)[0])[:, 0]
+    position, jacobian = point_motion(robot, 'elbow_pitch', offset, motion.q)
+    way = position - point_motion(robot, 'elbow_pitch', offset, behind.q)[0]
     arm = ArmModel(robot).with_effect(slow, [400.0, 0.0, 0.0, 0.0, 0.0])
-    expected = 400.0 * np.einsum('nxj,nx->nj', jacobian[:, 0], way)
+    expected = 400.0 * np.einsum('nxj,nx->nj', jacobian, way)
     np.testing.assert_allclose(
         arm.torque(motion) - ArmModel(robot).torque(motion), expected, atol=1e-9
     )
