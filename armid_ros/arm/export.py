@@ -1,0 +1,109 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""An identified arm as the files that other programs read: URDF and MJCF."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from armid_ros.arm.arm_model import ArmModel
+from armid_ros.model.mjcf_export import export_mjcf
+from armid_ros.model.urdf_export import export_urdf
+import numpy as np
+
+#: What each format has a place for, of every joint.
+_URDF = {'viscous_friction': 'damping', 'coulomb_friction': 'friction'}
+_MJCF = {**_URDF, 'rotor_inertia': 'armature'}
+
+
+@dataclass(frozen=True)
+class Exported:
+    """
+    A description of an arm.
+
+    Attributes
+    ----------
+    text : str
+        The file.
+    without_place : tuple of str
+        Parameters of effects that the format has no place for, one a line; a comment in the file
+        lists them too.
+
+    """
+
+    text: str
+    without_place: tuple[str, ...]
+
+
+def arm_urdf(arm: ArmModel) -> Exported:
+    """
+    Return the arm's own URDF with its inertial parameters and friction, otherwise as it was.
+
+    A payload is part of the link that carries it. Text expanded from xacro stays expanded.
+
+    Raises
+    ------
+    ModelError
+        If the parameters of a link are not those of a body.
+
+    """
+    missing = _without_place(arm, _URDF)
+    text = export_urdf(
+        arm.body,
+        damping=_of_joints(arm, 'viscous_friction'),
+        friction=_of_joints(arm, 'coulomb_friction'),
+        remarks=_remarks('a URDF', missing),
+    )
+    return Exported(text, missing)
+
+
+def arm_mjcf(arm: ArmModel) -> Exported:
+    """
+    Return a MuJoCo model of the arm, without shapes.
+
+    Raises
+    ------
+    ModelError
+        If the parameters of a link are not those of a body.
+
+    """
+    missing = _without_place(arm, _MJCF)
+    text = export_mjcf(
+        arm.body,
+        damping=_of_joints(arm, 'viscous_friction'),
+        friction=_of_joints(arm, 'coulomb_friction'),
+        armature=_of_joints(arm, 'rotor_inertia'),
+        remarks=_remarks('MuJoCo', missing),
+    )
+    return Exported(text, missing)
+
+
+def _of_joints(arm: ArmModel, name: str) -> dict[str, float]:
+    """Return the value of an effect with one quantity per joint, by joint."""
+    found: dict[str, float] = {}
+    for effect, values in zip(arm.effects, arm.values, strict=True):
+        if effect.name == name:
+            for joint, value in zip(effect.joints, values, strict=True):
+                found[joint] = found.get(joint, 0.0) + float(value)
+    return found
+
+
+def _without_place(arm: ArmModel, places: Collection[str]) -> tuple[str, ...]:
+    lines = []
+    for effect, values in zip(arm.effects, arm.values, strict=True):
+        if effect.name in places or effect.changes_body:
+            continue
+        names = [*effect.parameters(arm.robot), *effect.shape_parameters(arm.robot)]
+        numbers = [*values, *np.ravel(effect.shape_values)]
+        for parameter, value in zip(names, numbers, strict=True):
+            where = f' of {parameter.joint}' if parameter.joint else ''
+            line = f'{effect.name}: {parameter.name}{where} = {float(value)!r} {parameter.unit}'
+            lines.append(line.rstrip())
+    return tuple(lines)
+
+
+def _remarks(form: str, missing: tuple[str, ...]) -> tuple[str, ...]:
+    if not missing:
+        return ()
+    return (f'identified by armid_ros; {form} has no place for', *missing)

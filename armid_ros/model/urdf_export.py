@@ -1,0 +1,227 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+A URDF with other inertial parameters, and otherwise as its author wrote it.
+
+What a driven joint moves may be several links, on fixed joints or on joints that are not driven.
+The other links keep their inertials as far as bodies allow, and the driven joint's own link gets
+what is left, so that the file read again has exactly the parameters that were put in.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from armid_ros.errors import ModelError
+from armid_ros.model.pseudo_inertia import (
+    Consistency,
+    PER_LINK,
+    pseudo_inertia,
+    require_consistent,
+)
+from armid_ros.model.xml_edit import Element, XmlText
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot, robot_from_urdf
+import numpy as np
+import scipy.linalg
+
+#: The least share of a body's pseudo-inertia, in any direction, that its own link is left with.
+LEAST_SHARE = 0.05
+#: Largest difference of what the file says when read again, as a share of the largest parameter.
+ROUNDING = 1e-11
+
+
+def export_urdf(
+    robot: Robot,
+    *,
+    damping: Mapping[str, float] | None = None,
+    friction: Mapping[str, float] | None = None,
+    remarks: Sequence[str] = (),
+) -> str:
+    """
+    Return the robot's description with its present inertial parameters.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm; ``robot.urdf`` is the description that is changed.
+    damping, friction : mapping of str to float, optional
+        Joint, and its viscous coefficient [N m s/rad] or Coulomb torque [N m], for <dynamics>.
+    remarks : sequence of str
+        Lines to put into a comment at the end, such as what a URDF has no place for.
+
+    Returns
+    -------
+    str
+        URDF. Only <inertial> and <dynamics> differ, and the comment at the end.
+
+    Raises
+    ------
+    ModelError
+        If the parameters of a link are not those of a body, or if the file read again would not
+        have the parameters.
+
+    """
+    require_consistent(robot.links, robot.rigid_parameters)
+    body = robot.rigid_parameters.reshape(-1, PER_LINK)
+    others = _parameters(robot, _without_inertials(robot.urdf, robot.links))
+    shares = np.array([_share(*pair) for pair in zip(body, others, strict=True)])
+    text = robot.urdf
+    if np.any(shares < 1.0):
+        text = _scaled(robot, shares)
+        others = _parameters(robot, _without_inertials(text, robot.links))
+    own = dict(zip(robot.links, body - others, strict=True))
+
+    document = XmlText(text)
+    for link in document.root.all('link'):
+        if link.attributes['name'] in own:
+            _set_inertial(document, link, own[link.attributes['name']])
+    for joint in document.root.all('joint'):
+        values = {
+            key: repr(float(table[joint.attributes['name']]))
+            for key, table in (('damping', damping or {}), ('friction', friction or {}))
+            if joint.attributes['name'] in table
+        }
+        if values:
+            _set_dynamics(document, joint, values)
+    if remarks:
+        lines = [line.replace('--', '- -') for line in remarks]
+        document.append(document.root, ['<!--', *(f'  {line}' for line in lines), '-->'])
+    result = document.text()
+    _check(robot, result)
+    return result
+
+
+def _parameters(robot: Robot, urdf: str) -> FloatArray:
+    read = robot_from_urdf(urdf, joints=robot.joints, source=robot.name)
+    return read.rigid_parameters.reshape(-1, PER_LINK)
+
+
+def _without_inertials(urdf: str, links: Sequence[str]) -> str:
+    """Take the inertials of some links out."""
+    document = XmlText(urdf)
+    for link in document.root.all('link'):
+        inertial = link.find('inertial')
+        if link.attributes['name'] in links and inertial is not None:
+            document.remove(inertial)
+    return document.text()
+
+
+def _share(body: FloatArray, others: FloatArray) -> float:
+    """Return how much of the other links' inertia stays, 1 for all, so that a body is left."""
+    if not np.any(others):
+        return 1.0
+    if not Consistency.of('', others).eigenvalues[0] > -1e-12:
+        return 0.0
+    largest = float(scipy.linalg.eigh(pseudo_inertia(others), pseudo_inertia(body))[0][-1])
+    return 1.0 if largest <= 1.0 - LEAST_SHARE else 0.5 / largest
+
+
+def _scaled(robot: Robot, shares: FloatArray) -> str:
+    """Scale mass and inertia of the links that share a body with a driven one."""
+    document = XmlText(robot.urdf)
+    carriers = _carriers(robot, document.root)
+    for link in document.root.all('link'):
+        name, inertial = link.attributes['name'], link.find('inertial')
+        if inertial is None or name in robot.links or name not in carriers:
+            continue
+        share = float(shares[carriers[name]])
+        if share == 1.0:
+            continue
+        for element, keys in (
+            (inertial.find('mass'), ('value',)),
+            (inertial.find('inertia'), ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')),
+        ):
+            assert element is not None
+            known = {key: element.attributes[key] for key in keys if key in element.attributes}
+            values = {key: repr(share * float(value)) for key, value in known.items()}
+            document.set_attributes(element, values)
+    return document.text()
+
+
+def _carriers(robot: Robot, root: Element) -> dict[str, int]:
+    """Return, for every link that a driven joint moves, which driven joint is nearest to it."""
+    parents: dict[str, tuple[str, str]] = {}
+    for joint in root.all('joint'):
+        parent, child = joint.find('parent'), joint.find('child')
+        if parent is not None and child is not None:
+            names = parent.attributes['link'], joint.attributes['name']
+            parents[child.attributes['link']] = names
+    carriers = {}
+    for link in parents:
+        at: str | None = link
+        while at in parents:
+            above, joint_name = parents[at]
+            if joint_name in robot.joints:
+                carriers[link] = robot.joints.index(joint_name)
+                break
+            at = above
+    return carriers
+
+
+def _set_inertial(document: XmlText, link: Element, parameters: FloatArray) -> None:
+    """Write ten parameters as mass, centre and inertia about it, in the axes of the link."""
+    mass, center, tensor = _central(parameters)
+    values = {
+        'origin': {'xyz': ' '.join(map(repr, center)), 'rpy': '0 0 0'},
+        'mass': {'value': repr(mass)},
+        'inertia': {
+            'ixx': repr(float(tensor[0, 0])),
+            'ixy': repr(float(tensor[0, 1])),
+            'ixz': repr(float(tensor[0, 2])),
+            'iyy': repr(float(tensor[1, 1])),
+            'iyz': repr(float(tensor[1, 2])),
+            'izz': repr(float(tensor[2, 2])),
+        },
+    }
+    tags = {
+        name: f'<{name} ' + ' '.join(f'{key}="{value}"' for key, value in row.items()) + '/>'
+        for name, row in values.items()
+    }
+    inertial = link.find('inertial')
+    if inertial is None:
+        inner = [f'  {tag}' for tag in tags.values()]
+        document.append(link, ['<inertial>', *inner, '</inertial>'])
+        return
+    missing = []
+    for name, row in values.items():
+        element = inertial.find(name)
+        if element is None:
+            missing.append(tags[name])
+        else:
+            document.set_attributes(element, row)
+    if missing:
+        document.append(inertial, missing)
+
+
+def _central(parameters: FloatArray) -> tuple[float, list[float], FloatArray]:
+    """Return mass, centre of mass, and inertia about it, shape (3, 3)."""
+    mass = float(parameters[0])
+    center = parameters[1:4] / mass
+    ixx, ixy, iyy, ixz, iyz, izz = parameters[4:]
+    about_origin = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+    shift = mass * (center @ center * np.eye(3) - np.outer(center, center))
+    return mass, [float(c) for c in center], about_origin - shift
+
+
+def _set_dynamics(document: XmlText, joint: Element, values: Mapping[str, str]) -> None:
+    element = joint.find('dynamics')
+    if element is not None:
+        document.set_attributes(element, values)
+        return
+    row = ' '.join(f'{key}="{value}"' for key, value in values.items())
+    document.append(joint, [f'<dynamics {row}/>'])
+
+
+def _check(robot: Robot, urdf: str) -> None:
+    """Read the result again, for what it says is what others will believe."""
+    found, wanted = _parameters(robot, urdf), robot.rigid_parameters.reshape(-1, PER_LINK)
+    worst = np.max(np.abs(found - wanted), axis=1)
+    scale = float(np.max(np.abs(wanted)))
+    if np.any(worst > ROUNDING * scale):
+        link = robot.links[int(np.argmax(worst))]
+        raise ModelError(
+            f"{robot.name}: the description would not have the parameters of link '{link}' when "
+            f'read again: they differ by {worst.max():.3g}'
+        )

@@ -1,0 +1,55 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+from armid_ros.arm import ArmModel
+from armid_ros.arm.export import arm_mjcf, arm_urdf
+from armid_ros.effects import make_effect
+from armid_ros.robots import load_robot, robot_from_urdf
+import mujoco
+import numpy as np
+import pytest
+
+VALUES = {
+    'viscous_friction': 0.3,
+    'coulomb_friction': 0.2,
+    'rotor_inertia': 0.01,
+    'torque_offset': 0.05,
+}
+
+
+@pytest.fixture
+def arm():
+    robot = load_robot('humanoid_arm')
+    arm = ArmModel(robot)
+    for name, value in VALUES.items():
+        arm = arm.with_effect(make_effect(name, robot), np.full(6, value))
+    return arm
+
+
+def test_friction_is_carried_where_a_urdf_has_a_place(arm):
+    read = robot_from_urdf(arm_urdf(arm).text)
+    np.testing.assert_array_equal(read.urdf_damping, 0.3)
+    np.testing.assert_array_equal(read.urdf_friction, 0.2)
+
+
+def test_what_has_no_place_is_listed_and_said_in_the_file(arm):
+    exported = arm_urdf(arm)
+    kinds = {line.split(':')[0] for line in exported.without_place}
+    assert kinds == {'rotor_inertia', 'torque_offset'}
+    assert 'rotor_inertia: rotor_inertia of elbow_pitch = 0.01 kg m^2' in exported.text
+
+
+def test_mujoco_has_a_place_for_rotor_inertia(arm):
+    exported = arm_mjcf(arm)
+    model = mujoco.MjModel.from_xml_string(exported.text)
+    np.testing.assert_array_equal(model.dof_armature, 0.01)
+    np.testing.assert_array_equal(model.dof_damping, 0.3)
+    np.testing.assert_array_equal(model.dof_frictionloss, 0.2)
+    np.testing.assert_array_equal(model.opt.gravity, arm.robot.gravity)
+    assert {line.split(':')[0] for line in exported.without_place} == {'torque_offset'}
+
+
+def test_a_payload_is_part_of_its_link(arm):
+    payload = np.concatenate([0.5 * np.array([1.0, 0.0, 0.0, 0.03]), [1e-3, 0, 1e-3, 0, 0, 1e-3]])
+    loaded = arm.with_effect(make_effect('payload', arm.robot), payload)
+    bare, full = (robot_from_urdf(arm_urdf(a).text).rigid_parameters for a in (arm, loaded))
+    assert abs(full[50] - bare[50] - 0.5) < 1e-12
