@@ -110,8 +110,10 @@ def case_list(name: str) -> tuple[CaseSpec, ...]:
     for effect in OUTSIDE_NAMES:
         for k in range(rules['outside']):
             add('outside', f'{effect}/{k}', (effect,), (rules['gaps'][1 + k % 2],))
-    visible = [case for case in cases if case.kind == 'single' and '/20-0' in case.key]
-    cases += [replace(case, kind='removed', key=f'{case.key}/removed') for case in visible]
+    large = [case for case in cases if case.kind == 'single' and '/20-0' in case.key]
+    for case in large:
+        if not HIDDEN[case.effects[0]].rigid:  # link inertias can make any of those
+            cases.append(replace(case, kind='removed', key=f'{case.key}/removed'))
     return tuple(cases)
 
 

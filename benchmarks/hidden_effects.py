@@ -1,0 +1,205 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether the diagnosis names effects that are hidden in recordings of MuJoCo arms.
+
+The cases are those of tests/hidden, whose data come from code that has nothing in common with the
+diagnosis; rates have 95 % intervals (Wilson). Reach and what counts: tests/hidden/README.md.
+
+    python -m benchmarks.hidden_effects [development|locked] [--slice] [--only TEXT] [--out DIR]
+
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+import json
+import multiprocessing
+import os
+from pathlib import Path
+import time
+import traceback
+from typing import Any
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import CATALOGUE
+from armid_ros.motion import FloatArray
+import numpy as np
+
+from tests.hidden.cases import Case, make_case
+from tests.hidden.scoring import confusion, Finding, Judged, Outcome, score, Truth
+from tests.hidden.specification import case_list, CaseSpec
+
+#: Every so many cases of a kind are in the slice.
+SLICE = {'single': 9, 'free': 20, 'pair': 8, 'outside': 5, 'removed': 10}
+
+
+def nominal_arm(case: Case) -> ArmModel:
+    """Return the model that is given to the diagnosis: rigid bodies and what is known of drives."""
+    arm = ArmModel(case.robot)
+    for known in case.known:
+        effect = CATALOGUE[known.name].on(case.robot, known.joints)
+        arm = arm.with_effect(effect, known.values)
+    return arm
+
+
+def run_diagnosis(case: Case) -> Outcome:
+    """Diagnose a case. This is the one place that knows how."""
+    from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
+
+    library = tuple(name for name in CATALOGUE if name not in case.removed)
+    begin = time.perf_counter()
+    diagnosis = diagnose(
+        [bag.recording for bag in case.bags],
+        nominal_arm(case),
+        validation=[bag.recording for bag in case.validation],
+        settings=DiagnosisSettings(library=library),
+    )
+    seconds = time.perf_counter() - begin
+    return outcome_of(diagnosis_document(diagnosis), seconds)
+
+
+def outcome_of(document: dict[str, Any], seconds: float) -> Outcome:
+    """Read an outcome from a document of the schema armid/diagnosis/1."""
+    gap = document.get('gap', {})
+    return Outcome(
+        verdict=document['verdict'],
+        findings=tuple(
+            Finding(
+                name=effect['name'],
+                joints=tuple(effect['joints']),
+                ambiguous_with=tuple(effect.get('ambiguous_with', ())),
+                parameters=tuple(
+                    (p['name'], p.get('joint') or '', float(p['value']), float(p['std']))
+                    for p in effect.get('parameters', ())
+                ),
+            )
+            for effect in document['effects']
+        ),
+        closed=_number(gap.get('closed_fraction')),
+        before=_rms(gap.get('before')),
+        after=_rms(gap.get('after')),
+        floor=_rms(gap.get('noise_floor')),
+        seconds=seconds,
+    )
+
+
+def judge(spec: CaseSpec) -> Judged:
+    """Make a case and diagnose it; an exception is an outcome, too."""
+    case = make_case(spec)
+    try:
+        outcome = run_diagnosis(case)
+    except Exception:
+        outcome = Outcome(verdict='failed', error=traceback.format_exc(limit=-3))
+    return Judged(Truth.of(case), outcome)
+
+
+def run(specs: Sequence[CaseSpec], processes: int = 2) -> list[Judged]:
+    """Judge cases in several processes, with a line of progress each."""
+    judged = []
+    context = multiprocessing.get_context('spawn')
+    with ProcessPoolExecutor(processes, mp_context=context) as pool:
+        for count, one in enumerate(pool.map(judge, specs), start=1):
+            judged.append(one)
+            names = ' + '.join(
+                '|'.join([f.name, *f.ambiguous_with]) + f'@{",".join(f.joints)}'
+                for f in one.outcome.findings
+            )
+            print(
+                f'{count}/{len(specs)} {one.truth.key} (gap {one.truth.size:.2g}): '
+                f'{one.outcome.verdict} {names} [{one.outcome.seconds:.1f} s]'
+                + one.outcome.error.replace('\n', ' / '),
+                flush=True,
+            )
+    return judged
+
+
+def select(name: str, only: Iterable[str] = (), part: bool = False) -> list[CaseSpec]:
+    """Return the cases of a set, of the slice of it, or those with any of the texts in the key."""
+    specs = list(case_list(name))
+    if part:
+        chosen = []
+        for kind, every in SLICE.items():
+            chosen += [spec for spec in specs if spec.kind == kind][::every]
+        specs = chosen
+    texts = list(only)
+    return [spec for spec in specs if not texts or any(text in spec.key for text in texts)]
+
+
+def report(judged: Sequence[Judged]) -> None:
+    """Print the table."""
+    print(f'\n{"":30s} {"value":>7s}  {"95 %":>15s} {"cases":>6s}  reach')
+    for metric in score(judged):
+        interval = '' if np.isnan(metric.low) else f'{metric.low:.3f} - {metric.high:.3f}'
+        verdict = {True: 'reached', False: 'NOT reached', None: ''}[metric.good]
+        wanted = f'{metric.reach}: {verdict}' if metric.reach else ''
+        print(
+            f'{metric.name:30s} {metric.value:7.3f}  {interval:>15s} {metric.count:6d}  {wanted}'
+        )
+
+
+def write(judged: Sequence[Judged], folder: Path) -> None:
+    """Write all outcomes as JSON, and the confusion matrix as a figure."""
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = [{'truth': asdict(j.truth), 'outcome': asdict(j.outcome)} for j in judged]
+    table = [asdict(metric) for metric in score(judged)]
+    document = {'metrics': table, 'cases': rows}
+    (folder / 'outcomes.json').write_text(json.dumps(document, indent=1, default=float))
+    draw_confusion(judged, folder / 'confusion.svg')
+
+
+def draw_confusion(judged: Sequence[Judged], path: Path) -> None:
+    """Draw which hidden effects are named what: rows hidden, columns named first."""
+    import matplotlib
+
+    matplotlib.use('Agg')
+    import matplotlib.pyplot as plt
+
+    rows, columns, counts = confusion(judged)
+    share = counts / counts.sum(axis=1, keepdims=True)
+    size = 0.28 * len(columns) + 3.0, 0.24 * len(rows) + 2.6
+    figure, axes = plt.subplots(figsize=size, layout='constrained')
+    axes.imshow(share, cmap='Blues', vmin=0.0, vmax=1.0, aspect='auto')
+    for i, k in zip(*np.nonzero(counts), strict=True):
+        colour = 'white' if share[i, k] > 0.6 else 'black'
+        axes.text(k, i, counts[i, k], ha='center', va='center', fontsize=7, color=colour)
+    axes.set_xticks(range(len(columns)), columns, rotation=90, fontsize=7)
+    axes.set_yticks(range(len(rows)), rows, fontsize=7)
+    axes.set_xlabel('named first, or verdict without a name')
+    axes.set_ylabel('hidden')
+    figure.savefig(path)
+    plt.close(figure)
+
+
+def main() -> None:
+    """Run a set of cases, print the table and write what is asked for."""
+    parser = argparse.ArgumentParser(prog='python -m benchmarks.hidden_effects')
+    parser.add_argument('set', nargs='?', choices=['development', 'locked'])
+    parser.add_argument('--slice', action='store_true', help='a few cases of every kind')
+    parser.add_argument('--only', nargs='+', default=[], metavar='TEXT', help='keys that have it')
+    parser.add_argument('--out', type=Path, help='folder for outcomes.json and confusion.svg')
+    parser.add_argument('--processes', type=int, default=2)
+    options = parser.parse_args()
+    for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
+        os.environ.setdefault(variable, '1')  # the processes share the cores as it is
+    part = options.slice or options.set is None
+    judged = run(select(options.set or 'development', options.only, part), options.processes)
+    report(judged)
+    if options.out:
+        write(judged, options.out)
+
+
+def _number(value: Any) -> float:
+    return float('nan') if value is None else float(value)
+
+
+def _rms(joints: dict[str, float] | None) -> float:
+    values: FloatArray = np.array(list((joints or {}).values()), dtype=float)
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float('nan')
+
+
+if __name__ == '__main__':
+    main()
