@@ -1,0 +1,78 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A simulated arm that is excited, identified online and recorded."""
+
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+from launch import LaunchDescription
+
+
+def generate_launch_description():
+    """Describe what is started; `ros2 launch armid_ros simulation.launch.py --show-args`."""
+    robot = ParameterValue(LaunchConfiguration('robot'), value_type=str)
+    gravity = ParameterValue(LaunchConfiguration('gravity'), value_type=str)
+    bag = ParameterValue(LaunchConfiguration('bag'), value_type=str)
+    rate = ParameterValue(LaunchConfiguration('rate'), value_type=float)
+    noise = ParameterValue(LaunchConfiguration('torque_noise'), value_type=list[float])
+    duration = ParameterValue(LaunchConfiguration('duration'), value_type=float)
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                'robot', default_value='humanoid_arm', description='shipped name, URDF or xacro'
+            ),
+            DeclareLaunchArgument(
+                'gravity', default_value='earth', description='earth, moon, or x,y,z [m/s^2]'
+            ),
+            DeclareLaunchArgument(
+                'bag', default_value='', description='directory to record to; empty: dated'
+            ),
+            DeclareLaunchArgument(
+                'rate', default_value='500.0', description='of joint_states [Hz]'
+            ),
+            DeclareLaunchArgument(
+                'torque_noise', default_value='[0.05]', description='standard deviation [N m]'
+            ),
+            DeclareLaunchArgument(
+                'duration', default_value='44.0', description='of the excitation [s]'
+            ),
+            Node(
+                package='armid_ros',
+                executable='simulated_arm',
+                parameters=[
+                    {
+                        'robot': robot,
+                        'gravity': gravity,
+                        'rate': rate,
+                        'torque_noise': noise,
+                        'effects': [
+                            'viscous_friction:viscous_coefficient=0.5',
+                            'coulomb_friction:coulomb_torque=0.2',
+                        ],
+                    }
+                ],
+            ),
+            Node(
+                package='armid_ros',
+                executable='online_identifier',
+                parameters=[{'gravity': gravity}],
+            ),
+            Node(
+                package='armid_ros',
+                executable='recorder',
+                parameters=[
+                    {
+                        'bag': bag,
+                        'topics': ['joint_states', 'robot_description', 'joint_trajectory'],
+                    }
+                ],
+            ),
+            Node(
+                package='armid_ros',
+                executable='excitation_publisher',
+                parameters=[{'robot': robot, 'gravity': gravity, 'duration': duration}],
+            ),
+        ]
+    )

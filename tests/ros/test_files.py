@@ -1,0 +1,94 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Launch and parameter files name nodes, parameters and curves that exist."""
+
+from __future__ import annotations
+
+import ast
+from importlib import import_module
+import json
+from pathlib import Path
+import re
+from xml.etree import ElementTree
+
+from armid_ros.nodes.bag_player import BagPlayerNode
+from armid_ros.nodes.base import EXECUTOR
+from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
+from armid_ros.nodes.online_identifier import OnlineIdentifierNode
+from armid_ros.nodes.recorder import RecorderNode
+from armid_ros.nodes.simulated_arm import SimulatedArmNode
+from armid_ros.robots import load_robot
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[2]
+NODES = {
+    'bag_player': BagPlayerNode,
+    'excitation_publisher': ExcitationPublisherNode,
+    'online_identifier': OnlineIdentifierNode,
+    'recorder': RecorderNode,
+    'simulated_arm': SimulatedArmNode,
+}
+TABLES = {
+    name: {parameter.name: parameter for parameter in (*node.table, EXECUTOR)}
+    for name, node in NODES.items()
+}
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_a_node_has_a_main_and_a_table_that_explains_itself(name):
+    assert callable(import_module(f'armid_ros.nodes.{name}').main)
+    for parameter in NODES[name].table:
+        assert parameter.description.endswith('.') or '[' in parameter.description
+        assert (parameter.lower is None) == (parameter.upper is None)
+        assert not parameter.objection(parameter.default)
+        if isinstance(parameter.default, float):
+            assert parameter.lower is not None
+
+
+@pytest.mark.parametrize('path', sorted((ROOT / 'config').glob('*.yaml')), ids=lambda p: p.name)
+def test_parameter_files_hold_parameters_of_the_right_type(path):
+    for node, content in yaml.safe_load(path.read_text()).items():
+        table = TABLES[node.rpartition('/')[2]]
+        for name, value in content['ros__parameters'].items():
+            assert type(value) is type(table[name].default), name
+            assert not table[name].objection(value)
+
+
+@pytest.mark.parametrize('path', sorted((ROOT / 'launch').glob('*.py')), ids=lambda p: p.name)
+def test_launch_files_start_nodes_with_parameters_they_have(path):
+    tree = ast.parse(path.read_text())
+    calls = [call for call in ast.walk(tree) if isinstance(call, ast.Call)]
+    started = [c for c in calls if getattr(c.func, 'id', '') == 'Node']
+    assert started
+    for call in started:
+        given = {keyword.arg: keyword.value for keyword in call.keywords}
+        assert given['package'].value == 'armid_ros'
+        table = TABLES[given['executable'].value]
+        for key in (k.value for d in given['parameters'].elts for k in d.keys):
+            assert key in table or key == 'use_sim_time', key
+    declared = {
+        c.args[0].value: c for c in calls if getattr(c.func, 'id', '') == 'DeclareLaunchArgument'
+    }
+    used = {c.args[0].value for c in calls if getattr(c.func, 'id', '') == 'LaunchConfiguration'}
+    assert used == set(declared)
+    for call in declared.values():
+        assert any(k.arg == 'description' for k in call.keywords)
+
+
+def test_layouts_show_joints_of_the_shipped_arm():
+    joints = set(load_robot('humanoid_arm').joints)
+    curves = [
+        curve.get('name')
+        for curve in ElementTree.parse(ROOT / 'config' / 'plotjuggler_layout.xml').iter('curve')
+    ]
+    named = {m[1] for c in curves if (m := re.search(r'/(\w+)/(?:position|velocity|effort)$', c))}
+    assert named == joints
+    layout = json.loads((ROOT / 'config' / 'foxglove_layout.json').read_text())
+
+    def leaves(node):
+        if isinstance(node, str):
+            return [node]
+        return leaves(node['first']) + leaves(node['second'])
+
+    assert sorted(leaves(layout['layout'])) == sorted(layout['configById'])
