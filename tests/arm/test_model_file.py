@@ -1,0 +1,87 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""model.yaml: what goes in comes out, and what is wrong is named."""
+
+from armid_ros.arm import ArmModel, load_model, save_model
+from armid_ros.effects import CATALOGUE, make_effect
+from armid_ros.errors import ModelError
+from armid_ros.estimate import Estimate
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+import yaml
+
+
+@pytest.fixture(scope='module')
+def robot():
+    return load_robot('humanoid_arm')
+
+
+@pytest.mark.parametrize('name', CATALOGUE)
+def test_every_effect_comes_back_with_values_and_shape(robot, name, tmp_path):
+    rng = np.random.default_rng(0)
+    effect = make_effect(name, robot)
+    if effect.shapes:
+        effect = effect.with_shape(effect.shape_values * rng.uniform(0.9, 1.1))
+    values = rng.uniform(0.0, 0.3, len(effect.parameters(robot)))
+    save_model(tmp_path / 'model.yaml', ArmModel(robot).with_effect(effect, values), robot.name)
+    arm = load_model(tmp_path / 'model.yaml')
+    assert arm.effects == (effect,)
+    np.testing.assert_array_equal(arm.values[0], values)
+    np.testing.assert_array_equal(arm.robot.rigid_parameters, robot.rigid_parameters)
+
+
+def test_joints_gravity_and_errors_come_back(robot, tmp_path):
+    moon = robot.with_gravity([0.0, 0.0, -1.62])
+    effect = make_effect('stribeck_friction@elbow_pitch', moon).with_shape([0.05, 1.5])
+    arm = ArmModel(moon).with_effect(effect, [0.2])
+    names = (*effect.parameters(moon), effect.shape_parameters(moon)[0])
+    estimate = Estimate(names, np.array([0.2, 0.05]), np.diag([0.01, 0.02]) ** 2)
+    save_model(tmp_path / 'model.yaml', arm, robot.name, estimate)
+    back = load_model(tmp_path / 'model.yaml')
+    assert back.effects == arm.effects
+    np.testing.assert_array_equal(back.robot.gravity, [0.0, 0.0, -1.62])
+    (entry,) = yaml.safe_load((tmp_path / 'model.yaml').read_text())['effects']
+    assert entry['joints'] == ['elbow_pitch']
+    assert entry['parameters'][0]['std'] == pytest.approx(0.01)
+    velocity, exponent = entry['shapes']
+    assert (velocity['name'], velocity['value']) == ('stribeck_velocity', 0.05)
+    assert velocity['std'] == pytest.approx(0.02)
+    assert (exponent['value'], exponent['std'], exponent['unit']) == (1.5, None, '')
+
+
+def test_a_file_without_shapes_takes_the_defaults(robot, tmp_path):
+    path = tmp_path / 'model.yaml'
+    effect = make_effect('torque_ripple', robot)
+    save_model(path, ArmModel(robot).with_effect(effect, np.ones(12)), robot.name)
+    document = yaml.safe_load(path.read_text())
+    del document['effects'][0]['shapes']
+    path.write_text(yaml.safe_dump(document))
+    assert load_model(path).effects == (effect,)
+
+
+@pytest.mark.parametrize(
+    ('change', 'message'),
+    [
+        (lambda d: d.update(schema='other'), 'armid/model/1'),
+        (lambda d: d['effects'][0].update(name='stiction'), 'the catalogue has'),
+        (lambda d: d['effects'][0].update(joints=['elbo']), "no joint 'elbo'"),
+        (
+            lambda d: d['effects'][0]['parameters'].pop(),
+            "'stribeck_torque' of joint 'wrist_pitch'",
+        ),
+        (lambda d: d['effects'][0]['shapes'].pop(), "'stribeck_exponent' of joint 'wrist_pitch'"),
+        (lambda d: d['effects'][0]['shapes'][0].update(value=-1.0), 'has to be from'),
+        (lambda d: d.pop('gravity'), 'gravity'),
+    ],
+)
+def test_what_is_wrong_is_named(robot, tmp_path, change, message):
+    path = tmp_path / 'model.yaml'
+    arm = ArmModel(robot).with_effect(make_effect('stribeck_friction', robot), np.ones(6))
+    save_model(path, arm, robot.name)
+    document = yaml.safe_load(path.read_text())
+    change(document)
+    path.write_text(yaml.safe_dump(document))
+    with pytest.raises(ModelError, match=message) as error:
+        load_model(path)
+    assert str(path) in str(error.value)
