@@ -38,7 +38,7 @@ SLICE = {'single': 9, 'free': 20, 'pair': 8, 'outside': 5, 'removed': 10}
 
 
 def nominal_arm(case: Case) -> ArmModel:
-    """Return the model that is given to the diagnosis: rigid bodies and what is known of drives."""
+    """Return what the diagnosis is given: the nominal bodies and what is known of the drives."""
     arm = ArmModel(case.robot)
     for known in case.known:
         effect = CATALOGUE[known.name].on(case.robot, known.joints)

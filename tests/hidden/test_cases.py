@@ -1,0 +1,154 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The cases are what their lists say: sizes, repetition, errors of the nominal model, order."""
+
+from collections import Counter
+from dataclasses import replace
+import json
+
+from armid_ros.recording import read_recording
+import numpy as np
+import pytest
+
+from tests.hidden.cases import make_case, SIZES, write_case
+from tests.hidden.catalogue import CATALOGUED, HIDDEN
+from tests.hidden.sizing import noise_floor
+from tests.hidden.specification import case_list, find_case
+
+DESIGNED = (
+    'viscous_friction coulomb_friction stribeck_friction asymmetric_friction quadratic_friction '
+    'load_dependent_friction presliding_hysteresis thermal_friction coupled_joint_friction '
+    'torque_offset torque_drift torque_gain torque_crosstalk torque_lag time_delay encoder_offset '
+    'rotor_inertia payload link_inertia gravity_magnitude base_tilt joint_elasticity backlash '
+    'torque_ripple joint_spring joint_coupling soft_limit actuator_saturation human_interaction '
+    'interface_slack'
+).split()
+
+
+def test_every_name_of_the_catalogue_is_hidden():
+    assert sorted(CATALOGUED) == sorted(DESIGNED)
+
+
+@pytest.mark.parametrize('name', ['development', 'locked'])
+def test_lists_have_what_was_asked_for(name):
+    cases = case_list(name)
+    kinds = Counter(case.kind for case in cases)
+    assert len({case.key for case in cases}) == len(cases)
+    assert kinds['free'] >= 120
+    assert kinds['pair'] >= 24
+    assert {case.effects[0] for case in cases if case.kind == 'single'} == set(CATALOGUED)
+    assert len({case.effects[0] for case in cases if case.kind == 'outside'}) >= 3
+    free = [case for case in cases if case.kind == 'free']
+    assert 0.4 < np.mean([case.exact for case in free]) < 0.6
+    assert len({case.machine for case in free}) >= 5
+
+
+def test_sets_have_nothing_in_common():
+    seeds = [{case.seed for case in case_list(name)} for name in ('development', 'locked')]
+    assert not seeds[0] & seeds[1]
+
+
+def test_sizes_are_kept_for_every_case():
+    sizes = json.loads(SIZES.read_text())
+    for name in ('development', 'locked'):
+        for case in case_list(name):
+            if case.effects:
+                assert len(sizes[case.sized_as]['effects']) == len(case.effects), case.key
+
+
+@pytest.mark.parametrize(
+    'key',
+    [
+        'development/coulomb_friction/0.5-0',
+        'development/torque_crosstalk/3-0',
+        'development/payload/20-0',
+        'locked/joint_spring/3-0',
+        'locked/quadratic_friction/20-1',
+    ],
+)
+def test_gap_is_of_the_class_asked_for(key):
+    spec = find_case(key)
+    case = make_case(spec)
+    assert spec.gaps[0] / 1.5 < case.size < spec.gaps[0] * 1.5
+    assert case.visible
+    worst = int(np.argmax(case.gap.fixed if case.effects[0].rigid else case.gap.refit))
+    if case.effects[0].joints and not case.effects[0].rigid:
+        assert case.robot.joints[worst] in case.effects[0].joints
+
+
+@pytest.fixture(scope='module')
+def free():
+    """Return an arm with friction and without hidden effects."""
+    spec = next(case for case in case_list('development') if case.kind == 'free' and not case.bare)
+    return make_case(replace(spec, exact=False))
+
+
+def test_without_effects_there_is_no_gap(free):
+    assert free.gap.refit.max() < 0.05
+    assert free.gap.fixed.max() < 0.05
+    assert not free.visible
+
+
+def test_floor_from_repeated_periods_is_that_of_the_truth(free):
+    for bag in free.bags:
+        truth, repeated = noise_floor(free.true_robot, free.true_known, bag.evidence)
+        np.testing.assert_allclose(repeated, truth, rtol=0.3)
+
+
+def test_effects_repeat_or_do_not():
+    for name, changing in (('torque_offset', False), ('torque_drift', True)):
+        case = make_case(find_case(f'development/{name}/20-0'))
+        j = case.robot.index(case.effects[0].joints[0])
+        assert case.effects[0].repeats is not changing
+        for bag in case.bags:
+            first, second = (
+                np.searchsorted(bag.clean.t, start - 1e-9) for start, _ in bag.periods
+            )
+            count = len(bag.clean) - second
+            tau = bag.clean.tau[:, j]
+            period = slice(first, first + count), slice(second, second + count)
+            difference = np.median(np.abs(tau[period[1]] - tau[period[0]]))
+            level = 0.1 * abs(case.effects[0].parameters[0].value)
+            assert bool(difference > level) is changing
+
+
+def test_nominal_model_is_off_where_it_is_not_exact(free):
+    mass = free.robot.rigid_parameters[::10] / free.true_robot.rigid_parameters[::10]
+    assert np.all(np.abs(mass - 1.0) > 0.029)
+    for known in free.known:
+        ratio = known.values / free.true_known[known.name]
+        assert np.all((np.abs(ratio - 1.0) > 0.029) & (np.abs(ratio - 1.0) < 0.101))
+    exact = make_case(replace(free.spec, exact=True))
+    np.testing.assert_array_equal(exact.robot.rigid_parameters, exact.true_robot.rigid_parameters)
+
+
+def test_a_case_is_the_same_every_time(free):
+    again = make_case(free.spec)
+    for one, other in zip(free.bags, again.bags, strict=True):
+        np.testing.assert_array_equal(one.recording.q, other.recording.q)
+        np.testing.assert_array_equal(one.recording.tau, other.recording.tau)
+
+
+def test_known_drives_leave_the_hidden_one_out():
+    case = make_case(find_case('development/viscous_friction/3-0'))
+    hidden = case.effects[0].joints[0]
+    known = {effect.name: effect.joints for effect in case.known}
+    assert hidden not in known.get('viscous_friction', ())
+    assert hidden in known['rotor_inertia']
+
+
+def test_bags_hold_the_recordings(free, tmp_path):
+    write_case(free, tmp_path / 'case')
+    for bag in (*free.bags, *free.validation):
+        read = read_recording(tmp_path / 'case' / bag.speed, joints=free.robot.joints)
+        assert read.joints == bag.recording.joints
+        np.testing.assert_array_equal(read.q, bag.recording.q)
+        np.testing.assert_array_equal(read.tau, bag.recording.tau)
+
+
+def test_scaling_an_effect_keeps_it_in_its_joint():
+    case = make_case(find_case('development/soft_limit/3-0'))
+    larger = case.effects[0].scaled(2.0)
+    assert larger.joints == case.effects[0].joints
+    assert larger.parameters[0].value == 2.0 * case.effects[0].parameters[0].value
+    assert HIDDEN['soft_limit'] is type(larger)

@@ -1,0 +1,148 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Outcomes made up by hand are counted as a person would count them."""
+
+import numpy as np
+import pytest
+
+from tests.hidden.arrays import Parameter
+from tests.hidden.scoring import confusion, Finding, Judged, Outcome, score, Truth, wilson
+
+ELBOW = ('panda_joint4',)
+
+
+def truth(kind='single', names=('coulomb_friction',), **changes):
+    """Return 0.2 N m of Coulomb friction in the elbow, or something else."""
+    parameters = (Parameter('coulomb_torque', ELBOW[0], 0.2, 'N m'),)
+    facts = {
+        'key': 'x',
+        'kind': kind,
+        'machine': 'panda',
+        'exact': True,
+        'names': names,
+        'joints': (ELBOW,) * len(names),
+        'parameters': (parameters,) * len(names),
+        'repeats': True,
+        'size': 3.0,
+        'visible': True,
+    }
+    return Truth(**(facts | changes))
+
+
+def said(verdict, *findings, closed=1.0):
+    """Return an outcome."""
+    return Outcome(verdict, findings, closed=closed, seconds=1.0)
+
+
+def metric(judged, name):
+    """Return a row of the table."""
+    return next(m for m in score(judged) if m.name.strip() == name)
+
+
+RIGHT = Finding('coulomb_friction', ELBOW, (), (('coulomb_torque', ELBOW[0], 0.21, 0.01),))
+AMBIGUOUS = Finding('torque_offset', ELBOW, ('coulomb_friction',))
+WRONG = Finding('joint_spring', ELBOW)
+
+
+def test_names_are_right_ambiguous_or_wrong():
+    judged = [
+        Judged(truth(), said('named', RIGHT)),
+        Judged(truth(), said('ambiguous', AMBIGUOUS)),
+        Judged(truth(), said('named', WRONG, closed=0.2)),
+        Judged(truth(), said('unknown', closed=np.nan)),
+    ]
+    assert metric(judged, 'top-1 name right').value == 0.25
+    assert metric(judged, 'truth among the names').value == 0.5
+    assert metric(judged, 'mean number of names').value == 1.5
+    assert metric(judged, 'wrong names').value == 0.25
+    assert metric(judged, 'nothing found').value == 0.25
+    assert metric(judged, 'gap closed, median').value == pytest.approx(0.6)
+    assert metric(judged, 'parameter error, median').value == pytest.approx(0.05)
+    assert metric(judged, '95 % intervals with the truth').value == 1.0
+
+
+def test_joint_counts_where_the_name_is_right():
+    elsewhere = Finding('coulomb_friction', ('panda_joint1',))
+    judged = [Judged(truth(), said('named', f)) for f in (RIGHT, elsewhere, WRONG)]
+    assert metric(judged, 'joint right').value == 0.5
+    assert metric(judged, 'joint right').count == 2
+    whole = truth(names=('time_delay',), joints=((),))
+    found = said('named', Finding('time_delay'))
+    assert metric([Judged(whole, found)], 'joint right').count == 0
+
+
+def test_false_alarm_is_anything_but_silence():
+    clean = truth('free', (), joints=(), parameters=(), visible=False)
+    off = truth('free', (), joints=(), parameters=(), visible=False, exact=False)
+    bodies = Finding('link_inertia', ELBOW)
+    outcomes = [
+        (clean, said('consistent'), False),
+        (clean, said('named', RIGHT), True),
+        (clean, said('unknown'), True),
+        (clean, said('named', bodies), True),
+        (off, said('named', bodies), False),
+        (off, said('named', bodies, RIGHT), True),
+    ]
+    for what, outcome, alarm in outcomes:
+        assert Judged(what, outcome).false_alarm is alarm
+
+
+def test_pairs_count_when_both_are_named_and_nothing_else():
+    pair = truth('pair', ('coulomb_friction', 'joint_spring'))
+    judged = [
+        Judged(pair, said('named', RIGHT, WRONG)),
+        Judged(pair, said('named', RIGHT)),
+        Judged(pair, said('named', RIGHT, WRONG, AMBIGUOUS)),
+        Judged(pair, said('ambiguous', WRONG, AMBIGUOUS)),
+    ]
+    assert metric(judged, 'pairs exact').value == 0.25
+    assert metric(judged, 'pairs within the sets').value == 0.5
+
+
+def test_unknown_is_admitted_or_not():
+    contact = truth('outside', ('random_contact',), repeats=False)
+    patch = truth('outside', ('dead_patch',))
+    removed = truth('removed')
+    judged = [
+        Judged(contact, said('not_repeatable')),
+        Judged(patch, said('not_repeatable')),
+        Judged(patch, said('unknown')),
+        Judged(removed, said('partial', WRONG)),
+        Judged(removed, said('named', WRONG)),
+    ]
+    assert metric(judged, 'unknown or partial').value == pytest.approx(0.6)
+    assert metric(judged, 'name removed').value == 0.5
+
+
+def test_what_cannot_be_seen_is_not_asked_for():
+    hidden = truth(visible=False)
+    judged = [Judged(hidden, said('consistent')), Judged(truth(), said('named', RIGHT))]
+    assert metric(judged, 'top-1 name right').value == 1.0
+    assert metric(judged, 'top-1 name right').count == 1
+    assert metric(judged, 'silent where nothing shows').value == 1.0
+
+
+def test_intervals_are_those_of_wilson():
+    assert wilson(0, 120) == pytest.approx((0.0, 0.0310), abs=2e-4)
+    assert wilson(150, 156) == pytest.approx((0.9186, 0.9822), abs=2e-3)
+    assert wilson(0, 0) == (0.0, 1.0)
+
+
+def test_reach_is_judged():
+    reached = metric([Judged(truth(), said('named', RIGHT))] * 30, 'top-1 name right')
+    missed = metric([Judged(truth(), said('named', WRONG))] * 30, 'top-1 name right')
+    assert reached.good
+    assert missed.good is False
+
+
+def test_confusion_has_rows_of_what_is_hidden():
+    clean = truth('free', (), joints=(), parameters=(), visible=False)
+    judged = [
+        Judged(truth(), said('named', RIGHT)),
+        Judged(truth(), said('named', WRONG)),
+        Judged(clean, said('consistent')),
+    ]
+    rows, columns, counts = confusion(judged)
+    assert rows == ['coulomb_friction', 'consistent']
+    assert columns == ['coulomb_friction', 'consistent', 'joint_spring']
+    assert counts.tolist() == [[1, 0, 1], [0, 1, 0]]
