@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 from armid_ros.excitation.clearance import ClearanceModel
 from armid_ros.excitation.fourier import fourier_basis
 from armid_ros.excitation.problem import Problem
+from armid_ros.model import inverse_dynamics_derivatives
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
-import pinocchio as pin
 
 #: Distance over which the clearance counts as one unit of a constraint [m].
 _CLEARANCE_UNIT = 0.1
@@ -204,8 +204,8 @@ def torque_with_derivatives(
     """
     Return the torque a motion takes and its derivatives by q, dq and ddq.
 
-    Dry friction counts in full against the limit in either direction, and what else an effect
-    adds is taken as constant in the derivatives.
+    What effects add beside damping and inertia counts against the limit, but is taken as constant
+    in the derivatives.
 
     Returns
     -------
@@ -215,21 +215,13 @@ def torque_with_derivatives(
         [k, j, m]: derivative of the torque of joint j by the motion of joint m.
 
     """
-    action = problem.arm.action()
-    assert action.robot is not None and action.damping is not None and action.inertia is not None
-    model = action.robot.model
-    data = model.createData()
-    count, n = motion.q.shape
-    torque = np.empty((count, n))
-    by_q, by_dq, by_ddq = (np.empty((count, n, n)) for _ in range(3))
-    for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
-        pin.computeRNEADerivatives(model, data, q, dq, ddq)
-        torque[k], by_q[k], by_dq[k], by_ddq[k] = data.tau, data.dtau_dq, data.dtau_dv, data.M
-    by_ddq = np.triu(by_ddq)  # Pinocchio fills the upper triangle
-    by_ddq += np.swapaxes(np.triu(by_ddq, 1), -1, -2)
-    torque += motion.dq @ action.damping.T + motion.ddq @ action.inertia.T
-    if action.torque is not None:
-        torque += action.torque(motion.t, motion.q, motion.dq)
-    if action.dry_friction is not None:
-        torque += action.dry_friction.torque(motion.dq)
-    return torque, by_q, by_dq + action.damping, by_ddq + action.inertia
+    arm = problem.arm
+    action = arm.action()
+    by_q, by_dq, by_ddq = inverse_dynamics_derivatives(arm.body, arm.felt(motion))
+    if arm.quasi_static:
+        by_dq, by_ddq = np.zeros_like(by_dq), np.zeros_like(by_ddq)
+    if action.damping is not None:
+        by_dq = by_dq + action.damping
+    if action.inertia is not None:
+        by_ddq = by_ddq + action.inertia
+    return arm.joint_torque(motion), by_q, by_dq, by_ddq

@@ -32,6 +32,9 @@ CRITERIA = {
 #: p-norm instead, which is at most r^(1/p) beyond them: 1.4-fold for 60 parameters.
 _NORM = 12.0
 
+#: A direction of the parameters, each scaled to unit information, is not seen below this.
+_BLIND = 1e-13
+
 
 @dataclass(frozen=True)
 class Information:
@@ -85,9 +88,10 @@ class Information:
         std = np.full(len(diagonal), np.inf)
         scaled = self.matrix[np.ix_(seen, seen)] / np.outer(diagonal[seen], diagonal[seen])
         values, vectors = np.linalg.eigh(scaled)
-        with np.errstate(divide='ignore', invalid='ignore'):
-            variance = (vectors**2 / np.where(values > 1e-15, values, 0.0)).sum(axis=1)
-        std[seen] = np.sqrt(np.nan_to_num(variance, nan=np.inf)) / diagonal[seen]
+        visible = values > _BLIND
+        variance = (vectors[:, visible] ** 2 / values[visible]).sum(axis=1)
+        blind = (vectors[:, ~visible] ** 2).sum(axis=1) > np.sqrt(_BLIND)
+        std[seen] = np.where(blind, np.inf, np.sqrt(variance)) / diagonal[seen]
         return std
 
 

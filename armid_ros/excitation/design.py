@@ -205,9 +205,10 @@ def evaluate(
     if isinstance(excitation, FourierTrajectory):
         excitation = Excitation(excitation, settings.n_periods, settings.run_in, settings.start)
     trajectory = excitation.trajectory
-    recorded = settings.rate * trajectory.period * excitation.n_periods
-    motion = trajectory.one_period(4 * settings.samples)
-    information = problem.information(motion, recorded)
+    count = 4 * settings.samples
+    w = problem.periodic_columns(trajectory, count)[:, problem.base.independent]
+    weight = settings.rate * trajectory.period * excitation.n_periods / count
+    information = Information(problem.base.parameters, weight * (w.T @ w), problem.scale)
     if prior_information is not None:
         information = replace(information, matrix=information.matrix + prior_information)
     cost = exact_cost(problem, trajectory, prior_information)

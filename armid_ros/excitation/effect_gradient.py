@@ -4,8 +4,8 @@
 Columns of the effects, smooth in the motion, and their gradient in reverse.
 
 The direction of motion, sign(dq), has no gradient; while a search runs it is tanh(dq / width).
-Effects without an entry here are differentiated by finite differences of the coefficients, which
-is right for all of them and slower.
+Effects without an entry here are differentiated by finite differences of the state, where their
+columns depend on nothing else.
 
 """
 
@@ -15,9 +15,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
+from armid_ros.effects.load import Payload
+from armid_ros.excitation.rigid_gradient import RigidRegressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
+
+#: Step of finite differences, of a state of size 1.
+STEP = 1e-6
 
 #: Derivative of a number by the samples q, dq and ddq, each of shape (N, n).
 Gradient = tuple[FloatArray, FloatArray, FloatArray]
@@ -32,14 +38,14 @@ class SmoothColumns:
     ----------
     columns : ndarray, shape (N, n, P)
         Sensitivities with a smooth direction of motion.
-    pullback : callable, or None
-        From derivatives of a number by the columns, shape (N, n, P), to those by the samples;
-        None where it is not known.
+    pullback : callable
+        From derivatives of a number by the columns, shape (N, n, P), to those by the samples, or
+        to those by the Fourier coefficients, shape (n, 1 + 2 H).
 
     """
 
     columns: FloatArray
-    pullback: Callable[[FloatArray], Gradient] | None
+    pullback: Callable[[FloatArray], Gradient | FloatArray]
 
 
 def smooth_columns(effect: Effect, motion: Motion, width: FloatArray) -> SmoothColumns | None:
@@ -58,6 +64,37 @@ def smooth_columns(effect: Effect, motion: Motion, width: FloatArray) -> SmoothC
     """
     rule = _RULES.get(effect.name)
     return None if rule is None else rule(effect, motion, width)
+
+
+def payload_columns(effect: Payload, motion: Motion, rigid: RigidRegressor) -> SmoothColumns:
+    """Return the columns of a payload: those of the link that carries it."""
+    links = effect.indices(motion.joints)
+    pick = np.concatenate([np.arange(10 * link, 10 * link + 10) for link in links])
+
+    def pullback(weights: FloatArray) -> Gradient:
+        spread = np.zeros((*motion.q.shape, 10 * motion.n_joints))
+        spread[:, :, pick] = weights
+        return rigid.pullback(spread)
+
+    return SmoothColumns(rigid.matrix()[:, :, pick], pullback)
+
+
+def columns_by_state(effect: Effect, motion: Motion, arm: ArmModel) -> SmoothColumns:
+    """Return columns that depend on nothing but the state, with finite differences behind them."""
+
+    def pullback(weights: FloatArray) -> Gradient:
+        gradient = np.empty((3, *motion.q.shape))
+        for argument, joint in np.ndindex(3, motion.n_joints):
+            ends = []
+            for sign in (1.0, -1.0):
+                state = np.array([motion.q, motion.dq, motion.ddq])
+                state[argument, :, joint] += sign * STEP
+                ends.append(arm.columns_of(effect, Motion(motion.joints, motion.t, *state)))
+            difference = np.sum(weights * (ends[0] - ends[1]), axis=(1, 2))
+            gradient[argument, :, joint] = difference / (2.0 * STEP)
+        return gradient[0], gradient[1], gradient[2]
+
+    return SmoothColumns(arm.columns_of(effect, motion), pullback)
 
 
 def _diagonal(

@@ -126,7 +126,7 @@ def excitation_faults(
 def _violations(
     arm: ArmModel, limits: Limits, motion: Motion, *, periodic: bool
 ) -> tuple[Violation, ...]:
-    torque = arm.torque(motion) if np.isfinite(limits.torque).any() else None
+    torque = arm.joint_torque(motion) if np.isfinite(limits.torque).any() else None
     widened = Motion(
         motion.joints,
         motion.t,

@@ -9,7 +9,14 @@ from dataclasses import dataclass, field
 from armid_ros.effects import Effect
 from armid_ros.effects.load import Payload
 from armid_ros.excitation.chain import Chain
-from armid_ros.excitation.effect_gradient import smooth_columns, SmoothColumns
+from armid_ros.excitation.effect_gradient import (
+    columns_by_state,
+    Gradient,
+    payload_columns,
+    smooth_columns,
+    SmoothColumns,
+    STEP,
+)
 from armid_ros.excitation.fourier import fourier_basis
 from armid_ros.excitation.problem import Problem
 from armid_ros.excitation.rigid_gradient import RigidRegressor
@@ -19,9 +26,8 @@ import numpy as np
 #: The direction of motion is blurred below this share of a joint's velocity limit.
 _BLUR = 0.05
 
-#: Step of the finite differences of effects without a known gradient, as a share of the
-#: coefficients' size.
-_STEP = 1e-6
+#: Samples before and after the period for columns that depend on the motion around a sample.
+_MARGIN = 8
 
 
 @dataclass(frozen=True)
@@ -41,6 +47,8 @@ class Objective:
         Sample times [s].
     basis : tuple of ndarray, each of shape (N, 1 + 2 H)
         q, dq and ddq per coefficient.
+    wide : tuple of ndarray
+        Times and basis with some samples more before and after the period.
     width : ndarray, shape (n,)
         Velocity below which the direction of motion is blurred [rad/s or m/s].
 
@@ -51,6 +59,7 @@ class Objective:
     chain: Chain
     t: FloatArray
     basis: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
+    wide: tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]] = field(repr=False)
     width: FloatArray
 
     @classmethod
@@ -60,8 +69,10 @@ class Objective:
         t: FloatArray = np.linspace(0.0, settings.period, settings.samples, endpoint=False)
         velocity = problem.limits.velocity
         width = _BLUR * np.where(np.isfinite(velocity), velocity, 1.0)
-        basis = fourier_basis(t, settings.period, settings.harmonics)
-        return cls(problem, prior, Chain.of(problem.arm.robot), t, basis, width)
+        wide: FloatArray = np.arange(-_MARGIN, settings.samples + _MARGIN) * t[1]
+        bases = [fourier_basis(u, settings.period, settings.harmonics) for u in (t, wide)]
+        chain = Chain.of(problem.arm.body)
+        return cls(problem, prior, chain, t, bases[0], (wide, bases[1]), width)
 
     def motion(self, x: FloatArray) -> Motion:
         """Return the samples of coefficients X."""
@@ -85,16 +96,14 @@ class Objective:
 
         """
         problem, motion = self.problem, self.motion(x)
-        target, rest = problem.settings.target, np.zeros_like(motion.q)
-        still = target == 'gravity'
-        rigid = RigidRegressor.of(
-            self.chain, motion.q, rest if still else motion.dq, rest if still else motion.ddq
-        )
-        blocks = [np.zeros((*motion.q.shape, 10 * self.chain.n_joints))]
-        if target != 'effects':
-            blocks[0] = rigid.matrix()
-        effects = [(e, self._effect(e, motion, rigid)) for e in problem.arm.effects]
-        columns = np.concatenate([*blocks, *(c.columns for _, c in effects)], axis=2)
+        still = problem.settings.target == 'gravity' or problem.arm.quasi_static
+        felt = motion.at_rest() if still else motion
+        rigid = RigidRegressor.of(self.chain, felt.q, felt.dq, felt.ddq)
+        body = rigid.matrix()
+        if problem.settings.target == 'effects':
+            body = np.zeros_like(body)
+        effects = [self._effect(effect, motion, x) for effect in problem.arm.effects]
+        columns = np.concatenate([body, *(effect.columns for effect in effects)], axis=2)
         inverse_noise = (1.0 / problem.noise)[:, np.newaxis]
         w = (columns[:, :, problem.selected] * inverse_noise).reshape(-1, len(problem.selected))
         settings = problem.settings
@@ -106,11 +115,10 @@ class Objective:
         weights = np.zeros_like(columns)
         by_w = (2.0 * weight * (w @ by_matrix)).reshape(*motion.q.shape, -1)
         weights[:, :, problem.selected] = by_w * inverse_noise
-        return cost, self._gradient(x, weights, rigid, [c for _, c in effects], still)
+        return cost, self._gradient(weights, rigid, effects, still)
 
     def _gradient(
         self,
-        x: FloatArray,
         weights: FloatArray,
         rigid: RigidRegressor,
         effects: list[SmoothColumns],
@@ -118,61 +126,56 @@ class Objective:
     ) -> FloatArray:
         """Chain derivatives by the columns, shape (N, n, P), to those by the coefficients."""
         size = 10 * self.chain.n_joints
-        by_state = [np.zeros(weights.shape[:2]) for _ in range(3)]
+        total = np.zeros((weights.shape[1], self.basis[0].shape[1]))
         if self.problem.settings.target != 'effects':
-            parts = rigid.pullback(weights[:, :, :size])
-            by_state = [parts[0], *(0.0 * part if still else part for part in parts[1:])]
-        unknown: list[tuple[Effect, FloatArray]] = []
+            by_q, by_dq, by_ddq = rigid.pullback(weights[:, :, :size])
+            total += self._chained(
+                (by_q, 0.0 * by_dq, 0.0 * by_ddq) if still else (by_q, by_dq, by_ddq)
+            )
         start = size
-        for effect, smooth in zip(self.problem.arm.effects, effects, strict=True):
-            stop = start + smooth.columns.shape[2]
-            part = weights[:, :, start:stop]
-            if smooth.pullback is None:
-                unknown.append((effect, part))
-            else:
-                for total, addition in zip(by_state, smooth.pullback(part), strict=True):
-                    total += addition
+        for effect in effects:
+            stop = start + effect.columns.shape[2]
+            part = effect.pullback(weights[:, :, start:stop])
+            total += self._chained(part) if isinstance(part, tuple) else part
             start = stop
-        gradient = sum(
-            (total.T @ basis for total, basis in zip(by_state, self.basis, strict=True)),
-            np.zeros_like(x),
-        )
-        for effect, part in unknown:
-            gradient = gradient + self._difference(x, effect, part)
-        return np.asarray(gradient)
+        return total
 
-    def _effect(self, effect: Effect, motion: Motion, rigid: RigidRegressor) -> SmoothColumns:
-        if isinstance(effect, Payload):
-            if self.problem.settings.target == 'gravity':
-                rigid = RigidRegressor.of(self.chain, motion.q, motion.dq, motion.ddq)
-            return _payload(effect, motion, rigid)
-        return smooth_columns(effect, motion, self.width) or SmoothColumns(
-            effect.columns(motion, self.problem.arm), None
-        )
+    def _chained(self, by_state: Gradient) -> FloatArray:
+        parts = [by.T @ basis for by, basis in zip(by_state, self.basis, strict=True)]
+        return np.asarray(sum(parts))
 
-    def _difference(self, x: FloatArray, effect: Effect, weights: FloatArray) -> FloatArray:
-        """Differentiate sum(weights * columns) by the coefficients, by central differences."""
-        gradient = np.empty_like(x)
+    def _effect(self, effect: Effect, motion: Motion, x: FloatArray) -> SmoothColumns:
         arm = self.problem.arm
-        for index in np.ndindex(*x.shape):
-            step = _STEP * max(1.0, abs(float(x[index])))
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = x.copy()
-                moved[index] += sign * step
-                ends.append(float(np.sum(weights * effect.columns(self.motion(moved), arm))))
-            gradient[index] = (ends[0] - ends[1]) / (2.0 * step)
-        return gradient
+        if isinstance(effect, Payload):
+            felt = arm.felt(motion)
+            return payload_columns(
+                effect, motion, RigidRegressor.of(self.chain, felt.q, felt.dq, felt.ddq)
+            )
+        known = smooth_columns(effect, motion, self.width)
+        if known is not None:
+            return known
+        if effect.instantaneous:
+            return columns_by_state(effect, motion, arm)
+        return self._columns_by_coefficient(effect, x)
 
+    def _columns_by_coefficient(self, effect: Effect, x: FloatArray) -> SmoothColumns:
+        """Return columns that depend on the motion's past, with finite differences behind them."""
+        joints, (times, basis) = self.problem.limits.joints, self.wide
 
-def _payload(effect: Payload, motion: Motion, rigid: RigidRegressor) -> SmoothColumns:
-    """Columns of a payload: those of the link that carries it."""
-    links = effect.indices(motion.joints)
-    pick = np.concatenate([np.arange(10 * link, 10 * link + 10) for link in links])
+        def columns(y: FloatArray) -> FloatArray:
+            motion = Motion(joints, times, *(b @ y.T for b in basis))
+            return self.problem.arm.columns_of(effect, motion)[_MARGIN:-_MARGIN]
 
-    def pullback(weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        spread = np.zeros((*motion.q.shape, 10 * motion.n_joints))
-        spread[:, :, pick] = weights
-        return rigid.pullback(spread)
+        def pullback(weights: FloatArray) -> FloatArray:
+            gradient = np.empty_like(x)
+            for index in np.ndindex(*x.shape):
+                step = STEP * max(1.0, abs(float(x[index])))
+                ends = []
+                for sign in (1.0, -1.0):
+                    moved = x.copy()
+                    moved[index] += sign * step
+                    ends.append(float(np.sum(weights * columns(moved))))
+                gradient[index] = (ends[0] - ends[1]) / (2.0 * step)
+            return gradient
 
-    return SmoothColumns(rigid.matrix()[:, :, pick], pullback)
+        return SmoothColumns(columns(x), pullback)

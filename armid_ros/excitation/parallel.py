@@ -82,6 +82,8 @@ def search_all(
     ------
     TrajectoryError
         If no search finds anything feasible.
+    ChildProcessError
+        If a process dies.
     KeyboardInterrupt
         If interrupted before anything was found.
 
@@ -99,9 +101,8 @@ def search_all(
             raise
         stopped = 'interrupted'
     if board.best is None:
-        raise TrajectoryError(
-            f'nothing feasible within the time budget of {task.problem.settings.time_budget:g} s'
-        )
+        budget = task.problem.settings.time_budget
+        raise TrajectoryError(f'nothing was found within the time budget of {budget:g} s')
     return Outcome(board.best, stopped)
 
 
@@ -177,6 +178,10 @@ def _in_processes(
                     worker.join()
                     del running[connection]
                     connection.close()
+                    if worker.exitcode:
+                        raise ChildProcessError(
+                            f'search {number + 1} ended with code {worker.exitcode}, unfinished'
+                        ) from None
                     continue
                 if isinstance(message, Exception):
                     raise message

@@ -80,7 +80,7 @@ def _require_start(problem: Problem, clearance: ClearanceModel | None) -> None:
         )
     rest = np.zeros((1, len(start)))
     motion = Motion(limits.joints, np.zeros(1), start[np.newaxis], rest, rest)
-    violations = check_limits(limits, motion, problem.arm.torque(motion))
+    violations = check_limits(limits, motion, problem.arm.joint_torque(motion))
     if violations:
         raise TrajectoryError('start pose: ' + '; '.join(map(str, violations)))
     nearest = None if clearance is None else clearance.closest(motion)

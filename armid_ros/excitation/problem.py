@@ -16,12 +16,16 @@ from armid_ros.excitation.criteria import (
     SpectralCriterion,
     SubsetCriterion,
 )
+from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.settings import DesignSettings
-from armid_ros.model import BaseParameters, group_columns, random_motion, regressor
+from armid_ros.model import BaseParameters, group_columns, random_motion
 from armid_ros.motion import FloatArray, Motion, read_only
 import numpy as np
 import numpy.typing as npt
+
+#: Samples before and after a period that columns may depend on.
+_MARGIN = 8
 
 #: Share of the torque limit that a sensor's noise is taken to be when nothing is known of it.
 NOISE_SHARE = 0.01
@@ -116,6 +120,13 @@ class Problem:
         columns = target_columns(self.arm, self.settings.target, motion)
         return (columns / self.noise[:, np.newaxis]).reshape(-1, columns.shape[-1])
 
+    def periodic_columns(self, trajectory: FourierTrajectory, n_samples: int) -> FloatArray:
+        """Return the weighted columns of one period, shape (N n, P), of a motion without ends."""
+        step = trajectory.period / n_samples
+        motion = trajectory.motion(np.arange(-_MARGIN, n_samples + _MARGIN) * step)
+        rows = self.columns(motion).reshape(len(motion), -1)[_MARGIN : _MARGIN + n_samples]
+        return rows.reshape(n_samples * trajectory.n_joints, -1)
+
     def weighted_regressor(self, motion: Motion) -> FloatArray:
         """Return W, shape (N n, r): the base parameters, rows divided by the noise."""
         return self.columns(motion)[:, self.base.independent]
@@ -150,11 +161,9 @@ def target_columns(arm: ArmModel, target: str, motion: Motion) -> FloatArray:
     effects = arm.effect_columns(motion)
     if target == 'effects':
         rigid = np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters)))
-    elif target == 'gravity':
-        rest = np.zeros_like(motion.q)
-        rigid = regressor(arm.robot, Motion(motion.joints, motion.t, motion.q, rest, rest))
     else:
-        rigid = regressor(arm.robot, motion)
+        still = replace(arm, quasi_static=True) if target == 'gravity' else arm
+        rigid = still.rigid_columns(motion)
     return np.concatenate([rigid, effects], axis=2)
 
 

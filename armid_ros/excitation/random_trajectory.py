@@ -110,7 +110,7 @@ def feasible_pose(
     q = rng.uniform(lower, upper, (_POSES, len(lower)))
     rest = np.zeros_like(q)
     motion = Motion(limits.joints, np.arange(_POSES, dtype=float), q, rest, rest)
-    load = np.abs(arm.torque(motion)) / limits.torque
+    load = np.abs(arm.joint_torque(motion)) / limits.torque
     for j in np.flatnonzero(load.min(axis=0) > 1.0):
         least = float(load[:, j].min() * limits.torque[j])
         raise TrajectoryError(

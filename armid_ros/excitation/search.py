@@ -146,9 +146,9 @@ def search(
 def exact_cost(problem: Problem, trajectory: FourierTrajectory, prior: FloatArray | None) -> float:
     """Return the cost with the true direction of motion and many samples."""
     settings = problem.settings
-    motion = trajectory.one_period(4 * settings.samples)
-    w = problem.columns(motion)[:, problem.selected]
-    weight = settings.rate * settings.period * settings.n_periods / len(motion)
+    count = 4 * settings.samples
+    w = problem.periodic_columns(trajectory, count)[:, problem.selected]
+    weight = settings.rate * settings.period * settings.n_periods / count
     matrix = weight * (w.T @ w)
     return problem.criterion.cost(matrix if prior is None else matrix + prior)
 
@@ -323,7 +323,7 @@ def _faulty_times(
     """Return the times at which torque or clearance is worst between the samples of the solver."""
     motion = trajectory.one_period(_CHECK * trajectory.harmonics)
     limits = problem.limits
-    excess = (np.abs(problem.arm.torque(motion)) / limits.torque).max(axis=1) - 1.0
+    excess = (np.abs(problem.arm.joint_torque(motion)) / limits.torque).max(axis=1) - 1.0
     if clearance is not None:
         near = clearance.near(motion.q, margin)
         lack = np.zeros(len(motion))

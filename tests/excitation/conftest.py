@@ -1,0 +1,112 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Small arms and problems for the excitation tests."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.excitation import DesignSettings
+from armid_ros.robots import collision_model, load_robot, robot_from_urdf
+import pytest
+
+_LINK = (
+    '<link name="{name}"><inertial><origin xyz="0.05 0.02 0.1"/><mass value="{mass}"/>'
+    '<inertia ixx="0.02" ixy="0.001" ixz="0" iyy="0.03" iyz="0.002" izz="0.01"/></inertial>'
+    '<collision><origin xyz="0 0 0.15"/><geometry><cylinder radius="0.04" length="0.3"/>'
+    '</geometry></collision></link>'
+)
+_JOINT = (
+    '<joint name="{name}" type="{kind}"><origin xyz="{xyz}" rpy="0.1 {pitch} 0"/>'
+    '<parent link="{parent}"/><child link="{child}"/><axis xyz="{axis}"/>'
+    '<limit lower="{lower}" upper="{upper}" velocity="2" effort="{effort}"/></joint>'
+)
+
+
+def urdf(*joints, name='small'):
+    """Write a URDF of (name, kind, parent, child, xyz, axis, lower, upper, effort) joints."""
+    parts = ['<link name="base"/>']
+    for joint, kind, parent, child, xyz, axis, lower, upper, effort in joints:
+        parts.append(_LINK.format(name=child, mass=1.5))
+        parts.append(
+            _JOINT.format(
+                name=joint,
+                kind=kind,
+                xyz=xyz,
+                pitch=0.3,
+                parent=parent,
+                child=child,
+                axis=axis,
+                lower=lower,
+                upper=upper,
+                effort=effort,
+            )
+        )
+    return f'<robot name="{name}">{"".join(parts)}</robot>'
+
+
+@pytest.fixture(scope='session')
+def tree():
+    """Make a slide that carries two chains of revolute joints, one of a single joint."""
+    return robot_from_urdf(
+        urdf(
+            ('slide', 'prismatic', 'base', 'cart', '0 0 0.5', '0 1 0', -0.5, 0.5, 200),
+            ('left', 'revolute', 'cart', 'left_arm', '0 0.3 0', '1 0 0', -2, 2, 40),
+            ('left_elbow', 'revolute', 'left_arm', 'left_hand', '0 0 0.4', '0 1 1', -2, 2, 30),
+            ('right', 'revolute', 'cart', 'right_arm', '0 -0.3 0', '0.3 1 0', -2, 2, 40),
+        )
+    )
+
+
+@pytest.fixture(scope='session')
+def two_link():
+    """Make an arm of two joints."""
+    return robot_from_urdf(
+        urdf(
+            ('shoulder', 'revolute', 'base', 'upper', '0 0 0.5', '0 1 0', -2.5, 2.5, 60),
+            ('elbow', 'revolute', 'upper', 'lower', '0 0 0.4', '1 0 0', -2.5, 2.5, 30),
+        )
+    )
+
+
+@pytest.fixture(scope='session')
+def with_effects():
+    """Return a function that makes an arm of a robot and names of effects."""
+
+    def build(robot, *names):
+        arm = ArmModel(robot)
+        for name in names:
+            arm = arm.with_effect(make_effect(name, robot))
+        return arm
+
+    return build
+
+
+@pytest.fixture(scope='session')
+def two_link_arm(two_link, with_effects):
+    """Return the two-link arm with friction."""
+    return with_effects(two_link, 'viscous_friction', 'coulomb_friction')
+
+
+@pytest.fixture(scope='session')
+def humanoid():
+    """Load the shipped arm."""
+    return load_robot('humanoid_arm')
+
+
+@pytest.fixture(scope='session')
+def humanoid_collision(humanoid):
+    """Return its collision bodies."""
+    return collision_model(humanoid)
+
+
+@pytest.fixture(scope='session')
+def quick():
+    """Return settings of a design that takes a second."""
+    return DesignSettings(
+        period=6.0,
+        harmonics=3,
+        samples=40,
+        starts=2,
+        candidates=3,
+        iterations=30,
+        processes=1,
+    )

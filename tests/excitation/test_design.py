@@ -1,0 +1,281 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Designs: better than chance, inside every limit, the same for the same seed."""
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation import (
+    check_limits,
+    ClearanceModel,
+    design,
+    design_speeds,
+    evaluate,
+    Limits,
+    Obstacle,
+    Problem,
+    random_feasible,
+)
+from armid_ros.excitation.parallel import search_all, Task
+from armid_ros.robots import collision_model
+import numpy as np
+import pytest
+
+
+def coefficients(result):
+    trajectory = result.excitation.trajectory
+    return np.column_stack([trajectory.q0, trajectory.a, trajectory.b])
+
+
+@pytest.fixture(scope='module')
+def humanoid_design(humanoid, humanoid_collision, with_effects, quick):
+    arm = with_effects(humanoid, 'viscous_friction', 'coulomb_friction')
+    settings = replace(quick, period=10.0, starts=1, iterations=40)
+    rng = np.random.default_rng(0)
+    return arm, design(arm, settings, rng, collision=humanoid_collision)
+
+
+def test_design_beats_a_hundred_random_trajectories(two_link_arm, quick):
+    rng = np.random.default_rng(1)
+    problem = Problem.of(two_link_arm, quick, rng)
+    chance = [
+        evaluate(problem, random_feasible(two_link_arm, problem.limits, 6.0, 3, rng))
+        for _ in range(100)
+    ]
+    result = design(two_link_arm, quick, np.random.default_rng(2))
+    assert result.cost < min(one.cost for one in chance)
+    assert result.information.log_det > max(one.information.log_det for one in chance)
+
+
+@pytest.mark.parametrize('criterion', ['A', 'E', 'condition'])
+def test_every_criterion_improves_what_it_is_for(two_link_arm, quick, criterion):
+    settings = replace(quick, criterion=criterion, starts=1)
+    rng = np.random.default_rng(1)
+    problem = Problem.of(two_link_arm, settings, rng)
+    chance = [
+        evaluate(problem, random_feasible(two_link_arm, problem.limits, 6.0, 3, rng)).cost
+        for _ in range(30)
+    ]
+    assert design(two_link_arm, settings, np.random.default_rng(2)).cost < min(chance)
+
+
+def test_design_keeps_every_limit_at_ten_times_the_samples(humanoid_design, humanoid_collision):
+    arm, result = humanoid_design
+    rate = 10.0 * result.settings.samples / result.settings.period
+    motion = result.excitation.motion(max(rate, 1000.0))
+    assert check_limits(result.limits, motion, arm.torque(motion)) == ()
+    margin = result.settings.clearance
+    assert ClearanceModel.of(humanoid_collision).smallest(motion.q).min() >= margin
+
+
+def test_design_uses_the_room_it_has(humanoid_design):
+    _, result = humanoid_design
+    motion = result.excitation.trajectory.one_period(1000)
+    used = np.maximum(
+        np.abs(motion.dq).max(axis=0) / result.limits.velocity,
+        np.abs(motion.ddq).max(axis=0) / result.limits.acceleration,
+    )
+    assert used.max() > 0.9
+
+
+def test_predicted_deviations_are_the_scatter_of_repeats(humanoid_design):
+    arm, result = humanoid_design
+    rng = np.random.default_rng(3)
+    settings = replace(result.settings, rate=20.0)
+    problem = Problem.of(arm, settings, rng)
+    predicted = evaluate(problem, result.excitation).information.std
+    run = result.excitation.motion(20.0)
+    slices = result.excitation.period_slices(20.0)
+    motion = run.select(slice(slices[0].start, slices[-1].stop))
+    w = problem.weighted_regressor(motion)
+    inverse = np.linalg.pinv(w)
+    scatter = (inverse @ rng.normal(size=(len(w), 400))).std(axis=1)
+    np.testing.assert_allclose(predicted, scatter, rtol=0.2)
+
+
+def test_same_seed_same_trajectory_in_one_process_or_in_two(two_link_arm, quick):
+    here, again, spread = (
+        design(two_link_arm, replace(quick, processes=p), np.random.default_rng(7))
+        for p in (1, 1, 2)
+    )
+    np.testing.assert_array_equal(coefficients(here), coefficients(again))
+    np.testing.assert_allclose(coefficients(here), coefficients(spread), atol=1e-6)
+    other = design(two_link_arm, quick, np.random.default_rng(8))
+    assert np.abs(coefficients(here) - coefficients(other)).max() > 1e-3
+
+
+def test_interrupt_keeps_the_best_so_far(two_link_arm, quick):
+    seen = []
+
+    def interrupt(progress):
+        seen.append(progress)
+        if len(seen) == 10:
+            raise KeyboardInterrupt
+
+    result = design(two_link_arm, quick, np.random.default_rng(0), progress=interrupt)
+    assert result.stopped == 'interrupted'
+    assert result.cost == pytest.approx(seen[-1].cost, abs=0.05)
+    motion = result.excitation.motion(500.0)
+    assert check_limits(result.limits, motion, two_link_arm.torque(motion)) == ()
+
+
+@pytest.mark.parametrize('processes', [1, 2])
+def test_time_budget_ends_the_search_with_the_best_so_far(two_link_arm, quick, processes):
+    steps = []
+    settings = replace(quick, time_budget=5.5, processes=processes, iterations=100000)
+    result = design(
+        two_link_arm,
+        settings,
+        np.random.default_rng(0),
+        progress=steps.append,
+        clock=lambda: float(len(steps)),
+    )
+    assert result.stopped == 'time budget'
+    assert np.isfinite(result.cost)
+
+
+def test_progress_grows_to_one_and_cost_only_falls(two_link_arm, quick):
+    steps = []
+    result = design(two_link_arm, quick, np.random.default_rng(0), progress=steps.append)
+    done, costs = [s.done for s in steps], [s.cost for s in steps]
+    assert done == sorted(done)
+    assert done[-1] == 1.0
+    assert costs == sorted(costs, reverse=True)
+    assert result.stopped == ''
+    assert result.cost == pytest.approx(costs[-1], abs=0.05)
+
+
+def test_error_in_a_process_of_its_own_is_raised_here(two_link_arm, quick):
+    problem = Problem.of(two_link_arm, replace(quick, processes=2), np.random.default_rng(0))
+    weak = replace(
+        problem.limits,
+        lower=np.array([1.2, -0.1]),
+        upper=np.array([1.4, 0.1]),
+        torque=np.array([2.0, 90.0]),
+    )
+    task = Task(replace(problem, limits=weak), None, None)
+    rngs = np.random.default_rng(0).spawn(2)
+    with pytest.raises(TrajectoryError, match='joint shoulder: torque limit 2 N m'):
+        search_all(task, rngs, lambda done, found: None, lambda: 0.0)
+
+
+def test_speed_classes_come_from_one_call(two_link_arm, quick):
+    settings = replace(quick, starts=1, iterations=10)
+    designs = design_speeds(two_link_arm, settings, np.random.default_rng(0))
+    assert list(designs) == ['slow', 'medium', 'fast']
+    fastest = [
+        np.abs(d.excitation.trajectory.one_period(500).dq / d.limits.velocity).max()
+        for d in designs.values()
+    ]
+    assert max(fastest) <= 1.0
+    log_dets = [d.information.log_det for d in designs.values()]
+    assert log_dets == sorted(log_dets)
+
+
+def test_design_after_a_recording_adds_what_it_lacks(two_link_arm, quick):
+    """The first run holds the elbow still; what is added is about the elbow."""
+    rng = np.random.default_rng(0)
+    problem = Problem.of(two_link_arm, quick, rng)
+    first = random_feasible(two_link_arm, problem.limits, 6.0, 3, rng).scaled([1.0, 1e-3])
+    known = evaluate(problem, first).information.matrix
+    blind = design(two_link_arm, quick, np.random.default_rng(1))
+    after = design(two_link_arm, quick, np.random.default_rng(1), prior_information=known)
+    together = evaluate(problem, blind.excitation, known)
+    assert after.cost <= together.cost + 1e-6
+    assert after.information.log_det > blind.information.log_det
+    with pytest.raises(TrajectoryError, match='prior information'):
+        design(two_link_arm, quick, rng, prior_information=np.eye(3))
+
+
+def test_focus_sees_its_parameters_better(two_link_arm, quick):
+    rng = np.random.default_rng(0)
+    plain = design(two_link_arm, replace(quick, balance=0.0), rng)
+    focus = replace(quick, focus=('coulomb_friction',))
+    focused = design(two_link_arm, focus, rng)
+
+    def deviations(result):
+        names = [p.name for p in result.information.parameters]
+        rows = [i for i, name in enumerate(names) if name.startswith('coulomb')]
+        return result.information.std[rows]
+
+    assert np.prod(deviations(focused)) < np.prod(deviations(plain))
+
+
+def test_design_against_a_rival_leaves_it_more_to_explain(two_link, with_effects, quick):
+    """Friction that grows with speed against friction that does not."""
+    arm = ArmModel(two_link).with_effect(make_effect('viscous_friction', two_link), [0.5, 0.3])
+    rival = with_effects(two_link, 'coulomb_friction')
+    settings = replace(quick, criterion='T', starts=1)
+    rng = np.random.default_rng(0)
+    problem = Problem.of(arm, settings, rng, rival)
+    chance = [
+        evaluate(problem, random_feasible(arm, problem.limits, 6.0, 3, rng)).cost
+        for _ in range(20)
+    ]
+    result = design(arm, settings, rng, rival=rival)
+    assert result.cost < min(chance)
+    motion = result.excitation.trajectory.one_period(160)
+    weight = 1.0 / problem.noise[:, np.newaxis]
+    w = (rival.columns(motion) * weight).reshape(-1, len(rival.parameters))
+    torque = (arm.torque(motion) * weight[:, 0]).reshape(-1)
+    left = torque - w @ np.linalg.lstsq(w, torque, rcond=1e-12)[0]
+    recorded = settings.rate * settings.period * settings.n_periods / 160
+    assert result.cost == pytest.approx(-np.log(recorded * left @ left), abs=0.05)
+
+
+def test_run_starts_and_ends_in_the_start_pose(humanoid, humanoid_collision, with_effects, quick):
+    start = np.array([0.5, -0.8, 0.2, 0.6, 0.0, 0.0])
+    arm = with_effects(humanoid)
+    settings = replace(quick, start=start, starts=1, iterations=5, target='gravity')
+    result = design(arm, settings, np.random.default_rng(0), collision=humanoid_collision)
+    motion = result.excitation.motion(500.0)
+    np.testing.assert_allclose(motion.q[[0, -1]], [start, start], atol=1e-12)
+    assert check_limits(result.limits, motion, arm.torque(motion)) == ()
+    assert humanoid_collision.path_clearance(motion.q).min() >= settings.clearance
+
+
+@pytest.mark.parametrize(
+    ('start', 'message'),
+    [
+        (np.full(6, 9.0), 'start pose: joint shoulder_pitch: upper position'),
+        (np.zeros(2), '6 positions are needed, for shoulder_pitch'),
+    ],
+)
+def test_impossible_start_pose_is_refused(humanoid, with_effects, quick, start, message):
+    settings = replace(quick, start=start, starts=1, iterations=1, target='gravity')
+    with pytest.raises(TrajectoryError, match=message):
+        design(with_effects(humanoid), settings, np.random.default_rng(0))
+
+
+def test_start_pose_in_a_wall_is_refused_with_the_wall(two_link_arm, quick):
+    settings = replace(quick, start=np.zeros(2), starts=1, iterations=1)
+    wall = Obstacle('wall', 'sphere', (0.3,), (0.3, 0.0, 1.0))
+    with pytest.raises(TrajectoryError, match=r'start pose: .* wall are -'):
+        design(
+            two_link_arm,
+            settings,
+            np.random.default_rng(0),
+            collision=collision_model(two_link_arm.robot),
+            obstacles=[wall],
+        )
+
+
+def test_obstacles_without_bodies_are_refused(two_link_arm, quick):
+    with pytest.raises(TrajectoryError, match="obstacle 'wall'"):
+        design(
+            two_link_arm,
+            quick,
+            np.random.default_rng(0),
+            obstacles=[Obstacle('wall', 'sphere', (0.3,))],
+        )
+
+
+def test_own_limits_are_kept_in_place_of_the_robots(two_link_arm, quick):
+    limits = replace(Limits.of(two_link_arm.robot), velocity=np.array([0.3, 0.2]))
+    settings = replace(quick, limits=limits, starts=1)
+    result = design(two_link_arm, settings, np.random.default_rng(0))
+    speed = np.abs(result.excitation.motion(500.0).dq).max(axis=0)
+    assert np.all(speed <= limits.velocity)
+    assert np.all(speed > 0.5 * limits.velocity)

@@ -1,0 +1,166 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Analytic gradients against finite differences, and the fast regressor against Pinocchio's."""
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.excitation import DesignSettings, Problem
+from armid_ros.excitation.chain import Chain
+from armid_ros.excitation.clearance import ClearanceModel
+from armid_ros.excitation.constraints import Constraints
+from armid_ros.excitation.objective import Objective
+from armid_ros.excitation.random_trajectory import random_feasible
+from armid_ros.excitation.rigid_gradient import RigidRegressor
+from armid_ros.model import random_motion, regressor
+import numpy as np
+import pytest
+
+ROBOTS = pytest.mark.parametrize('name', ['tree', 'humanoid'])
+
+
+def central(function, x, direction, step=1e-6):
+    """Differentiate along a direction."""
+    ahead, behind = function(x + step * direction), function(x - step * direction)
+    return (np.asarray(ahead) - np.asarray(behind)) / (2.0 * step)
+
+
+def coefficients(problem, rng):
+    settings = problem.settings
+    trajectory = random_feasible(
+        problem.arm, problem.limits, settings.period, settings.harmonics, rng
+    )
+    return np.column_stack([trajectory.q0, trajectory.a, trajectory.b])
+
+
+@ROBOTS
+def test_regressor_is_pinocchios(name, request):
+    robot = request.getfixturevalue(name)
+    motion = random_motion(robot, 20, np.random.default_rng(1))
+    ours = RigidRegressor.of(Chain.of(robot), motion.q, motion.dq, motion.ddq).matrix()
+    np.testing.assert_allclose(ours, regressor(robot, motion), atol=1e-11)
+
+
+@ROBOTS
+@pytest.mark.parametrize('argument', range(3), ids=['q', 'dq', 'ddq'])
+def test_pullback_of_the_regressor_is_its_derivative(name, argument, request):
+    robot = request.getfixturevalue(name)
+    rng = np.random.default_rng(2)
+    motion, chain = random_motion(robot, 5, rng), Chain.of(robot)
+    weights = rng.normal(size=(5, robot.n_joints, 10 * robot.n_joints))
+    states = [motion.q, motion.dq, motion.ddq]
+    analytic = RigidRegressor.of(chain, *states).pullback(weights)[argument]
+
+    def number(values):
+        moved = [*states[:argument], values, *states[argument + 1 :]]
+        return np.sum(weights * RigidRegressor.of(chain, *moved).matrix(), axis=(1, 2))
+
+    for joint in range(robot.n_joints):
+        direction = np.eye(robot.n_joints)[joint]
+        numeric = central(number, states[argument], direction)
+        np.testing.assert_allclose(analytic[:, joint], numeric, atol=1e-6)
+
+
+EFFECTS = {
+    'none': (),
+    'friction': ('viscous_friction', 'coulomb_friction', 'torque_offset', 'asymmetric_friction'),
+    'drive': ('rotor_inertia', 'coupled_joint_friction'),
+    'gravity': ('base_tilt',),
+    'state': ('stribeck_friction', 'torque_ripple'),
+    'history': ('time_delay',),
+}
+
+
+@pytest.mark.parametrize('effects', EFFECTS.values(), ids=EFFECTS.keys())
+@pytest.mark.parametrize('criterion', ['D', 'A', 'E', 'condition'])
+def test_gradient_of_each_criterion(tree, with_effects, criterion, effects):
+    settings = DesignSettings(period=5.0, harmonics=2, samples=40, criterion=criterion)
+    arm = with_effects(tree, *effects)
+    problem = Problem.of(arm, settings, np.random.default_rng(3))
+    assert_gradient(Objective.of(problem), problem)
+
+
+@pytest.mark.parametrize(
+    ('target', 'effects'),
+    [
+        ('gravity', ()),
+        ('gravity', ('coulomb_friction', 'payload')),
+        ('effects', ('payload', 'viscous_friction')),
+    ],
+)
+def test_gradient_of_each_target(humanoid, with_effects, target, effects):
+    settings = DesignSettings(period=5.0, harmonics=2, samples=40, target=target)
+    problem = Problem.of(with_effects(humanoid, *effects), settings, np.random.default_rng(3))
+    assert_gradient(Objective.of(problem), problem)
+
+
+def test_gradient_of_a_subset(two_link_arm):
+    settings = DesignSettings(period=5.0, harmonics=2, samples=40, focus=('coulomb_friction',))
+    problem = Problem.of(two_link_arm, settings, np.random.default_rng(3))
+    assert_gradient(Objective.of(problem), problem)
+
+
+def test_gradient_against_a_rival(two_link, with_effects):
+    settings = DesignSettings(period=5.0, harmonics=2, samples=40, criterion='T')
+    arm = ArmModel(two_link).with_effect(make_effect('viscous_friction', two_link), [0.5, 0.2])
+    rival = with_effects(two_link, 'coulomb_friction', 'torque_offset')
+    problem = Problem.of(arm, settings, np.random.default_rng(3), rival)
+    assert_gradient(Objective.of(problem), problem)
+
+
+def test_gradient_with_prior_information(two_link_arm):
+    settings = DesignSettings(period=5.0, harmonics=2, samples=40)
+    rng = np.random.default_rng(3)
+    problem = Problem.of(two_link_arm, settings, rng)
+    known = problem.information(random_motion(two_link_arm.robot, 50, rng)).matrix
+    assert_gradient(Objective.of(problem, known), problem)
+
+
+def assert_gradient(objective, problem):
+    rng = np.random.default_rng(4)
+    x = coefficients(problem, rng)
+    _, gradient = objective.value(x)
+    for _ in range(3):
+        direction = rng.normal(size=x.shape)
+        numeric = central(lambda y: objective.value(y)[0], x, direction, 1e-5)
+        np.testing.assert_allclose(np.sum(gradient * direction), numeric, rtol=2e-5, atol=1e-7)
+
+
+@pytest.mark.parametrize('effects', [(), ('viscous_friction', 'rotor_inertia')])
+def test_gradient_of_the_constraints(humanoid, humanoid_collision, with_effects, effects):
+    settings = DesignSettings(period=5.0, harmonics=2, samples=40)
+    arm = with_effects(humanoid, *effects)
+    arm = replace(arm, values=tuple(v + 0.3 for v in arm.values))
+    rng = np.random.default_rng(5)
+    problem = Problem.of(arm, settings, rng)
+    constraints = Constraints.of(
+        problem,
+        ClearanceModel.of(humanoid_collision),
+        margin=0.01,
+        reserve=0.01,
+        sharpness=60.0,
+        more_times=np.array([0.123]),
+    )
+    x = coefficients(problem, rng)
+    values, gradients = constraints.value(x)
+    direction = rng.normal(size=x.shape)
+    numeric = central(lambda y: constraints.value(y)[0], x, direction)
+    np.testing.assert_allclose(np.sum(gradients * direction, axis=(1, 2)), numeric, atol=1e-4)
+    assert len(values) == 4 * humanoid.n_joints + 20
+
+
+def test_soft_maximum_is_never_below_the_maximum(two_link_arm):
+    settings = DesignSettings(period=5.0, harmonics=2, samples=40)
+    rng = np.random.default_rng(6)
+    problem = Problem.of(two_link_arm, settings, rng)
+    constraints = Constraints.of(
+        problem, None, margin=0.0, reserve=0.0, sharpness=60.0, more_times=np.empty(0)
+    )
+    for factor in (0.5, 1.0, 2.0):
+        x = coefficients(problem, rng) * np.array([1.0, *[factor] * 4])
+        values, _ = constraints.value(x)
+        velocity = constraints.dense[1] @ x.T
+        excess = np.abs(velocity).max(axis=0) / problem.limits.velocity - 1.0
+        assert np.all(values[2:4] >= excess)
+        assert np.all(values[2:4] <= excess + np.log(240) / 60.0)

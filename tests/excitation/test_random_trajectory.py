@@ -1,0 +1,65 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Random trajectories, and what is said when there is none."""
+
+from dataclasses import replace
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation import check_limits, Limits, Obstacle, random_feasible, with_obstacles
+from armid_ros.robots import collision_model
+import numpy as np
+import pytest
+
+
+def test_random_trajectories_keep_every_limit(humanoid, humanoid_collision, with_effects):
+    arm, limits = with_effects(humanoid), Limits.of(humanoid)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        trajectory = random_feasible(
+            arm, limits, 6.0, 3, rng, collision=humanoid_collision, margin=0.01
+        )
+        motion = trajectory.one_period(3000)
+        assert not check_limits(limits, motion, arm.torque(motion))
+        assert humanoid_collision.path_clearance(motion.q).min() >= 0.01
+
+
+def test_same_seed_gives_the_same_trajectory(two_link_arm):
+    limits = Limits.of(two_link_arm.robot)
+    first, second = (
+        random_feasible(two_link_arm, limits, 6.0, 3, np.random.default_rng(5)) for _ in range(2)
+    )
+    np.testing.assert_array_equal(first.a, second.a)
+
+
+def test_torque_limit_below_gravity_is_named(two_link_arm):
+    limits = Limits.of(two_link_arm.robot)
+    pinned = replace(
+        limits, lower=np.array([1.2, -0.1]), upper=np.array([1.4, 0.1]), torque=np.array([2.0, 90])
+    )
+    with pytest.raises(TrajectoryError, match=r'joint shoulder: torque limit 2 N m.*every pose'):
+        random_feasible(two_link_arm, pinned, 6.0, 3, np.random.default_rng(0))
+
+
+def test_bodies_that_cannot_be_kept_apart_are_named(two_link_arm):
+    robot = two_link_arm.robot
+    walled = with_obstacles(
+        collision_model(robot), [Obstacle('wall', 'box', (3.0, 3.0, 3.0), (0.0, 0.0, 0.5))]
+    )
+    with pytest.raises(TrajectoryError, match=r'(upper|lower) and wall'):
+        random_feasible(
+            two_link_arm, Limits.of(robot), 6.0, 3, np.random.default_rng(0), collision=walled
+        )
+
+
+def test_trajectory_in_a_narrow_gap_touches_no_wall(two_link_arm):
+    robot = two_link_arm.robot
+    walls = [
+        Obstacle('behind', 'plane', (), (-0.35, 0.0, 0.0), (0.0, np.pi / 2, 0.0)),
+        Obstacle('ahead', 'plane', (), (0.35, 0.0, 0.0), (0.0, -np.pi / 2, 0.0)),
+    ]
+    between = with_obstacles(collision_model(robot), walls)
+    limits, rng = Limits.of(robot), np.random.default_rng(0)
+    trajectory = random_feasible(two_link_arm, limits, 6.0, 3, rng, collision=between, margin=0.01)
+    q = trajectory.one_period(3000).q
+    assert between.path_clearance(q).min() >= 0.01
+    assert np.ptp(q, axis=0).min() > 0.0
