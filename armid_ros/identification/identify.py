@@ -11,7 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.checks import check_motion, check_torque
-from armid_ros.identification.least_squares import Method, solve
+from armid_ros.identification.least_squares import joint_triangles, Method, solve
 from armid_ros.identification.physical import (
     fit_bodies,
     PhysicalCertificate,
@@ -273,7 +273,7 @@ def _positions(theory: BaseParameters, base: BaseParameters) -> list[int]:
 
 def _excited(theory: BaseParameters, problem: Sequence[Regression]) -> BaseParameters:
     """Group further what this motion does not tell apart, such as the links of a joint at rest."""
-    w = np.concatenate([part.columns.reshape(-1, theory.rank) for part in problem])
+    w = joint_triangles(problem)[:, :, :-1].reshape(-1, theory.rank)
     names = tuple(theory.standard[column] for column in theory.independent)
     data = group_columns(w, names, tolerance=EXCITATION_TOLERANCE)
     if data.rank == theory.rank:

@@ -151,6 +151,7 @@ def filtered_columns(
             whole = source.columns(motion)[:, :, source.inner]
             result[:, :, source.outer] = decimate(whole, used)
     margin = arm.neighbours(1.0 / used.rate_hz)
+    stride = used.smooth_stride if margin == 0 else 1
     first = 0
     for samples in _overlapping(len(motion), used):
         around = slice(max(0, samples.start - margin), samples.stop + margin)
@@ -158,7 +159,11 @@ def filtered_columns(
         inside = slice(samples.start - around.start, samples.stop - around.start)
         count = len(decimated_samples(samples.stop - samples.start, used))
         for source in sources:
-            if source.instantaneous:
+            if source.smooth and stride > 1:
+                block = source.columns(part.select(slice(None, None, stride)))
+                filtered = decimate(block[:, :, source.inner], used, stride)
+                result[first : first + count, :, source.outer] = filtered
+            elif source.instantaneous:
                 block = source.columns(part)[inside, :, source.inner]
                 result[first : first + count, :, source.outer] = decimate(block, used)
         first += count
@@ -179,6 +184,8 @@ class _Source:
         Which of them are wanted, and where they go.
     instantaneous : bool
         Whether a part of the motion will do.
+    smooth : bool
+        Whether they have no steps, so that fewer samples will do.
 
     """
 
@@ -186,6 +193,7 @@ class _Source:
     inner: npt.NDArray[np.intp]
     outer: npt.NDArray[np.intp]
     instantaneous: bool
+    smooth: bool
 
 
 def _sources(arm: ArmModel, columns: npt.NDArray[np.intp]) -> list[_Source]:
@@ -198,7 +206,8 @@ def _sources(arm: ArmModel, columns: npt.NDArray[np.intp]) -> list[_Source]:
     for size, function, local in zip(sizes, functions, instantaneous, strict=True):
         outer = np.flatnonzero((columns >= start) & (columns < start + size))
         if len(outer):
-            sources.append(_Source(function, columns[outer] - start, outer, local))
+            rigid = start == 0
+            sources.append(_Source(function, columns[outer] - start, outer, local, rigid))
         start += size
     return sources
 

@@ -32,6 +32,8 @@ MODEL_BANDS = 10.0
 NOISE_MARGIN = 3.0
 #: Periods of the cut-off that are cut off at both ends, where the filter has no neighbours.
 EDGE_PERIODS = 4.0
+#: Samples per period of the cut-off that describe a smooth function of the filtered positions.
+SMOOTH_SAMPLES = 5.0
 #: Half length of the decimation filter in output samples; its edges are cut off.
 _HALF_TAPS = 4
 #: Output samples that one matrix product makes; larger ones multiply more zeros of the band.
@@ -90,6 +92,19 @@ class Conditioning:
         count = 2 * _HALF_TAPS * self.decimation + 1
         return np.asarray(signal.firwin(count, 0.8 / self.decimation, window=('kaiser', 5.0)))
 
+    @property
+    def smooth_stride(self) -> int:
+        """
+        How many samples apart what follows the filtered positions smoothly needs to be known.
+
+        The positions end at the cut-off, and what is made of them soon after; five samples per
+        period of the cut-off are enough for the decimation filter to see what it passes.
+
+        """
+        widest = self.rate_hz / (SMOOTH_SAMPLES * self.cutoff_hz)
+        divisors = [d for d in range(1, self.decimation + 1) if self.decimation % d == 0]
+        return max(d for d in divisors if d <= max(1.0, widest))
+
 
 def conditioning(recordings: list[Recording], settings: SignalSettings) -> Conditioning:
     """
@@ -102,10 +117,12 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
 
     """
     rate = float(np.median([sampling_rate(recording) for recording in recordings]))
-    crossing = max(_noise_crossing(recording) for recording in recordings)
-    band = MODEL_BANDS * max(_motion_band(recording, crossing) for recording in recordings)
-    decimation = settings.decimation or max(1, int(rate / (2.5 * band)))
-    cutoff = settings.cutoff_hz or min(max(crossing, band), 0.2 * rate)
+    cutoff, decimation = settings.cutoff_hz, settings.decimation
+    if cutoff is None or decimation is None:
+        crossing = max(_noise_crossing(recording) for recording in recordings)
+        band = MODEL_BANDS * max(_motion_band(recording, crossing) for recording in recordings)
+        decimation = decimation or max(1, int(rate / (2.5 * band)))
+        cutoff = cutoff or min(max(crossing, band), 0.2 * rate)
     if cutoff >= 0.5 * rate:
         raise IdentificationError(
             f'{recordings[0].source}: a cut-off of {cutoff:g} Hz needs more than '
@@ -142,16 +159,18 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
             yield _differentiated(recording.joints, t, q, tau, used)
 
 
-def decimate(values: FloatArray, used: Conditioning) -> FloatArray:
+def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatArray:
     """
     Low-pass and decimate along the first axis.
 
     Parameters
     ----------
-    values : ndarray, shape (N, ...)
-        Samples at the full rate.
+    values : ndarray, shape (ceil(N / stride), ...)
+        Samples at the full rate, or every stride-th of them.
     used : Conditioning
         The filter.
+    stride : int
+        A divisor of the decimation; above 1 only for values without content beyond the filter.
 
     Returns
     -------
@@ -159,8 +178,9 @@ def decimate(values: FloatArray, used: Conditioning) -> FloatArray:
         Sample m belongs to input ``decimated_samples(N, used)[m]``.
 
     """
-    taps, factor = used.taps(), used.decimation
-    count = len(decimated_samples(len(values), used))
+    taps, factor = used.taps()[::stride], used.decimation // stride
+    taps = taps / taps.sum()
+    count = len(range(len(taps) // 2, len(values) - len(taps) // 2, factor))
     flat = values.reshape(len(values), -1)
     result = np.zeros((count, flat.shape[1]))
     active = np.flatnonzero(flat.any(axis=0))  # a link moves no joint after its own: half are zero
@@ -238,7 +258,7 @@ def _noise_crossing(recording: Recording) -> float:
     rate = sampling_rate(recording)
     length = min(len(recording), int(8.0 * rate))
     frequency, power = signal.welch(
-        recording.q, fs=rate, window='blackmanharris', nperseg=length, detrend='linear', axis=0
+        recording.q, fs=rate, window='blackmanharris', nperseg=length, axis=0
     )
     floor = np.median(power[frequency > 0.3 * rate], axis=0)
     above = power > NOISE_MARGIN * floor

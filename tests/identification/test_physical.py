@@ -76,9 +76,9 @@ def test_without_noise_and_with_a_true_description_nothing_changes(arm):
 
 
 def test_friction_is_not_negative(arm, recording):
-    """A joint without viscous friction, and noise that would make it negative."""
+    """Data of an arm that friction drives on: the nearest that can be has none."""
     values = list(arm.values)
-    values[0] = np.zeros(6)
+    values[0] = np.full(6, -0.05)
     smooth = ArmModel(arm.robot, arm.effects, tuple(values))
     motion = multisine(arm.robot.joints, 20.0, 250.0, seed=1)
     recording = recorded(smooth, motion, 5, 0.5)
