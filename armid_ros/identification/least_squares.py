@@ -154,7 +154,8 @@ def joint_triangles(
 
 
 def _residual(problem: Sequence[Regression], values: FloatArray) -> FloatArray:
-    return np.concatenate([part.tau - part.columns @ values for part in problem])
+    parts: list[FloatArray] = [part.tau - part.columns @ values for part in problem]
+    return np.concatenate(parts)
 
 
 def _squares(triangles: FloatArray, values: FloatArray) -> FloatArray:
