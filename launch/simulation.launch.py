@@ -16,7 +16,6 @@ def generate_launch_description():
     gravity = ParameterValue(LaunchConfiguration('gravity'), value_type=str)
     bag = ParameterValue(LaunchConfiguration('bag'), value_type=str)
     rate = ParameterValue(LaunchConfiguration('rate'), value_type=float)
-    noise = ParameterValue(LaunchConfiguration('torque_noise'), value_type=list[float])
     duration = ParameterValue(LaunchConfiguration('duration'), value_type=float)
     return LaunchDescription(
         [
@@ -33,9 +32,6 @@ def generate_launch_description():
                 'rate', default_value='500.0', description='of joint_states [Hz]'
             ),
             DeclareLaunchArgument(
-                'torque_noise', default_value='[0.05]', description='standard deviation [N m]'
-            ),
-            DeclareLaunchArgument(
                 'duration', default_value='44.0', description='of the excitation [s]'
             ),
             Node(
@@ -46,7 +42,7 @@ def generate_launch_description():
                         'robot': robot,
                         'gravity': gravity,
                         'rate': rate,
-                        'torque_noise': noise,
+                        'torque_noise': [0.05],
                         'effects': [
                             'viscous_friction:viscous_coefficient=0.5',
                             'coulomb_friction:coulomb_torque=0.2',

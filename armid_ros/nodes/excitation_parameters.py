@@ -46,7 +46,16 @@ EXCITATION_PARAMETERS = (
         'Effects that are to be seen, beside the rigid body.',
     ),
     NodeParameter('clearance', 0.01, 'Kept between bodies.', 'm', lower=0.0, upper=1.0),
-    NodeParameter('seed', 0, 'Of the search; the same gives the same.', lower=0, upper=2**62),
+    NodeParameter(
+        'design_time', 20.0, 'What the search may take at most.', 's', lower=1.0, upper=86400.0
+    ),
+    NodeParameter(
+        'seed',
+        0,
+        'Of the search; the same gives the same, if it has the time.',
+        lower=0,
+        upper=2**62,
+    ),
 )
 
 
@@ -87,6 +96,9 @@ def make_excitation(value: Values, rate: float) -> Excitation:
         run_in=run_in,
         speed=value('speed'),
         clearance=value('clearance'),
+        starts=2,
+        time_budget=value('design_time'),
+        processes=1,  # a signal to the node must not leave others behind
     )
     rng = np.random.default_rng(value('seed'))
     return design(arm, settings, rng, collision=collision_model(robot)).excitation

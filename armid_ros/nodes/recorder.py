@@ -208,7 +208,8 @@ class RecorderNode(ArmidNode):
             self._writer.flush()
 
     def _tell(self, text: str) -> str:
-        self.get_logger().info(text)
+        if self.context.ok():  # /rosout is gone once the process is told to end
+            self.get_logger().info(text)
         return text
 
     def _next_path(self) -> Path:

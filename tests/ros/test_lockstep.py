@@ -37,7 +37,7 @@ def truth(robot):
 @pytest.fixture(scope='module')
 def excitation(truth, robot):
     rng = np.random.default_rng(1)
-    trajectory = random_feasible(truth, Limits.of(robot, speed='medium'), 4.0, 3, rng)
+    trajectory = random_feasible(truth, Limits.of(robot, speed='medium'), 3.0, 3, rng)
     return Excitation(trajectory, n_periods=1, run_in=1.0)
 
 
@@ -54,11 +54,16 @@ def run(truth, robot, excitation, bag, **options):
     return run_lockstep(arm, excitation, identifier(robot), bag, rate=RATE, **options)
 
 
-def test_excite_identify_record_and_replay(truth, robot, excitation, tmp_path):
-    told = []
-    bag = tmp_path / 'bag'
+@pytest.fixture(scope='module')
+def first_run(truth, robot, excitation, tmp_path_factory):
+    """Return the bag, the result, and what was told on the way."""
+    bag, told = tmp_path_factory.mktemp('lockstep') / 'bag', []
     result = run(truth, robot, excitation, bag, approach=APPROACH, on_progress=told.append)
+    return bag, result, told
 
+
+def test_every_sample_is_recorded_on_time(first_run, robot, excitation):
+    bag, result, _ = first_run
     recording = read_recording(bag, joints=robot.joints)
     assert recording.report.clean
     assert recording.start_ns == EPOCH_NS + round(1e9 / RATE)
@@ -69,28 +74,36 @@ def test_excite_identify_record_and_replay(truth, robot, excitation, tmp_path):
     assert found['/robot_description'] == found['/joint_trajectory'] == 1
     assert found['/joint_states'] == len(recording) and found['/online_identifier/estimate'] > 10
 
+
+def test_the_arm_is_where_the_excitation_is(first_run, robot, excitation):
+    recording = read_recording(first_run[0], joints=robot.joints)
     middle = APPROACH + excitation.duration / 2.0
     reached = recording.q[np.searchsorted(recording.t, middle - 1.0 / RATE)]
     wanted = excitation.at([middle - APPROACH]).q[0]
     np.testing.assert_allclose(reached, wanted, atol=0.01)
 
+
+def test_the_estimate_converges_to_the_truth(first_run, robot, truth):
+    _, _, told = first_run
     assert [round(p.t) for p in told] == list(range(1, len(told) + 1))
     error = [
         np.abs(p.estimate.values - identifier(robot).base.values(truth.theta)).max() for p in told
     ]
     assert error[-1] < 0.1 * error[0]
 
+
+def test_a_replay_learns_the_same(first_run, robot):
+    bag, result, _ = first_run
     again = replay_lockstep(bag, identifier(robot), duration=result.t)
     assert again.samples == result.samples
     np.testing.assert_allclose(again.estimate.values, result.estimate.values, rtol=1e-9)
 
 
-def test_two_runs_give_the_same_samples(truth, robot, excitation, tmp_path):
-    recordings = []
-    for name in ('first', 'second'):
-        run(truth, robot, excitation, tmp_path / name, approach=APPROACH)
-        recordings.append(read_recording(tmp_path / name, joints=robot.joints))
-    first, second = recordings
+def test_another_run_gives_the_same_samples(first_run, truth, robot, excitation, tmp_path):
+    run(truth, robot, excitation, tmp_path / 'bag', approach=APPROACH)
+    first, second = (
+        read_recording(bag, joints=robot.joints) for bag in (first_run[0], tmp_path / 'bag')
+    )
     np.testing.assert_array_equal(first.t, second.t)
     np.testing.assert_array_equal(first.q, second.q)
     np.testing.assert_array_equal(first.tau, second.tau)
