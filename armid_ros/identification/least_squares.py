@@ -28,6 +28,10 @@ Method = Literal['ols', 'wls', 'irls']
 _HUBER = 1.345
 #: Rounds of reweighting; the weights of both schemes settle in three to ten.
 _ROUNDS = 20
+#: Order of the autoregression that whitens residuals: the slopes of drift, and one resonance.
+AR_ORDER = 3
+#: Least share of the noise that a residual is taken to have kept in a band.
+LEAST_LEFT = 0.1
 
 
 @dataclass(frozen=True)
@@ -84,84 +88,42 @@ def solve(
         Parameters with covariance.
 
     """
+    w = np.concatenate([part.columns for part in problem])
+    y = np.concatenate([part.tau for part in problem])
     used = np.concatenate([part.informative for part in problem])
     counts = np.maximum(used.sum(axis=0), 1)
-    rank = problem[0].columns.shape[2]
+    rank = w.shape[2]
     freedom = counts.sum() / max(1.0, counts.sum() - rank)
-    relative, scale = used.astype(float), np.ones(used.shape[1])
-    triangles = joint_triangles(problem, relative)
-    values, triangle = _fit(triangles, scale)
+    weights = used.astype(float)
+    values, triangle = _weighted(w, y, weights)
     for _ in range(0 if method == 'ols' else _ROUNDS):
-        before = (scale, relative)
+        residual = y - w @ values
         if method == 'wls':
-            scale = _positive(np.sqrt(freedom * _squares(triangles, values) / counts))
+            scale = np.sqrt(freedom * np.sum(residual**2, axis=0, where=used) / counts)
+            new = used / _positive(scale)
         else:
-            residual = _residual(problem, values)
-            scale = _positive(_robust_scale(residual, used))
-            size = np.maximum(np.abs(residual) / scale, 1e-12)
-            relative = used * np.sqrt(np.minimum(1.0, _HUBER / size))
-            triangles = joint_triangles(problem, relative)
-        values, triangle = _fit(triangles, scale)
-        if np.allclose(scale, before[0], rtol=1e-6) and np.allclose(relative, before[1]):
+            scale = _robust_scale(residual, used)
+            size = np.abs(residual) / _positive(scale)
+            huber = np.sqrt(np.minimum(1.0, _HUBER / np.maximum(size, 1e-12)))
+            new = used * huber / _positive(scale)
+        settled = np.allclose(new, weights, rtol=1e-6)
+        weights = new
+        values, triangle = _weighted(w, y, weights)
+        if settled:
             break
     if bounds is not None:
         values = _within(values, triangle, bounds)
-    residual = _residual(problem, values)
-    weights = relative / scale
+    residual = y - w @ values
+    joint_std = np.sqrt(freedom * np.sum(residual**2, axis=0, where=used) / counts)
+    relative = np.where(used, weights / np.max(weights, axis=0).clip(1e-300), 1.0)
     return Solution(
         values=values,
-        covariance=_covariance(problem, residual * weights, weights, triangle, freedom),
-        joint_std=np.sqrt(freedom * np.sum(residual**2, axis=0, where=used) / counts),
+        covariance=_covariance(problem, values, weights, triangle),
+        joint_std=joint_std,
         condition_number=float(np.linalg.cond(triangle)),
-        outliers=int(np.sum(used & (relative**2 < 0.5))),
+        outliers=int(np.sum(relative**2 < 0.5)),
         weights=weights,
     )
-
-
-def joint_triangles(
-    problem: Sequence[Regression], weights: npt.NDArray[np.floating] | None = None
-) -> FloatArray:
-    """
-    Compress every joint's rows [columns, torque] to a triangle with the same products.
-
-    Parameters
-    ----------
-    problem : sequence of Regression
-        N rows of each of n joints in r columns, in one or more stretches.
-    weights : ndarray, shape (N, n), optional
-        What the rows are multiplied by; by default those that say nothing are left out.
-
-    Returns
-    -------
-    ndarray, shape (n, r + 1, r + 1)
-        T_j with T_j' T_j = [W_j, y_j]' [W_j, y_j]; not triangular where columns are zero.
-
-    """
-    if weights is None:
-        weights = np.concatenate([part.informative for part in problem]).astype(float)
-    n_joints, rank = problem[0].columns.shape[1:]
-    triangles = np.zeros((n_joints, rank + 1, rank + 1))
-    for joint in range(n_joints):
-        rows = np.concatenate(
-            [np.column_stack([part.columns[:, joint], part.tau[:, joint]]) for part in problem]
-        )
-        active = np.flatnonzero(rows.any(axis=0))
-        stacked = rows[:, active] * weights[:, joint, np.newaxis]
-        (factor,) = scipy.linalg.qr(stacked, mode='r', overwrite_a=True, check_finite=False)
-        factor = factor[: len(active)]
-        triangles[joint, : len(factor), active] = factor.T
-    return triangles
-
-
-def _residual(problem: Sequence[Regression], values: FloatArray) -> FloatArray:
-    parts: list[FloatArray] = [part.tau - part.columns @ values for part in problem]
-    return np.concatenate(parts)
-
-
-def _squares(triangles: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the sum of squared residuals of every joint, shape (n,)."""
-    rest: FloatArray = triangles @ np.append(values, -1.0)
-    return np.asarray(np.sum(rest**2, axis=1))
 
 
 def _within(
@@ -174,7 +136,7 @@ def _within(
     solution = scipy.optimize.lsq_linear(
         triangle / scale, triangle @ values, (bounds[0] * scale, bounds[1] * scale), method='bvls'
     )
-    return np.clip(solution.x / scale, *bounds)
+    return np.asarray(np.clip(solution.x / scale, *bounds))
 
 
 def _robust_scale(residual: FloatArray, used: npt.NDArray[np.bool_]) -> FloatArray:
@@ -186,70 +148,114 @@ def _robust_scale(residual: FloatArray, used: npt.NDArray[np.bool_]) -> FloatArr
 
 def _positive(scale: FloatArray) -> FloatArray:
     """Keep a joint that is fitted exactly from taking all the weight."""
-    floor = max(1e-9 * float(np.max(scale)), 1e-100)
+    floor = 1e-9 * max(float(np.max(scale)), 1e-300)
     return np.maximum(scale, floor)
 
 
-def _fit(triangles: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _weighted(w: FloatArray, y: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Solve by QR with scaled columns; return the values and the triangular factor."""
-    stacked = (triangles / scale[:, np.newaxis, np.newaxis]).reshape(-1, triangles.shape[2])
-    size = np.linalg.norm(stacked, axis=0)
-    size[size == 0.0] = 1.0
-    (factor,) = scipy.linalg.qr(stacked / size, mode='r', check_finite=False)
-    rank = len(size) - 1
+    rank = w.shape[2]
+    stacked = np.empty((w.shape[0] * w.shape[1], rank + 1))
+    np.multiply(w, weights[:, :, np.newaxis], out=stacked[:, :rank].reshape(w.shape))
+    stacked[:, rank] = (y * weights).ravel()
+    scale = np.linalg.norm(stacked, axis=0)
+    scale[scale == 0.0] = 1.0
+    stacked /= scale
+    factor = scipy.linalg.qr(stacked, mode='r', overwrite_a=True, check_finite=False)[0]
     triangle = factor[:rank, :rank]
-    values = scipy.linalg.solve_triangular(triangle, factor[:rank, rank]) * size[rank]
-    return values / size[:rank], triangle * size[:rank]
+    values = scipy.linalg.solve_triangular(triangle, factor[:rank, rank]) * scale[rank]
+    return values / scale[:rank], triangle * scale[:rank]
 
 
 def _covariance(
-    problem: Sequence[Regression],
-    residual: FloatArray,
-    weights: FloatArray,
-    triangle: FloatArray,
-    freedom: float,
+    problem: Sequence[Regression], values: FloatArray, weights: FloatArray, triangle: FloatArray
 ) -> FloatArray:
     """
     Propagate coloured residuals through the fit: H^-1 (sum over f of W^H Phi W) H^-1.
 
-    Phi is the spectrum of each joint's residual, smoothed by a Parzen window over lags; residuals
-    of different joints are taken as independent, those of different stretches too.
+    Phi is the spectrum of each joint's noise; noises of different joints are taken as independent,
+    those of different stretches too. A fit takes most of the noise where the regressor has its
+    power, so the residual has less of it there: at a frequency f of a joint the share x^H H^-1 x
+    of what was, x being the transform of the joint's rows, its leverage.
 
     """
-    rank = len(triangle)
+    rank = len(values)
+    inverse = scipy.linalg.solve_triangular(triangle, np.eye(rank))
     meat = np.zeros((rank, rank))
     start = 0
     for part in problem:
-        stop = start + len(part.tau)
-        size = 2 * len(part.tau)
+        count = len(part.tau)
+        scaled = weights[start : start + count]
+        start += count
+        residual = (part.tau - part.columns @ values) * scaled
+        size = 2 * count
         for joint in range(part.tau.shape[1]):
-            spectrum = freedom * _smooth_spectrum(residual[start:stop, joint], size)
-            spectrum[1:-1] *= 2.0  # the constant and the Nyquist bin have no mirror image
-            columns = part.columns[:, joint]
-            active = np.flatnonzero(columns.any(axis=0))
-            columns = columns[:, active] * weights[start:stop, joint, np.newaxis]
-            transformed = np.fft.rfft(columns, size, axis=0)
-            transformed *= np.sqrt(spectrum / size)[:, np.newaxis]
-            power = transformed.real.T @ transformed.real + transformed.imag.T @ transformed.imag
-            meat[np.ix_(active, active)] += power
-        start = stop
-    inverse = scipy.linalg.solve_triangular(triangle, np.eye(rank))
+            columns = part.columns[:, joint] * scaled[:, joint, np.newaxis]
+            active = np.flatnonzero(np.any(columns != 0.0, axis=0))
+            transformed = np.fft.rfft(columns[:, active], size, axis=0)
+            leverage = np.sum(np.abs(transformed @ inverse[active]) ** 2, axis=1) / count
+            spectrum = _noise_spectrum(residual[:, joint], leverage)
+            bins = np.full(len(transformed), 2.0)
+            bins[[0, -1]] = 1.0  # the constant and the Nyquist bin have no mirror image
+            power = (transformed.conj().T * (bins * spectrum / size)) @ transformed
+            meat[np.ix_(active, active)] += power.real
     bread = inverse @ inverse.T
     return np.asarray(bread @ meat @ bread)
 
 
-def _smooth_spectrum(residual: FloatArray, size: int) -> FloatArray:
-    """Return the power spectrum on the bins of an rfft of an even size, shape (size / 2 + 1,)."""
+def _noise_spectrum(residual: FloatArray, leverage: FloatArray) -> FloatArray:
+    """
+    Estimate the power spectrum of the noise that left a residual.
+
+    The residual is whitened by an autoregression, its spectrum smoothed by a Parzen window over
+    lags, and coloured again, which keeps peaks from being smoothed away (Andrews and Monahan
+    1992). What the fit took is made up for in the same band.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (M,)
+        Residual.
+    leverage : ndarray, shape (M + 1,)
+        Share of the noise that the fit takes, on the bins of an rfft of 2 M samples.
+
+    Returns
+    -------
+    ndarray, shape (M + 1,)
+        Power on the same bins.
+
+    """
     count = len(residual)
+    size = 2 * count
     power = np.abs(np.fft.rfft(residual, size)) ** 2 / count
-    lags = np.fft.irfft(power, size)[: count // 2]
+    whitening = _whitening(np.fft.irfft(power, size)[:count], size)
+    lags = np.fft.irfft(power * whitening, size)[: count // 2]
     reach = _correlation_reach(lags, count)
+    left = _smoothed(1.0 - leverage, reach).clip(LEAST_LEFT)
+    return np.asarray(_smoothed(power * whitening, reach).clip(0.0) / left / whitening)
+
+
+def _whitening(lags: FloatArray, size: int) -> FloatArray:
+    """Return the power gain that whitens a signal of given autocovariance, shape (size/2 + 1,)."""
+    order = min(AR_ORDER, len(lags) - 1)
+    if lags[0] <= 0.0 or order < 1:
+        return np.ones(size // 2 + 1)
+    regular = lags[: order + 1].copy()
+    regular[0] *= 1.0 + 1e-6
+    coefficients = scipy.linalg.solve_toeplitz(regular[:order], regular[1:])
+    filtered = np.fft.rfft(np.concatenate([[1.0], -coefficients]), size)
+    return np.asarray(np.abs(filtered) ** 2)
+
+
+def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:
+    """Smooth a spectrum on the bins of an rfft: keep lags below a reach, Parzen-weighted."""
+    size = 2 * (len(spectrum) - 1)
+    lags = np.fft.irfft(spectrum, size)
     x = np.arange(reach) / reach
     parzen = np.where(x < 0.5, 1 - 6 * x**2 + 6 * x**3, 2 * (1 - x) ** 3)
     tapered = np.zeros(size)
     tapered[:reach] = lags[:reach] * parzen
     tapered[size - reach + 1 :] = tapered[1:reach][::-1]
-    return np.maximum(np.fft.rfft(tapered).real, 0.0)
+    return np.asarray(np.fft.rfft(tapered).real)
 
 
 def _correlation_reach(lags: FloatArray, count: int) -> int:

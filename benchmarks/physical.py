@@ -1,0 +1,112 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What it takes and costs to fit among bodies, beside the unconstrained fit.
+
+Ten minutes of a 7-joint arm at 1 kHz for the time; recordings of real machines, their first two
+thirds against the last, for the torque error.
+
+"""
+
+import argparse
+from dataclasses import replace
+import os
+from pathlib import Path
+import tempfile
+import time
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.identification import (
+    IdentificationSettings,
+    identify,
+    PhysicalSettings,
+    Score,
+    SignalSettings,
+)
+from armid_ros.recording import read_recording, Recording
+from armid_ros.robots import load_robot
+import numpy as np
+
+from benchmarks import real_recordings
+from benchmarks.offline_speed import CUTOFF_HZ, DECIMATION, motion, panda
+
+FRICTION = ('viscous_friction', 'coulomb_friction', 'torque_offset')
+
+
+def fits(arm, recording, **signals):
+    """Identify without and with constraints; returns both results and their seconds."""
+    results, seconds = [], []
+    for physical in (None, PhysicalSettings()):
+        settings = IdentificationSettings(signals=SignalSettings(**signals), physical=physical)
+        start = time.perf_counter()
+        results.append(identify(arm, [recording], settings, rng=np.random.default_rng(0)))
+        seconds.append(time.perf_counter() - start)
+    return results, seconds
+
+
+def part(recording, samples):
+    """Return some samples of a recording."""
+    dq = None if recording.dq is None else recording.dq[samples]
+    return replace(
+        recording,
+        t=recording.t[samples],
+        q=recording.q[samples],
+        dq=dq,
+        tau=recording.tau[samples],
+    )
+
+
+def speed(minutes):
+    """Print the time that constraints add."""
+    arm = panda()
+    exact = motion(arm, minutes, np.random.default_rng(0))
+    recording = Recording(joints=exact.joints, t=exact.t, q=exact.q, tau=exact.tau, source='panda')
+    structure = ArmModel(arm.robot, arm.effects)
+    signals = {'cutoff_hz': CUTOFF_HZ, 'decimation': DECIMATION}
+    results, seconds = fits(structure, recording, **signals)
+    least = min(link.eigenvalues[0] for link in results[1].physical.links)
+    print(
+        f'{minutes:g} min of 7 joints at 1 kHz: {seconds[0]:.1f} s, with constraints '
+        f'{seconds[1] - seconds[0]:+.1f} s, wanted +10 s or less; least eigenvalue {least:.2g}'
+    )
+
+
+def held_out(name, data, effects):
+    """Print the error on the last third of a recording."""
+    robot = load_robot(str(data.robot))
+    arm = ArmModel(robot)
+    for effect in effects:
+        arm = arm.with_effect(make_effect(effect, robot))
+    recording = read_recording(data.bags[0], joints=robot.joints)
+    cut = 2 * len(recording.t) // 3
+    results, seconds = fits(arm, part(recording, slice(None, cut)))
+    rest = part(recording, slice(cut, None))
+    free, bodies = (Score.of(r.predict([rest])).relative_error_percent for r in results)
+    least = min(link.eigenvalues[0] for link in results[1].physical.links)
+    print(
+        f'{name:8s} held out {free:6.2f} %, among bodies {bodies:6.2f} % '
+        f'({100 * (bodies / free - 1):+.1f} %, wanted +3 % or less), least eigenvalue '
+        f'{least:.2g}, {seconds[1] - seconds[0]:+.1f} s'
+    )
+
+
+def main():
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--minutes', type=float, default=10.0)
+    speed(parser.parse_args().minutes)
+    if not os.environ.get('ARMID_DATA'):
+        print('ARMID_DATA names no recordings of real machines')
+        return
+    data = real_recordings.folder()
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        held_out('EMPS', real_recordings.emps(data, out), FRICTION)
+        held_out('UR10', real_recordings.ur10(data), FRICTION)
+        coupled = (*FRICTION, 'rotor_inertia', 'coupled_joint_friction')
+        held_out('TX40', real_recordings.tx40(data, out), coupled)
+
+
+if __name__ == '__main__':
+    main()
