@@ -7,7 +7,7 @@ Links 1 to 7: stance foot, stance shank, stance thigh, trunk, swing thigh, swing
 The origin is the toe of the stance foot, x forward, y up. All angles are anatomical [rad]:
 flexion of hips and knees, dorsiflexion of ankles. The source counts the swing hip from the upward
 vertical; it is pi - flexion.
-Source: lower-limb exoskeleton with elastic human-machine interaction, Table 1, equations (16)-(26).
+Source: lower-limb exoskeleton with elastic human-machine interaction, Table 1, (16) to (26).
 
 """
 
@@ -148,7 +148,7 @@ def leg_frames(angles: LegAngles, lengths: LegLengths) -> FloatArray:
         (0.0, lengths.pelvis, False),
         (np.pi / 2.0 + (np.pi - angles.swing_hip), lengths.thigh, True),
         (-angles.swing_knee, lengths.shank, False),
-        (np.pi - (np.pi / 2.0 - angles.swing_ankle) - np.pi, lengths.foot, False),
+        (np.pi - (np.pi / 2.0 - angles.swing_ankle), lengths.foot, False),
     )
     frames = np.empty((len(rows), 4, 4))
     frame = np.eye(4)

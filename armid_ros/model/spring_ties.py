@@ -75,12 +75,12 @@ class TieGeometry(NamedTuple):
     @property
     def columns(self) -> FloatArray:
         """Torque of the machine's actuators per stiffness, J^T D, shape (N, n, S) [m^2]."""
-        return np.einsum('nsxj,nsx->njs', self.jacobian, self.way)
+        return np.asarray(np.einsum('nsxj,nsx->njs', self.jacobian, self.way))
 
     @property
     def other_columns(self) -> FloatArray:
         """Torque of the other machine's per stiffness, -J^T D, shape (N, m, S) [m^2]."""
-        return -np.einsum('nsxj,nsx->njs', self.other_jacobian, self.way)
+        return -np.asarray(np.einsum('nsxj,nsx->njs', self.other_jacobian, self.way))
 
 
 def centroid_ties(robot: Robot, other: Robot, joints: Sequence[tuple[str, str]]) -> list[Tie]:

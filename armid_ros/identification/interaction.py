@@ -1,0 +1,175 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Stiffness of what ties two machines, from the torques of one and the joint angles of both.
+
+tau = Y pi + sum_s k_s J_s^T D_s is linear in k, but D, the way between the ends of a spring, is a
+small difference of measured angles: noise in them makes J^T D too long on average and k too
+small, by several per cent at 0.1 deg. To the torque the noise x of a motion does G x, where G is
+the derivative of the model by the motion, so that residuals have the covariance
+S = var(tau) + G var(x) G^T, in which k stands as well. The k that makes sum r^T S^-1 r smallest is
+consistent (generalised total least squares); its columns are those at the motion that the
+residuals make likely.
+Source: Van Huffel and Vandewalle 1991; the leg pair's equations (16), (18), (23), (25).
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.interaction_problem import InteractionProblem
+from armid_ros.motion import FloatArray, read_only
+import numpy as np
+from scipy import stats
+
+_ITERATIONS = 50
+#: Steps below this share of a standard deviation end the iteration.
+_CONVERGED = 1e-4
+
+
+@dataclass(frozen=True)
+class Interaction:
+    """
+    What was found.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        Stiffnesses, then the combinations of inertias that were free.
+    uncorrected : ndarray, shape (P,)
+        The same by least squares, with the bias of noisy angles in it.
+    segments : tuple of str
+        Names of the springs; a single 'all' where they have one stiffness.
+    torque_noise : ndarray, shape (n,)
+        Standard deviation of the torques, as given or as estimated [N m].
+    position_noise : ndarray, shape (n + m,)
+        Standard deviation of the angles of both machines that was corrected for [rad].
+    residual : ndarray, shape (N, n)
+        Of the torques [N m].
+
+    """
+
+    estimate: Estimate
+    uncorrected: FloatArray
+    segments: tuple[str, ...]
+    torque_noise: FloatArray
+    position_noise: FloatArray
+    residual: FloatArray
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Stiffness of every spring, shape (S,) [N/m]."""
+        return self.estimate.values[: len(self.segments)]
+
+    @property
+    def std(self) -> FloatArray:
+        """Their standard deviations, shape (S,) [N/m]."""
+        return self.estimate.std[: len(self.segments)]
+
+    @property
+    def bias(self) -> FloatArray:
+        """What noisy angles would have done to them, shape (S,) [N/m]."""
+        return np.asarray(self.uncorrected[: len(self.segments)] - self.stiffness)
+
+    def interval(self, confidence: float = 0.95) -> FloatArray:
+        """Return lower and upper ends of confidence intervals, shape (S, 2) [N/m]."""
+        reach = stats.norm.ppf(0.5 + confidence / 2.0) * self.std
+        return np.column_stack([self.stiffness - reach, self.stiffness + reach])
+
+
+def identify_interaction(
+    problem: InteractionProblem, torque_noise: FloatArray | float | None = None
+) -> Interaction:
+    """
+    Estimate stiffnesses, and free inertias with them, without the bias of noisy angles.
+
+    Parameters
+    ----------
+    problem : InteractionProblem
+        Torques, columns and their derivatives: see ``interaction_problem``.
+    torque_noise : float or ndarray, shape (n,), optional
+        Standard deviation of the torques [N m]; from the residuals by default.
+
+    Raises
+    ------
+    IdentificationError
+        If the motion does not show every stiffness, or the iteration does not end.
+
+    """
+    theta = _least_squares(problem)
+    uncorrected = theta
+    variance = _given(problem, torque_noise)
+    for _ in range(_ITERATIONS):
+        used = _torque_variance(problem, theta) if variance is None else variance
+        step, information = _gauss_newton(problem, theta, used)
+        theta = theta + step
+        if step @ information @ step < _CONVERGED**2 * len(step):
+            break
+    else:
+        raise IdentificationError(
+            'the stiffness does not settle: the angles are too noisy for ways of '
+            f'{1e3 * problem.typical_way:.2g} mm; filter them, or move more'
+        )
+    names = tuple(
+        ParameterName('interaction_stiffness', joint, 'N/m') for joint in problem.spring_joints
+    )
+    return Interaction(
+        Estimate(names + problem.rigid, theta, _inverse(information)),
+        read_only(uncorrected),
+        problem.segments,
+        read_only(np.sqrt(used)),
+        problem.position_noise,
+        read_only(problem.residual(theta)),
+    )
+
+
+def _least_squares(problem: InteractionProblem) -> FloatArray:
+    w = problem.columns.reshape(-1, problem.columns.shape[2])
+    scale = np.linalg.norm(w, axis=0)
+    if not np.all(scale > 0.0):
+        name = problem.segments[int(np.argmin(scale[: len(problem.segments)]))]
+        raise IdentificationError(f'{name}: its spring is never drawn out, so nothing shows it')
+    y = problem.tau - problem.known
+    return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
+
+
+def _given(problem: InteractionProblem, noise: FloatArray | float | None) -> FloatArray | None:
+    if noise is None:
+        return None
+    return np.broadcast_to(np.asarray(noise, dtype=float) ** 2, problem.tau.shape[1:]).copy()
+
+
+def _torque_variance(problem: InteractionProblem, theta: FloatArray) -> FloatArray:
+    """Return what of the residuals' variance the angles do not explain, shape (n,)."""
+    residual = problem.residual(theta)
+    by_motion = problem.sensitivity(theta)
+    explained = np.mean(np.sum(by_motion @ problem.motion_noise * by_motion, axis=2), axis=0)
+    total = np.mean(residual**2, axis=0)
+    return np.asarray(np.maximum(total - explained, 0.01 * total + 1e-18))
+
+
+def _gauss_newton(
+    problem: InteractionProblem, theta: FloatArray, variance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the step of the parameters and their information matrix."""
+    by_motion = problem.sensitivity(theta)
+    weighted = by_motion @ problem.motion_noise
+    covariance = np.diag(variance) + weighted @ by_motion.transpose(0, 2, 1)
+    pull = np.linalg.solve(covariance, problem.residual(theta)[..., np.newaxis])[..., 0]
+    correction = np.einsum('nij,ni->nj', weighted, pull)
+    columns = problem.columns + np.einsum('nipj,nj->nip', problem.columns_by_motion, correction)
+    scaled = np.linalg.solve(covariance, columns)
+    information = np.einsum('nip,niq->pq', columns, scaled)
+    gradient = np.einsum('nip,ni->p', columns, pull)
+    size = np.sqrt(np.diag(information))
+    step = np.linalg.solve(information / np.outer(size, size), gradient / size) / size
+    return np.asarray(step), np.asarray(information)
+
+
+def _inverse(information: FloatArray) -> FloatArray:
+    size = np.sqrt(np.diag(information))
+    scaled = np.linalg.inv(information / np.outer(size, size))
+    return np.asarray(scaled / np.outer(size, size))

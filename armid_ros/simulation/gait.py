@@ -1,0 +1,156 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Walking: hip, knee and ankle over a gait cycle, and the joint motion of both legs from it.
+
+A leg is known by its phase, 0 at heel strike; the other leg is half a cycle later. The stance foot
+stays flat and the trunk upright, so that the stance ankle is knee - hip.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.robots.assumptions import leg_pair_file
+import numpy as np
+
+#: Harmonics of the series through a gait; walking has nothing beyond.
+_HARMONICS = 6
+_COLUMNS = ['phase', 'hip_deg', 'knee_deg', 'ankle_deg']
+
+
+@dataclass(frozen=True)
+class Gait:
+    """
+    Angles of one leg as a Fourier series of the phase.
+
+    Attributes
+    ----------
+    cosine, sine : ndarray, shape (H + 1, 3)
+        Coefficients of hip flexion, knee flexion and ankle dorsiflexion [rad].
+
+    """
+
+    cosine: FloatArray
+    sine: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the coefficients."""
+        object.__setattr__(self, 'cosine', read_only(self.cosine))
+        object.__setattr__(self, 'sine', read_only(self.sine))
+
+    @classmethod
+    def fit(cls, phase: FloatArray, angles: FloatArray) -> Gait:
+        """Fit the series to angles [rad] of shape (N, 3) at phases of shape (N,) from 0 to 1."""
+        turn = 2.0 * np.pi * np.outer(phase, np.arange(_HARMONICS + 1))
+        basis = np.hstack([np.cos(turn), np.sin(turn[:, 1:])])
+        solution = np.linalg.lstsq(basis, angles, rcond=None)[0]
+        cosine = solution[: _HARMONICS + 1]
+        return cls(cosine, np.vstack([np.zeros((1, 3)), solution[_HARMONICS + 1 :]]))
+
+    def __call__(self, phase: FloatArray, derivative: int = 0) -> FloatArray:
+        """Return angles or a derivative by the phase, shape (N, 3), at phases of shape (N,)."""
+        w = 2.0 * np.pi * np.arange(len(self.cosine))
+        turn = np.outer(phase, w) + derivative * np.pi / 2.0
+        return np.asarray(
+            np.cos(turn) @ (w[:, np.newaxis] ** derivative * self.cosine)
+            + np.sin(turn) @ (w[:, np.newaxis] ** derivative * self.sine)
+        )
+
+
+class Phase(NamedTuple):
+    """
+    Where in the gait cycle a leg is, 0 at heel strike.
+
+    Attributes
+    ----------
+    value, speed, acceleration : ndarray, shape (N,)
+        Phase [-] and its derivatives by time [1/s, 1/s^2].
+
+    """
+
+    value: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
+
+
+def steady_phase(t: FloatArray, cycle_time: float, start: float = 0.0) -> Phase:
+    """Return the phase of walking on, from a phase at t = 0."""
+    return Phase(start + t / cycle_time, np.full_like(t, 1.0 / cycle_time), np.zeros_like(t))
+
+
+def stepping_phase(t: FloatArray, period: float, start: float, stop: float) -> Phase:
+    """Return the phase of stepping forward from start to stop and back, over and over."""
+    w, half = 2.0 * np.pi / period, (stop - start) / 2.0
+    return Phase(
+        start + half * (1.0 - np.cos(w * t)),
+        half * w * np.sin(w * t),
+        half * w**2 * np.cos(w * t),
+    )
+
+
+def read_gait(path: Path | None = None) -> Gait:
+    """
+    Read a gait; by default the shipped one: level walking, hip -20..40 deg, knee 0..65 deg.
+
+    Parameters
+    ----------
+    path : Path, optional
+        A CSV file with the columns phase, hip_deg, knee_deg and ankle_deg over one cycle.
+
+    Raises
+    ------
+    TrajectoryError
+        If the file has other columns, something that is no number, or too few rows.
+
+    """
+    path = path or leg_pair_file('human_legs/gait.csv')
+    try:
+        text = path.read_text(encoding='utf-8')
+    except OSError as error:
+        raise TrajectoryError(f'{path}: {error.strerror}; give a gait as CSV') from None
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith('#')]
+    head = [name.strip() for name in lines[0].split(',')] if lines else []
+    if head != _COLUMNS:
+        raise TrajectoryError(f'{path}: has the columns {head}, a gait has {_COLUMNS}')
+    try:
+        rows = np.array([[float(cell) for cell in line.split(',')] for line in lines[1:]])
+    except ValueError as error:
+        raise TrajectoryError(f'{path}: {error}; every row is four numbers') from None
+    if len(rows) < 2 * _HARMONICS + 1:
+        raise TrajectoryError(
+            f'{path}: {len(rows)} rows; a cycle takes at least {2 * _HARMONICS + 1}'
+        )
+    return Gait.fit(rows[:, 0], np.radians(rows[:, 1:]))
+
+
+def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: Phase) -> Motion:
+    """
+    Return the motion of a seven-link body on one foot.
+
+    Parameters
+    ----------
+    gait : Gait
+        Of one leg.
+    joints : tuple of str, length 6
+        Stance ankle, knee, hip, swing hip, knee, ankle.
+    t : ndarray, shape (N,)
+        Time [s].
+    phase : Phase
+        Of the stance leg at these times.
+
+    """
+    speed, acceleration = phase.speed[:, np.newaxis], phase.acceleration[:, np.newaxis]
+    here = [_body(gait, phase.value, derivative) for derivative in range(3)]
+    return Motion(joints, t, here[0], here[1] * speed, here[2] * speed**2 + here[1] * acceleration)
+
+
+def _body(gait: Gait, phase: FloatArray, derivative: int) -> FloatArray:
+    """Return the angles of a body with a flat foot and an upright trunk, or a derivative."""
+    hip, knee, _ = gait(phase, derivative).T
+    return np.column_stack([knee - hip, knee, hip, gait(phase + 0.5, derivative)])
