@@ -1,0 +1,15 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Diagnosis: where model and measurement disagree, and which effect is missing.
+
+``diagnose`` looks, ``diagnosis_document`` writes down what it found.
+
+"""
+
+from armid_ros.diagnosis.diagnose import diagnose, Diagnosis
+from armid_ros.diagnosis.output import diagnosis_document
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.verdict import Finding
+
+__all__ = ['Diagnosis', 'DiagnosisSettings', 'Finding', 'diagnose', 'diagnosis_document']

@@ -1,0 +1,221 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The groups that may be named: every effect of the catalogue, per joint, pair or whole arm.
+
+A group is an effect on its joints with one shape; an effect with shape parameters is a family of
+groups on a grid, of which the best is refined later. The columns of all joints are computed at
+once and shared out.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations, pairwise, permutations, product
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.evidence import Trajectory
+from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.errors import ModelError
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+
+#: Effects whose joints are pairs, and which pairs are likely enough to be looked at.
+_PAIRS = {
+    'coupled_joint_friction': pairwise,
+    'joint_coupling': lambda joints: combinations(joints, 2),
+    'torque_crosstalk': lambda joints: permutations(joints, 2),
+}
+#: Effects of the whole arm that can be of single joints as well.
+_ALSO_JOINTS = ('time_delay',)
+#: Effects whose quantities stand for causes of their own. Together, the two of a saturation are
+#: the measured torque minus the model's: they would explain anything.
+_ALONE = {'actuator_saturation': ((0,), (1,))}
+#: Effects that cost much and depend on position and velocity smoothly: their columns are computed
+#: at the rows.
+_SMOOTH = ('human_interaction', 'interface_slack')
+#: Most combinations of shape values that a search starts from.
+_MOST_SHAPES = 12
+
+
+@dataclass(frozen=True)
+class Group:
+    """
+    An effect on certain joints, with a shape, and where its columns are.
+
+    Attributes
+    ----------
+    effect : Effect
+        Joints and shape included.
+    columns : slice
+        Its columns among those of all groups.
+    kept : tuple of int
+        Parameters of the effect that the columns belong to; the others are zero.
+
+    """
+
+    effect: Effect
+    columns: slice
+    kept: tuple[int, ...]
+
+    @property
+    def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
+        """Name, joints and quantities: groups of one key differ in their shape."""
+        return self.effect.name, self.effect.joints, self.kept
+
+    @property
+    def size(self) -> int:
+        """Number of its columns."""
+        return self.columns.stop - self.columns.start
+
+
+def group_effects(arm: ArmModel, library: Sequence[str]) -> Iterator[tuple[Effect, list[Effect]]]:
+    """
+    Yield effects whose columns are computed together, with the groups they are shared out to.
+
+    Effects that the arm has already, on the same joints, are left out.
+
+    """
+    robot = arm.robot
+    there = {(e.name, joint) for e in arm.effects for joint in e.joints or ('',)}
+    for name in library:
+        kind = CATALOGUE[name]
+        if name in _PAIRS:
+            for pair in _PAIRS[name](robot.joints):
+                if (name, pair[0]) not in there:
+                    effect = kind.on(robot, pair)
+                    yield effect, [effect]
+            continue
+        try:
+            whole = kind.on(robot)
+        except ModelError:
+            continue
+        if not whole.joints:
+            if (name, '') not in there:
+                yield whole, [whole]
+            if name not in _ALSO_JOINTS:
+                continue
+        joints = robot.joints[-1:] if name == 'payload' else robot.joints
+        free = tuple(joint for joint in joints if (name, joint) not in there)
+        if free:
+            yield kind.on(robot, free), [kind.on(robot, (joint,)) for joint in free]
+
+
+def shaped(
+    effect: Effect, members: list[Effect], arm: ArmModel, data: Sequence[Trajectory]
+) -> Iterator[tuple[Effect, list[Effect]]]:
+    """Yield an effect and its groups with every shape that a search starts from."""
+    if not effect.shapes:
+        yield effect, members
+        return
+    grids = _grids(effect, arm, data)
+    counts = [grid.shape[1] for grid in grids]
+    together = len(set(counts)) == 1 and int(np.prod(counts)) > _MOST_SHAPES
+    chosen = (
+        [(k,) * len(counts) for k in range(counts[0])]
+        if together
+        else [index for index in product(*(range(count) for count in counts))]
+    )
+    for index in chosen:
+        values = np.column_stack([grid[:, k] for grid, k in zip(grids, index, strict=True)])
+        lower = np.array([s.lower for s in effect.shapes])
+        upper = np.array([s.upper for s in effect.shapes])
+        values = np.clip(values, lower, upper)
+        rows = values if len(members) > 1 else [values.ravel()]
+        whole = effect.with_shape(values)
+        yield whole, [m.with_shape(row) for m, row in zip(members, rows, strict=True)]
+
+
+def _grids(effect: Effect, arm: ArmModel, data: Sequence[Trajectory]) -> tuple[FloatArray, ...]:
+    """Return the grids of the trajectory that shows most: extremes of all, peaks of the last."""
+    per_trajectory = []
+    for part in data:
+        assert part.motion.tau is not None
+        left = part.motion.tau - arm.torque(part.motion)
+        per_trajectory.append(effect.shape_grids(part.motion, arm, left))
+    return tuple(_merge(grids) for grids in zip(*per_trajectory, strict=True))
+
+
+def _merge(grids: Sequence[FloatArray]) -> FloatArray:
+    """Merge the grids of several trajectories: their ends, and evenly chosen ones between."""
+    joined = np.sort(np.concatenate(grids, axis=1), axis=1)
+    count = max(grid.shape[1] for grid in grids)
+    if joined.shape[1] == count or np.ptp(np.stack(grids), axis=0).max() < 1e-12:
+        return grids[0]
+    picks = np.unique(np.linspace(0, joined.shape[1] - 1, max(count + 2, 8)).round().astype(int))
+    return joined[:, picks]
+
+
+@dataclass(frozen=True)
+class _Remembering(ArmModel):
+    """An arm that computes the torques of a motion once, for all effects that ask."""
+
+    @cached_property
+    def _known(self) -> dict[tuple[str, int], tuple[Motion, FloatArray]]:
+        return {}
+
+    def load(self, motion: Motion) -> FloatArray:
+        """Return what the rigid body takes, shape (N, n) [N m]."""
+        key = 'load', id(motion)
+        if key not in self._known:
+            self._known[key] = motion, super().load(motion)
+        return self._known[key][1].copy()
+
+    def joint_torque(self, motion: Motion) -> FloatArray:
+        """Return the true torques of a recorded motion, shape (N, n) [N m]."""
+        key = 'torque', id(motion)
+        if key not in self._known:
+            self._known[key] = motion, super().joint_torque(motion)
+        return self._known[key][1].copy()
+
+
+def remembering(arm: ArmModel) -> ArmModel:
+    """Return the arm, made to compute the torques of each motion once."""
+    return _Remembering(arm.robot, arm.effects, arm.values, arm.quasi_static)
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """
+    All groups with their columns in rows.
+
+    Attributes
+    ----------
+    groups : tuple of Group
+        What may be named.
+    columns : tuple of ndarray, each (M, n, C)
+        Columns of all groups, per trajectory, filtered and decimated.
+
+    """
+
+    groups: tuple[Group, ...]
+    columns: tuple[FloatArray, ...]
+
+
+def candidates(arm: ArmModel, data: Sequence[Trajectory], library: Sequence[str]) -> Candidates:
+    """Compute the columns of every effect that the arm does not have."""
+    arm = remembering(arm)
+    groups: list[Group] = []
+    blocks: list[list[FloatArray]] = [[] for _ in data]
+    start = 0
+    for effect, members in group_effects(arm, library):
+        for whole, singles in shaped(effect, members, arm, data):
+            for block, part in zip(blocks, data, strict=True):
+                block.append(effect_rows(arm, whole, part))
+            for single in singles:
+                size = len(single.parameters(arm.robot))
+                for kept in _ALONE.get(single.name, (tuple(range(size)),)):
+                    span = slice(start + kept[0], start + kept[-1] + 1)
+                    groups.append(Group(single, span, kept))
+                start += size
+    return Candidates(tuple(groups), tuple(np.concatenate(block, axis=2) for block in blocks))
+
+
+def effect_rows(arm: ArmModel, effect: Effect, part: Trajectory) -> FloatArray:
+    """Return the columns of an effect in the rows of a trajectory, shape (M, n, P)."""
+    if effect.name in _SMOOTH:
+        return arm.columns_of(effect, part.motion.select(part.rows))
+    return part.reduce(arm.columns_of(effect, part.motion))

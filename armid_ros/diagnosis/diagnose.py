@@ -1,0 +1,226 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The diagnosis: from recordings and a model to a verdict.
+
+The model is tried as it is, with single causes added (what is wrong with the description shows
+there), and with its rigid body and known effects fitted anew, where only the structure counts.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.evidence import trajectories, Trajectory
+from armid_ros.diagnosis.fit import excited, fit
+from armid_ros.diagnosis.floor import Floor, noise_floor
+from armid_ros.diagnosis.gap import Gap, measure_gap
+from armid_ros.diagnosis.gate import check_data, Gate
+from armid_ros.diagnosis.model_search import explain, Explanation
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.verdict import decide, Finding, Verdict
+from armid_ros.diagnosis.where import locate, Where
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.checks import check_motion
+from armid_ros.identification.signals import conditioning
+from armid_ros.recording import Recording
+import numpy as np
+
+#: Told the share that is done and what is being done.
+Progress = Callable[[float, str], None]
+
+#: Causes that a model as described may lack before a fit of everything is the better explanation.
+_FIXED_STEPS = 1
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """
+    What a diagnosis came to.
+
+    Attributes
+    ----------
+    verdict : str
+        consistent, named, ambiguous, partial, unknown, not_repeatable or bad_data.
+    summary : str
+        The same in a sentence or two.
+    findings : tuple of Finding
+        What was named, with parameters, rivals and the experiment that would separate them.
+    where : tuple of Where
+        Where the gap was before anything was named, or is where nothing was.
+    left : tuple of Where
+        Where what remains lives.
+    gap : Gap or None
+        Errors before and after beside the noise; None where the data are bad.
+    explanation : Explanation or None
+        How it was found.
+    arm : ArmModel
+        The patched model.
+    gate : Gate or None
+        What the data are like.
+    data : tuple of Trajectory
+        What was looked at.
+    floors : tuple of Floor
+        Noise of each trajectory.
+    not_visible : tuple of str
+        Names of the catalogue that these data cannot show.
+    refitted : bool
+        Whether the rigid body and known effects were fitted anew.
+    notes : tuple of str
+        What a reader should know.
+
+    """
+
+    verdict: str
+    summary: str
+    findings: tuple[Finding, ...]
+    where: tuple[Where, ...]
+    left: tuple[Where, ...]
+    gap: Gap | None
+    explanation: Explanation | None
+    arm: ArmModel
+    gate: Gate | None
+    data: tuple[Trajectory, ...]
+    floors: tuple[Floor, ...]
+    not_visible: tuple[str, ...]
+    refitted: bool
+    notes: tuple[str, ...]
+
+
+def diagnose(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    *,
+    validate: Sequence[Recording] = (),
+    settings: DiagnosisSettings | None = None,
+    rng: np.random.Generator,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """
+    Find what a model lacks.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The model as it is believed to be: rigid body, gravity, known effects with values.
+    recordings : sequence of Recording
+        Data with torques; three speeds or more with two equal periods each are best.
+    validate : sequence of Recording
+        Data that are only predicted.
+    settings : DiagnosisSettings, optional
+        Thresholds and library.
+    rng : numpy.random.Generator
+        Draws the states over which base parameters are found.
+    progress : callable, optional
+        Told the share that is done and what is being done.
+
+    Returns
+    -------
+    Diagnosis
+        Verdict, names, patched model.
+
+    Raises
+    ------
+    IdentificationError
+        If there is nothing to diagnose: no torque, no motion, too short.
+
+    """
+    settings = settings or DiagnosisSettings()
+    tell = progress or _silent
+    tell(0.02, 'filtering')
+    used = conditioning(list(recordings), settings.signals)
+    data = trajectories(recordings, used)
+    gate = check_data(arm, recordings, data)
+    faults, notes = list(gate.faults), [*gate.notes]
+    try:
+        notes += check_motion(arm.robot, recordings, used)
+    except IdentificationError as error:
+        faults.append(str(error))
+    if faults:
+        return _bad(arm, gate, data, tuple(faults))
+    tell(0.1, 'noise floor')
+    base, _ = excited(arm, arm.base_parameters(rng), data)
+    sigma = [noise_floor(part, arm).sigma for part in data]
+    refit = fit(arm, (), data, sigma, base)
+    floors = [noise_floor(part, refit.arm) for part in data]
+    sigma = [floor.sigma for floor in floors]
+    if any(floor.period is None for floor in floors):
+        notes.append(
+            'nothing repeats in some recordings: their noise floor is assumed from the upper part '
+            'of the spectrum; two equal periods would measure it'
+        )
+    tell(0.25, 'model as described')
+    fixed = explain(arm, data, sigma, None, settings, _FIXED_STEPS)
+    explained = bool(np.all(fixed.losses < settings.consistent_loss))
+    if explained and fixed.steps:
+        chosen = fixed
+    elif explained:
+        refitted = explain(arm, data, sigma, base, settings, 1)
+        chosen = replace(fixed, survey=refitted.survey)
+    else:
+        tell(0.5, 'model fitted anew')
+        chosen = explain(arm, data, sigma, base, settings, settings.most_steps)
+    tell(0.85, 'held-out gap')
+    floors = [noise_floor(part, chosen.fitted.arm) for part in data]
+    gap = measure_gap(chosen, data, floors, validate, used)
+    verdict: Verdict = decide(chosen, floors, gap, settings, arm)
+    where = locate(
+        chosen.reference.arm,
+        data,
+        chosen.reference.residual,
+        chosen.reference_losses,
+        settings.consistent_loss,
+    )
+    left = locate(
+        chosen.fitted.arm, data, chosen.fitted.residual, chosen.losses, settings.consistent_loss
+    )
+    tell(1.0, verdict.word)
+    return Diagnosis(
+        verdict=verdict.word,
+        summary=verdict.summary,
+        findings=verdict.findings,
+        where=where,
+        left=left,
+        gap=gap,
+        explanation=chosen,
+        arm=chosen.fitted.arm,
+        gate=gate,
+        data=tuple(data),
+        floors=tuple(floors),
+        not_visible=_not_visible(chosen, settings),
+        refitted=chosen.base is not None,
+        notes=tuple(notes),
+    )
+
+
+def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:
+    hidden = chosen.survey.hidden if chosen.survey is not None else frozenset()
+    return tuple(name for name in settings.library if name in hidden)
+
+
+def _bad(
+    arm: ArmModel, gate: Gate, data: Sequence[Trajectory], faults: tuple[str, ...]
+) -> Diagnosis:
+    return Diagnosis(
+        verdict='bad_data',
+        summary=f'The data cannot be diagnosed: {"; ".join(faults)}.',
+        findings=(),
+        where=(),
+        left=(),
+        gap=None,
+        explanation=None,
+        arm=arm,
+        gate=gate,
+        data=tuple(data),
+        floors=(),
+        not_visible=(),
+        refitted=False,
+        notes=gate.notes,
+    )
+
+
+def _silent(share: float, what: str) -> None:
+    """Tell nobody."""

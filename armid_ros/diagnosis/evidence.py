@@ -1,0 +1,139 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What recordings show beside a model: torques and columns, filtered alike and decimated.
+
+A trajectory is one unbroken stretch of a recording. Its motion stays at the full rate, where
+columns are computed; its rows are decimated, which is where everything is compared.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.signals import (
+    Conditioning,
+    decimate,
+    decimated_samples,
+    segments,
+)
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+import numpy as np
+import numpy.typing as npt
+
+#: Columns are computed at this many times the rate of the rows: enough for signs and hysteresis.
+_OVERSAMPLING = 8
+#: A joint slower than this share of its top speed for this long [s] is at rest.
+_REST_SPEED, _REST_TIME = 0.02, 0.2
+#: Below this share of the top speed the sign of a velocity is uncertain, and so is dry friction in
+#: as many rows around as the filter smears it over: beyond two rows the residuals of six-joint arms
+#: are at their noise again, within them they are at 3 to 15 times its power.
+_REVERSAL_SPEED, _REVERSAL_ROWS = 0.004, 2
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """
+    One unbroken stretch of a recording.
+
+    Attributes
+    ----------
+    source : str
+        The recording.
+    fold : int
+        Which part of the data it belongs to when parts are held out.
+    motion : Motion
+        Filtered motion with the measured torque, N samples.
+    used : Conditioning
+        From motion to rows.
+    rows : ndarray of int, shape (M,)
+        Samples of the motion that the rows sit on.
+    told : ndarray of bool, shape (M, n)
+        False where a joint rests or turns round: friction is undetermined there.
+
+    """
+
+    source: str
+    fold: int
+    motion: Motion
+    used: Conditioning
+    rows: npt.NDArray[np.intp]
+    told: npt.NDArray[np.bool_]
+
+    def reduce(self, values: FloatArray) -> FloatArray:
+        """Filter and decimate samples (N, ...) to rows (M, ...)."""
+        return decimate(values, self.used)
+
+    def residual(self, arm: ArmModel) -> FloatArray:
+        """Return measured torque minus that of a model, in rows, shape (M, n) [N m]."""
+        assert self.motion.tau is not None
+        return self.reduce(self.motion.tau - arm.torque(self.motion))
+
+    @property
+    def t(self) -> FloatArray:
+        """Time of the rows [s]."""
+        return self.motion.t[self.rows]
+
+
+def trajectories(recordings: Sequence[Recording], used: Conditioning) -> list[Trajectory]:
+    """
+    Cut recordings into unbroken stretches, conditioned alike.
+
+    Raises
+    ------
+    IdentificationError
+        If a recording has no stretch that is long enough.
+
+    """
+    result = []
+    for fold, recording in enumerate(recordings):
+        found = [_trajectory(recording.source, fold, m, used) for m in segments(recording, used)]
+        if not found:
+            raise IdentificationError(
+                f'{recording.source}: no stretch is long enough to be filtered at '
+                f'{used.cutoff_hz:g} Hz'
+            )
+        result += found
+    return result
+
+
+def _trajectory(source: str, fold: int, motion: Motion, used: Conditioning) -> Trajectory:
+    thin = max(1, used.decimation // _OVERSAMPLING)
+    while used.decimation % thin:
+        thin -= 1
+    if thin > 1:
+        first = replace(used, decimation=thin)
+        assert motion.tau is not None
+        kept = np.array(decimated_samples(len(motion), first), dtype=np.intp)
+        motion = motion.select(kept).with_torque(decimate(motion.tau, first))
+        used = Conditioning(used.rate_hz / thin, used.cutoff_hz, used.decimation // thin)
+    rows = np.array(decimated_samples(len(motion), used), dtype=np.intp)
+    told = ~(_at_rest(motion) | _turning(motion, used))[rows]
+    return Trajectory(source, fold, motion, used, rows, told)
+
+
+def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
+    """Return where joints stand still, shape (N, n)."""
+    rest = np.zeros(motion.q.shape, dtype=bool)
+    shortest = _REST_TIME / float(motion.t[1] - motion.t[0])
+    for joint in range(motion.n_joints):
+        speed = np.abs(motion.dq[:, joint])
+        slow = np.concatenate([[False], speed <= _REST_SPEED * speed.max(), [False]])
+        edges = np.flatnonzero(np.diff(slow.astype(int))).reshape(-1, 2)
+        for start, stop in edges[np.diff(edges, axis=1)[:, 0] >= shortest]:
+            rest[start:stop, joint] = True
+    return rest
+
+
+def _turning(motion: Motion, used: Conditioning) -> npt.NDArray[np.bool_]:
+    """Return where joints are too slow for the sign of their velocity, rows around included."""
+    slow = np.abs(motion.dq) < _REVERSAL_SPEED * np.abs(motion.dq).max(axis=0)
+    slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
+    reach = _REVERSAL_ROWS * used.decimation
+    wide = np.cumsum(np.pad(slow, ((reach + 1, reach), (0, 0))), axis=0)
+    return np.asarray(wide[2 * reach + 1 :] - wide[: -2 * reach - 1] > 0)

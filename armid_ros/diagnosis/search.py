@@ -1,0 +1,277 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The forward search: name by name, until the noise is reached or nothing passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.candidates import effect_rows, Group
+from armid_ros.diagnosis.evidence import Trajectory
+from armid_ros.diagnosis.problem import Problem, project, Projection
+from armid_ros.diagnosis.selection import (
+    acceptable,
+    block_z,
+    joint_losses,
+    Score,
+    screen,
+    Trial,
+    try_group,
+)
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.effects import Effect, Shape
+from armid_ros.errors import ModelError
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Best groups that are looked at row by row; shapes of this many are refined.
+_LOOKED_AT, _REFINED = 30, 4
+#: Shapes that the data give a good start of, and how far from it a search goes: of a peak of a
+#: spectrum [1/rev], of a level near the highest torque (far below it, it would be the torque).
+_NEAR = {'ripple_order': 1.0, 'saturation_torque': 0.08}
+#: Rounds and evaluations per shape of a refinement.
+_GOLDEN, _ROUNDS = 7, 2
+
+
+@dataclass(frozen=True)
+class Step:
+    """
+    One name that was accepted.
+
+    Attributes
+    ----------
+    trial : Trial
+        What it explains.
+    rivals : tuple of Trial
+        Groups that the data do not exclude in its place.
+    league : tuple of Trial
+        The best groups of the round, one per name and joints, best first.
+    before, after : ndarray, shape (n,)
+        Loss of each joint.
+
+    """
+
+    trial: Trial
+    rivals: tuple[Trial, ...]
+    league: tuple[Trial, ...]
+    before: FloatArray
+    after: FloatArray
+
+
+@dataclass(frozen=True)
+class Survey:
+    """
+    What a look at all groups showed.
+
+    Attributes
+    ----------
+    league : tuple of Trial
+        The best groups, best first.
+    hidden : frozenset of str
+        Names of which the free parameters leave nothing to be seen.
+    scores : tuple of Score
+        All visible groups, best shape of each.
+
+    """
+
+    league: tuple[Trial, ...]
+    hidden: frozenset[str]
+    scores: tuple[Score, ...]
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """The data and the arm that columns are computed for, when shapes are refined."""
+
+    arm: ArmModel
+    data: tuple[Trajectory, ...]
+    settings: DiagnosisSettings
+
+    def columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
+        """Return the columns of an effect in rows, shape (R, n, p)."""
+        blocks = [effect_rows(self.arm, effect, part) for part in self.data]
+        return np.asarray(np.concatenate(blocks)[:, :, list(kept)])
+
+
+def next_step(
+    problem: Problem,
+    free: Sequence[int],
+    groups: Sequence[Group],
+    work: Workspace,
+) -> tuple[Step | None, Survey, Problem]:
+    """
+    Look for the group that explains most of what is left.
+
+    Returns
+    -------
+    step : Step or None
+        The name, with its rivals; None if nothing passes.
+    survey : Survey
+        The best groups, accepted or not, and what cannot be seen.
+    problem : Problem
+        With the columns of refined shapes behind the others.
+
+    """
+    settings = work.settings
+    projection = project(problem, free)
+    left = projection.rest(problem.y)
+    scores = _best_per_key(screen(problem, projection, groups, settings.least_visible))
+    visible = {score.group.effect.name for score in scores}
+    hidden = frozenset(group.effect.name for group in groups) - visible
+    trials: list[Trial] = []
+    refined = 0
+    for score in scores[:_LOOKED_AT]:
+        columns = problem.x[:, :, score.group.columns]
+        if score.gain <= 0.0:
+            break
+        promising = refined < _REFINED and score.gain > 0.4 * scores[0].gain
+        if score.group.effect.shapes and promising:
+            refined += 1
+            score, columns = _refine(problem, projection, score, left, work)
+            start = problem.x.shape[2]
+            problem = problem.with_columns(columns)
+            span = slice(start, start + columns.shape[2])
+            score = replace(score, group=replace(score.group, columns=span))
+            columns = problem.x[:, :, span]
+        trials.append(try_group(problem, projection, score, columns, settings))
+    trials.sort(key=lambda trial: -trial.gain)
+    passing = [t for t in trials if acceptable(t, problem, left, settings)]
+    league = tuple(trials)
+    survey = Survey(league, hidden, tuple(scores))
+    if not passing:
+        return None, survey, problem
+    tied = [passing[0], *_not_beaten(passing, problem, left, settings)]
+    winner = simplest(tied)
+    rivals = tuple(
+        t for t in tied if t is not winner and not _contains(t, winner, problem, projection)
+    )
+    before = joint_losses(problem, left)
+    after = joint_losses(problem, left - winner.torque)
+    return Step(winner, rivals, league, before, after), survey, problem
+
+
+def simplest(tied: Sequence[Trial]) -> Trial:
+    """Return the one with the fewest quantities and shapes; of these, the one that gains most."""
+
+    def key(trial: Trial) -> tuple[int, float]:
+        group = trial.score.group
+        return len(group.kept) + len(group.effect.shapes), -trial.gain
+
+    return min(tied, key=key)
+
+
+def _best_per_key(scores: Sequence[Score]) -> list[Score]:
+    best: dict[object, Score] = {}
+    for score in scores:
+        best.setdefault(score.group.key, score)
+    return list(best.values())
+
+
+def _not_beaten(
+    passing: Sequence[Trial], problem: Problem, left: FloatArray, settings: DiagnosisSettings
+) -> list[Trial]:
+    """Return the groups that the first does not beat on two held-out parts, or looks like."""
+    best = passing[0]
+    result = []
+    for other in passing[1:]:
+        lead = (left - other.held_out) ** 2 - (left - best.held_out) ** 2
+        z = block_z(problem.fold, lead.sum(axis=1), settings.blocks)
+        worse = lead.sum() > 0.05 * best.gain
+        beaten = worse and np.sum(z >= settings.rival_z) >= min(2, problem.folds)
+        alike = _cosine(best.torque, other.torque) > settings.same_cosine and not worse
+        if not beaten or alike:
+            result.append(other)
+    return result
+
+
+def _cosine(a: FloatArray, b: FloatArray) -> float:
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(np.sum(a * b)) / size if size > 0.0 else 0.0
+
+
+def _contains(big: Trial, small: Trial, problem: Problem, projection: Projection) -> bool:
+    """Return whether a larger group can make what a smaller one makes."""
+    span = big.score.group.columns
+    if span.stop - span.start <= len(small.score.values):
+        return False
+    columns = projection.rest(problem.x[:, :, span]).reshape(-1, span.stop - span.start)
+    target = small.torque.ravel()
+    fit = np.linalg.lstsq(columns, target, rcond=1e-6)[0]
+    return bool(np.sum((target - columns @ fit) ** 2) < 0.02 * np.sum(target**2))
+
+
+def _refine(
+    problem: Problem,
+    projection: Projection,
+    score: Score,
+    left: FloatArray,
+    work: Workspace,
+) -> tuple[Score, FloatArray]:
+    """Refine the shape of a group by variable projection; return it with its columns."""
+    effect, kept = score.group.effect, score.group.kept
+    cache: dict[tuple[float, ...], tuple[float, FloatArray]] = {}
+
+    def gain(shape: FloatArray) -> float:
+        key = tuple(shape.tolist())
+        if key not in cache:
+            try:
+                columns = work.columns(effect.with_shape(shape), kept)
+            except ModelError:
+                return -np.inf
+            weighted = columns * problem.weight[:, :, np.newaxis]
+            flat = projection.rest(weighted).reshape(-1, len(kept))
+            own, aim = flat.T @ flat, flat.T @ left.ravel()
+            values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
+            cache[key] = float(values @ aim), columns
+        return cache[key][0]
+
+    shape = np.array(effect.shape)
+    gain(shape)
+    for _ in range(_ROUNDS if len(shape) > 1 else 1):
+        for index, kind in enumerate(effect.shapes):
+            shape = _line_search(gain, shape, index, kind)
+    best = max(cache, key=lambda key: cache[key][0])
+    group = replace(score.group, effect=effect.with_shape(best))
+    return replace(score, group=group), cache[best][1]
+
+
+def _line_search(
+    gain: Callable[[FloatArray], float], shape: FloatArray, index: int, kind: Shape
+) -> FloatArray:
+    """Search one shape around where it is, by golden sections of its logarithm if positive."""
+    value = float(shape[index])
+    positive = kind.lower > 0.0 and value > 0.0 and kind.name not in _NEAR
+    if kind.name in _NEAR:
+        reach = _NEAR[kind.name] if kind.unit == '1/rev' else _NEAR[kind.name] * abs(value)
+        low, high = max(kind.lower, value - reach), min(kind.upper, value + reach)
+    elif positive:
+        ratio = max([b / a for a, b in pairwise(sorted(kind.grid)) if a > 0.0] or [3.0])
+        ratio = min(ratio, 3.5)
+        low = np.log(max(kind.lower, value / ratio))
+        high = np.log(min(kind.upper, value * ratio))
+    else:
+        reach = max(0.15 * abs(value), 0.05 * float(np.ptp(kind.grid)), 1e-3)
+        low, high = max(kind.lower, value - reach), min(kind.upper, value + reach)
+
+    def at(x: float) -> FloatArray:
+        moved = shape.copy()
+        moved[index] = np.exp(x) if positive else x
+        return moved
+
+    golden = (np.sqrt(5.0) - 1.0) / 2.0
+    a, b = high - golden * (high - low), low + golden * (high - low)
+    fa, fb = gain(at(a)), gain(at(b))
+    for _ in range(_GOLDEN):
+        if fa > fb:
+            high, b, fb = b, a, fa
+            a = high - golden * (high - low)
+            fa = gain(at(a))
+        else:
+            low, a, fa = a, b, fb
+            b = low + golden * (high - low)
+            fb = gain(at(b))
+    chosen = at(a if fa > fb else b)
+    return chosen if max(fa, fb) > gain(shape) else shape

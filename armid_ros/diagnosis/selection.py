@@ -1,0 +1,203 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which group explains what is left, scored on parts of the data it was not fitted to.
+
+The rigid body and all that was accepted before are free throughout. The values of a group come
+from all parts of the data but one, and are judged by how much of that one's excess they take.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.diagnosis.candidates import Group
+from armid_ros.diagnosis.problem import Problem, Projection
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+
+
+@dataclass(frozen=True)
+class Score:
+    """
+    How well a group explains what is left.
+
+    Attributes
+    ----------
+    group : Group
+        The group.
+    values : ndarray, shape (p,)
+        Its values fitted to all parts.
+    std : ndarray, shape (p,)
+        Their standard deviations, as far as white noise goes.
+    gain : float
+        Sum of squares that the parts lose with values from the other parts.
+    visible : float
+        Share of the columns that the free ones cannot make.
+
+    """
+
+    group: Group
+    values: FloatArray
+    std: FloatArray
+    gain: float
+    visible: float
+
+
+@dataclass(frozen=True)
+class Trial:
+    """
+    A group looked at row by row.
+
+    Attributes
+    ----------
+    score : Score
+        Its values.
+    torque : ndarray, shape (R, n)
+        What it explains with values from all data, over noise, free columns taken out.
+    held_out : ndarray, shape (R, n)
+        The same with values from the other parts.
+    gains : ndarray, shape (F, n)
+        Sum of squares that each part and joint loses, held out.
+    z : ndarray, shape (F,)
+        How sure the gain of each part is.
+    fold_values : ndarray, shape (F, p)
+        Values without each part.
+
+    """
+
+    score: Score
+    torque: FloatArray
+    held_out: FloatArray
+    gains: FloatArray
+    z: FloatArray
+    fold_values: FloatArray
+
+    @property
+    def gain(self) -> float:
+        """Held-out gain over all parts and joints."""
+        return float(self.gains.sum())
+
+
+def screen(
+    problem: Problem, projection: Projection, groups: Sequence[Group], least_visible: float
+) -> list[Score]:
+    """
+    Score all groups of which something is visible, best first.
+
+    Columns of the groups count from the beginning of the problem.
+
+    """
+    left = projection.sweep(problem.products)
+    whole, rest = np.diagonal(problem.products.sum(axis=0)), left.sum(axis=0)
+    result = []
+    for group in groups:
+        span = group.columns
+        parts, target = left[:, span, span], left[:, span, -1]
+        own, aim = rest[span, span], rest[span, -1]
+        size = float(whole[span].sum())
+        visible = float(np.sqrt(max(np.trace(own), 0.0) / size)) if size > 0.0 else 0.0
+        if visible < least_visible:
+            continue
+        values, std = solve_products(own, aim)
+        gain = 0.0
+        for a, b in zip(parts, target, strict=True):
+            v, _ = solve_products(own - a, aim - b)
+            gain += float(2.0 * v @ b - v @ a @ v)
+        result.append(Score(group, values, std, gain, visible))
+    return sorted(result, key=lambda score: -score.gain)
+
+
+def solve_products(own: FloatArray, aim: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Solve normal equations; directions that the data do not tell stay at zero."""
+    diagonal = np.diag(own)
+    seen = diagonal > 1e-9 * max(float(diagonal.max()), 1e-300)
+    scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, diagonal, 1.0)), 0.0)
+    values, vectors = np.linalg.eigh(own * np.outer(scale, scale))
+    good = values > 1e-5 * max(float(values[-1]), 1e-300)
+    basis = scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good])
+    return basis @ (basis.T @ aim), np.sqrt(np.sum(basis**2, axis=1))
+
+
+def try_group(
+    problem: Problem,
+    projection: Projection,
+    score: Score,
+    columns: FloatArray,
+    settings: DiagnosisSettings,
+) -> Trial:
+    """Look at a group row by row; columns are weighted, (R, n, p), free ones not taken out."""
+    left = projection.rest(problem.y)
+    own_columns = projection.rest(columns)
+    flat = own_columns.reshape(-1, columns.shape[2])
+    owner = np.repeat(problem.fold, problem.y.shape[1])
+    parts = np.array([flat[owner == k].T @ flat[owner == k] for k in range(problem.folds)])
+    aims = np.array([flat[owner == k].T @ left.ravel()[owner == k] for k in range(problem.folds)])
+    own, aim = parts.sum(axis=0), aims.sum(axis=0)
+    values, std = solve_products(own, aim)
+    fold_values = np.array(
+        [solve_products(own - a, aim - b)[0] for a, b in zip(parts, aims, strict=True)]
+    )
+    held_out = np.einsum('rnp,rp->rn', own_columns, fold_values[problem.fold])
+    gain = left**2 - (left - held_out) ** 2
+    gains = np.array([gain[problem.fold == k].sum(axis=0) for k in range(problem.folds)])
+    scored = Score(score.group, values, std, float(gains.sum()), score.visible)
+    z = block_z(problem.fold, gain.sum(axis=1), settings.blocks)
+    return Trial(scored, own_columns @ values, held_out, gains, z, fold_values)
+
+
+def block_z(fold: npt.NDArray[np.intp], gain: FloatArray, blocks: int) -> FloatArray:
+    """
+    Return how sure it is that a gain per row is positive, in each fold, shape (F,).
+
+    Blocks are long enough to be independent of each other, whatever the colour of the residual.
+
+    """
+    z = np.zeros(int(fold.max()) + 1)
+    for k in range(len(z)):
+        means = np.array([part.mean() for part in np.array_split(gain[fold == k], blocks)])
+        spread = float(means.std(ddof=1)) / np.sqrt(len(means))
+        z[k] = means.mean() / max(spread, 1e-300) if means.any() else 0.0
+    return z
+
+
+def excess(problem: Problem, left: FloatArray) -> FloatArray:
+    """Return the sum of squares beyond the noise of each fold and joint, shape (F, n)."""
+    return np.asarray(np.maximum(problem.losses(left) - 1.0, 0.0) * problem.count())
+
+
+def joint_losses(problem: Problem, left: FloatArray) -> FloatArray:
+    """Return the loss of each joint over all folds, shape (n,)."""
+    count = problem.used.sum(axis=0)
+    return np.asarray(np.sum(left**2, axis=0) / np.maximum(count, 1))
+
+
+def within_bounds(score: Score) -> bool:
+    """Return whether the values are physically possible, or differ from that by noise."""
+    kept = list(score.group.kept)
+    lower, upper = (bound[kept] for bound in score.group.effect.bounds())
+    slack = 3.0 * score.std
+    return bool(np.all(score.values > lower - slack) and np.all(score.values < upper + slack))
+
+
+def acceptable(
+    trial: Trial, problem: Problem, left: FloatArray, settings: DiagnosisSettings
+) -> bool:
+    """Return whether a group is possible, replicated, and closes a real share of the gap."""
+    if not within_bounds(trial.score):
+        return False
+    if np.sum(trial.z >= settings.least_z) < min(2, problem.folds) or trial.gain <= 0.0:
+        return False
+    single = len(trial.score.values) == 1
+    if single and np.any(trial.fold_values[:, 0] * trial.score.values[0] < 0.0):
+        return False
+    beyond = excess(problem, left).sum(axis=0)
+    gap = joint_losses(problem, left) > settings.consistent_loss
+    gains = trial.gains.sum(axis=0)
+    whole = trial.gain >= settings.least_share * beyond[gap].sum() and gains[gap].sum() > 0.0
+    one = bool(np.any(gap & (gains >= 0.3 * beyond)))
+    return bool(gap.any()) and (whole or one)

@@ -1,0 +1,59 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The thresholds of a diagnosis, each with the reason for its value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from armid_ros.effects import CATALOGUE
+from armid_ros.identification import SignalSettings
+
+
+@dataclass(frozen=True)
+class DiagnosisSettings:
+    """
+    When a gap is a gap, and when an effect may be named.
+
+    The excess of a joint is e - 1, where e is the mean of (residual / noise)^2.
+
+    Attributes
+    ----------
+    library : tuple of str
+        Names that may be given.
+    signals : SignalSettings
+        Filters; chosen from the recordings by default.
+    consistent_loss : float
+        A joint with a loss e below this is at its noise: the floor itself is known to 10 or 20 %
+        from two periods of some ten seconds.
+    partial_loss : float
+        A model that leaves a joint above this is not the whole truth: names are provisional.
+    least_share : float
+        A group has to close this share of the excess that is left, in the arm or in one joint.
+    least_z : float
+        Block z that a gain has to reach on a held-out trajectory to count as replicated.
+    rival_z : float
+        Block z by which a name has to beat another one to exclude it.
+    same_cosine : float
+        Groups whose torques, as far as the rigid body cannot make them, have a cosine above this
+        are the same to these data.
+    least_visible : float
+        A group of which the rigid body's parameters leave less than this share cannot be seen.
+    most_steps : int
+        Groups that are looked for, one after the other.
+    blocks : int
+        Blocks per trajectory for the z: some hundred rows each, longer than any correlation.
+
+    """
+
+    library: tuple[str, ...] = tuple(CATALOGUE)
+    signals: SignalSettings = field(default_factory=SignalSettings)
+    consistent_loss: float = 1.2
+    partial_loss: float = 1.4
+    least_share: float = 0.10
+    least_z: float = 3.0
+    rival_z: float = 2.0
+    same_cosine: float = 0.95
+    least_visible: float = 0.02
+    most_steps: int = 24
+    blocks: int = 12

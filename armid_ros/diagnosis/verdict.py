@@ -1,0 +1,213 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From an explanation to a verdict: names only where the data leave no other, or none at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.experiment import separating
+from armid_ros.diagnosis.floor import Floor
+from armid_ros.diagnosis.gap import Gap
+from armid_ros.diagnosis.model_search import Explanation
+from armid_ros.diagnosis.search import Step
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.estimate import ParameterName
+import numpy as np
+
+Word = Literal[
+    'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
+]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """
+    One named effect.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the catalogue.
+    joints : tuple of str
+        The joints it is on; none for the whole arm.
+    parameters : tuple of ParameterName
+        Its parameters, shapes included.
+    values, std : tuple of float
+        Their values and standard deviations; nan where the data do not tell.
+    ambiguous_with : tuple of str
+        Names that the data do not exclude in its place.
+    experiment : str
+        What would separate them; empty if there is nothing to separate.
+    gain : float
+        Sum of squares over noise that it takes, held out.
+
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    parameters: tuple[ParameterName, ...]
+    values: tuple[float, ...]
+    std: tuple[float, ...]
+    ambiguous_with: tuple[str, ...]
+    experiment: str
+    gain: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """
+    The word, the sentence, the names.
+
+    Attributes
+    ----------
+    word : str
+        See ``Word``.
+    summary : str
+        A sentence or two.
+    findings : tuple of Finding
+        Effects by name, most of the gap first.
+
+    """
+
+    word: Word
+    summary: str
+    findings: tuple[Finding, ...]
+
+
+def decide(
+    explanation: Explanation,
+    floors: Sequence[Floor],
+    gap: Gap,
+    settings: DiagnosisSettings,
+    arm: ArmModel,
+) -> Verdict:
+    """Decide what may be said."""
+    findings = _findings(explanation, arm)
+    worst = float(np.max(explanation.losses))
+    strange = _not_repeating(floors, arm)
+    if strange and (not findings or worst > settings.partial_loss):
+        return Verdict('not_repeatable', _strange(strange, findings), findings)
+    if not findings:
+        if worst <= settings.partial_loss:
+            return Verdict('consistent', _consistent(explanation, gap), ())
+        joint = arm.robot.joints[int(np.argmax(explanation.losses))]
+        text = (
+            f'Something is missing, most of it in {joint} ({worst:.2g} times the power of the '
+            'noise), and nothing in the catalogue explains it. No name is given.'
+        )
+        return Verdict('unknown', text, ())
+    if worst > settings.partial_loss:
+        joint = arm.robot.joints[int(np.argmax(explanation.losses))]
+        text = (
+            f'Provisional: {_names(findings)} {_closes(gap)}, but {joint} is left at '
+            f'{worst:.2g} times the power of the noise: there is more than this.'
+        )
+        return Verdict('partial', text, findings)
+    doubtful = [f for f in findings if f.ambiguous_with]
+    if doubtful:
+        first = doubtful[0]
+        others = ' or '.join(first.ambiguous_with)
+        text = (
+            f'{_names(findings)} {_closes(gap)}. These data cannot tell {first.name} from '
+            f'{others}. {first.experiment}'
+        )
+        return Verdict('ambiguous', text, findings)
+    return Verdict('named', f'{_names(findings)} {_closes(gap)}.', findings)
+
+
+def _findings(explanation: Explanation, arm: ArmModel) -> tuple[Finding, ...]:
+    fitted, steps = explanation.fitted, explanation.steps
+    merged: dict[str, list[int]] = {}
+    for index, named in enumerate(fitted.named):
+        merged.setdefault(named.effect.name, []).append(index)
+    starts = np.cumsum([0, *(len(named.kept) + len(named.effect.shape) for named in fitted.named)])
+    std = fitted.estimate.std
+    result = []
+    for name, indices in merged.items():
+        rows = [row for k in indices for row in range(starts[k], starts[k + 1])]
+        joints = tuple(joint for k in indices for joint in fitted.named[k].effect.joints)
+        order = [j for j in arm.robot.joints if j in joints]
+        pairs = any(len(fitted.named[k].effect.joints) > 1 for k in indices)
+        rivals = _rivals([steps[k] for k in indices], set(merged))
+        result.append(
+            Finding(
+                name,
+                tuple(dict.fromkeys(joints)) if pairs else tuple(order),
+                tuple(fitted.estimate.parameters[row] for row in rows),
+                tuple(float(fitted.estimate.values[row]) for row in rows),
+                tuple(float(std[row]) for row in rows),
+                rivals,
+                separating(name, rivals[0], order) if rivals else '',
+                float(sum(steps[k].trial.gain for k in indices)),
+            )
+        )
+    return tuple(result)
+
+
+def _rivals(steps: Sequence[Step], named: set[str]) -> tuple[str, ...]:
+    """Return the other names that are possible, the likeliest first."""
+    best: dict[str, float] = {}
+    for step in steps:
+        for rival in step.rivals:
+            name = rival.score.group.effect.name
+            if name not in named:
+                best[name] = max(best.get(name, 0.0), rival.gain)
+    return tuple(sorted(best, key=lambda name: -best[name]))
+
+
+def _not_repeating(floors: Sequence[Floor], arm: ArmModel) -> list[str]:
+    """Return the joints that did not do the same in equal periods."""
+    measured = [floor for floor in floors if floor.period is not None]
+    if not measured:
+        return []
+    strange = np.array([~floor.repeats for floor in measured])
+    often = strange.sum(axis=0) >= min(2, len(measured))
+    return [joint for joint, odd in zip(arm.robot.joints, often, strict=True) if odd]
+
+
+def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
+    text = (
+        f'Equal periods differ in {", ".join(joints)} by more than noise, and not with time or '
+        'velocity: something acts that does not repeat, such as contact or a person. '
+    )
+    if findings:
+        return text + f'{_names(findings)} is provisional.'
+    return text + 'No effect of the arm is named.'
+
+
+def _consistent(explanation: Explanation, gap: Gap) -> str:
+    worst = float(np.max(explanation.losses))
+    how = (
+        'as it is described'
+        if explanation.base is None
+        else 'once its rigid parameters and known effects are fitted; the described values are off'
+    )
+    return (
+        f'The model explains the data {how}: every joint is within {worst:.2f} times the power '
+        'of the noise.'
+    )
+
+
+def _names(findings: Sequence[Finding]) -> str:
+    return '; '.join(_name(finding) for finding in findings)
+
+
+def _name(finding: Finding) -> str:
+    where = f'{", ".join(finding.joints)}: ' if finding.joints else ''
+    words = finding.name.replace('_', ' ')
+    shown = [
+        f'{p.name.replace("_", " ")} {value:.3g} +- {std:.1g} {p.unit}'.strip()
+        for p, value, std in zip(finding.parameters, finding.values, finding.std, strict=True)
+    ]
+    if len(shown) > 3:
+        shown = [*shown[:2], f'and {len(shown) - 2} more']
+    return f'{where}{words} ({", ".join(shown)})'
+
+
+def _closes(gap: Gap) -> str:
+    where = 'held-out data' if gap.data == 'held-out' else 'data left out of the fit'
+    return f'closes {100 * gap.closed:.0f} % of the gap on {where}'
