@@ -88,42 +88,84 @@ def solve(
         Parameters with covariance.
 
     """
-    w = np.concatenate([part.columns for part in problem])
-    y = np.concatenate([part.tau for part in problem])
     used = np.concatenate([part.informative for part in problem])
     counts = np.maximum(used.sum(axis=0), 1)
-    rank = w.shape[2]
+    rank = problem[0].columns.shape[2]
     freedom = counts.sum() / max(1.0, counts.sum() - rank)
-    weights = used.astype(float)
-    values, triangle = _weighted(w, y, weights)
+    relative, scale = used.astype(float), np.ones(used.shape[1])
+    triangles = joint_triangles(problem, relative)
+    values, triangle = _fit(triangles, scale)
     for _ in range(0 if method == 'ols' else _ROUNDS):
-        residual = y - w @ values
+        before = (scale, relative)
         if method == 'wls':
-            scale = np.sqrt(freedom * np.sum(residual**2, axis=0, where=used) / counts)
-            new = used / _positive(scale)
+            scale = _positive(np.sqrt(freedom * _squares(triangles, values) / counts))
         else:
-            scale = _robust_scale(residual, used)
-            size = np.abs(residual) / _positive(scale)
-            huber = np.sqrt(np.minimum(1.0, _HUBER / np.maximum(size, 1e-12)))
-            new = used * huber / _positive(scale)
-        settled = np.allclose(new, weights, rtol=1e-6)
-        weights = new
-        values, triangle = _weighted(w, y, weights)
-        if settled:
+            residual = _residual(problem, values)
+            scale = _positive(_robust_scale(residual, used))
+            size = np.maximum(np.abs(residual) / scale, 1e-12)
+            relative = used * np.sqrt(np.minimum(1.0, _HUBER / size))
+            triangles = joint_triangles(problem, relative)
+        values, triangle = _fit(triangles, scale)
+        if np.allclose(scale, before[0], rtol=1e-6) and np.allclose(relative, before[1]):
             break
     if bounds is not None:
         values = _within(values, triangle, bounds)
-    residual = y - w @ values
-    joint_std = np.sqrt(freedom * np.sum(residual**2, axis=0, where=used) / counts)
-    relative = np.where(used, weights / np.max(weights, axis=0).clip(1e-300), 1.0)
+    residual = _residual(problem, values)
+    weights = relative / scale
     return Solution(
         values=values,
-        covariance=_covariance(problem, values, weights, triangle),
-        joint_std=joint_std,
+        covariance=_covariance(problem, residual * weights, weights, triangle),
+        joint_std=np.sqrt(freedom * np.sum(residual**2, axis=0, where=used) / counts),
         condition_number=float(np.linalg.cond(triangle)),
-        outliers=int(np.sum(relative**2 < 0.5)),
+        outliers=int(np.sum(used & (relative**2 < 0.5))),
         weights=weights,
     )
+
+
+def joint_triangles(
+    problem: Sequence[Regression], weights: npt.NDArray[np.floating] | None = None
+) -> FloatArray:
+    """
+    Compress every joint's rows [columns, torque] to a triangle with the same products.
+
+    Parameters
+    ----------
+    problem : sequence of Regression
+        N rows of each of n joints in r columns, in one or more stretches.
+    weights : ndarray, shape (N, n), optional
+        What the rows are multiplied by; by default those that say nothing are left out.
+
+    Returns
+    -------
+    ndarray, shape (n, r + 1, r + 1)
+        T_j with T_j' T_j = [W_j, y_j]' [W_j, y_j]; not triangular where columns are zero.
+
+    """
+    if weights is None:
+        weights = np.concatenate([part.informative for part in problem]).astype(float)
+    n_joints, rank = problem[0].columns.shape[1:]
+    triangles = np.zeros((n_joints, rank + 1, rank + 1))
+    for joint in range(n_joints):
+        rows = np.concatenate(
+            [np.column_stack([part.columns[:, joint], part.tau[:, joint]]) for part in problem]
+        )
+        active = np.flatnonzero(rows.any(axis=0))
+        stacked = rows[:, active] * weights[:, joint, np.newaxis]
+        (factor,) = scipy.linalg.qr(stacked, mode='r', overwrite_a=True, check_finite=False)
+        factor = factor[: len(active)]
+        triangles[joint, : len(factor), active] = factor.T
+    return triangles
+
+
+def _residual(problem: Sequence[Regression], values: FloatArray) -> FloatArray:
+    parts: list[FloatArray] = [part.tau - part.columns @ values for part in problem]
+    return np.concatenate(parts)
+
+
+def _squares(triangles: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the sum of squared residuals of every joint, shape (n,)."""
+    rest: FloatArray = triangles @ np.append(values, -1.0)
+    return np.asarray(np.sum(rest**2, axis=1))
 
 
 def _within(
@@ -136,7 +178,7 @@ def _within(
     solution = scipy.optimize.lsq_linear(
         triangle / scale, triangle @ values, (bounds[0] * scale, bounds[1] * scale), method='bvls'
     )
-    return np.asarray(np.clip(solution.x / scale, *bounds))
+    return np.clip(solution.x / scale, *bounds)
 
 
 def _robust_scale(residual: FloatArray, used: npt.NDArray[np.bool_]) -> FloatArray:
@@ -148,27 +190,24 @@ def _robust_scale(residual: FloatArray, used: npt.NDArray[np.bool_]) -> FloatArr
 
 def _positive(scale: FloatArray) -> FloatArray:
     """Keep a joint that is fitted exactly from taking all the weight."""
-    floor = 1e-9 * max(float(np.max(scale)), 1e-300)
+    floor = max(1e-9 * float(np.max(scale)), 1e-100)
     return np.maximum(scale, floor)
 
 
-def _weighted(w: FloatArray, y: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _fit(triangles: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Solve by QR with scaled columns; return the values and the triangular factor."""
-    rank = w.shape[2]
-    stacked = np.empty((w.shape[0] * w.shape[1], rank + 1))
-    np.multiply(w, weights[:, :, np.newaxis], out=stacked[:, :rank].reshape(w.shape))
-    stacked[:, rank] = (y * weights).ravel()
-    scale = np.linalg.norm(stacked, axis=0)
-    scale[scale == 0.0] = 1.0
-    stacked /= scale
-    factor = scipy.linalg.qr(stacked, mode='r', overwrite_a=True, check_finite=False)[0]
+    stacked = (triangles / scale[:, np.newaxis, np.newaxis]).reshape(-1, triangles.shape[2])
+    size = np.linalg.norm(stacked, axis=0)
+    size[size == 0.0] = 1.0
+    (factor,) = scipy.linalg.qr(stacked / size, mode='r', check_finite=False)
+    rank = len(size) - 1
     triangle = factor[:rank, :rank]
-    values = scipy.linalg.solve_triangular(triangle, factor[:rank, rank]) * scale[rank]
-    return values / scale[:rank], triangle * scale[:rank]
+    values = scipy.linalg.solve_triangular(triangle, factor[:rank, rank]) * size[rank]
+    return values / size[:rank], triangle * size[:rank]
 
 
 def _covariance(
-    problem: Sequence[Regression], values: FloatArray, weights: FloatArray, triangle: FloatArray
+    problem: Sequence[Regression], residual: FloatArray, weights: FloatArray, triangle: FloatArray
 ) -> FloatArray:
     """
     Propagate coloured residuals through the fit: H^-1 (sum over f of W^H Phi W) H^-1.
@@ -179,26 +218,25 @@ def _covariance(
     of what was, x being the transform of the joint's rows, its leverage.
 
     """
-    rank = len(values)
+    rank = len(triangle)
     inverse = scipy.linalg.solve_triangular(triangle, np.eye(rank))
     meat = np.zeros((rank, rank))
     start = 0
     for part in problem:
         count = len(part.tau)
-        scaled = weights[start : start + count]
-        start += count
-        residual = (part.tau - part.columns @ values) * scaled
-        size = 2 * count
+        stop = start + count
         for joint in range(part.tau.shape[1]):
-            columns = part.columns[:, joint] * scaled[:, joint, np.newaxis]
-            active = np.flatnonzero(np.any(columns != 0.0, axis=0))
-            transformed = np.fft.rfft(columns[:, active], size, axis=0)
+            columns = part.columns[:, joint]
+            active = np.flatnonzero(columns.any(axis=0))
+            columns = columns[:, active] * weights[start:stop, joint, np.newaxis]
+            transformed = np.fft.rfft(columns, 2 * count, axis=0)
             leverage = np.sum(np.abs(transformed @ inverse[active]) ** 2, axis=1) / count
-            spectrum = _noise_spectrum(residual[:, joint], leverage)
-            bins = np.full(len(transformed), 2.0)
-            bins[[0, -1]] = 1.0  # the constant and the Nyquist bin have no mirror image
-            power = (transformed.conj().T * (bins * spectrum / size)) @ transformed
-            meat[np.ix_(active, active)] += power.real
+            spectrum = _noise_spectrum(residual[start:stop, joint], leverage)
+            spectrum[1:-1] *= 2.0  # the constant and the Nyquist bin have no mirror image
+            transformed *= np.sqrt(spectrum / (2 * count))[:, np.newaxis]
+            power = transformed.real.T @ transformed.real + transformed.imag.T @ transformed.imag
+            meat[np.ix_(active, active)] += power
+        start = stop
     bread = inverse @ inverse.T
     return np.asarray(bread @ meat @ bread)
 

@@ -105,13 +105,13 @@ def test_bounds_hold_and_the_others_make_up_for_it():
 def test_noise_that_the_fit_takes_is_made_up_for():
     """Regressor and noise have their power in one narrow band, where the residual has least."""
     rng = np.random.default_rng(0)
-    t = np.arange(400) / 50.0
-    angle = 2.0 * np.pi * 0.125 * np.arange(1, 9) * t[:, np.newaxis]
+    t = np.arange(1200) / 50.0
+    angle = 2.0 * np.pi * 0.125 * np.arange(1, 5) * t[:, np.newaxis]
     columns = np.concatenate([np.sin(angle), np.cos(angle)], axis=1)[:, np.newaxis]
-    zero, used = np.zeros((400, 1)), np.ones((400, 1), dtype=bool)
+    zero, used = np.zeros((1200, 1)), np.ones((1200, 1), dtype=bool)
     values, stated = [], []
     for _ in range(200):
-        noise = lfilter([1.0], [1.0, -0.9], rng.normal(size=(600, 1)), axis=0)[200:]
+        noise = lfilter([1.0], [1.0, -0.9], rng.normal(size=(1400, 1)), axis=0)[200:]
         motion = Motion(('a',), t, zero, zero, zero, noise)
         solution = solve([Regression(motion, columns, used, 'bag')])
         values.append(solution.values)
