@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 from armid_ros.effects import Action, Displacement, Effect, merge_actions, TorqueLaw, TorqueReading
 from armid_ros.errors import ModelError
@@ -105,6 +106,10 @@ class ArmModel:
     def action(self) -> Action:
         """Return how the robot and all effects together act on plant and sensors."""
         return self._acting
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what is derived: it has functions that do not go to other processes."""
+        return {part.name: getattr(self, part.name) for part in fields(self)}
 
     @cached_property
     def _acting(self) -> Action:

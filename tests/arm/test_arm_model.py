@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The arm as a whole: its parameters, what it needs of a motion, what it can tell apart."""
 
+import pickle
+
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError
@@ -98,3 +100,11 @@ def test_effects_that_an_arm_lacks_have_no_values(robot):
     arm = arm_with(robot, viscous_friction=0.2)
     np.testing.assert_array_equal(arm.values_of(make_effect('coulomb_friction', robot)), 0.0)
     np.testing.assert_array_equal(arm.values_of(make_effect('viscous_friction', robot)), 0.2)
+
+
+def test_an_arm_goes_to_other_processes_after_use(robot):
+    """What it derives and keeps, functions among it, stays behind."""
+    arm = ArmModel(robot).with_effect(make_effect('torque_offset', robot), np.full(6, 0.1))
+    motion = random_motion(robot, 5, np.random.default_rng(0))
+    tau = arm.torque(motion)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(arm)).torque(motion), tau)
