@@ -1,0 +1,44 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What changed between two identifications."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from armid_ros.cli import options
+from armid_ros.cli.terminal import say
+from armid_ros.identification.comparison import compare as run
+from armid_ros.identification.comparison import read_parameters
+from armid_ros.report import hash_files, Provenance, versions
+from armid_ros.report.compare_report import compare_report, tell
+import click
+
+
+@click.command(epilog='Example: armid compare monday friday --out changes')
+@click.argument('before', metavar='A', type=click.Path(path_type=Path))
+@click.argument('after', metavar='B', type=click.Path(path_type=Path))
+@options.folder
+@options.as_json
+def compare(before: Path, after: Path, out: Path, as_json: bool) -> None:
+    """
+    Say what changed between two identifications of one robot.
+
+    A and B are folders that identify wrote, identification.json or model.yaml.
+
+    """
+    first, second = read_parameters(before), read_parameters(after)
+    comparison = run(first, second)
+    files = [Path(first.source), Path(second.source)]
+    page = compare_report(comparison, Provenance(files=hash_files(files), versions=versions()))
+    out.mkdir(parents=True, exist_ok=True)
+    (out / 'report.html').write_text(page, encoding='utf-8')
+    document = comparison.document()
+    (out / 'comparison.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    if as_json:
+        click.echo(json.dumps(document))
+        return
+    for sentence in tell(comparison):
+        say(sentence)
+    say(f'{out}: report.html, comparison.json')

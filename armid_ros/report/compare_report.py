@@ -1,0 +1,144 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.estimate import ParameterName
+from armid_ros.identification.comparison import Change, Comparison
+from armid_ros.report.families import full_label, is_rigid
+from armid_ros.report.notation import counted, digits, pretty
+from armid_ros.report.page import Page
+from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.changes import Changes
+from armid_ros.report.sections.facts import Asked
+from armid_ros.report.sections.origin import Origin
+from armid_ros.report.sections.parameters import HALF_WIDTH
+from armid_ros.report.sections.verdict import Verdict
+
+#: Changes that are told in a sentence each; the table has all.
+_TOLD = 8
+#: Parameters that a line names.
+_NAMED = 6
+
+
+def compare_report(comparison: Comparison, provenance: Provenance | None = None) -> str:
+    """
+    Return the page of a comparison.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Two identifications.
+    provenance : Provenance, optional
+        Files, versions.
+
+    Returns
+    -------
+    str
+        One HTML file that loads nothing.
+
+    """
+    sentences = tell(comparison)
+    changed = bool(comparison.changed)
+    sections = [
+        Verdict(
+            'changed' if changed else 'unchanged',
+            'fair' if changed else 'good',
+            sentences,
+            _beware(comparison),
+        ),
+        Asked(_asked(comparison)),
+        Changes(comparison),
+        Origin(provenance or Provenance()),
+    ]
+    title = f'Comparison of two identifications of {comparison.after.robot}'
+    subtitle = f'{comparison.before.source} · {comparison.after.source}'
+    return Page(title, subtitle, sections).html()
+
+
+def tell(comparison: Comparison) -> tuple[str, ...]:
+    """Say in words what changed, the surest first; the first sentence is the sum of it."""
+    changed, count = comparison.changed, len(comparison.changes)
+    if not changed:
+        return (
+            f'None of {counted(count, "parameter")} changed beyond its uncertainty.',
+            _least_visible(comparison.changes),
+        )
+    joints = list(dict.fromkeys(c.parameter.joint for c in changed if c.parameter.joint))
+    where = f', at {", ".join(joints)}' if joints else ''
+    first = f'{len(changed)} of {counted(count, "parameter")} changed beyond uncertainty{where}.'
+    told = [_sentence(change) for change in changed[:_TOLD]]
+    if len(changed) > _TOLD:
+        told.append(f'{len(changed) - _TOLD} more are in the table.')
+    rigid = [c for c in changed if is_rigid(c.parameter)]
+    if len(rigid) >= 3 and len(rigid) > len(changed) - len(rigid):
+        last = rigid[0].parameter.joint
+        told.append(
+            f'Mostly inertial parameters changed, {last} the surest: a tool or load was added or '
+            'taken away, or the gravity or mounting is another.'
+        )
+    return (first, *told)
+
+
+def _sentence(change: Change) -> str:
+    verb = 'rose' if change.difference > 0.0 else 'fell'
+    unit = pretty(change.parameter.unit)
+    label = full_label(change.parameter)
+    label = label[0].upper() + label[1:]
+    share = ''
+    if abs(change.before) > HALF_WIDTH * change.before_std:
+        share = f' ({100.0 * change.difference / abs(change.before):+.0f} %)'
+    sure = f'{abs(change.deviations):.0f} standard deviations' if change.std > 0.0 else 'exactly'
+    return (
+        f'{label} {verb} from {change.before:.4g} to {change.after:.4g} {unit}{share}, '
+        f'by {digits(abs(change.difference))} ± {digits(HALF_WIDTH * change.std)}: {sure}.'
+    )
+
+
+def _least_visible(changes: Sequence[Change]) -> str:
+    """Say how large a change would have had to be, of the kinds that wear changes."""
+    worn = [c for c in changes if not is_rigid(c.parameter)] or list(changes)
+    known = [c for c in worn if abs(c.before) > 0.0]
+    if not known:
+        return 'Nothing is known of how large a change would have been seen.'
+    shares = sorted(3.5 * c.std / abs(c.before) for c in known)
+    return (
+        f'A change of {100.0 * shares[0]:.2g} % of the best known and of '
+        f'{100.0 * shares[len(shares) // 2]:.2g} % of a typical one would have been seen.'
+    )
+
+
+def _beware(comparison: Comparison) -> tuple[str, ...]:
+    lines = []
+    for side, names in (
+        ('first', comparison.only_before),
+        ('second', comparison.only_after),
+    ):
+        if names:
+            lines.append(
+                f'{counted(len(names), "parameter")} in the {side} only cannot be compared: '
+                f'{_named(names)}. Different motions or effects group parameters differently.'
+            )
+    if comparison.before.robot != comparison.after.robot:
+        lines.append(
+            f'The robots have different names: {comparison.before.robot} and '
+            f'{comparison.after.robot}.'
+        )
+    return tuple(lines)
+
+
+def _named(names: Sequence[ParameterName]) -> str:
+    shown = ', '.join(full_label(name) for name in names[:_NAMED])
+    return shown + (f' and {len(names) - _NAMED} more' if len(names) > _NAMED else '')
+
+
+def _asked(comparison: Comparison) -> list[tuple[str, str]]:
+    facts = []
+    for title, side in (('First', comparison.before), ('Second', comparison.after)):
+        error = side.error_percent
+        said = '' if error is None else f'; relative torque error {error:.2f} %'
+        facts.append((title, f'{side.source}: {side.robot}{said}'))
+    return facts

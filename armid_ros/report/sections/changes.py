@@ -1,0 +1,88 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of two identifications side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armid_ros.identification.comparison import Change, Comparison
+from armid_ros.report.families import is_rigid, parameter_families
+from armid_ros.report.notation import digits, pretty
+from armid_ros.report.page import Section
+from armid_ros.report.sections.parameters import HALF_WIDTH
+
+
+@dataclass(frozen=True)
+class ChangeRow:
+    """
+    One parameter.
+
+    Attributes
+    ----------
+    change : Change
+        Both values.
+
+    """
+
+    change: Change
+
+    @property
+    def label(self) -> str:
+        """The parameter, or its joint where the heading says the kind."""
+        name = self.change.parameter
+        return name.name if is_rigid(name) else name.joint or name.name
+
+    @property
+    def texts(self) -> tuple[str, str, str]:
+        """Both values with their 95 % intervals, and the difference in standard deviations."""
+        c = self.change
+        return (
+            f'{c.before:.4g} ± {digits(HALF_WIDTH * c.before_std)}',
+            f'{c.after:.4g} ± {digits(HALF_WIDTH * c.after_std)}',
+            f'{c.deviations:+.1f}',
+        )
+
+    def place(self, number: float) -> float:
+        """Return where a number is on the row's own axis, 0 to 100, zero at 50."""
+        c = self.change
+        reach = HALF_WIDTH * max(c.before_std, c.after_std)
+        span = max(abs(c.before), abs(c.after)) + reach or 1.0
+        return round(50.0 + 48.0 * number / span, 2)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Where the interval of the second begins and what is left behind it, 0 to 100."""
+        c, reach = self.change, HALF_WIDTH * self.change.after_std
+        return self.place(c.after - reach), round(100.0 - self.place(c.after + reach), 2)
+
+
+@dataclass(frozen=True)
+class Changes(Section):
+    """
+    Every parameter of both.
+
+    Attributes
+    ----------
+    comparison : Comparison
+        The two.
+
+    """
+
+    title: ClassVar[str] = 'Side by side'
+    template: ClassVar[str] = 'changes.html'
+
+    comparison: Comparison
+
+    @property
+    def families(self) -> Sequence[tuple[str, str, int, Sequence[ChangeRow]]]:
+        """Heading, unit, how many changed, and rows of each kind."""
+        names = tuple(change.parameter for change in self.comparison.changes)
+        families = []
+        for title, members in parameter_families(names).items():
+            rows = [ChangeRow(self.comparison.changes[k]) for k in members]
+            count = sum(row.change.changed for row in rows)
+            families.append((title, pretty(names[members[0]].unit), count, rows))
+        return families

@@ -1,0 +1,75 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+import json
+
+from armid_ros.cli import main
+from armid_ros.cli.commands import COMMANDS
+from click.testing import CliRunner
+import pytest
+
+FRICTION = ('viscous_coefficient', 'elbow', 'N m s/rad')
+INERTIA = ('Izz1 + Iyy2', 'shoulder', 'kg m^2')
+
+
+@pytest.fixture(autouse=True)
+def command(monkeypatch):
+    monkeypatch.setitem(COMMANDS, 'compare', 'compare')
+
+
+def identified(folder, friction, robot='arm'):
+    """Write an identification with a given friction."""
+    folder.mkdir()
+    rows = [
+        dict(zip(('name', 'joint', 'unit'), name, strict=True)) | {'value': value, 'std': std}
+        for name, value, std in ((FRICTION, friction, 0.002), (INERTIA, 0.5, 0.01))
+    ]
+    document = {
+        'schema': 'armid/identification/1',
+        'robot': robot,
+        'parameters': rows,
+        'training': {'relative_error_percent': 4.0},
+        'validation': [],
+    }
+    (folder / 'identification.json').write_text(json.dumps(document))
+    return folder
+
+
+def armid(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def test_a_change_is_said_in_words_and_on_a_page(tmp_path):
+    first, second = identified(tmp_path / 'a', 0.08), identified(tmp_path / 'b', 0.1)
+    result = armid('compare', first, second, '--out', tmp_path / 'out')
+    assert result.exit_code == 0, result.output
+    assert '1 of 2 parameters changed beyond uncertainty, at elbow' in result.output
+    assert 'of elbow rose from 0.08 to 0.1 N m s/rad (+25 %)' in result.output
+    page = (tmp_path / 'out' / 'report.html').read_text()
+    assert 'rose from 0.08 to 0.1' in page
+    assert 'Izz1 + Iyy2' in page
+    assert 'http' not in page.split('<main>')[1].split('<script>')[0]
+
+
+def test_what_stayed_is_said_to_have_stayed(tmp_path):
+    first, second = identified(tmp_path / 'a', 0.08), identified(tmp_path / 'b', 0.081)
+    result = armid('compare', first, second, '--out', tmp_path / 'out')
+    assert 'None of 2 parameters changed beyond its uncertainty' in result.output
+
+
+def test_json_is_for_programs(tmp_path):
+    first, second = identified(tmp_path / 'a', 0.08), identified(tmp_path / 'b', 0.1)
+    file = second / 'identification.json'
+    result = armid('compare', first, file, '--out', tmp_path / 'out', '--json')
+    document = json.loads(result.output)
+    assert document['schema'] == 'armid/comparison/1'
+    assert [row['changed'] for row in document['parameters']] == [True, False]
+    assert document == json.loads((tmp_path / 'out' / 'comparison.json').read_text())
+
+
+def test_bad_input_is_one_line_and_code_2(tmp_path):
+    first = identified(tmp_path / 'a', 0.08)
+    result = armid('compare', first, tmp_path / 'nothing', '--out', tmp_path / 'out')
+    assert result.exit_code == 2
+    assert 'nothing' in result.output
+    assert len(result.output.strip().splitlines()) == 1
+    assert not (tmp_path / 'out').exists()
