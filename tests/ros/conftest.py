@@ -26,7 +26,7 @@ from std_srvs.srv import Trigger
 AnyNode = TypeVar('AnyNode', bound=Node)
 
 #: Only reached when something is broken; nothing is asserted about how long things take.
-PATIENCE = 20.0
+PATIENCE = 60.0
 #: A message published within this process is delivered at once; this is a thousand times more [s].
 QUIET = 0.02
 

@@ -18,7 +18,7 @@ from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 
-PATIENCE = 60.0
+PATIENCE = 120.0
 
 
 def short_excitation():
