@@ -25,9 +25,9 @@ from armid_ros.motion import FloatArray, read_only
 import numpy as np
 from scipy import stats
 
-_ITERATIONS = 50
+_ITERATIONS = 100
 #: Steps below this share of a standard deviation end the iteration.
-_CONVERGED = 1e-4
+_CONVERGED = 1e-3
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,8 @@ from armid_ros.errors import IdentificationError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.signals import (
     Conditioning,
-    conditioning,
     decimate,
     decimated_samples,
-    segments,
-    SignalSettings,
 )
 from armid_ros.model import (
     group_columns,
@@ -27,24 +24,19 @@ from armid_ros.model import (
 )
 from armid_ros.model.spring_ties import Tie, tie_columns_derivatives, tie_geometry
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 from scipy import signal
-from scipy.interpolate import CubicSpline
 
 #: A column of which others leave less than this share is not told apart from them.
 _RANK_TOLERANCE = 1e-6
 #: Step of the central differences of rigid columns [rad or m].
 _STEP = 1e-5
-#: Length of the pieces that spectra are averaged over [s].
-_SPECTRUM = 4.0
-#: The motion ends where its spectrum is less than this many times the noise.
-_ABOVE = 3.0
 
 Inertias = Literal['known', 'free']
-_STACKED = ('tau', 'known', 'columns', 'known_by_motion', 'columns_by_motion')
+#: Arrays of a problem that have its samples first.
+STACKED = ('tau', 'known', 'columns', 'known_by_motion', 'columns_by_motion')
 
 
 @dataclass(frozen=True)
@@ -90,7 +82,7 @@ class InteractionProblem:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in (*_STACKED, 'motion_noise'):
+        for name in (*STACKED, 'motion_noise'):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
@@ -117,7 +109,7 @@ def interaction_problem(
     ties: Sequence[Tie],
     *,
     position_noise: npt.ArrayLike = 0.0,
-    derivative_noise: FloatArray | None = None,
+    used: Conditioning | None = None,
     inertias: Inertias = 'known',
     separate: bool = False,
 ) -> InteractionProblem:
@@ -134,9 +126,9 @@ def interaction_problem(
         Where the springs are.
     position_noise : array_like, number or shape (n + m,)
         Standard deviation of the angles in the motions [rad].
-    derivative_noise : ndarray, shape (3, 3), optional
-        Covariance of what a filter and differences make of white noise of variance 1 in an angle,
-        as position, velocity and acceleration; by default the last two have none.
+    used : Conditioning, optional
+        The filters that the positions went through, and by which torques and columns are to be
+        decimated. By default every sample counts and noise is in the angles alone.
     inertias : {'known', 'free'}
         Whether the machine's inertias are those of its description or are estimated as well.
     separate : bool
@@ -154,165 +146,45 @@ def interaction_problem(
         raise IdentificationError(
             f'{robot.name} and {other.name}: their motions have to be on one time base'
         )
+    kept = np.array(decimated_samples(len(motion), used) if used else range(len(motion)))
+    slow, far = motion.select(kept), other_motion.select(kept)
     geometry = tie_geometry(robot, motion.q, other, other_motion.q, ties)
     springs = geometry.columns
-    springs_by = _springs_by_motion(robot, motion, other, other_motion, ties)
+    springs_by = _springs_by_motion(robot, slow, other, far, ties)
     if not separate:
         springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))
     count = springs_by.shape[3] // 3
     rigid: tuple[ParameterName, ...] = ()
     if inertias == 'known':
         known = inverse_dynamics(robot, motion)
-        known_by = _placed(np.stack(inverse_dynamics_derivatives(robot, motion), axis=2), count)
+        known_by = _placed(np.stack(inverse_dynamics_derivatives(robot, slow), axis=2), count)
         columns, columns_by = springs, springs_by
     else:
-        known, known_by = np.zeros_like(motion.tau), np.zeros((*motion.tau.shape, 3 * count))
-        kept, rigid = _told_apart(robot, motion, springs, ties, separate)
-        columns = np.concatenate([springs, regressor(robot, motion)[:, :, kept]], axis=2)
-        body = _placed(_regressor_by_motion(robot, motion, kept), count)
-        columns_by = np.concatenate([springs_by, body], axis=2)
-    if derivative_noise is None:
-        derivative_noise = np.diag([1.0, 0.0, 0.0])
+        body = regressor(robot, motion)
+        independent, rigid = _told_apart(robot, body, springs, ties, separate)
+        known = np.zeros_like(motion.tau)
+        known_by = np.zeros((*slow.q.shape, 3 * count))
+        columns = np.concatenate([springs, body[:, :, independent]], axis=2)
+        body_by = _placed(_regressor_by_motion(robot, slow, independent), count)
+        columns_by = np.concatenate([springs_by, body_by], axis=2)
+    tau = motion.tau
+    passed = np.diag([1.0, 0.0, 0.0])
+    if used is not None:
+        tau, known, columns = (decimate(values, used) for values in (tau, known, columns))
+        passed = _passed(used)
     deviation = np.broadcast_to(np.asarray(position_noise, dtype=float), (count,))
     return InteractionProblem(
-        motion.tau,
+        tau,
         known,
         columns,
         known_by,
         columns_by,
-        np.asarray(np.kron(derivative_noise, np.diag(deviation**2))),
+        np.asarray(np.kron(passed, np.diag(deviation**2))),
         tuple(tie.name for tie in ties) if separate else ('all',),
         tuple(tie.joint for tie in ties) if separate else ('',),
         rigid,
         float(np.sqrt(np.mean(np.sum(geometry.way**2, axis=2)))),
     )
-
-
-def recorded_interaction_problem(
-    robot: Robot,
-    recording: Recording,
-    other: Robot,
-    other_recording: Recording,
-    ties: Sequence[Tie],
-    *,
-    settings: SignalSettings | None = None,
-    inertias: Inertias = 'known',
-    separate: bool = False,
-) -> InteractionProblem:
-    """
-    Set up the regression on recordings, the noise of their angles being measured in them.
-
-    The angles of the other machine are brought to the stamps of the first; both are filtered and
-    torques and columns decimated as for any identification. White noise is what the angles have
-    in the upper two fifths of their spectrum; the filters leave a known share of it.
-
-    Parameters
-    ----------
-    robot, other : Robot
-        The machine whose torques were measured, and the one it is tied to.
-    recording, other_recording : Recording
-        Of both, with overlapping stamps.
-    ties : sequence of Tie
-        Where the springs are.
-    settings : SignalSettings, optional
-        Filters.
-    inertias : {'known', 'free'}
-        Whether the machine's inertias are those of its description or are estimated as well.
-    separate : bool
-        Whether every spring has a stiffness of its own, or all have one.
-
-    Raises
-    ------
-    IdentificationError
-        If there are no torques, no common time, or too little of it.
-
-    """
-    both = _together(recording, other_recording)
-    settings = settings or SignalSettings()
-    used = conditioning([both], settings)
-    noise, crossing = _white_noise(both, used.rate_hz)
-    if settings.cutoff_hz is None:
-        used = replace(used, cutoff_hz=min(used.cutoff_hz, crossing))
-    passed = _passed(used)
-    n, problems = len(recording.joints), []
-    for stretch in segments(both, used):
-        kept = np.array(decimated_samples(len(stretch), used), dtype=np.intp)
-        assert stretch.tau is not None
-        own = _joints(stretch, slice(0, n), recording.joints)
-        far = _joints(stretch, slice(n, None), other_recording.joints)
-        assert own.tau is not None
-        slow = own.select(kept).with_torque(decimate(own.tau, used))
-        problem = interaction_problem(
-            robot,
-            slow,
-            other,
-            far.select(kept),
-            ties,
-            position_noise=noise,
-            derivative_noise=passed,
-            inertias=inertias,
-            separate=separate,
-        )
-        problems.append(problem)
-    if not problems:
-        raise IdentificationError(
-            f'{recording.source}: no stretch is long enough for a filter of '
-            f'{used.cutoff_hz:.3g} Hz'
-        )
-    return problems[0] if len(problems) == 1 else _stacked(problems)
-
-
-def _stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
-    """Put stretches together; all are of the same columns, or there is no one problem."""
-    if any(part.rigid != problems[0].rigid for part in problems):
-        raise IdentificationError('a stretch between gaps moves too little to free the inertias')
-    joined = {
-        name: np.concatenate([getattr(part, name) for part in problems]) for name in _STACKED
-    }
-    return replace(problems[0], **joined)  # type: ignore[arg-type]
-
-
-def _together(recording: Recording, other: Recording) -> Recording:
-    """Return one recording of both machines' joints at the stamps of the first."""
-    if recording.tau is None:
-        raise IdentificationError(f'{recording.source}: {recording.topic} has no effort')
-    t = recording.t + 1e-9 * (recording.start_ns - other.start_ns)
-    inside = (t >= other.t[0]) & (t <= other.t[-1])
-    if np.count_nonzero(inside) < 4:
-        raise IdentificationError(
-            f'{recording.topic} and {other.topic} have no time in common; record them together'
-        )
-    far = CubicSpline(other.t, other.q)(t[inside])
-    return replace(
-        recording,
-        joints=(*recording.joints, *other.joints),
-        t=recording.t[inside],
-        q=np.hstack([recording.q[inside], far]),
-        dq=None,
-        tau=np.hstack([recording.tau[inside], np.zeros_like(far)]),
-    )
-
-
-def _joints(motion: Motion, columns: slice, joints: tuple[str, ...]) -> Motion:
-    assert motion.tau is not None
-    parts = (motion.q, motion.dq, motion.ddq, motion.tau)
-    return Motion(joints, motion.t, *(np.array(part[:, columns]) for part in parts))
-
-
-def _white_noise(recording: Recording, rate: float) -> tuple[FloatArray, float]:
-    """Return the deviation of every angle's noise [rad], and where motion sinks into it [Hz]."""
-    frequency, power = signal.welch(
-        recording.q,
-        fs=rate,
-        window='blackmanharris',
-        nperseg=min(len(recording.t), int(_SPECTRUM * rate)),
-        detrend='linear',
-        axis=0,
-    )
-    floor = np.mean(power[frequency > 0.3 * rate], axis=0)
-    above = power > _ABOVE * floor
-    crossing = max(float(frequency[np.argmin(column)]) for column in above.T)
-    return np.asarray(np.sqrt(floor * rate / 2.0)), crossing
 
 
 def _passed(used: Conditioning) -> FloatArray:
@@ -326,10 +198,9 @@ def _passed(used: Conditioning) -> FloatArray:
 
 
 def _told_apart(
-    robot: Robot, motion: Motion, springs: FloatArray, ties: Sequence[Tie], separate: bool
+    robot: Robot, body: FloatArray, springs: FloatArray, ties: Sequence[Tie], separate: bool
 ) -> tuple[npt.NDArray[np.intp], tuple[ParameterName, ...]]:
     """Return the rigid columns that the motion tells apart beside the springs."""
-    body = regressor(robot, motion)
     names = rigid_parameter_names(robot)
     base = group_columns(body.reshape(-1, body.shape[2]), names, _RANK_TOLERANCE)
     w = np.concatenate([body[:, :, base.independent], springs], axis=2)

@@ -1,0 +1,163 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The regression of the springs between two machines, from recordings of both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import comb
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.interaction_problem import (
+    Inertias,
+    interaction_problem,
+    InteractionProblem,
+    STACKED,
+)
+from armid_ros.identification.signals import conditioning, segments, SignalSettings
+from armid_ros.model.spring_ties import Tie
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+from scipy import signal
+from scipy.interpolate import CubicSpline
+
+#: Order of the differences that noise is measured by.
+_ORDER = 6
+#: The filter's pass band is so much wider than the motion's that it leaves the motion as it is.
+_MARGIN = 2.0
+#: Length of the pieces that spectra are averaged over [s].
+_SPECTRUM = 4.0
+#: The motion ends where its spectrum is less than this many times the noise.
+_ABOVE = 3.0
+
+
+def recorded_interaction_problem(
+    robot: Robot,
+    recording: Recording,
+    other: Robot,
+    other_recording: Recording,
+    ties: Sequence[Tie],
+    *,
+    settings: SignalSettings | None = None,
+    inertias: Inertias = 'known',
+    separate: bool = False,
+) -> InteractionProblem:
+    """
+    Set up the regression on recordings, the noise of their angles being measured in them.
+
+    The angles of the other machine are brought to the stamps of the first; both are filtered and
+    torques and columns decimated as for any identification. White noise is what the angles have
+    in the upper two fifths of their spectrum; the filters leave a known share of it.
+
+    Parameters
+    ----------
+    robot, other : Robot
+        The machine whose torques were measured, and the one it is tied to.
+    recording, other_recording : Recording
+        Of both, with overlapping stamps.
+    ties : sequence of Tie
+        Where the springs are.
+    settings : SignalSettings, optional
+        Filters.
+    inertias : {'known', 'free'}
+        Whether the machine's inertias are those of its description or are estimated as well.
+    separate : bool
+        Whether every spring has a stiffness of its own, or all have one.
+
+    Raises
+    ------
+    IdentificationError
+        If there are no torques, no common time, or too little of it.
+
+    """
+    both = _together(recording, other_recording)
+    settings = settings or SignalSettings()
+    used = conditioning([both], settings)
+    noise, crossing = _white_noise(both, used.rate_hz)
+    if settings.cutoff_hz is None:
+        used = replace(used, cutoff_hz=min(used.cutoff_hz, _MARGIN * crossing))
+    if settings.decimation is None:
+        factor = int(used.rate_hz / (2.0 * used.cutoff_hz))
+        used = replace(used, decimation=max(used.decimation, factor))
+    n = len(recording.joints)
+    problems = [
+        interaction_problem(
+            robot,
+            _joints(stretch, slice(0, n), recording.joints),
+            other,
+            _joints(stretch, slice(n, None), other_recording.joints),
+            ties,
+            position_noise=noise,
+            used=used,
+            inertias=inertias,
+            separate=separate,
+        )
+        for stretch in segments(both, used)
+    ]
+    if not problems:
+        raise IdentificationError(
+            f'{recording.source}: no stretch is long enough for a filter of '
+            f'{used.cutoff_hz:.3g} Hz'
+        )
+    return problems[0] if len(problems) == 1 else _stacked(problems)
+
+
+def _stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
+    """Put stretches together; all are of the same columns, or there is no one problem."""
+    if any(part.rigid != problems[0].rigid for part in problems):
+        raise IdentificationError('a stretch between gaps moves too little to free the inertias')
+    joined = {name: np.concatenate([getattr(part, name) for part in problems]) for name in STACKED}
+    return replace(problems[0], **joined)  # type: ignore[arg-type]
+
+
+def _together(recording: Recording, other: Recording) -> Recording:
+    """Return one recording of both machines' joints at the stamps of the first."""
+    if recording.tau is None:
+        raise IdentificationError(f'{recording.source}: {recording.topic} has no effort')
+    t = recording.t + 1e-9 * (recording.start_ns - other.start_ns)
+    inside = (t >= other.t[0]) & (t <= other.t[-1])
+    if np.count_nonzero(inside) < 4:
+        raise IdentificationError(
+            f'{recording.topic} and {other.topic} have no time in common; record them together'
+        )
+    far = CubicSpline(other.t, other.q)(t[inside])
+    return replace(
+        recording,
+        joints=(*recording.joints, *other.joints),
+        t=recording.t[inside],
+        q=np.hstack([recording.q[inside], far]),
+        dq=None,
+        tau=np.hstack([recording.tau[inside], np.zeros_like(far)]),
+    )
+
+
+def _joints(motion: Motion, columns: slice, joints: tuple[str, ...]) -> Motion:
+    assert motion.tau is not None
+    parts = (motion.q, motion.dq, motion.ddq, motion.tau)
+    return Motion(joints, motion.t, *(np.array(part[:, columns]) for part in parts))
+
+
+def _white_noise(recording: Recording, rate: float) -> tuple[FloatArray, float]:
+    """
+    Return the deviation of every angle's noise [rad], and where motion sinks into it [Hz].
+
+    Differences of high order leave nothing of a motion that is sampled densely.
+
+    """
+    differences = np.diff(recording.q, _ORDER, axis=0)
+    noise = np.sqrt(np.mean(differences**2, axis=0) / comb(2 * _ORDER, _ORDER))
+    frequency, power = signal.welch(
+        recording.q,
+        fs=rate,
+        window='blackmanharris',
+        nperseg=min(len(recording.t), int(_SPECTRUM * rate)),
+        detrend='linear',
+        axis=0,
+    )
+    above = power > _ABOVE * 2.0 * noise**2 / rate
+    above[-1] = False
+    crossing = max(float(frequency[2:][np.argmin(column)]) for column in above[2:].T)
+    return noise, crossing
