@@ -34,6 +34,9 @@ _ALSO_JOINTS = ('time_delay',)
 #: Effects whose quantities stand for causes of their own. Together, the two of a saturation are
 #: the measured torque minus the model's: they would explain anything.
 _ALONE = {'actuator_saturation': ((0,), (1,))}
+#: Effects whose shape is a level of the highest torque in all trajectories; a level far below it
+#: would make the column the measured torque itself, which explains anything.
+_LEVELS = ('actuator_saturation',)
 #: Effects that cost much and depend on position and velocity smoothly: their columns are computed
 #: at the rows.
 _SMOOTH = ('human_interaction', 'interface_slack')
@@ -117,7 +120,7 @@ def shaped(
     chosen = (
         [(k,) * len(counts) for k in range(counts[0])]
         if together
-        else [index for index in product(*(range(count) for count in counts))]
+        else list(product(*(range(count) for count in counts)))
     )
     for index in chosen:
         values = np.column_stack([grid[:, k] for grid, k in zip(grids, index, strict=True)])
@@ -136,6 +139,8 @@ def _grids(effect: Effect, arm: ArmModel, data: Sequence[Trajectory]) -> tuple[F
         assert part.motion.tau is not None
         left = part.motion.tau - arm.torque(part.motion)
         per_trajectory.append(effect.shape_grids(part.motion, arm, left))
+    if effect.name in _LEVELS:
+        return tuple(np.max(grids, axis=0) for grids in zip(*per_trajectory, strict=True))
     return tuple(_merge(grids) for grids in zip(*per_trajectory, strict=True))
 
 

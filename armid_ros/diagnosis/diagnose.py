@@ -32,6 +32,9 @@ import numpy as np
 #: Told the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
+#: A diagnosis keeps six times the band of the motion where an identification keeps ten: what is
+#: beyond is mostly noise, and a gap has to stand out of it.
+_NARROWER = 1.7
 #: Causes that a model as described may lack before a fit of everything is the better explanation.
 _FIXED_STEPS = 1
 
@@ -132,6 +135,8 @@ def diagnose(
     tell = progress or _silent
     tell(0.02, 'filtering')
     used = conditioning(list(recordings), settings.signals)
+    if settings.signals.decimation is None:
+        used = replace(used, decimation=max(1, round(_NARROWER * used.decimation)))
     data = trajectories(recordings, used)
     gate = check_data(arm, recordings, data)
     faults, notes = list(gate.faults), [*gate.notes]
@@ -165,7 +170,7 @@ def diagnose(
         chosen = explain(arm, data, sigma, base, settings, settings.most_steps)
     tell(0.85, 'held-out gap')
     floors = [noise_floor(part, chosen.fitted.arm) for part in data]
-    gap = measure_gap(chosen, data, floors, validate, used)
+    gap = measure_gap(chosen, data, floors, validate, used, settings.consistent_loss)
     verdict: Verdict = decide(chosen, floors, gap, settings, arm)
     where = locate(
         chosen.reference.arm,

@@ -31,8 +31,8 @@ _OVERSAMPLING = 8
 #: A joint slower than this share of its top speed for this long [s] is at rest.
 _REST_SPEED, _REST_TIME = 0.02, 0.2
 #: Below this share of the top speed the sign of a velocity is uncertain, and so is dry friction in
-#: as many rows around as the filter smears it over: beyond two rows the residuals of six-joint arms
-#: are at their noise again, within them they are at 3 to 15 times its power.
+#: as many rows around as the filter smears it over: beyond two rows the residuals of six-joint
+#: arms are at their noise again, within them they are at 3 to 15 times its power.
 _REVERSAL_SPEED, _REVERSAL_ROWS = 0.004, 2
 
 

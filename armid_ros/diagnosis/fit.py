@@ -27,6 +27,8 @@ import numpy as np
 #: Free columns of which the others leave less than this share of their length are grouped.
 _EXCITED = 1e-4
 _MOST_ROUNDS = 4
+#: Largest relative step of a shape in a round: the search has refined it already.
+_SHAPE_STEP = 0.1
 #: Relative step of the differences by a shape.
 _STEP = 1e-3
 
@@ -189,7 +191,7 @@ class _State:
             if count:
                 low, high, step = _shape_bounds(effect)
                 shape = np.array(effect.shape)
-                limit = np.maximum(0.3 * np.abs(shape), 30.0 * step)
+                limit = np.maximum(_SHAPE_STEP * np.abs(shape), 30.0 * step)
                 shape = shape + np.clip(change[start : start + count], -limit, limit)
                 effect = effect.with_shape(np.clip(shape, low, high))
                 start += count

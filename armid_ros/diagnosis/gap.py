@@ -57,7 +57,8 @@ class Gap:
     loss_before, loss_after : ndarray, shape (n,)
         Mean square over noise.
     closed : float
-        Share of the excess over the noise that is gone, 0 to 1.
+        Share of the excess over the noise that is gone, 0 to 1, in the joints that had a gap or
+        have one.
     data : str
         What it was measured on.
     overlays : tuple of Overlay
@@ -81,6 +82,7 @@ def measure_gap(
     floors: Sequence[Floor],
     validate: Sequence[Recording],
     used: Conditioning,
+    lowest: float,
 ) -> Gap:
     """Measure the gap on recordings to be predicted, else on each part of the data in turn."""
     before, after = explanation.reference.arm, explanation.fitted.arm
@@ -91,11 +93,11 @@ def measure_gap(
             _overlay(part, s, before, after) for part, s in zip(unseen, sigma, strict=True)
         ]
         pairs = [(o.measured - o.before, o.measured - o.after) for o in overlays]
-        return _gap(unseen, sigma, pairs, 'held-out', overlays)
+        return _gap(unseen, sigma, pairs, 'held-out', lowest, overlays)
     sigma = [floor.sigma for floor in floors]
     overlays = [_overlay(part, s, before, after) for part, s in zip(data, sigma, strict=True)]
     pairs = _left_out(explanation, data, sigma)
-    return _gap(data, sigma, pairs, 'held-out, each part of the data in turn', overlays)
+    return _gap(data, sigma, pairs, 'held-out, each part of the data in turn', lowest, overlays)
 
 
 def _overlay(part: Trajectory, sigma: FloatArray, before: ArmModel, after: ArmModel) -> Overlay:
@@ -110,10 +112,13 @@ def _gap(
     sigma: Sequence[FloatArray],
     pairs: Sequence[tuple[FloatArray, FloatArray]],
     what: str,
+    lowest: float,
     overlays: Sequence[Overlay],
 ) -> Gap:
     told = np.concatenate([part.told for part in data])
-    noise = np.concatenate([np.broadcast_to(s, part.told.shape) for part, s in zip(data, sigma)])
+    noise = np.concatenate(
+        [np.broadcast_to(s, part.told.shape) for part, s in zip(data, sigma, strict=True)]
+    )
     before, after = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
     count = np.maximum(told.sum(axis=0), 1)
 
@@ -121,7 +126,8 @@ def _gap(
         return np.asarray(np.sum(squares, axis=0, where=told) / count)
 
     losses = [mean((left / noise) ** 2) for left in (before, after)]
-    beyond = [float(np.sum(np.maximum(loss - 1.0, 0.0))) for loss in losses]
+    gap = np.maximum(*losses) > lowest
+    beyond = [float(np.sum(np.maximum(loss[gap] - 1.0, 0.0))) for loss in losses]
     closed = 1.0 - beyond[1] / beyond[0] if beyond[0] > 0.0 else 0.0
     return Gap(
         np.sqrt(mean(before**2)),

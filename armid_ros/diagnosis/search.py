@@ -29,6 +29,9 @@ import numpy as np
 
 #: Best groups that are looked at row by row; shapes of this many are refined.
 _LOOKED_AT, _REFINED = 30, 4
+#: Torques of a cosine above this are one and the same: Coulomb friction is stribeck_friction of a
+#: velocity beyond all that was moved at, viscous friction is thermal_friction warmed at once.
+_IMITATION = 0.98
 #: Shapes that the data give a good start of, and how far from it a search goes: of a peak of a
 #: spectrum [1/rev], of a level near the highest torque (far below it, it would be the torque).
 _NEAR = {'ripple_order': 1.0, 'saturation_torque': 0.08}
@@ -146,7 +149,11 @@ def next_step(
     tied = [passing[0], *_not_beaten(passing, problem, left, settings)]
     winner = simplest(tied)
     rivals = tuple(
-        t for t in tied if t is not winner and not _contains(t, winner, problem, projection)
+        t
+        for t in tied
+        if t is not winner
+        and not _contains(t, winner, problem, projection)
+        and not _imitates(t, winner)
     )
     before = joint_losses(problem, left)
     after = joint_losses(problem, left - winner.torque)
@@ -156,11 +163,11 @@ def next_step(
 def simplest(tied: Sequence[Trial]) -> Trial:
     """Return the one with the fewest quantities and shapes; of these, the one that gains most."""
 
-    def key(trial: Trial) -> tuple[int, float]:
-        group = trial.score.group
-        return len(group.kept) + len(group.effect.shapes), -trial.gain
+    return min(tied, key=lambda trial: (_complexity(trial.score.group), -trial.gain))
 
-    return min(tied, key=key)
+
+def _complexity(group: Group) -> int:
+    return len(group.kept) + len(group.effect.shapes)
 
 
 def _best_per_key(scores: Sequence[Score]) -> list[Score]:
@@ -201,6 +208,12 @@ def _contains(big: Trial, small: Trial, problem: Problem, projection: Projection
     target = small.torque.ravel()
     fit = np.linalg.lstsq(columns, target, rcond=1e-6)[0]
     return bool(np.sum((target - columns @ fit) ** 2) < 0.02 * np.sum(target**2))
+
+
+def _imitates(other: Trial, winner: Trial) -> bool:
+    """Return whether a group with more shapes is there only as the limit of a simpler one."""
+    more = _complexity(other.score.group) > _complexity(winner.score.group)
+    return more and _cosine(other.torque, winner.torque) > _IMITATION
 
 
 def _refine(

@@ -1,0 +1,127 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From bags and a model to what the model lacks."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from armid_ros.arm import ArmModel, load_model, save_model
+from armid_ros.cli import options
+from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
+from armid_ros.diagnosis import diagnose as run
+from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
+from armid_ros.identification import SignalSettings
+from armid_ros.report import hash_files, Provenance, versions
+from armid_ros.report.diagnosis_report import diagnosis_report
+import click
+import numpy as np
+
+
+@click.command(epilog='Example: armid diagnose slow.mcap fast.mcap --robot ur10.urdf --out found')
+@click.argument('bags', nargs=-1, required=True, type=click.Path(path_type=Path))
+@options.robot
+@options.folder
+@click.option(
+    '--validate',
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar='BAG',
+    help='A bag that is only predicted; may be given several times.',
+)
+@click.option(
+    '--model',
+    type=click.Path(path_type=Path),
+    help='model.yaml with what is known of the arm; its effects are part of the model.',
+)
+@click.option(
+    '--effects',
+    default='',
+    metavar='E,...',
+    help="Effects that the model has already, fitted anew; 'E@joint+joint' for some joints only.",
+)
+@click.option('--cutoff', type=float, help='Of the position filter [Hz]; from the noise if none.')
+@click.option('--decimation', type=int, help='Keep one sample of this many.')
+@click.option('--topic', help='JointState topic, where a bag has several.')
+@options.gravity
+@options.joints
+@options.seed
+@options.as_json
+def diagnose(
+    bags: tuple[Path, ...],
+    robot_source: str,
+    out: Path,
+    validate: tuple[Path, ...],
+    model: Path | None,
+    effects: str,
+    cutoff: float | None,
+    decimation: int | None,
+    topic: str | None,
+    gravity: str,
+    joints: str | None,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Find which effect a model lacks, and add it."""
+    robot = options.open_robot(robot_source, gravity, joints, bags)
+    arm = ArmModel(robot) if model is None else load_model(model, robot)
+    arm = options.with_effects(arm, effects)
+    settings = DiagnosisSettings(signals=SignalSettings(cutoff, decimation))
+    with progress('reading') as tick:
+        recordings = options.read(bags, robot, topic)
+        held_out = options.read(validate, robot, topic)
+        result = run(
+            arm,
+            recordings,
+            validate=held_out,
+            settings=settings,
+            rng=np.random.default_rng(seed),
+            progress=tick,
+        )
+    document = diagnosis_document(result)
+    out.mkdir(parents=True, exist_ok=True)
+    save_model(out / 'model.yaml', result.arm, options.kept_source(robot_source, robot, out))
+    page = diagnosis_report(
+        result,
+        robot=robot_source,
+        recordings=recordings,
+        validation=held_out,
+        patch=(out / 'model.yaml').read_text(encoding='utf-8'),
+        provenance=Provenance(
+            files=hash_files([*bags, *validate]), versions=versions(), settings={}, seed=seed
+        ),
+    )
+    (out / 'report.html').write_text(page, encoding='utf-8')
+    (out / 'diagnosis.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    if as_json:
+        click.echo(json.dumps(document))
+        return
+    _show(result, out)
+
+
+def _show(result: Diagnosis, out: Path) -> None:
+    say(f'{result.verdict.replace("_", " ").upper()}: {result.summary}')
+    explanation = result.explanation
+    if explanation is not None and explanation.steps:
+        rows = [
+            {
+                'added': step.trial.score.group.effect.name,
+                'joints': ', '.join(step.trial.score.group.effect.joints),
+                'loss': f'{step.before.max():.3g} -> {step.after.max():.3g}',
+            }
+            for step in explanation.steps
+        ]
+        print_rows(rows, as_json=False)
+    for finding in result.findings:
+        print_parameters(
+            [
+                {'name': p.name, 'joint': p.joint, 'value': value, 'std': std, 'unit': p.unit}
+                for p, value, std in zip(
+                    finding.parameters, finding.values, finding.std, strict=True
+                )
+            ]
+        )
+    for note in result.notes:
+        say(f'note: {note}')
+    say(f'{out}: diagnosis.json, model.yaml, report.html')

@@ -1,0 +1,73 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The league of candidates: what each would explain, and how little of it could have been seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armid_ros.diagnosis import Diagnosis
+from armid_ros.report.notation import digits
+from armid_ros.report.page import Section
+
+_MOST = 15
+
+
+@dataclass(frozen=True)
+class Row:
+    """One candidate, as text."""
+
+    name: str
+    joints: str
+    gain: str
+    replicated: str
+    value: str
+    visible: str
+    detectable: str
+    named: bool
+
+
+@dataclass(frozen=True)
+class CandidateTable(Section):
+    """
+    Candidates of the first look, best first.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis
+        What was found.
+
+    """
+
+    title: ClassVar[str] = 'Candidates'
+    template: ClassVar[str] = 'candidates.html'
+
+    diagnosis: Diagnosis
+
+    @property
+    def rows(self) -> Sequence[Row]:
+        """The best candidates."""
+        explanation = self.diagnosis.explanation
+        if explanation is None or explanation.survey is None:
+            return ()
+        names = {finding.name for finding in self.diagnosis.findings}
+        rows = []
+        for trial in explanation.survey.league[:_MOST]:
+            score, effect = trial.score, trial.score.group.effect
+            quantity = effect.quantities[score.group.kept[0] % len(effect.quantities)]
+            value = f'{digits(float(score.values[0]))} {quantity.unit}'
+            rows.append(
+                Row(
+                    effect.name.replace('_', ' '),
+                    ', '.join(effect.joints),
+                    digits(trial.gain),
+                    f'{int((trial.z >= 3.0).sum())} of {len(trial.z)}',
+                    value.strip(),
+                    f'{100.0 * score.visible:.0f} %',
+                    f'{digits(5.0 * float(score.std[0]))} {quantity.unit}'.strip(),
+                    effect.name in names,
+                )
+            )
+        return rows
