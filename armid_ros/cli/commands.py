@@ -18,6 +18,8 @@ COMMANDS = {
     'excite': 'excite',
     'simulate': 'record',
     'identify': 'identify',
+    'diagnose': 'diagnose',
+    'compare': 'compare',
     'recover': 'record',
     'robots': 'catalogues',
     'effects': 'catalogues',

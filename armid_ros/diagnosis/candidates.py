@@ -11,7 +11,7 @@ once and shared out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, pairwise, permutations, product
@@ -24,8 +24,8 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
 #: Effects whose joints are pairs, and which pairs are likely enough to be looked at.
-_PAIRS = {
-    'coupled_joint_friction': pairwise,
+_PAIRS: dict[str, Callable[[Sequence[str]], Iterable[tuple[str, str]]]] = {
+    'coupled_joint_friction': lambda joints: pairwise(joints),
     'joint_coupling': lambda joints: combinations(joints, 2),
     'torque_crosstalk': lambda joints: permutations(joints, 2),
 }
@@ -72,7 +72,7 @@ class Group:
     @property
     def size(self) -> int:
         """Number of its columns."""
-        return self.columns.stop - self.columns.start
+        return int(self.columns.stop) - int(self.columns.start)
 
 
 def group_effects(arm: ArmModel, library: Sequence[str]) -> Iterator[tuple[Effect, list[Effect]]]:

@@ -172,7 +172,7 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     frequency, power = signal.welch(rows, nperseg=min(len(rows), 256), axis=0)
     high = (frequency > 0.25) & (frequency < 0.36)
     sigma = np.sqrt(np.median(power[high], axis=0) * 0.4)
-    return np.maximum(sigma, _least(sigma))
+    return np.asarray(np.maximum(sigma, _least(sigma)))
 
 
 def _least(sigma: FloatArray) -> float:

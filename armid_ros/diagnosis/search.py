@@ -162,7 +162,6 @@ def next_step(
 
 def simplest(tied: Sequence[Trial]) -> Trial:
     """Return the one with the fewest quantities and shapes; of these, the one that gains most."""
-
     return min(tied, key=lambda trial: (_complexity(trial.score.group), -trial.gain))
 
 
