@@ -46,6 +46,27 @@ def nominal_arm(case: Case) -> ArmModel:
     return arm
 
 
+def true_arm(case: Case) -> ArmModel:
+    """Return the arm as it is, with the hidden effects that the catalogue has."""
+    arm = ArmModel(case.true_robot)
+    for name, values in case.true_known.items():
+        joints = tuple(j for j, value in zip(arm.robot.joints, values, strict=True) if value)
+        if joints:
+            effect = CATALOGUE[name].on(arm.robot, joints)
+            arm = arm.with_effect(effect, values[values != 0.0])
+    for hidden in case.effects:
+        told = {(p.name, p.joint): p.value for p in hidden.parameters}
+        effect = CATALOGUE[hidden.name].on(arm.robot, hidden.joints)
+        shape = [
+            told.get((name.name, name.joint), value)
+            for name, value in zip(effect.shape_parameters(arm.robot), effect.shape, strict=True)
+        ]
+        effect = effect.with_shape(np.reshape(shape, (len(effect.owners), -1)))
+        names = effect.parameters(arm.robot)
+        arm = arm.with_effect(effect, [told.get((n.name, n.joint), 0.0) for n in names])
+    return arm
+
+
 def run_diagnosis(case: Case) -> Outcome:
     """Diagnose a case. This is the one place that knows how."""
     from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings

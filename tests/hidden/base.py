@@ -57,11 +57,13 @@ class Setting:
     peak: FloatArray
     postures: FloatArray
 
-    def points(self, joint: int, offset: FloatArray) -> FloatArray:
+    def points(
+        self, joint: int, offset: FloatArray, postures: FloatArray | None = None
+    ) -> FloatArray:
         """Return where a point of the link of a joint comes to in the base frame, (K, 3) [m]."""
         data = self.robot.model.createData()
         places = []
-        for q in self.postures:
+        for q in self.postures if postures is None else postures:
             pin.forwardKinematics(self.robot.model, data, q)
             places.append(data.oMi[joint + 1].act(offset))
         return np.array(places)

@@ -19,10 +19,13 @@ from tests.hidden.cases import Draft, draft_gap, draw, gap_size, simulate, SIZES
 from tests.hidden.specification import CaseSpec
 
 #: How far the gap may be from what was asked for, as a factor, and how often it is tried.
-CLOSE_ENOUGH, TRIALS = 1.12, 9
+CLOSE_ENOUGH, TRIALS = 1.25, 9
 
 #: Factor by which a gap may miss its class, and how often effects are drawn to reach it.
 CLASS_WIDTH, ATTEMPTS = 1.4, 5
+
+#: What effects of ordinary size come to, more or less.
+ORDINARY_GAP = 20.0
 
 _SMALLEST_FACTOR = 1e-3
 
@@ -77,7 +80,7 @@ def _calibrate_one(draft: Draft, k: int) -> dict[str, float]:
     effect, wanted = draft.effects[k], np.log(draft.spec.gaps[k])
     most = float(np.log(effect.largest_factor))
     trials: list[tuple[float, float]] = []
-    size = min(0.0, most)
+    size = min(0.5 * (wanted - np.log(ORDINARY_GAP)), most)
     for _ in range(TRIALS):
         gap = np.log(_gap_of(draft, k, float(np.exp(size))))
         trials.append((size, gap))
@@ -110,7 +113,8 @@ def _gap_of(draft: Draft, k: int, factor: float) -> float:
     known = {name: values.copy() for name, values in draft.known.items()}
     alone = replace(draft, effects=(effect,), known=known)
     try:
-        gap = gap_size(draft_gap(alone, simulate(alone, TRAINING)), alone.effects)
+        bags = simulate(alone, TRAINING, 1 if effect.repeats else 2)
+        gap = gap_size(draft_gap(alone, bags), alone.effects)
     except FloatingPointError:
         return 1e9
     return max(gap, 1e-9)

@@ -129,7 +129,7 @@ class TorqueCrosstalk(HiddenEffect):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('crosstalk', self.pair[0], self.share, ''),)
+        return (Parameter(f'crosstalk_from_{self.pair[1]}', self.pair[0], self.share, ''),)
 
     def distort(self, signals: Signals, robot: Robot) -> Signals:
         tau = signals.tau.copy()

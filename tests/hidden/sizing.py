@@ -107,14 +107,15 @@ def noise_floor(
     robot: Robot, known: Mapping[str, FloatArray], bag: Evidence
 ) -> tuple[FloatArray, FloatArray]:
     """Return sigma of the joints, shape (n,), from the truth, and from the repeated period."""
-    clean, noisy, _ = _residuals(robot, known, bag)
     first, second = (_select(bag, period) for period in bag.periods[:2])
-    count = min(len(first), len(second))
-    difference = noisy[second[:count]] - noisy[first[:count]]
-    free = ~(held := _held(known, bag))[first[:count]] & ~held[second[:count]]
-    error = np.where(held, 0.0, noisy - clean)[np.concatenate([first, second])]
-    truth = (error**2).sum(axis=0) / (~held)[np.concatenate([first, second])].sum(axis=0)
-    repeated = (difference**2 * free).sum(axis=0) / free.sum(axis=0) / 2.0
+    count = len(first)
+    rows = np.concatenate([first, second])
+    clean, noisy, _ = _residuals(robot, known, bag, rows)
+    difference = noisy[count:] - noisy[:count]
+    free = ~_held(known, bag)[rows]
+    truth = ((noisy - clean) ** 2 * free).sum(axis=0) / free.sum(axis=0)
+    both = free[count:] & free[:count]
+    repeated = (difference**2 * both).sum(axis=0) / both.sum(axis=0) / 2.0
     return np.sqrt(truth), np.sqrt(repeated)
 
 
@@ -132,12 +133,12 @@ def _rows(
         Of what is fitted.
 
     """
-    clean, noisy, drives = _residuals(robot, known, bag)
     chosen = np.concatenate([_select(bag, period) for period in bag.periods])
+    clean, noisy, drives = _residuals(robot, known, bag, chosen)
     free = ~_held(known, bag)[chosen]
     if not free.any(axis=0).all():
         raise FloatingPointError(f'{robot.name}: a joint is stuck')
-    sigma = np.sqrt(((noisy - clean)[chosen] ** 2 * free).sum(axis=0) / free.sum(axis=0))
+    sigma = np.sqrt(((noisy - clean) ** 2 * free).sum(axis=0) / free.sum(axis=0))
     q, dq, ddq = _motion(bag.clean)
     data = robot.model.createData()
     rigid = np.array(
@@ -150,33 +151,35 @@ def _rows(
     for name, drive in drives.items():
         there = np.flatnonzero(known[name])
         spread = np.zeros((len(chosen), robot.n_joints, len(there)))
-        spread[:, there, range(len(there))] = drive[np.ix_(chosen, there)]
+        spread[:, there, range(len(there))] = drive[:, there]
         columns.append(spread)
-    return clean[chosen], free / sigma, np.concatenate(columns, axis=2)
+    return clean, free / sigma, np.concatenate(columns, axis=2)
 
 
 def _residuals(
-    robot: Robot, known: Mapping[str, FloatArray], bag: Evidence
+    robot: Robot, known: Mapping[str, FloatArray], bag: Evidence, rows: npt.NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
-    """Return the torque that model and known drives leave over, and the drives' columns."""
+    """Return what model and known drives leave over in some rows, and the drives' columns."""
     shapes = {
         'viscous_friction': bag.dq_true,
         'coulomb_friction': np.sign(bag.dq_true),
         'rotor_inertia': bag.ddq_true,
     }
-    drives = {name: _low_pass(shapes[name], bag.clean) for name in known}
+    drives = {name: _low_pass(shapes[name], bag.clean)[rows] for name in known}
     friction = sum(values * drives[name] for name, values in known.items())
     left = []
     for recording in (bag.clean, bag.noisy):
         assert recording.tau is not None
-        torque = _low_pass(recording.tau, recording)
-        left.append(torque - _inverse_dynamics(robot, recording) - friction)
+        torque = _low_pass(recording.tau, recording)[rows]
+        left.append(torque - _inverse_dynamics(robot, recording, rows) - friction)
     return left[0], left[1], drives
 
 
-def _inverse_dynamics(robot: Robot, recording: Recording) -> FloatArray:
+def _inverse_dynamics(
+    robot: Robot, recording: Recording, rows: npt.NDArray[np.intp]
+) -> FloatArray:
     data = robot.model.createData()
-    states = zip(*_motion(recording), strict=True)
+    states = zip(*(values[rows] for values in _motion(recording)), strict=True)
     return np.array([pin.rnea(robot.model, data, *state) for state in states])
 
 

@@ -232,6 +232,7 @@ class HumanInteraction(_Strap):
 
     name = 'human_interaction'
     damping_time: float = 0.02
+    middle: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
@@ -239,14 +240,20 @@ class HumanInteraction(_Strap):
         anchor = points.mean(axis=0) + 0.05 * rng.normal(size=3)
         reach = np.linalg.norm(points - anchor, axis=1).mean()
         stiffness = 0.02 * float(setting.drive[:2].mean()) / reach
-        return cls(joint, attachment, tuple(anchor.tolist()), stiffness)
+        middle = _middle(setting, joint, attachment)
+        return cls(joint, attachment, tuple(anchor.tolist()), stiffness, middle=middle)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
+        force = self.stiffness * (np.array(self.anchor) - self.middle)
         return (
             Parameter('interaction_stiffness', self.joint, self.stiffness, 'N/m'),
             Parameter(
                 'interaction_damping', self.joint, self.stiffness * self.damping_time, 'N s/m'
+            ),
+            *(
+                Parameter(f'interaction_force_{axis}', self.joint, float(value), 'N')
+                for axis, value in zip('xyz', force, strict=True)
             ),
         )
 
@@ -275,6 +282,10 @@ class InterfaceSlack(_Strap):
     def parameters(self) -> tuple[Parameter, ...]:
         return (
             Parameter('slack_stiffness', self.joint, self.stiffness, 'N/m'),
+            *(
+                Parameter(f'anchor_{axis}', self.joint, value, 'm')
+                for axis, value in zip('xyz', self.anchor, strict=True)
+            ),
             Parameter('slack', self.joint, self.slack, 'm'),
         )
 
@@ -289,6 +300,17 @@ def add_twist(spec: mujoco.MjSpec, joint: str) -> mujoco.MjsJoint:
     twist = motor.parent.add_joint(name=f'{joint}_twist')
     twist.type, twist.axis, twist.pos = motor.type, motor.axis, motor.pos
     return twist
+
+
+def _middle(
+    setting: Setting, joint: str, attachment: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Return where an attachment is in the middle of the range of motion, which forces go by."""
+    robot = setting.robot
+    ends = np.array([robot.lower, robot.upper])
+    posture = np.where(np.isfinite(ends).all(axis=0), ends, 0.0).mean(axis=0)
+    place = setting.points(robot.index(joint), np.array(attachment), posture[np.newaxis])
+    return tuple(place[0].tolist())
 
 
 def _attach(

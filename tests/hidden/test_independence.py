@@ -9,6 +9,7 @@ import sys
 
 HERE = Path(__file__).parent
 ALLOWED = {'armid_ros.robots', 'armid_ros.recording', 'armid_ros.errors', 'armid_ros.motion'}
+JUDGING = {'test_catalogue', 'test_benchmark'}  # these compare with what looks
 LOOKING = ('effects', 'arm', 'model', 'simulation', 'excitation', 'identification', 'diagnosis')
 
 
@@ -24,6 +25,8 @@ def imports(path):
 
 def test_files_import_descriptions_and_arrays_only():
     for path in HERE.glob('*.py'):
+        if path.stem in JUDGING:
+            continue
         ours = {name for name in imports(path) if name.split('.')[0] == 'armid_ros'}
         assert ours <= ALLOWED, f'{path.name} imports {ours - ALLOWED}'
 

@@ -1,0 +1,86 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The benchmark reads outcomes as diagnosis.json has them, and writes what it saw."""
+
+import json
+
+from armid_ros.effects import CATALOGUE
+import numpy as np
+import pytest
+
+from benchmarks import hidden_effects
+from tests.hidden.cases import make_case
+from tests.hidden.catalogue import CATALOGUED
+from tests.hidden.scoring import Judged, Truth
+from tests.hidden.specification import find_case
+
+DOCUMENT = {
+    'schema': 'armid/diagnosis/1',
+    'verdict': 'ambiguous',
+    'effects': [
+        {
+            'name': 'torque_offset',
+            'joints': ['elbow'],
+            'parameters': [
+                {
+                    'name': 'torque_offset',
+                    'joint': 'elbow',
+                    'value': 0.2,
+                    'std': 0.01,
+                    'unit': 'N m',
+                }
+            ],
+            'ambiguous_with': ['asymmetric_friction'],
+        }
+    ],
+    'gap': {
+        'before': {'elbow': 0.4, 'wrist': 0.0},
+        'after': {'elbow': 0.1, 'wrist': 0.0},
+        'noise_floor': {'elbow': 0.1, 'wrist': 0.0},
+        'closed_fraction': 1.0,
+    },
+}
+
+
+@pytest.fixture(scope='module')
+def judged():
+    """Return a payload that was called an offset."""
+    outcome = hidden_effects.outcome_of(DOCUMENT, 2.5)
+    return Judged(Truth.of(make_case(find_case('development/payload/3-0'))), outcome)
+
+
+def test_the_catalogue_has_every_hidden_name():
+    assert set(CATALOGUED) <= set(CATALOGUE)
+
+
+def test_outcome_is_what_the_document_says(judged):
+    outcome = judged.outcome
+    assert outcome.verdict == 'ambiguous'
+    assert outcome.findings[0].names == {'torque_offset', 'asymmetric_friction'}
+    assert outcome.findings[0].parameters == (('torque_offset', 'elbow', 0.2, 0.01),)
+    assert (outcome.closed, outcome.seconds) == (1.0, 2.5)
+    assert outcome.before == pytest.approx(0.4 / np.sqrt(2.0))
+
+
+def test_silence_is_an_outcome():
+    outcome = hidden_effects.outcome_of({'verdict': 'consistent', 'effects': []}, 1.0)
+    assert not outcome.findings
+    assert np.isnan(outcome.closed)
+
+
+def test_slice_has_all_kinds_and_is_short():
+    part = hidden_effects.select('development', part=True)
+    assert {spec.kind for spec in part} == {'single', 'free', 'pair', 'outside', 'removed'}
+    assert len(part) < 30
+
+
+def test_report_and_files_tell_the_same(judged, tmp_path, capsys):
+    hidden_effects.report([judged])
+    assert 'NOT reached' in capsys.readouterr().out
+    hidden_effects.write([judged], tmp_path / 'out')
+    document = json.loads((tmp_path / 'out' / 'outcomes.json').read_text())
+    assert document['cases'][0]['truth']['names'] == ['payload']
+    wrong = next(m for m in document['metrics'] if m['name'] == 'wrong names')
+    assert wrong['value'] == 1.0
+    figure = (tmp_path / 'out' / 'confusion.svg').read_text()
+    assert 'payload' in figure or '<use' in figure
