@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.arm import ArmModel, save_model
+from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.cli import options
 from armid_ros.cli.terminal import print_parameters, progress, say
 from armid_ros.identification import (
     identification_document,
     IdentificationSettings,
+    PhysicalSettings,
     SignalSettings,
 )
 from armid_ros.identification import (
@@ -48,6 +50,12 @@ import numpy as np
 )
 @click.option('--decimation', type=int, help='Keep one sample of this many.')
 @click.option('--quasi-static', is_flag=True, help='Weight and effects only, for slow motions.')
+@click.option(
+    '--physical',
+    is_flag=True,
+    help='Fit links that can be bodies; writes identified.urdf and identified.mjcf.xml too.',
+)
+@click.option('--total-mass', type=float, help='Of all moving links [kg], with --physical.')
 @click.option('--topic', help='JointState topic, where a bag has several.')
 @options.gravity
 @options.joints
@@ -63,6 +71,8 @@ def identify(
     cutoff: float | None,
     decimation: int | None,
     quasi_static: bool,
+    physical: bool,
+    total_mass: float | None,
     topic: str | None,
     gravity: str,
     joints: str | None,
@@ -72,7 +82,13 @@ def identify(
     """Fit a model with uncertainties to recordings."""
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
-    settings = IdentificationSettings(method, SignalSettings(cutoff, decimation))
+    if total_mass is not None and not physical:
+        raise click.UsageError('--total-mass goes with --physical')
+    settings = IdentificationSettings(
+        method,
+        SignalSettings(cutoff, decimation),
+        PhysicalSettings(total_mass=total_mass) if physical else None,
+    )
     with progress('reading') as tick:
         recordings = options.read(bags, robot, topic)
         held_out = options.read(validate, robot, topic)
@@ -98,6 +114,14 @@ def identify(
         ),
     )
     (out / 'report.html').write_text(page, encoding='utf-8')
+    files = ['model.yaml', 'identification.json', 'report.html']
+    if physical:
+        for name, made in (
+            ('identified.urdf', arm_urdf(result.arm)),
+            ('identified.mjcf.xml', arm_mjcf(result.arm)),
+        ):
+            (out / name).write_text(made.text, encoding='utf-8')
+            files.append(name)
     (out / 'identification.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
     if as_json:
         click.echo(json.dumps(document))
@@ -111,4 +135,4 @@ def identify(
     say(f'relative error {fitted:.2f} % on the data it was fitted to')
     for entry in document['validation']:
         say(f'relative error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
-    say(f'{out}: model.yaml, identification.json, report.html')
+    say(f'{out}: {", ".join(files)}')

@@ -81,6 +81,18 @@ def test_identify_prints_json_and_nothing_else(bags, tmp_path):
     assert json.loads(result.stdout)['robot'] == ROBOT
 
 
+def test_physical_identifications_are_bodies_and_can_be_compared(bags, tmp_path):
+    before, after = tmp_path / 'before', tmp_path / 'after'
+    for bag, out in zip(bags, (before, after), strict=True):
+        armid('identify', bag, '--robot', ROBOT, '--physical', '--out', out)
+    robot = load_robot(before / 'identified.urdf')
+    model = load_model(before / 'model.yaml')
+    np.testing.assert_allclose(robot.rigid_parameters, model.robot.rigid_parameters, atol=1e-9)
+    assert (before / 'identified.mjcf.xml').read_text().startswith('<')
+    armid('compare', before, after, '--out', tmp_path / 'compared')
+    assert (tmp_path / 'compared' / 'report.html').is_file()
+
+
 def test_excite_simulate_identify_in_three_lines(tmp_path):
     plan, run = tmp_path / 'plan', tmp_path / 'run'
     armid('excite', '--robot', ROBOT, '--gravity', 'moon', '--duration', 10, '--out', plan)
