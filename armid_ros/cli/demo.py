@@ -43,7 +43,7 @@ OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'repor
 
 @click.command(epilog='Example: armid demo --gravity earth --out demo')
 @click.option('--gravity', type=click.Choice(['moon', 'earth']), default='moon', show_default=True)
-@click.option('--rate', default=500.0, show_default=True, help='Joint states per second.')
+@click.option('--rate', default=200.0, show_default=True, help='Joint states per second.')
 @options.folder
 @options.seed
 @options.as_json
