@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Identify and record a running robot, from its joint_states and robot_description."""
 
+from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
-
-from launch import LaunchDescription
 
 
 def generate_launch_description():
