@@ -19,6 +19,7 @@ COMMANDS = {
     'simulate': 'record',
     'identify': 'identify',
     'diagnose': 'diagnose',
+    'exo': 'exo',
     'compare': 'compare',
     'recover': 'record',
     'robots': 'catalogues',

@@ -12,12 +12,12 @@ nothing holds, and falls.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.model.spring_ties import tie_geometry
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.simulation.leg_pair import TiedPair
+from armid_ros.simulation.leg_pair import pair_torques, PairMotion, TiedPair
 import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
@@ -103,6 +103,60 @@ def drive_by_torque(
     for values, part in zip(result, zip(*rows, strict=True), strict=True):
         values[:, columns] = part
     return replace(motion, t=motion.t[::2], q=result[0], dq=result[1], ddq=result[2], tau=None)
+
+
+@dataclass(frozen=True)
+class GaitCheck:
+    """
+    One joint driven by its torque, against what was prescribed.
+
+    Attributes
+    ----------
+    joint : str
+        The driven joint.
+    t : ndarray, shape (N,)
+        Time [s].
+    prescribed, followed : ndarray, shape (N,)
+        Position [rad].
+
+    """
+
+    joint: str
+    t: FloatArray
+    prescribed: FloatArray
+    followed: FloatArray
+
+    @property
+    def error(self) -> FloatArray:
+        """How far the joint is off, shape (N,) [rad]."""
+        return self.followed - self.prescribed
+
+
+def check_gait(
+    pair: TiedPair, motions: PairMotion, joint: str, rate: float, believed: TiedPair | None = None
+) -> GaitCheck:
+    """
+    Let one joint of the machine walk by its torque, as the source does.
+
+    Parameters
+    ----------
+    pair : TiedPair
+        The machines as they are.
+    motions : PairMotion
+        What was prescribed.
+    joint : str
+        The joint that follows its torque.
+    rate : float
+        Torque samples per second, joined by cubic splines.
+    believed : TiedPair, optional
+        The machines that the torques are computed for; by default those that there are.
+
+    """
+    own, other = motions
+    column = pair.robot.index(joint)
+    tau = pair_torques(believed or pair, own, other).tau[:, [column]]
+    moved = drive_by_torque(pair, own, other, [joint], splined(own.t, tau, rate))
+    return GaitCheck(joint, moved.t, own.q[::2, column], moved.q[:, column])
 
 
 def _step(

@@ -1,0 +1,246 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A machine and its wearer: what ties them, from the machine's torques and both's angles."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from armid_ros.cli import options
+from armid_ros.cli.terminal import print_rows, progress, say, Tick
+from armid_ros.errors import ModelError
+from armid_ros.identification.interaction import identify_interaction, Interaction
+from armid_ros.identification.interaction_recording import recorded_interaction_problem
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import BagWriter, read_recording, Recording, write_joint_states
+from armid_ros.report.exo_report import exo_report, GaitChecks
+from armid_ros.report.provenance import hash_files, Provenance, versions
+from armid_ros.robots.assumptions import read_assumptions
+from armid_ros.simulation.gait import Gait, read_gait
+from armid_ros.simulation.leg_pair import (
+    leg_pair,
+    pair_torques,
+    PairMotion,
+    stepping,
+    TiedPair,
+    walking,
+)
+from armid_ros.simulation.torque_driven import check_gait
+import click
+import numpy as np
+
+#: Joints that the source drives by torque, one at a time.
+_DRIVEN = ('exo_swing_hip', 'exo_swing_knee')
+_SOFTER = 0.2
+_RATE = 1000.0
+
+
+@click.command(
+    epilog='Example: armid exo --out result; with a recording: armid exo run.mcap --out result'
+)
+@click.argument('bag', required=False, type=click.Path(path_type=Path))
+@options.folder
+@click.option(
+    '--topics',
+    default='/exo/joint_states,/human/joint_states',
+    show_default=True,
+    help='JointState topics of the machine and of its wearer.',
+)
+@click.option(
+    '--inertias',
+    type=click.Choice(['known', 'free']),
+    default='known',
+    show_default=True,
+    help="Whether the machine's inertias are those of its description, or estimated as well.",
+)
+@click.option('--gait', 'gait_file', type=click.Path(path_type=Path), help='CSV; level walking.')
+@click.option('--stiffness', type=float, help='Of simulated springs [N/m]; as assumed by default.')
+@click.option('--duration', default=10.0, show_default=True, help='Simulated recording [s].')
+@click.option('--torque-noise', default=0.5, show_default=True, help='Simulated [N m].')
+@click.option('--angle-noise', default=0.05, show_default=True, help='Simulated [deg].')
+@options.seed
+@options.as_json
+def exo(
+    bag: Path | None,
+    out: Path,
+    topics: str,
+    inertias: Any,
+    gait_file: Path | None,
+    stiffness: float | None,
+    duration: float,
+    torque_noise: float,
+    angle_noise: float,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """
+    Find what ties an exoskeleton to its wearer.
+
+    Without a BAG the shipped pair walks, is recorded with noise, and its springs are found again.
+
+    """
+    pair = leg_pair(stiffness)
+    gait = read_gait(gait_file)
+    names = topics.split(',')
+    if len(names) != 2:
+        raise ModelError(f'--topics {topics}: give two, of the machine and of its wearer')
+    out.mkdir(parents=True, exist_ok=True)
+    simulated = bag is None
+    with progress('recording') as tick:
+        if bag is None:
+            bag = out / 'recording'
+            noise = torque_noise, np.radians(angle_noise)
+            _record(bag, names, pair, gait, duration, noise, np.random.default_rng(seed))
+        machine = read_recording(bag, joints=pair.robot.joints, topic=names[0])
+        wearer = read_recording(bag, joints=pair.other.joints, topic=names[1])
+        found = _identify(pair, machine, wearer, inertias, tick)
+        tick(0.6, 'driving joints by torque')
+        checks = _checks(pair, gait) if simulated else None
+    truth = dict(zip(('all', *pair.segments), [pair.stiffness[0]] * 5, strict=False))
+    document = _document(found, truth if simulated else {}, checks, machine.source)
+    shown, abscissa, name = _shown(pair, gait) if simulated else _recorded(machine, wearer)
+    page = exo_report(
+        pair.with_stiffness(found[0].stiffness[0].clip(0.0)),
+        shown,
+        abscissa,
+        name,
+        found,
+        truth=truth if simulated else None,
+        gait=checks,
+        assumptions=read_assumptions(),
+        provenance=Provenance(
+            files=hash_files([bag]),
+            versions=versions(),
+            settings={'inertias': inertias, 'topics': topics},
+            seed=seed if simulated else None,
+        ),
+    )
+    (out / 'report.html').write_text(page, encoding='utf-8')
+    (out / 'exo.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    if as_json:
+        click.echo(json.dumps(document))
+        return
+    print_rows(
+        [
+            {
+                'spring': row['segment'],
+                'stiffness': f'{row["value"]:.1f}',
+                'std': f'{row["std"]:.1f}',
+                'unit': row['unit'],
+            }
+            for row in document['stiffness']
+        ],
+        as_json=False,
+        right=('stiffness', 'std'),
+    )
+    for row in document['gait']:
+        say(
+            f'{row["joint"]} by its torque: at most {row["error_deg"]:.1e} deg off; '
+            f'{row["error_softer_deg"]:.2f} deg with springs {100 * _SOFTER:.0f} % too soft'
+        )
+    say(f'{out}: exo.json, report.html')
+
+
+def _record(
+    path: Path,
+    topics: list[str],
+    pair: TiedPair,
+    gait: Gait,
+    duration: float,
+    noise: tuple[float, float],
+    rng: np.random.Generator,
+) -> None:
+    """Let the pair step to and fro and record both as their sensors see them."""
+    t = np.arange(0.0, duration, 1.0 / _RATE)
+    motions = stepping(pair, gait, t)
+    tau = pair_torques(pair, *motions).tau
+    tau = tau + noise[0] * rng.normal(size=tau.shape)
+    stamps = 10**9 + np.rint(t * 1e9).astype(np.int64)
+    with BagWriter(path) as writer:
+        for topic, motion, torque in zip(topics, motions, (tau, None), strict=True):
+            q = motion.q + noise[1] * rng.normal(size=motion.q.shape)
+            write_joint_states(writer, topic, motion.joints, stamps, q, None, torque)
+
+
+def _identify(
+    pair: TiedPair, machine: Recording, wearer: Recording, inertias: Any, tick: Tick
+) -> list[Interaction]:
+    """Find one stiffness for all springs, and one for each."""
+    found = []
+    for share, separate in ((0.1, False), (0.35, True)):
+        tick(share, 'identifying')
+        problem = recorded_interaction_problem(
+            pair.robot,
+            machine,
+            pair.other,
+            wearer,
+            pair.ties,
+            inertias=inertias,
+            separate=separate,
+        )
+        found.append(identify_interaction(problem))
+    return found
+
+
+def _shown(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
+    """Return single support of walking, over the gait cycle of the swing leg."""
+    known = read_assumptions()
+    begin, end = known['single_support'].value
+    cycle = known['cycle_time'].value
+    t = np.linspace(0.0, (end - begin) * cycle, 2 * round(500 * (end - begin) * cycle) + 1)
+    return walking(pair, gait, t), begin + 0.5 + t / cycle, 'gait cycle of the swing leg'
+
+
+def _checks(pair: TiedPair, gait: Gait) -> GaitChecks:
+    motions, phase, _ = _shown(pair, gait)
+    rate = read_assumptions()['torque_rate'].value
+    soft = pair.with_stiffness((1.0 - _SOFTER) * pair.stiffness)
+    checks = [
+        (check_gait(pair, motions, joint, rate), check_gait(pair, motions, joint, rate, soft))
+        for joint in _DRIVEN
+    ]
+    return GaitChecks(checks, _SOFTER, phase[::2], rate)
+
+
+def _recorded(machine: Recording, wearer: Recording) -> tuple[PairMotion, FloatArray, str]:
+    """Return the recorded motion as it is, of which positions alone are shown."""
+    shift = 1e-9 * (machine.start_ns - wearer.start_ns)
+    t = machine.t[(machine.t + shift >= wearer.t[0]) & (machine.t + shift <= wearer.t[-1])]
+    motions = [
+        _smooth(recording, times) for recording, times in ((machine, t), (wearer, t + shift))
+    ]
+    return PairMotion(motions[0], motions[1]), t, 'time [s]'
+
+
+def _smooth(recording: Recording, t: FloatArray) -> Motion:
+    q = np.column_stack([np.interp(t, recording.t, column) for column in recording.q.T])
+    return Motion(recording.joints, t, q, np.zeros_like(q), np.zeros_like(q))
+
+
+def _document(
+    found: list[Interaction], truth: dict[str, float], checks: GaitChecks | None, source: str
+) -> dict[str, Any]:
+    rows = [
+        {
+            'segment': segment,
+            'value': float(part.stiffness[k]),
+            'std': float(part.std[k]),
+            'unit': 'N/m',
+            'interval': part.interval()[k].tolist(),
+            'bias_of_least_squares': float(part.bias[k]),
+            'truth': truth.get(segment),
+        }
+        for part in found
+        for k, segment in enumerate(part.segments)
+    ]
+    gait = [
+        {
+            'joint': right.joint,
+            'error_deg': float(np.degrees(np.abs(right.error).max())),
+            'error_softer_deg': float(np.degrees(np.abs(wrong.error).max())),
+        }
+        for right, wrong in (checks.checks if checks else ())
+    ]
+    return {'schema': 'armid/exo/1', 'recording': source, 'stiffness': rows, 'gait': gait}
