@@ -20,6 +20,10 @@ _SHIPPED = {
         'human_legs/human_legs.urdf',
         'legs and trunk of a man of 70.5 kg in the sagittal plane, stance foot fixed',
     ),
+    'two_link_elastic': (
+        'two_link_elastic/two_link_elastic.urdf',
+        'two links in the horizontal plane with elastic joints, 1 m, 17 kg',
+    ),
     'exoskeleton_legs': (
         'exoskeleton_legs/exoskeleton_legs.urdf',
         'exoskeleton of 12.25 kg that human_legs wears, stance foot fixed',

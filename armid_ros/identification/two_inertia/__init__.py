@@ -1,0 +1,2 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0

@@ -1,0 +1,171 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The serial two-link arm with elastic joints: its parameters, and the sets that are shipped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from armid_ros.errors import RobotError
+from armid_ros.motion import FloatArray, read_only
+from armid_ros.robots.robot import Robot
+import numpy as np
+import yaml
+
+ROBOT = 'two_link_elastic'
+
+
+@dataclass(frozen=True, eq=False)
+class TwoLinkParameters:
+    """
+    Parameters of two links in a plane, each driven by a motor through a spring and a damper.
+
+    Motors: Mm v_m' + Dm v_m + fm sgn(v_m) = E u - n tau_g, motor side, n = 1 / gear.
+    Springs: tau_g = Kg (n th_m - th_l) + Dg (n v_m - v_l).
+    Links: M(th_l) v_l' + h(th_l, v_l) + Dl v_l = tau_g, with c2 = cos(th_l2) and
+    M = [[alpha + beta + 2 gamma c2, beta + gamma c2], [beta + gamma c2, beta]].
+    Source: Oaki and Adachi 2008, Table 1; equations in their standard form.
+
+    Attributes
+    ----------
+    alpha, beta, gamma : float
+        m1 lc1^2 + I1 + m2 l1^2, m2 lc2^2 + I2 and m2 l1 lc2 [kg m^2].
+    motor_inertia : ndarray, shape (2,)
+        mm [kg m^2], motor side.
+    stiffness : ndarray, shape (2,)
+        kg [N m/rad], link side.
+    link_damping : ndarray, shape (2,)
+        dl [N m s/rad].
+    motor_damping : ndarray, shape (2,)
+        dm [N m s/rad], motor side.
+    spring_damping : ndarray, shape (2,)
+        dg [N m s/rad], link side.
+    coulomb : ndarray, shape (2,)
+        fm [N m], motor side.
+    torque_constant : ndarray, shape (2,)
+        e [N m/V], motor side.
+    gear : ndarray, shape (2,)
+        Turns of the motor per turn of the joint.
+
+    """
+
+    alpha: float
+    beta: float
+    gamma: float
+    motor_inertia: FloatArray
+    stiffness: FloatArray
+    link_damping: FloatArray
+    motor_damping: FloatArray
+    spring_damping: FloatArray
+    coulomb: FloatArray
+    torque_constant: FloatArray
+    gear: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check that bodies like these exist."""
+        for field in fields(self)[3:]:
+            values = read_only(getattr(self, field.name))
+            object.__setattr__(self, field.name, values)
+            if values.shape != (2,) or not np.all(np.isfinite(values)):
+                raise RobotError(f'two links: {field.name} has to be two numbers, got {values}')
+        if not (self.alpha > 0.0 and self.alpha * self.beta > self.gamma**2):
+            raise RobotError(
+                f'two links: alpha = {self.alpha:g}, beta = {self.beta:g} and gamma = '
+                f'{self.gamma:g} kg m^2 are not those of bodies; alpha beta has to exceed gamma^2'
+            )
+
+    @property
+    def inertia(self) -> FloatArray:
+        """Inertia of each joint on its own, alpha and beta, shape (2,) [kg m^2]."""
+        return np.array([self.alpha, self.beta])
+
+    @property
+    def rotor(self) -> FloatArray:
+        """Motor inertia at the joint, shape (2,) [kg m^2]."""
+        return np.asarray(self.motor_inertia * self.gear**2)
+
+    @property
+    def joint_motor_damping(self) -> FloatArray:
+        """Motor damping at the joint, shape (2,) [N m s/rad]."""
+        return np.asarray(self.motor_damping * self.gear**2)
+
+    @property
+    def joint_coulomb(self) -> FloatArray:
+        """Coulomb friction at the joint, shape (2,) [N m]."""
+        return np.asarray(self.coulomb * self.gear)
+
+    @property
+    def torque_per_volt(self) -> FloatArray:
+        """Torque at the joint per command voltage, shape (2,) [N m/V]."""
+        return np.asarray(self.torque_constant * self.gear)
+
+    @property
+    def total_damping(self) -> FloatArray:
+        """Viscous friction of motor and link together, dl + dm gear^2, shape (2,) [N m s/rad]."""
+        return np.asarray(self.link_damping + self.joint_motor_damping)
+
+    def mass_matrix(self, angle: float) -> FloatArray:
+        """Return M for an angle of joint 2 [rad], shape (2, 2) [kg m^2]."""
+        coupling = self.beta + self.gamma * np.cos(angle)
+        first = self.alpha + self.beta + 2.0 * self.gamma * np.cos(angle)
+        return np.array([[first, coupling], [coupling, self.beta]])
+
+    def body(self, robot: Robot) -> Robot:
+        """
+        Return the two links with these alpha, beta and gamma.
+
+        Masses, lengths and the first link's centroid stay; centroid and inertia of the second
+        link, and the inertia of the first, give way.
+
+        """
+        pi = np.array(robot.rigid_parameters).reshape(2, 10)
+        length = float(robot.model.jointPlacements[2].translation[0])
+        pi[1, 1] = self.gamma / length
+        pi[1, [6, 9]] = self.beta
+        pi[0, [6, 9]] = self.alpha - pi[1, 0] * length**2
+        return robot.with_inertias(pi.ravel())
+
+
+@dataclass(frozen=True, eq=False)
+class TwoLinkSet:
+    """
+    What is shipped with the two-link arm.
+
+    Attributes
+    ----------
+    parameters : TwoLinkParameters
+        One of the printed sets.
+    assumptions : mapping of str to value
+        Link length, radii of the accelerometers, gains: what the source does not print.
+
+    """
+
+    parameters: TwoLinkParameters
+    assumptions: Mapping[str, Any]
+
+
+def two_link_set(name: str = 'after', path: Path | None = None) -> TwoLinkSet:
+    """
+    Read a shipped parameter set of the two-link arm, 'before' or 'after' tuning.
+
+    Raises
+    ------
+    RobotError
+        If there is no such set.
+
+    """
+    default = resources.files('armid_ros.robots').joinpath(ROBOT, 'parameters.yaml')
+    path = path or Path(str(default))
+    content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    if name not in content['sets']:
+        raise RobotError(f"{path}: no set '{name}'; there are {', '.join(content['sets'])}")
+    assumed = {key: entry['value'] for key, entry in content['assumptions'].items()}
+    parameters = TwoLinkParameters(**content['sets'][name], **content['drive'])
+    return TwoLinkSet(parameters, MappingProxyType(assumed))
+
+
