@@ -178,7 +178,7 @@ def _within(
     solution = scipy.optimize.lsq_linear(
         triangle / scale, triangle @ values, (bounds[0] * scale, bounds[1] * scale), method='bvls'
     )
-    return np.clip(solution.x / scale, *bounds)
+    return np.asarray(np.clip(solution.x / scale, *bounds))
 
 
 def _robust_scale(residual: FloatArray, used: npt.NDArray[np.bool_]) -> FloatArray:
@@ -209,36 +209,69 @@ def _fit(triangles: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArr
 def _covariance(
     problem: Sequence[Regression], residual: FloatArray, weights: FloatArray, triangle: FloatArray
 ) -> FloatArray:
-    """
-    Propagate coloured residuals through the fit: H^-1 (sum over f of W^H Phi W) H^-1.
+    """Propagate coloured residuals through the fit: H^-1 (sum over f of W^H Phi W) H^-1."""
+    inverse = scipy.linalg.solve_triangular(triangle, np.eye(len(triangle)))
+    meat = noise_products(problem, residual, weights, inverse)
+    bread = inverse @ inverse.T
+    return np.asarray(bread @ meat @ bread)
 
-    Phi is the spectrum of each joint's noise; noises of different joints are taken as independent,
-    those of different stretches too. A fit takes most of the noise where the regressor has its
-    power, so the residual has less of it there: at a frequency f of a joint the share x^H H^-1 x
-    of what was, x being the transform of the joint's rows, its leverage.
+
+def noise_products(
+    problem: Sequence[Regression],
+    residual: FloatArray,
+    weights: FloatArray,
+    inverse: FloatArray,
+    instruments: Sequence[FloatArray] | None = None,
+) -> FloatArray:
+    """
+    Return the covariance of the products of columns and noise, W' n.
+
+    The noise of each joint is coloured, with a spectrum Phi that its residual tells; noises of
+    different joints are taken as independent, those of different stretches too. A fit takes most
+    of the noise where the regressor has its power, so the residual has less of it there: at a
+    frequency of a joint the share x^H H^-1 x of what was, x being the transform of the joint's
+    rows, its leverage.
+
+    Parameters
+    ----------
+    problem : sequence of Regression
+        Stretches, N samples in all, of r columns.
+    residual, weights : ndarray, shape (N, n)
+        Weighted residual of the fit, and the weights.
+    inverse : ndarray, shape (r, r)
+        Inverse of the triangular factor of the weighted problem: H^-1 = inverse inverse'.
+    instruments : sequence of ndarray, each of shape (M, n, k), optional
+        Further columns, one array a stretch.
+
+    Returns
+    -------
+    ndarray, shape (r + k, r + k)
 
     """
-    rank = len(triangle)
-    inverse = scipy.linalg.solve_triangular(triangle, np.eye(rank))
-    meat = np.zeros((rank, rank))
+    rank = len(inverse)
+    extra = [np.empty((*part.tau.shape, 0)) for part in problem]
+    added = extra if instruments is None else instruments
+    size = rank + added[0].shape[2]
+    products = np.zeros((size, size))
     start = 0
-    for part in problem:
+    for part, more in zip(problem, added, strict=True):
         count = len(part.tau)
         stop = start + count
         for joint in range(part.tau.shape[1]):
-            columns = part.columns[:, joint]
+            columns = np.concatenate([part.columns[:, joint], more[:, joint]], axis=1)
             active = np.flatnonzero(columns.any(axis=0))
             columns = columns[:, active] * weights[start:stop, joint, np.newaxis]
             transformed = np.fft.rfft(columns, 2 * count, axis=0)
-            leverage = np.sum(np.abs(transformed @ inverse[active]) ** 2, axis=1) / count
+            fitted = active < rank
+            taken = transformed[:, fitted] @ inverse[active[fitted]]
+            leverage = np.sum(np.abs(taken) ** 2, axis=1) / count
             spectrum = _noise_spectrum(residual[start:stop, joint], leverage)
             spectrum[1:-1] *= 2.0  # the constant and the Nyquist bin have no mirror image
             transformed *= np.sqrt(spectrum / (2 * count))[:, np.newaxis]
             power = transformed.real.T @ transformed.real + transformed.imag.T @ transformed.imag
-            meat[np.ix_(active, active)] += power
+            products[np.ix_(active, active)] += power
         start = stop
-    bread = inverse @ inverse.T
-    return np.asarray(bread @ meat @ bread)
+    return products
 
 
 def _noise_spectrum(residual: FloatArray, leverage: FloatArray) -> FloatArray:
