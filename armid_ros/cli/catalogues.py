@@ -27,8 +27,13 @@ def effects(as_json: bool) -> None:
         {
             'name': name,
             'what it is': effect.summary,
-            'parameters': [f'{q.name} [{q.unit}]' for q in effect.quantities],
+            'parameters': [_with_unit(q.name, q.unit) for q in effect.quantities],
+            **({'shapes': [_with_unit(s.name, s.unit) for s in effect.shapes]} if as_json else {}),
         }
         for name, effect in CATALOGUE.items()
     ]
     print_rows(rows, as_json)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return f'{name} [{unit}]' if unit else name

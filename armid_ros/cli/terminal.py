@@ -49,7 +49,10 @@ def print_rows(rows: Sequence[dict[str, Any]], as_json: bool, right: Sequence[st
     table = Table(box=None, header_style='bold')
     for head in rows[0] if rows else ():
         table.add_column(
-            head, justify='right' if head in right else 'left', no_wrap=head in ('name', 'joint')
+            head,
+            justify='right' if head in right else 'left',
+            no_wrap=head in ('name', 'joint'),
+            overflow='fold',
         )
     for row in rows:
         table.add_row(*(Text(_cell(value)) for value in row.values()))

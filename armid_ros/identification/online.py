@@ -140,6 +140,12 @@ class OnlineIdentifier:
     ) -> None:
         settings = settings or OnlineSettings()
         robot = arm.robot
+        for effect in arm.effects:
+            if not effect.instantaneous:
+                raise IdentificationError(
+                    f'{effect.name} depends on the motion before, which single samples do not '
+                    'tell; identify it from a recording'
+                )
         self.arm = arm
         self.settings = settings
         self.base: BaseParameters = arm.base_parameters(rng)

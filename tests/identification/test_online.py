@@ -340,3 +340,12 @@ def test_joints_are_found_by_name_in_any_order():
         order.map(['a', 'c'])
     with pytest.raises(RecordingError, match='name a twice'):
         order.map(['a', 'b', 'a'])
+
+
+def test_effects_that_remember_are_refused(arm):
+    robot = arm.robot
+    with pytest.raises(IdentificationError, match=r'presliding_hysteresis.*from a recording'):
+        OnlineIdentifier(
+            ArmModel(robot).with_effect(make_effect('presliding_hysteresis', robot)),
+            rng=np.random.default_rng(0),
+        )
