@@ -72,14 +72,15 @@ def run_diagnosis(case: Case) -> Outcome:
     from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
 
     library = tuple(name for name in CATALOGUE if name not in case.removed)
-    begin = time.perf_counter()
+    begin = time.process_time()
     diagnosis = diagnose(
-        [bag.recording for bag in case.bags],
         nominal_arm(case),
-        validation=[bag.recording for bag in case.validation],
+        [bag.recording for bag in case.bags],
+        validate=[bag.recording for bag in case.validation],
         settings=DiagnosisSettings(library=library),
+        rng=np.random.default_rng(0),
     )
-    seconds = time.perf_counter() - begin
+    seconds = time.process_time() - begin
     return outcome_of(diagnosis_document(diagnosis), seconds)
 
 
@@ -94,7 +95,7 @@ def outcome_of(document: dict[str, Any], seconds: float) -> Outcome:
                 joints=tuple(effect['joints']),
                 ambiguous_with=tuple(effect.get('ambiguous_with', ())),
                 parameters=tuple(
-                    (p['name'], p.get('joint') or '', float(p['value']), float(p['std']))
+                    (p['name'], p.get('joint') or '', _number(p['value']), _number(p['std']))
                     for p in effect.get('parameters', ())
                 ),
             )

@@ -63,7 +63,7 @@ class Outcome:
     before, after, floor : float
         Root mean square of the torque error over all joints, on held-out data [N m].
     seconds : float
-        Time it took.
+        Processor time it took [s].
     error : str
         Why there is no outcome; empty if there is one.
 
@@ -288,8 +288,8 @@ def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
         _rate('95 % intervals with the truth', errors, lambda e: e[1], least=0.90, most=0.98),
         _rate('silent where nothing shows', unseen, lambda j: not j.findings),
         _rate('failures', judged, lambda j: bool(j.outcome.error)),
-        _number('time, median [s]', np.median, seconds, '', None),
-        _number('time, longest [s]', np.max, seconds, 'at most 30', lambda x: x <= 30.0),
+        _number('processor time, median [s]', np.median, seconds, '', None),
+        _number('processor time, longest [s]', np.max, seconds, 'at most 30', lambda x: x <= 30.0),
     )
 
 

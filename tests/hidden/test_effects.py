@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from tests.hidden.arrays import FloatArray, Signals
 from tests.hidden.cases import Draft, draw, simulate
 from tests.hidden.catalogue import CATALOGUED, HIDDEN
+from tests.hidden.sensing import SENSING
 from tests.hidden.specification import CaseSpec
 
 SAMPLES = slice(2200, -1000, 7)  # from the first period on
@@ -227,8 +228,9 @@ def see(draft: Draft, speed: str) -> tuple[Seen, Signals]:
     """Move an arm and look at it."""
     effect = draft.effects[0]
     signals = simulate(draft, [speed])[0].signals
-    plain = simulate(replace(draft, effects=()), [speed])[0].signals
-    plain_tau = np.column_stack([np.interp(signals.t, plain.t, tau) for tau in plain.tau.T])
+    plain = signals
+    if isinstance(effect, SENSING):  # the arm itself moves as without it
+        plain = simulate(replace(draft, effects=()), [speed])[0].signals
     seen = Seen(
         robot=draft.robot,
         values={p.name: p.value for p in effect.parameters},
@@ -238,7 +240,7 @@ def see(draft: Draft, speed: str) -> tuple[Seen, Signals]:
         dq=signals.dq,
         ddq=signals.ddq,
         tau=signals.tau,
-        plain=plain_tau,
+        plain=plain.tau,
         known=dict(draft.known),
     )
     return seen, signals
