@@ -35,13 +35,13 @@ FRICTION = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 
 
 def fits(arm, recording, **signals):
-    """Identify without and with constraints; returns both results and their seconds."""
+    """Identify without and with constraints; returns both results and their processor time."""
     results, seconds = [], []
     for physical in (None, PhysicalSettings()):
         settings = IdentificationSettings(signals=SignalSettings(**signals), physical=physical)
-        start = time.perf_counter()
+        start = time.process_time()
         results.append(identify(arm, [recording], settings, rng=np.random.default_rng(0)))
-        seconds.append(time.perf_counter() - start)
+        seconds.append(time.process_time() - start)
     return results, seconds
 
 
