@@ -87,6 +87,8 @@ def _sentence(change: Change) -> str:
     verb = 'rose' if change.difference > 0.0 else 'fell'
     unit = pretty(change.parameter.unit)
     label = full_label(change.parameter)
+    if is_rigid(change.parameter):
+        label = f'Inertial parameter {label} of {change.parameter.joint}'
     label = label[0].upper() + label[1:]
     share = ''
     if abs(change.before) > HALF_WIDTH * change.before_std:
