@@ -28,6 +28,8 @@ from scipy import stats
 _ITERATIONS = 100
 #: Steps below this share of a standard deviation end the iteration.
 _CONVERGED = 1e-3
+#: Torque per stiffness below which a spring is not drawn out, root mean square [m^2].
+_DRAWN_OUT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -129,8 +131,9 @@ def identify_interaction(
 def _least_squares(problem: InteractionProblem) -> FloatArray:
     w = problem.columns.reshape(-1, problem.columns.shape[2])
     scale = np.linalg.norm(w, axis=0)
-    if not np.all(scale > 0.0):
-        name = problem.segments[int(np.argmin(scale[: len(problem.segments)]))]
+    springs = scale[: len(problem.segments)]
+    if not np.all(springs > _DRAWN_OUT * np.sqrt(len(w))):
+        name = problem.segments[int(np.argmin(springs))]
         raise IdentificationError(f'{name}: its spring is never drawn out, so nothing shows it')
     y = problem.tau - problem.known
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)

@@ -20,7 +20,7 @@ from armid_ros.simulation.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.simulation.torque_driven import GaitCheck
 import numpy as np
 
-_POSES = 8
+_POSES = 6
 #: Intervals wider than this share of the value are called poor.
 _NARROW = 0.1
 

@@ -13,8 +13,10 @@ from armid_ros.robots import Robot
 from armid_ros.simulation.leg_pair import PairMotion, TiedPair
 import numpy as np
 
-_MARGIN = 0.12
-_SCALE = 180.0
+_MARGIN = 0.06
+_SCALE = 260.0
+#: Springs are drawn so many times longer than they are, or nobody would see them.
+_MAGNIFIED = 4.0
 _BASE = (0.0, 0.0, 0.0)
 
 
@@ -30,7 +32,7 @@ class Drawing:
     own, other : tuple of str
         Polylines of both machines, as coordinates of SVG.
     ties : tuple of tuple of float
-        x1, y1, x2, y2 of every spring.
+        x1, y1, x2, y2 of every spring, from the other machine; four times as long as it is.
     captions : tuple of (float, str)
         Where each pose is, and when.
 
@@ -74,18 +76,23 @@ def draw_poses(
         for group in lines
     ]
     ties = [
-        tuple(np.round(place(ends[:, [0, 2]], pose), 1).ravel().tolist())
+        tuple(np.round(place(_ends(start, way), pose), 1).ravel().tolist())
         for pose in range(len(rows))
-        for ends in np.stack([geometry.position[pose], geometry.other_position[pose]], axis=1)
+        for start, way in zip(geometry.other_position[pose], geometry.way[pose], strict=True)
     ]
     return Drawing(
         round(pitch * len(rows), 1),
-        round((high - low) * _SCALE + 18.0, 1),
+        round((high - low) * _SCALE + 30.0, 1),
         drawn[0],
         drawn[1],
         tuple(ties),
         tuple((round((k + 0.5) * pitch, 1), text) for k, text in enumerate(captions)),
     )
+
+
+def _ends(start: FloatArray, way: FloatArray) -> FloatArray:
+    """Return both ends of a spring, drawn out of proportion, shape (2, 2) [m]."""
+    return np.stack([start, start + _MAGNIFIED * way])[:, [0, 2]]
 
 
 def _lines(robot: Robot, q: FloatArray) -> list[FloatArray]:

@@ -66,7 +66,7 @@ class Stiffness(Section):
         found = self.found[0]
         angles = np.degrees(found.position_noise)
         return [
-            ('Noise of the angles', f'{angles.min():.3f} to {angles.max():.3f}°'),
+            ('Noise of the angles, as filtered', f'{angles.min():.3f} to {angles.max():.3f}°'),
             (
                 'Noise of the torques, as filtered',
                 f'{found.torque_noise.min():.2g} to {found.torque_noise.max():.2g} N m',

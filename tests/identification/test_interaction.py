@@ -1,0 +1,169 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Springs between two machines, found from the torques of one and noisy angles of both."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.interaction import identify_interaction, Interaction
+from armid_ros.identification.interaction_problem import interaction_problem
+from armid_ros.identification.interaction_recording import recorded_interaction_problem
+from armid_ros.motion import Motion
+from armid_ros.recording import Recording
+from armid_ros.simulation.gait import read_gait
+from armid_ros.simulation.leg_pair import leg_pair, pair_torques, PairMotion, stepping, TiedPair
+import numpy as np
+import pytest
+
+STIFFNESS = 1.0e4
+TORQUE_NOISE = 0.5
+
+
+@pytest.fixture(scope='module')
+def pair() -> TiedPair:
+    return leg_pair(STIFFNESS)
+
+
+@pytest.fixture(scope='module')
+def poses(pair) -> PairMotion:
+    """Return 200 poses, with exact torques."""
+    motions = stepping(pair, read_gait(), np.linspace(0.0, 1.8, 201)[:-1])
+    return measured(pair, motions)
+
+
+@pytest.fixture(scope='module')
+def seconds(pair) -> PairMotion:
+    """Return 6 s at 1 kHz, with exact torques."""
+    return measured(pair, stepping(pair, read_gait(), np.arange(0.0, 6.0, 1e-3)))
+
+
+def measured(pair: TiedPair, motions: PairMotion) -> PairMotion:
+    tau = pair_torques(pair, *motions).tau
+    return PairMotion(motions.own.with_torque(tau), motions.other)
+
+
+def noisy(motion: Motion, degrees: float, rng: np.random.Generator) -> Motion:
+    q = motion.q + np.radians(degrees) * rng.normal(size=motion.q.shape)
+    if motion.tau is None:
+        return replace(motion, q=q)
+    return replace(motion, q=q, tau=motion.tau + TORQUE_NOISE * rng.normal(size=q.shape))
+
+
+def from_poses(pair, poses, degrees, seed, **options) -> Interaction:
+    rng = np.random.default_rng(seed)
+    own, other = (noisy(motion, degrees, rng) for motion in poses)
+    problem = interaction_problem(
+        pair.robot,
+        own,
+        pair.other,
+        other,
+        pair.ties,
+        position_noise=np.radians(degrees),
+        **options,
+    )
+    return identify_interaction(problem, TORQUE_NOISE)
+
+
+def from_recording(pair, seconds, degrees, seed, shift_ns=0, **options) -> Interaction:
+    rng = np.random.default_rng(seed)
+    own, other = (noisy(motion, degrees, rng) for motion in seconds)
+    recordings = [
+        Recording(
+            joints=m.joints, t=m.t[rows] - m.t[rows][0], q=m.q[rows], tau=tau, start_ns=start
+        )
+        for m, rows, tau, start in (
+            (own, slice(0, None), own.tau, 10**9),
+            (other, slice(shift_ns // 10**6, None), None, 10**9 + shift_ns),
+        )
+    ]
+    return identify_interaction(
+        recorded_interaction_problem(
+            pair.robot, recordings[0], pair.other, recordings[1], pair.ties, **options
+        )
+    )
+
+
+def percent(found: Interaction) -> np.ndarray:
+    return np.asarray(100.0 * (found.stiffness / STIFFNESS - 1.0))
+
+
+@pytest.mark.parametrize('inertias', ['known', 'free'])
+@pytest.mark.parametrize('separate', [False, True])
+def test_exact_data_give_exact_stiffness(pair, poses, inertias, separate) -> None:
+    problem = interaction_problem(
+        pair.robot,
+        poses.own,
+        pair.other,
+        poses.other,
+        pair.ties,
+        inertias=inertias,
+        separate=separate,
+    )
+    found = identify_interaction(problem, 1e-3)
+    np.testing.assert_allclose(found.stiffness, STIFFNESS, rtol=1e-5)
+
+
+def test_noise_of_a_tenth_of_a_degree_leaves_no_bias_in_200_poses(pair, poses) -> None:
+    """The mean over draws, to the error of that mean; plain least squares is off by much more."""
+    found = [from_poses(pair, poses, 0.1, seed) for seed in range(8)]
+    biased = np.mean([100.0 * part.bias[0] / STIFFNESS for part in found])
+    mean, scatter = np.mean([percent(f) for f in found]), np.std([percent(f) for f in found])
+    assert biased < -3.0
+    assert abs(mean) < 1.0
+    assert abs(mean) < 3.0 * scatter / np.sqrt(len(found)) + 0.1
+
+
+def test_intervals_hold(pair, poses) -> None:
+    found = [from_poses(pair, poses, 0.05, seed, separate=True) for seed in range(8)]
+    inside = [
+        (part.interval()[:, 0] <= STIFFNESS) & (part.interval()[:, 1] >= STIFFNESS)
+        for part in found
+    ]
+    assert np.mean(inside) >= 0.85
+
+
+@pytest.mark.parametrize(('inertias', 'one', 'each'), [('known', 0.5, 5.0), ('free', 1.0, 5.0)])
+def test_a_recording_gives_them_within_per_cent(pair, seconds, inertias, one, each) -> None:
+    overall = from_recording(pair, seconds, 0.05, 0, inertias=inertias)
+    assert abs(percent(overall)[0]) < one
+    apart = from_recording(pair, seconds, 0.05, 0, inertias=inertias, separate=True)
+    assert np.abs(percent(apart)).max() < each
+
+
+def test_a_recording_with_a_tenth_of_a_degree(pair, seconds) -> None:
+    assert abs(percent(from_recording(pair, seconds, 0.1, 1))[0]) < 1.0
+
+
+def test_recordings_need_not_begin_together(pair, seconds) -> None:
+    late = from_recording(pair, seconds, 0.05, 0, shift_ns=700 * 10**6)
+    assert abs(percent(late)[0]) < 0.5
+
+
+def test_the_noise_of_the_angles_is_measured(pair, seconds) -> None:
+    found = [from_recording(pair, seconds, d, 0).position_noise for d in (0.05, 0.1)]
+    np.testing.assert_allclose(found[1] / found[0], 2.0, rtol=0.2)
+
+
+def test_without_springs_none_are_found(pair) -> None:
+    loose = pair.with_stiffness(0.0)
+    still = measured(loose, stepping(loose, read_gait(), np.linspace(0.0, 1.8, 200)))
+    found = from_poses(loose, still, 0.05, 0)
+    lower, upper = found.interval(0.999)[0]
+    assert lower < 0.0 < upper
+    assert upper < 100.0
+
+
+def test_data_that_cannot_tell_are_refused(pair, poses) -> None:
+    same = replace(poses.own, q=poses.other.q)
+    problem = interaction_problem(pair.robot, same, pair.other, poses.other, pair.ties[:1])
+    with pytest.raises(IdentificationError, match='nothing shows it'):
+        identify_interaction(problem)
+    with pytest.raises(IdentificationError, match='no torques'):
+        interaction_problem(
+            pair.robot, poses.own.with_torque(None), pair.other, poses.other, pair.ties
+        )
+    with pytest.raises(IdentificationError, match='one time base'):
+        shifted = replace(poses.other, t=poses.other.t + 0.1)
+        interaction_problem(pair.robot, poses.own, pair.other, shifted, pair.ties)
