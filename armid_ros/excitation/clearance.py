@@ -27,6 +27,9 @@ IntArray = npt.NDArray[np.intp]
 #: body by less than the slack the design keeps.
 _SHORTEST_INTERVAL = 1e-4
 
+#: How far a slide without limits is taken to go [m].
+_LONGEST_STROKE = 10.0
+
 
 @dataclass(frozen=True)
 class NearPairs:
@@ -310,6 +313,7 @@ def _levers(chain: Chain, collision: CollisionModel, joint: int, length: float) 
     levers = np.zeros(chain.n_joints)
     robot = collision.robot
     stroke = np.where(robot.prismatic, np.maximum(np.abs(robot.lower), np.abs(robot.upper)), 0.0)
+    stroke = np.minimum(stroke, _LONGEST_STROKE)
     while joint >= 0:
         levers[joint] = 1.0 if chain.prismatic[joint] else length
         length += float(np.linalg.norm(chain.placements[joint][1])) + float(stroke[joint])

@@ -11,6 +11,7 @@ import multiprocessing
 from multiprocessing.connection import Connection, wait
 import os
 import signal
+import threading
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.clearance import ClearanceModel
@@ -165,7 +166,7 @@ def _in_processes(
                 number, rng = waiting.pop()
                 ours, theirs = context.Pipe(duplex=False)
                 process = context.Process(target=_work, args=(task, rng, theirs), daemon=True)
-                with _single_threaded():
+                with _undisturbed_children():
                     process.start()
                 theirs.close()
                 running[ours] = (number, process)
@@ -212,13 +213,17 @@ def _work(task: Task, rng: np.random.Generator, connection: Connection) -> None:
 
 
 @contextmanager
-def _single_threaded() -> Iterator[None]:
-    """Have processes that start in the meantime use one thread of linear algebra."""
+def _undisturbed_children() -> Iterator[None]:
+    """Have processes that start in the meantime use one thread each and leave Ctrl-C to us."""
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, '1'))
+    ours = threading.current_thread() is threading.main_thread()
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN) if ours else None
     try:
         yield
     finally:
+        if handler is not None:
+            signal.signal(signal.SIGINT, handler)
         for name, value in before.items():
             if value is None:
                 del os.environ[name]
