@@ -58,13 +58,15 @@ def resonance_experiments(
     dt: float = 1e-3,
     band: tuple[float, float] = (2.0, 100.0),
     speed: npt.ArrayLike = 0.8,
-    slow: float = 0.5,
+    slow: tuple[float, float] = (0.3, 1.0),
+    reach: npt.ArrayLike = np.pi / 3.0,
 ) -> list[Experiment]:
     """
     Return experiments that excite all joints through their resonances, in many poses.
 
     Motors follow a slow sine of velocity under a loop of low gain, so that friction has one sign
-    most of the time, and get a multisine of torque on top. Poses and directions are random.
+    most of the time, and get a multisine of torque on top. Poses are random, around the arm
+    stretched, where links act on each other most.
 
     Parameters
     ----------
@@ -80,8 +82,10 @@ def resonance_experiments(
         Of the multisine [Hz].
     speed : array_like
         Amplitude of the slow velocity [rad/s].
-    slow : float
-        Its frequency [Hz].
+    slow : tuple of float
+        Lowest and highest frequency of it [Hz]; each experiment has its own.
+    reach : array_like
+        How far the links begin from zero at most [rad].
 
     """
     size = np.asarray(rms, dtype=float)
@@ -89,11 +93,12 @@ def resonance_experiments(
     t = dt * np.arange(steps)[:, np.newaxis]
     experiments = []
     for _ in range(count):
+        rate = 2.0 * np.pi * rng.uniform(*slow, len(size))
         phase = 2.0 * np.pi * rng.random(len(size))
         ramp = np.minimum(t / 0.2, 1.0)
-        velocity = ramp * speed * np.cos(2.0 * np.pi * slow * t + phase)
+        velocity = ramp * speed * np.cos(rate * t + phase)
         torque = ramp * multisine(steps, dt, band, size, rng)
-        pose = rng.uniform(-np.pi, np.pi, len(size))
+        pose = reach * rng.uniform(-1.0, 1.0, len(size))
         experiments.append(Experiment(pose, velocity, torque))
     return experiments
 

@@ -1,0 +1,71 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Frequency responses straight from the data, of no model and no order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.two_inertia.subspace import Signals
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import get_window
+
+
+def measured_response(
+    experiments: Sequence[Signals],
+    dt: float,
+    *,
+    window: float = 1.0,
+    hold: bool = True,
+) -> tuple[FloatArray, npt.NDArray[np.complex128]]:
+    """
+    Estimate the frequency response from all inputs to all outputs by averaged spectra (H1).
+
+    Parameters
+    ----------
+    experiments : sequence of Signals
+        With m inputs and p outputs.
+    dt : float
+        Time between samples [s].
+    window : float
+        Length of the averaged stretches [s], half overlapping, under a Hann window.
+    hold : bool
+        Whether the first input is held between samples; its response is then that to the
+        continuous, held signal.
+
+    Returns
+    -------
+    frequency : ndarray, shape (K,)
+        [Hz], zero left out.
+    response : ndarray of complex, shape (K, p, m)
+
+    Raises
+    ------
+    IdentificationError
+        If the data are shorter than one window.
+
+    """
+    size = round(window / dt)
+    taper = get_window('hann', size)[:, np.newaxis]
+    cross, power = 0.0, 0.0
+    for e in experiments:
+        for start in range(0, len(e.u) - size + 1, size // 2):
+            part = slice(start, start + size)
+            u, y = (
+                np.fft.rfft(taper * (x[part] - x[part].mean(axis=0)), axis=0) for x in (e.u, e.y)
+            )
+            cross = cross + np.einsum('kp,km->kpm', y, u.conj())
+            power = power + np.einsum('kl,km->klm', u, u.conj())
+    if isinstance(cross, float) or isinstance(power, float):
+        raise IdentificationError(
+            f'no experiment is as long as the window of {window:g} s of the spectra'
+        )
+    frequency = np.fft.rfftfreq(size, dt)[1:]
+    response = cross[1:] @ np.linalg.pinv(power[1:], rcond=1e-12, hermitian=True)
+    if hold:
+        s = 2j * np.pi * frequency * dt
+        response[:, :, 0] /= ((1.0 - np.exp(-s)) / s)[:, np.newaxis]
+    return frequency, response

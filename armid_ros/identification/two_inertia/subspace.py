@@ -1,0 +1,254 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Multivariable subspace identification: PO-MOESP, of many experiments at once.
+
+Poles and output matrix come from the column space of what the past tells of the future (Verhaegen
+1994, past inputs and outputs as instruments, `ordinary MOESP` of Verhaegen and Dewilde 1992 with
+past outputs added); the input matrix then follows from a linear regression on whole simulated
+experiments, with free initial states. Kept libraries take one experiment at a time (nfoursid) or
+need a Fortran library of their own (SIPPY); both hold every input over a sample, which a torque
+that comes from the motion of the arm is not.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from armid_ros.errors import IdentificationError
+from armid_ros.motion import FloatArray, read_only
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import lfilter
+
+ComplexArray = npt.NDArray[np.complex128]
+#: What an input does between samples: stay ('zero') or go straight to the next one ('first').
+Hold = Literal['zero', 'first']
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpace:
+    """
+    A continuous linear system x' = a x + b u, y = c x in its modes.
+
+    Attributes
+    ----------
+    poles : ndarray of complex, shape (r,)
+        Eigenvalues of a [rad/s].
+    b : ndarray of complex, shape (r, m)
+        Inputs to modes.
+    c : ndarray of complex, shape (p, r)
+        Modes to outputs.
+    singular_values : ndarray
+        Of the past-future relation; a gap after the r-th says that the order is r.
+
+    """
+
+    poles: ComplexArray
+    b: ComplexArray
+    c: ComplexArray
+    singular_values: FloatArray
+
+    def response(self, frequency: npt.ArrayLike) -> ComplexArray:
+        """Return the frequency response, shape (K, p, m), at frequencies in Hz, shape (K,)."""
+        s = 2j * np.pi * np.asarray(frequency, dtype=float)
+        modal = self.b / (s[:, np.newaxis, np.newaxis] - self.poles[:, np.newaxis])
+        return np.asarray(self.c @ modal)
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """
+    Inputs and outputs of one experiment.
+
+    Attributes
+    ----------
+    u : ndarray, shape (N, m)
+        Inputs.
+    y : ndarray, shape (N, p)
+        Outputs.
+
+    """
+
+    u: FloatArray
+    y: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check that they belong together."""
+        object.__setattr__(self, 'u', read_only(self.u))
+        object.__setattr__(self, 'y', read_only(self.y))
+        if self.u.ndim != 2 or self.y.ndim != 2 or len(self.u) != len(self.y):
+            raise IdentificationError(
+                f'subspace identification: inputs {self.u.shape} and outputs {self.y.shape} have '
+                'to be tables of equal length'
+            )
+
+
+def identify_subspace(
+    experiments: Sequence[Signals],
+    dt: float,
+    order: int,
+    hold: Sequence[Hold],
+    *,
+    horizon: int = 24,
+) -> StateSpace:
+    """
+    Identify a linear system of given order from sampled experiments.
+
+    Parameters
+    ----------
+    experiments : sequence of Signals
+        All with the same m inputs and p outputs.
+    dt : float
+        Time between samples [s].
+    order : int
+        Number of states r.
+    hold : sequence of {'zero', 'first'}
+        What each input does between samples.
+    horizon : int
+        Samples of the past, and of the future, that are related.
+
+    Raises
+    ------
+    IdentificationError
+        If the data are too short, an input does nothing, or the poles found are not those of a
+        sampled system.
+
+    """
+    _require_data(experiments, order, hold, horizon)
+    u_scale, y_scale = (
+        np.sqrt(np.mean(np.concatenate([getattr(e, name) for e in experiments]) ** 2, axis=0))
+        for name in ('u', 'y')
+    )
+    if np.any(u_scale == 0.0) or np.any(y_scale == 0.0):
+        raise IdentificationError('subspace identification: an input or an output is always zero')
+    scaled = [Signals(e.u / u_scale, e.y / y_scale) for e in experiments]
+    a, c, sizes = _observable(scaled, order, horizon)
+    eigenvalues, vectors = np.linalg.eig(a)
+    if np.any((np.abs(eigenvalues.imag) < 1e-12) & (eigenvalues.real <= 0.0)):
+        raise IdentificationError(
+            f'subspace identification: order {order} gives poles that no sampled system has; '
+            'take more data, a longer horizon or another order'
+        )
+    poles = np.log(eigenvalues.astype(complex)) / dt
+    modal = c @ vectors
+    b = _inputs(scaled, dt, poles, modal, hold)
+    return StateSpace(poles, b / u_scale, y_scale[:, np.newaxis] * modal, sizes)
+
+
+def _require_data(
+    experiments: Sequence[Signals], order: int, hold: Sequence[Hold], horizon: int
+) -> None:
+    if not experiments:
+        raise IdentificationError('subspace identification: there is no experiment')
+    m, p = experiments[0].u.shape[1], experiments[0].y.shape[1]
+    if len(hold) != m:
+        raise IdentificationError(f'subspace identification: {m} inputs, but {len(hold)} holds')
+    if order > p * (horizon - 1):
+        raise IdentificationError(
+            f'subspace identification: order {order} needs a horizon of more than '
+            f'{order // p + 1} samples'
+        )
+    columns = sum(max(len(e.u) - 2 * horizon + 1, 0) for e in experiments)
+    if columns < 4 * horizon * (m + p):
+        raise IdentificationError(
+            f'subspace identification: {columns} samples after the first {2 * horizon} of each '
+            f'experiment are too few; {4 * horizon * (m + p)} are needed'
+        )
+
+
+def _observable(
+    experiments: Sequence[Signals], order: int, horizon: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return state and output matrix of a sampled system, and the singular values."""
+    m, p = experiments[0].u.shape[1], experiments[0].y.shape[1]
+    triangle = np.empty((0, 2 * horizon * (m + p)))
+    for e in experiments:
+        if len(e.u) >= 2 * horizon:
+            u, y = _hankel(e.u, 2 * horizon), _hankel(e.y, 2 * horizon)
+            block = np.hstack(
+                [u[:, m * horizon :], u[:, : m * horizon], y[:, : p * horizon],
+                 y[:, p * horizon :]]
+            )  # fmt: skip
+            triangle = np.linalg.qr(np.vstack([triangle, block]), mode='r')
+    lower = triangle.T
+    past = slice(m * horizon, (2 * m + p) * horizon)
+    left, sizes, _ = np.linalg.svd(lower[(2 * m + p) * horizon :, past])
+    gamma = left[:, :order] * np.sqrt(sizes[:order])
+    a = np.linalg.lstsq(gamma[:-p], gamma[p:], rcond=None)[0]
+    return a, gamma[:p], sizes
+
+
+def _hankel(values: FloatArray, rows: int) -> FloatArray:
+    """Return windows of `rows` samples side by side, shape (N - rows + 1, rows * columns)."""
+    windows = np.lib.stride_tricks.sliding_window_view(values, rows, axis=0)
+    return np.asarray(windows.transpose(0, 2, 1).reshape(len(windows), -1))
+
+
+def _inputs(
+    experiments: Sequence[Signals],
+    dt: float,
+    poles: ComplexArray,
+    modal: ComplexArray,
+    hold: Sequence[Hold],
+) -> ComplexArray:
+    """Fit the input matrix to whole experiments, each with an initial state of its own."""
+    m = experiments[0].u.shape[1]
+    kept = np.flatnonzero(poles.imag >= 0.0)
+    normal, right = 0.0, 0.0
+    for e in experiments:
+        decay = np.exp(dt * np.outer(np.arange(len(e.u)), poles[kept]))
+        start = _real(modal[:, kept], decay, poles[kept])
+        columns = [
+            _real(modal[:, kept], _driven(e.u[:, j], dt, poles[kept], hold[j]), poles[kept])
+            for j in range(m)
+        ]
+        table, wanted = np.hstack(columns), e.y.T.ravel()
+        basis = np.linalg.qr(start)[0]
+        table = table - basis @ (basis.T @ table)
+        normal = normal + table.T @ table
+        right = right + table.T @ wanted
+    solution = np.linalg.solve(normal, right).reshape(m, -1).T
+    b = np.zeros((len(poles), m), complex)
+    place = 0
+    for k in kept:
+        if poles[k].imag == 0.0:
+            b[k] = solution[place]
+            place += 1
+        else:
+            b[k] = solution[place] + 1j * solution[place + 1]
+            twin = int(np.argmin(np.abs(poles - poles[k].conj())))
+            # The eigenvectors of the pair are conjugate, so the inputs are.
+            b[twin] = b[k].conj()
+            place += 2
+    return b
+
+
+def _driven(u: FloatArray, dt: float, poles: ComplexArray, hold: Hold) -> ComplexArray:
+    """Return what an input does to modes with unit input gain, shape (N, r)."""
+    states = np.empty((len(u), len(poles)), complex)
+    for k, pole in enumerate(poles):
+        factor = np.exp(pole * dt)
+        gain = (factor - 1.0) / pole
+        if hold == 'zero':
+            numerator = [0.0, gain]
+        else:
+            ramp = (gain - dt) / (pole * dt)
+            numerator = [ramp, gain - ramp]
+        states[:, k] = lfilter(numerator, [1.0, -factor], u.astype(complex))
+    return states
+
+
+def _real(modal: ComplexArray, states: ComplexArray, poles: ComplexArray) -> FloatArray:
+    """Return real columns, (p N, real unknowns), of outputs of modes and their conjugates."""
+    columns = []
+    for k, pole in enumerate(poles):
+        output = np.outer(modal[:, k], states[:, k]).ravel()
+        if pole.imag == 0.0:
+            columns.append(output.real)
+        else:
+            columns += [2.0 * output.real, -2.0 * output.imag]
+    return np.column_stack(columns)
