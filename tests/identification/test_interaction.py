@@ -10,6 +10,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.identification.interaction import identify_interaction, Interaction
 from armid_ros.identification.interaction_problem import interaction_problem
 from armid_ros.identification.interaction_recording import recorded_interaction_problem
+from armid_ros.identification.interaction_search import find_interaction
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.simulation.gait import read_gait
@@ -167,3 +168,33 @@ def test_data_that_cannot_tell_are_refused(pair, poses) -> None:
     with pytest.raises(IdentificationError, match='one time base'):
         shifted = replace(poses.other, t=poses.other.t + 0.1)
         interaction_problem(pair.robot, poses.own, pair.other, shifted, pair.ties)
+
+
+def recorded(pair: TiedPair, seed: int, degrees: float = 0.05) -> tuple[Recording, Recording]:
+    rng = np.random.default_rng(seed)
+    motions = measured(pair, stepping(pair, read_gait(), np.arange(0.0, 4.0, 1e-3)))
+    own, other = (noisy(motion, degrees, rng) for motion in motions)
+    return (
+        Recording(joints=own.joints, t=own.t, q=own.q, tau=own.tau),
+        Recording(joints=other.joints, t=other.t, q=other.q),
+    )
+
+
+def test_hidden_springs_are_found_where_they_are(pair) -> None:
+    real = leg_pair(3e3, ('swing_thigh', 'stance_shank'))
+    found = find_interaction(
+        pair.robot, pair.other, pair.ties, recorded(real, 0), recorded(real, 1)
+    )
+    assert set(found.segments) == {'swing_thigh', 'stance_shank'}
+    assert found.interaction is not None
+    np.testing.assert_allclose(found.interaction.stiffness, 3e3, rtol=0.1)
+    assert found.closed_fraction > 0.5
+
+
+def test_no_springs_no_name(pair) -> None:
+    loose = pair.with_stiffness(0.0)
+    found = find_interaction(
+        pair.robot, pair.other, pair.ties, recorded(loose, 2), recorded(loose, 3)
+    )
+    assert found.segments == ()
+    assert found.interaction is None
