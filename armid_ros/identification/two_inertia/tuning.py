@@ -41,7 +41,8 @@ class Tuning:
     parameters : TwoLinkParameters
         The result.
     estimate : Estimate
-        The thirteen values with their covariance; tied ones vary together.
+        The thirteen values, and their covariance as if none of them were tied: the split of
+        friction that tying keeps is not known any better for it.
     steps : Steps
         The experiments.
     measured, before, after : ndarray, shape (N, E, 4)
@@ -142,8 +143,9 @@ def tune(
         left = fit.fun.reshape(-1, len(weight)) * weight
         weight = np.sqrt(np.mean(left**2, axis=0)) + 1e-12
     found = values(factors)
-    slopes = ties * found[:, np.newaxis]
-    covariance = slopes @ _covariance(jacobian(factors)) @ slopes.T
+    free = sensitivities(steps, pack(found, start), np.diag(found))[1][:, :, chosen]
+    relative = _covariance((free / weight[:, np.newaxis]).reshape(-1, SIZE))
+    covariance = relative * np.outer(found, found)
     after = pack(found, start)
     return Tuning(
         after,

@@ -1,0 +1,123 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Linear accelerations as sensor_msgs/Imu, to and from bags."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armid_ros.errors import RecordingError
+from armid_ros.motion import FloatArray
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.source import IntArray
+from armid_ros.recording.writer import BagWriter
+import numpy as np
+import numpy.typing as npt
+
+IMU = 'sensor_msgs/msg/Imu'
+#: Orientation, its covariance, angular velocity, covariance, linear acceleration, covariance.
+_NUMBERS = 37
+_ORIENTATION_COVARIANCE, _RATE_COVARIANCE, _ACCELERATION = 4, 16, slice(25, 28)
+_ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
+
+
+def write_accelerations(
+    writer: BagWriter,
+    topic: str,
+    frame_id: str,
+    stamps_ns: npt.ArrayLike,
+    acceleration: npt.ArrayLike,
+) -> None:
+    """
+    Write accelerometer readings to a topic of a bag, logged at their stamps.
+
+    Orientation and angular velocity are marked as not measured, by a covariance of -1.
+
+    Parameters
+    ----------
+    writer : BagWriter
+        The bag.
+    topic, frame_id : str
+        Where they go, and the frame they are in.
+    stamps_ns : array_like, shape (N,)
+        Stamps of the headers [ns].
+    acceleration : array_like, shape (N, 3)
+        Specific force [m/s^2]; that of a body at rest points up.
+
+    """
+    stamps = np.asarray(stamps_ns, np.int64)
+    layout = _layout(len(frame_id.encode()) + 1, '<')
+    rows = np.zeros(len(stamps), layout)
+    rows['encapsulation'] = (0, 1, 0, 0)
+    rows['sec'], rows['nanosec'] = np.divmod(stamps, 10**9)
+    rows['length'] = len(frame_id.encode()) + 1
+    rows['frame'] = frame_id.encode()
+    rows['numbers'][:, _ORIENTATION_COVARIANCE] = -1.0
+    rows['numbers'][:, _RATE_COVARIANCE] = -1.0
+    rows['numbers'][:, _ACCELERATION] = acceleration
+    writer.add_topic(topic, IMU)
+    writer.write_many(topic, rows.view(np.dtype((np.void, layout.itemsize))), stamps)
+
+
+def read_accelerations(path: str | Path, topic: str) -> tuple[IntArray, FloatArray]:
+    """
+    Read the accelerometer readings of a topic.
+
+    Returns
+    -------
+    stamps_ns : ndarray of int, shape (N,)
+        Stamps of the headers [ns], in the order of storage.
+    acceleration : ndarray, shape (N, 3)
+        [m/s^2].
+
+    Raises
+    ------
+    RecordingError
+        There is no such bag or topic, or messages are not those of the type.
+
+    """
+    with Bag(path) as bag:
+        found = {t.name: t.type_name for t in bag.topics()}
+        if found.get(topic) != IMU:
+            listed = ', '.join(name for name, kind in found.items() if kind == IMU)
+            raise RecordingError(
+                f'{path}: there is no topic {topic} of {IMU}; of that type there are: '
+                f'{listed or "none"}'
+            )
+        messages = [b.message(k) for b in bag.blocks(topic) for k in range(len(b))]
+    if not messages:
+        raise RecordingError(f'{path}: {topic} has no messages')
+    order = _ORDERS.get(messages[0][:2])
+    if order is None or len(messages[0]) < 16:
+        raise RecordingError(f'{path}: {topic} is not CDR')
+    layout = _layout(int(np.frombuffer(messages[0], order + 'u4', 1, 12)[0]), order)
+    odd = [k for k, m in enumerate(messages) if len(m) != layout.itemsize]
+    if odd:
+        raise RecordingError(
+            f'{path}: {topic}: message {odd[0]} has {len(messages[odd[0]])} bytes, but one with '
+            f'the frame of the first has {layout.itemsize}; keep one sensor per topic'
+        )
+    rows = np.frombuffer(b''.join(messages), layout)
+    stamps = rows['sec'].astype(np.int64) * 10**9 + rows['nanosec']
+    return stamps, np.array(rows['numbers'][:, _ACCELERATION], dtype=float)
+
+
+def _layout(frame_length: int, order: str) -> np.dtype[np.void]:
+    """Return an Imu message in CDR with a frame name of some bytes, its final zero included."""
+    end = 12 + frame_length
+    padded = -(-end // 8) * 8
+    return np.dtype(
+        {
+            'names': ['encapsulation', 'sec', 'nanosec', 'length', 'frame', 'numbers'],
+            'formats': [
+                '4u1',
+                order + 'i4',
+                order + 'u4',
+                order + 'u4',
+                f'S{frame_length}',
+                (order + 'f8', (_NUMBERS,)),
+            ],
+            'offsets': [0, 4, 8, 12, 16, 4 + padded],
+            'itemsize': 4 + padded + 8 * _NUMBERS,
+        }
+    )
