@@ -28,6 +28,8 @@ from scipy import stats
 _ITERATIONS = 100
 #: Steps below this share of a standard deviation end the iteration.
 _CONVERGED = 1e-3
+#: Of the residuals' mean square at least this share is the torques' own noise.
+_LEAST_SHARE = 0.01
 #: Torque per stiffness below which a spring is not drawn out, root mean square [m^2].
 _DRAWN_OUT = 1e-9
 
@@ -151,7 +153,8 @@ def _torque_variance(problem: InteractionProblem, theta: FloatArray) -> FloatArr
     by_motion = problem.sensitivity(theta)
     explained = np.mean(np.sum(by_motion @ problem.motion_noise * by_motion, axis=2), axis=0)
     total = np.mean(residual**2, axis=0)
-    return np.asarray(np.maximum(total - explained, 0.01 * total + 1e-18))
+    least = np.maximum(problem.torque_noise**2, _LEAST_SHARE * total + 1e-18)
+    return np.asarray(np.maximum(total - explained, least))
 
 
 def _gauss_newton(

@@ -58,6 +58,8 @@ class InteractionProblem:
         Derivatives by the same.
     motion_noise : ndarray, shape (3 J, 3 J)
         Covariance of what noisy angles make of positions, velocities and accelerations.
+    torque_noise : ndarray, shape (n,)
+        Standard deviation that the torques have at least, as they are here [N m].
     segments : tuple of str
         Names of the springs.
     spring_joints : tuple of str
@@ -75,6 +77,7 @@ class InteractionProblem:
     known_by_motion: FloatArray
     columns_by_motion: FloatArray
     motion_noise: FloatArray
+    torque_noise: FloatArray
     segments: tuple[str, ...]
     spring_joints: tuple[str, ...]
     rigid: tuple[ParameterName, ...]
@@ -82,7 +85,7 @@ class InteractionProblem:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in (*STACKED, 'motion_noise'):
+        for name in (*STACKED, 'motion_noise', 'torque_noise'):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
@@ -109,6 +112,7 @@ def interaction_problem(
     ties: Sequence[Tie],
     *,
     position_noise: npt.ArrayLike = 0.0,
+    torque_noise: npt.ArrayLike = 0.0,
     used: Conditioning | None = None,
     inertias: Inertias = 'known',
     separate: bool = False,
@@ -126,6 +130,8 @@ def interaction_problem(
         Where the springs are.
     position_noise : array_like, number or shape (n + m,)
         Standard deviation of the angles in the motions [rad].
+    torque_noise : array_like, number or shape (n,)
+        Standard deviation that the torques have at least [N m].
     used : Conditioning, optional
         The filters that the positions went through, and by which torques and columns are to be
         decimated. By default every sample counts and noise is in the angles alone.
@@ -168,10 +174,10 @@ def interaction_problem(
         body_by = _placed(_regressor_by_motion(robot, slow, independent), count)
         columns_by = np.concatenate([springs_by, body_by], axis=2)
     tau = motion.tau
-    passed = np.diag([1.0, 0.0, 0.0])
+    passed, left = np.diag([1.0, 0.0, 0.0]), 1.0
     if used is not None:
         tau, known, columns = (decimate(values, used) for values in (tau, known, columns))
-        passed = _passed(used)
+        passed, left = _passed(used), float(np.sqrt(np.sum(used.taps() ** 2)))
     deviation = np.broadcast_to(np.asarray(position_noise, dtype=float), (count,))
     return InteractionProblem(
         tau,
@@ -180,6 +186,7 @@ def interaction_problem(
         known_by,
         columns_by,
         np.asarray(np.kron(passed, np.diag(deviation**2))),
+        left * np.broadcast_to(np.asarray(torque_noise, dtype=float), tau.shape[1:]),
         tuple(tie.name for tie in ties) if separate else ('all',),
         tuple(tie.joint for tie in ties) if separate else ('',),
         rigid,

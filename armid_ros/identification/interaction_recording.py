@@ -83,6 +83,8 @@ def recorded_interaction_problem(
         factor = int(used.rate_hz / (2.0 * used.cutoff_hz))
         used = replace(used, decimation=max(used.decimation, factor))
     n = len(recording.joints)
+    assert both.tau is not None
+    torque_noise = _white(both.tau[:, :n])
     problems = [
         interaction_problem(
             robot,
@@ -91,6 +93,7 @@ def recorded_interaction_problem(
             _joints(stretch, slice(n, None), other_recording.joints),
             ties,
             position_noise=noise,
+            torque_noise=torque_noise,
             used=used,
             inertias=inertias,
             separate=separate,
@@ -141,14 +144,8 @@ def _joints(motion: Motion, columns: slice, joints: tuple[str, ...]) -> Motion:
 
 
 def _white_noise(recording: Recording, rate: float) -> tuple[FloatArray, float]:
-    """
-    Return the deviation of every angle's noise [rad], and where motion sinks into it [Hz].
-
-    Differences of high order leave nothing of a motion that is sampled densely.
-
-    """
-    differences = np.diff(recording.q, _ORDER, axis=0)
-    noise = np.sqrt(np.mean(differences**2, axis=0) / comb(2 * _ORDER, _ORDER))
+    """Return the deviation of every angle's noise [rad], and where motion sinks into it [Hz]."""
+    noise = _white(recording.q)
     frequency, power = signal.welch(
         recording.q,
         fs=rate,
@@ -161,3 +158,14 @@ def _white_noise(recording: Recording, rate: float) -> tuple[FloatArray, float]:
     above[-1] = False
     crossing = max(float(frequency[2:][np.argmin(column)]) for column in above[2:].T)
     return noise, crossing
+
+
+def _white(signals: FloatArray) -> FloatArray:
+    """
+    Return the standard deviation of white noise in signals of shape (N, n).
+
+    Differences of high order leave nothing of a motion that is sampled densely.
+
+    """
+    differences = np.diff(signals, _ORDER, axis=0)
+    return np.asarray(np.sqrt(np.mean(differences**2, axis=0) / comb(2 * _ORDER, _ORDER)))
