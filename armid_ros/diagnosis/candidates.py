@@ -33,10 +33,10 @@ _PAIRS: dict[str, Callable[[Sequence[str]], Iterable[tuple[str, str]]]] = {
 _ALSO_JOINTS = ('time_delay',)
 #: Effects whose quantities stand for causes of their own. Together, the two of a saturation are
 #: the measured torque minus the model's: they would explain anything.
-_ALONE = {'actuator_saturation': ((0,), (1,))}
-#: Effects whose shape is a level of the highest torque in all trajectories; a level far below it
-#: would make the column the measured torque itself, which explains anything.
-_LEVELS = ('actuator_saturation',)
+_ALONE = {'actuator_saturation': ((0,), (1,)), 'soft_limit': ((0,), (1,))}
+#: Effects whose shape is a peak of the spectrum over the angle; peaks that are tried, and between
+#: which orders [1/rad]: below, it is gravity and springs; above, filters take it away.
+_PEAKS, _MOST_PEAKS, _ORDERS = ('torque_ripple',), 6, (3.0, 80.0)
 #: Effects that cost much and depend on position and velocity smoothly: their columns are computed
 #: at the rows.
 _SMOOTH = ('human_interaction', 'interface_slack')
@@ -92,6 +92,8 @@ def group_effects(arm: ArmModel, library: Sequence[str]) -> Iterator[tuple[Effec
                     effect = kind.on(robot, pair)
                     yield effect, [effect]
             continue
+        if name in _SMOOTH and robot.n_joints == 1:
+            continue  # the same as a joint_spring
         try:
             whole = kind.on(robot)
         except ModelError:
@@ -133,25 +135,38 @@ def shaped(
 
 
 def _grids(effect: Effect, arm: ArmModel, data: Sequence[Trajectory]) -> tuple[FloatArray, ...]:
-    """Return the grids of the trajectory that shows most: extremes of all, peaks of the last."""
-    per_trajectory = []
-    for part in data:
-        assert part.motion.tau is not None
-        left = part.motion.tau - arm.torque(part.motion)
-        per_trajectory.append(effect.shape_grids(part.motion, arm, left))
-    if effect.name in _LEVELS:
-        return tuple(np.max(grids, axis=0) for grids in zip(*per_trajectory, strict=True))
-    return tuple(_merge(grids) for grids in zip(*per_trajectory, strict=True))
+    """Return where to start: extremes of all trajectories together, peaks of their spectrum."""
+    if effect.name in _PEAKS:
+        return (_orders(effect, arm, data),)
+    parts = [part.motion for part in data]
+    whole = Motion(
+        parts[0].joints,
+        np.concatenate([part.t for part in parts]),
+        *(np.concatenate([getattr(part, k) for part in parts]) for k in ('q', 'dq', 'ddq', 'tau')),
+    )
+    return effect.shape_grids(whole, arm)
 
 
-def _merge(grids: Sequence[FloatArray]) -> FloatArray:
-    """Merge the grids of several trajectories: their ends, and evenly chosen ones between."""
-    joined = np.sort(np.concatenate(grids, axis=1), axis=1)
-    count = max(grid.shape[1] for grid in grids)
-    if joined.shape[1] == count or np.ptp(np.stack(grids), axis=0).max() < 1e-12:
-        return grids[0]
-    picks = np.unique(np.linspace(0, joined.shape[1] - 1, max(count + 2, 8)).round().astype(int))
-    return joined[:, picks]
+def _orders(effect: Effect, arm: ArmModel, data: Sequence[Trajectory]) -> FloatArray:
+    """
+    Return the orders at which the residual of all trajectories has its peaks, (owners, K).
+
+    The rows of all trajectories count together, as a ripple has one order and phase in all.
+
+    """
+    left = np.concatenate([part.residual(arm) * part.told for part in data])
+    q = np.concatenate([part.motion.q[part.rows] for part in data])
+    rows = []
+    for joint in effect.indices(arm.robot.joints):
+        step = 0.5 * np.pi / max(float(np.ptp(q[:, joint])), 0.1)
+        orders = np.arange(_ORDERS[0], _ORDERS[1], step)
+        wave = np.exp(-1j * np.outer(orders, q[:, joint]))
+        power = np.abs(wave @ (left[:, joint] - left[:, joint].mean())) ** 2
+        padded = np.concatenate([[0.0], power, [0.0]])
+        peaks = np.flatnonzero((power >= padded[:-2]) & (power > padded[2:]))
+        best = peaks[np.argsort(-power[peaks])[:_MOST_PEAKS]]
+        rows.append(np.resize(orders[best] if len(best) else orders[:1], _MOST_PEAKS))
+    return np.array(rows)
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,13 @@ from armid_ros.diagnosis.fit import excited, fit
 from armid_ros.diagnosis.floor import Floor, noise_floor
 from armid_ros.diagnosis.gap import Gap, measure_gap
 from armid_ros.diagnosis.gate import check_data, Gate
-from armid_ros.diagnosis.model_search import explain, Explanation
+from armid_ros.diagnosis.model_search import as_described, explain, Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict import decide, Finding, Verdict
 from armid_ros.diagnosis.where import locate, Where
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.checks import check_motion
-from armid_ros.identification.signals import conditioning
+from armid_ros.identification.signals import Conditioning, conditioning, MODEL_BANDS
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -33,8 +33,8 @@ import numpy as np
 Progress = Callable[[float, str], None]
 
 #: A diagnosis keeps six times the band of the motion where an identification keeps ten: what is
-#: beyond is mostly noise, and a gap has to stand out of it.
-_NARROWER = 1.7
+#: beyond is mostly noise, which a gap has to stand out of.
+_BANDS = 6.0
 #: Causes that a model as described may lack before a fit of everything is the better explanation.
 _FIXED_STEPS = 1
 
@@ -135,8 +135,7 @@ def diagnose(
     tell = progress or _silent
     tell(0.02, 'filtering')
     used = conditioning(list(recordings), settings.signals)
-    if settings.signals.decimation is None:
-        used = replace(used, decimation=max(1, round(_NARROWER * used.decimation)))
+    used = _narrower(used, settings)
     data = trajectories(recordings, used)
     gate = check_data(arm, recordings, data)
     faults, notes = list(gate.faults), [*gate.notes]
@@ -168,6 +167,7 @@ def diagnose(
     else:
         tell(0.5, 'model fitted anew')
         chosen = explain(arm, data, sigma, base, settings, settings.most_steps)
+        chosen = as_described(chosen, arm, data, sigma, settings)
     tell(0.85, 'held-out gap')
     floors = [noise_floor(part, chosen.fitted.arm) for part in data]
     gap = measure_gap(chosen, data, floors, validate, used, settings.consistent_loss)
@@ -199,6 +199,14 @@ def diagnose(
         refitted=chosen.base is not None,
         notes=tuple(notes),
     )
+
+
+def _narrower(used: Conditioning, settings: DiagnosisSettings) -> Conditioning:
+    """Return the filters of an identification, narrowed to what a diagnosis needs."""
+    band = used.rate_hz / (2.5 * MODEL_BANDS * used.decimation)
+    if settings.signals.decimation is None:
+        used = replace(used, decimation=max(1, int(used.rate_hz / (2.5 * _BANDS * band))))
+    return used
 
 
 def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:

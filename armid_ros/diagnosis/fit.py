@@ -27,6 +27,8 @@ import numpy as np
 #: Free columns of which the others leave less than this share of their length are grouped.
 _EXCITED = 1e-4
 _MOST_ROUNDS = 4
+#: How far from its joint a link's mass may be without a word in the description [m].
+_REACH = 0.1
 #: Largest relative step of a shape in a round: the search has refined it already.
 _SHAPE_STEP = 0.1
 #: Relative step of the differences by a shape.
@@ -125,13 +127,14 @@ def fit(
 
     """
     values = list(start) or [np.zeros(len(n.effect.parameters(arm.robot))) for n in named]
-    state = _State(arm, tuple(named), tuple(values))
+    state = _State(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
+    pull = np.zeros((0, 0)) if base is None else _described(base, arm)
     residual = _residuals(state.model, data)
     loss = _loss(residual, data, sigma)
     rounds = _MOST_ROUNDS if named else int(base is not None)
     for _ in range(rounds):
         columns = [_columns(state, part, base) for part in data]
-        step = _step(columns, residual, data, sigma)
+        step = _step(columns, residual, data, sigma, pull, state.change)
         moved, after = state, residual
         for share in (1.0, 0.5, 0.2):
             trial = state.moved(share * step, base)
@@ -164,6 +167,7 @@ class _State:
     arm: ArmModel
     named: tuple[Named, ...]
     values: tuple[FloatArray, ...]
+    change: FloatArray
 
     @property
     def model(self) -> ArmModel:
@@ -196,7 +200,7 @@ class _State:
                 effect = effect.with_shape(np.clip(shape, low, high))
                 start += count
             named.append(Named(effect, own.kept))
-        return _State(arm, tuple(named), tuple(values))
+        return _State(arm, tuple(named), tuple(values), self.change + change[: len(self.change)])
 
     def parameters(self) -> tuple[tuple[ParameterName, ...], FloatArray]:
         """Name the free parameters of the named effects, shapes behind quantities."""
@@ -266,13 +270,40 @@ def _loss(
     return float(sum(np.sum((left * part.told / s) ** 2) for left, part, s in parts))
 
 
+def _described(base: BaseParameters, arm: ArmModel) -> FloatArray:
+    """
+    Return how strongly the description holds the base parameters, as a precision (r, r).
+
+    It is believed to a factor or so: data decide whatever they tell, and what they tell hardly
+    stays where it predicts other motions well. A value of zero of an effect is no description.
+
+    """
+    size = len(arm.robot.rigid_parameters)
+    body = arm.robot.rigid_parameters.reshape(-1, 10)
+    mass = np.abs(body[:, :1]) + 0.1 * np.mean(np.abs(body[:, :1]))
+    reach = mass * np.array([[1.0] + 3 * [_REACH] + 6 * [_REACH**2]])
+    spread = np.full(len(base.standard), np.inf)
+    spread[:size] = (np.abs(body) + reach).ravel()
+    known = np.abs(arm.theta[size:])
+    spread[size:] = np.where(known > 0.0, known, np.inf)
+    told = ~np.any((base.grouping != 0.0) & np.isinf(spread), axis=1)
+    finite = np.where(np.isfinite(spread), spread, 0.0)
+    grouped = base.grouping[told] * finite
+    covariance = grouped @ grouped.T
+    precision = np.zeros((base.rank, base.rank))
+    precision[np.ix_(told, told)] = np.linalg.pinv(covariance, hermitian=True)
+    return precision
+
+
 def _step(
     columns: Sequence[FloatArray],
     residual: Sequence[FloatArray],
     data: Sequence[Trajectory],
     sigma: Sequence[FloatArray],
+    pull: FloatArray,
+    change: FloatArray,
 ) -> FloatArray:
-    """Solve with weights; directions that the data do not tell get no step."""
+    """Solve with weights, the description pulling; what nothing tells gets no step."""
     size = columns[0].shape[2]
     own, aim = np.zeros((size, size)), np.zeros(size)
     for block, left, part, s in zip(columns, residual, data, sigma, strict=True):
@@ -280,6 +311,9 @@ def _step(
         flat = (block * weight[:, :, np.newaxis]).reshape(-1, size)
         own += flat.T @ flat
         aim += flat.T @ (left * weight).ravel()
+    known = len(change)
+    own[:known, :known] += pull
+    aim[:known] -= pull @ change
     scale = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-300))
     values, vectors = np.linalg.eigh(own * np.outer(scale, scale))
     good = values > 1e-10 * max(float(values[-1]), 1e-300) if size else values > 0.0

@@ -27,7 +27,7 @@ _SAME = 0.02
 _SHORTEST = 1.5
 #: Where the difference of two periods has this many times the power at low frequency that it has
 #: at high frequency, something happened in one period that did not in the other.
-_STRUCTURED = 6.0
+_STRUCTURED = 20.0
 #: What people, loose parts and machines nearby do is slow; noise of torques is as strong in the
 #: band above, and noise of positions stronger [Hz]. Window of the spectra [s].
 _SLOW_HZ, _FAST_HZ, _WINDOW = 4.0, (6.0, 12.0), 2.5

@@ -18,6 +18,9 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
+#: A joint that had no gap counts when it has this much more than passes as noise.
+_WORSE = 1.2
+
 
 @dataclass(frozen=True)
 class Overlay:
@@ -126,7 +129,7 @@ def _gap(
         return np.asarray(np.sum(squares, axis=0, where=told) / count)
 
     losses = [mean((left / noise) ** 2) for left in (before, after)]
-    gap = np.maximum(*losses) > lowest
+    gap = (losses[0] > lowest) | (losses[1] > _WORSE * lowest)
     beyond = [float(np.sum(np.maximum(loss[gap] - 1.0, 0.0))) for loss in losses]
     closed = 1.0 - beyond[1] / beyond[0] if beyond[0] > 0.0 else 0.0
     return Gap(

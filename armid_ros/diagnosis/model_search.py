@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.candidates import Candidates, candidates, remembering
+from armid_ros.diagnosis.candidates import Candidates, candidates, effect_rows, remembering
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.fit import fit, Fitted, Named
-from armid_ros.diagnosis.problem import make_problem, Problem, project
-from armid_ros.diagnosis.search import next_step, Step, Survey, Workspace
+from armid_ros.diagnosis.problem import make_problem, Problem, project, Projection
+from armid_ros.diagnosis.search import imitates, next_step, not_beaten, Step, Survey, Workspace
 from armid_ros.diagnosis.selection import (
     acceptable,
     joint_losses,
@@ -73,8 +73,9 @@ def explain(
     steps: list[Step] = []
     survey: Survey | None = None
     named: list[Named] = []
-    losses = before = _joint_losses(reference, data, sigma)
+    losses = before = joint_losses_of(reference, data, sigma)
     found: Candidates | None = None
+    total = _excess(reference, data, sigma)
     problem, free = None, []
     while len(steps) < most_steps:
         gap = bool(np.any(losses > settings.consistent_loss))
@@ -93,7 +94,7 @@ def explain(
         work = Workspace(remembering(current.arm), tuple(data), settings)
         taken = {(n.effect.name, n.effect.joints, n.kept) for n in named}
         groups = [g for g in found.groups if g.key not in taken]
-        step, seen, problem = next_step(problem, free, groups, work)
+        step, seen, problem = next_step(problem, free, groups, work, total)
         survey = survey or seen
         if step is None:
             break
@@ -109,7 +110,7 @@ def explain(
         else:
             current = fit(arm, named, data, sigma, base, _start(named, steps, arm))
             named = list(current.named)
-            losses, found = _joint_losses(current, data, sigma), None
+            losses, found = joint_losses_of(current, data, sigma), None
     if named:
         current = fit(arm, named, data, sigma, base, _start(named, steps, arm))
         kept = _prune(current, data, sigma, steps, settings)
@@ -117,8 +118,36 @@ def explain(
             named = [current.named[k] for k in kept]
             steps = [steps[k] for k in kept]
             current = fit(arm, named, data, sigma, base)
-        losses = _joint_losses(current, data, sigma)
+        losses = joint_losses_of(current, data, sigma)
+        steps = _doubts(current, data, sigma, steps, settings)
     return Explanation(base, current, reference, tuple(steps), survey, losses, before)
+
+
+def as_described(
+    explanation: Explanation,
+    arm: ArmModel,
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+    settings: DiagnosisSettings,
+) -> Explanation:
+    """Return the same names in the arm as described, where no more than they is needed."""
+    if not explanation.steps:
+        return explanation
+    fitted = fit(arm, explanation.fitted.named, data, sigma, None)
+    losses = joint_losses_of(fitted, data, sigma)
+    near = losses < np.maximum(settings.consistent_loss, 1.05 * explanation.losses)
+    if not np.all(near):
+        return explanation
+    reference = fit(arm, (), data, sigma, None)
+    before = joint_losses_of(reference, data, sigma)
+    return replace(
+        explanation,
+        base=None,
+        fitted=fitted,
+        reference=reference,
+        losses=losses,
+        reference_losses=before,
+    )
 
 
 def _start(named: Sequence[Named], steps: Sequence[Step], arm: ArmModel) -> list[FloatArray]:
@@ -132,7 +161,7 @@ def _start(named: Sequence[Named], steps: Sequence[Step], arm: ArmModel) -> list
     return result
 
 
-def _joint_losses(
+def joint_losses_of(
     fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
 ) -> FloatArray:
     total = np.zeros(data[0].told.shape[1])
@@ -141,6 +170,13 @@ def _joint_losses(
         total += np.sum((left * part.told / s) ** 2, axis=0)
         count += part.told.sum(axis=0)
     return np.asarray(total / np.maximum(count, 1))
+
+
+def _excess(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> float:
+    """Return the sum of squares beyond the noise."""
+    parts = zip(fitted.residual, data, sigma, strict=True)
+    squares = sum(float(np.sum((left * part.told / s) ** 2)) for left, part, s in parts)
+    return max(squares - sum(float(part.told.sum()) for part in data), 0.0)
 
 
 def _prune(
@@ -154,35 +190,78 @@ def _prune(
     kept = list(range(len(steps)))
     if len(steps) < 2:
         return kept
-    problem = make_problem(data, sigma, fitted.residual, list(fitted.columns))
-    size = problem.x.shape[2]
-    spans, start = [], size - len(fitted.estimate.values)
-    for own in fitted.named:
-        stop = start + len(own.kept)
-        spans.append((start, stop, stop + len(own.effect.shape)))
-        start = stop + len(own.effect.shape)
-    values = fitted.estimate.values
-    offset = size - len(values)
+    view = _View.of(fitted, data, sigma)
     for k in reversed(range(len(steps))):
-        start, stop, end = spans[k]
-        own_columns = problem.x[:, :, start:stop]
-        restored = own_columns @ values[start - offset : stop - offset]
-        without = _with_target(problem, problem.y + restored)
-        gone = {
-            c
-            for other in range(len(steps))
-            if other not in kept
-            for c in range(spans[other][0], spans[other][2])
-        }
-        free = [c for c in range(size) if not start <= c < end and c not in gone]
-        projection = project(without, free)
-        score = steps[k].trial.score
-        trial = try_group(without, projection, score, own_columns, settings)
-        left = projection.rest(without.y)
-        if not acceptable(trial, without, left, settings):
+        gone = [other for other in range(len(steps)) if other not in kept]
+        problem, projection, columns = view.without(k, gone)
+        trial = try_group(problem, projection, steps[k].trial.score, columns, settings)
+        if not acceptable(trial, problem, projection.rest(problem.y), settings):
             kept.remove(k)
     return kept
 
 
-def _with_target(problem: Problem, y: FloatArray) -> Problem:
-    return Problem(problem.x, y, problem.weight, problem.fold, problem.products)
+def _doubts(
+    fitted: Fitted,
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+    steps: Sequence[Step],
+    settings: DiagnosisSettings,
+) -> list[Step]:
+    """Ask for every name again which others are possible, now that the rest is known."""
+    if len(steps) < 2:
+        return list(steps)
+    view = _View.of(fitted, data, sigma)
+    arm = remembering(fitted.arm)
+    named = {own.effect.name for own in fitted.named}
+    result = []
+    for k, step in enumerate(steps):
+        rivals = [r for r in step.rivals if r.score.group.effect.name not in named]
+        problem, projection, columns = view.without(k, ())
+        own = try_group(problem, projection, step.trial.score, columns, settings)
+        left = projection.rest(problem.y)
+        tried = []
+        for rival in rivals:
+            group = rival.score.group
+            rows = np.concatenate([effect_rows(arm, group.effect, part) for part in data])
+            weighted = rows[:, :, list(group.kept)] * problem.weight[:, :, np.newaxis]
+            tried.append(try_group(problem, projection, rival.score, weighted, settings))
+        tried = [t for t in tried if acceptable(t, problem, left, settings)]
+        left_over = not_beaten([own, *tried], problem, left, settings)
+        doubtful = tuple(t for t in left_over if not imitates(t, own))
+        result.append(replace(step, rivals=doubtful))
+    return result
+
+
+@dataclass(frozen=True)
+class _View:
+    """A fitted arm as a linear problem, in which names can be taken away again."""
+
+    problem: Problem
+    spans: tuple[tuple[int, int, int], ...]
+    values: FloatArray
+
+    @staticmethod
+    def of(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> _View:
+        problem = make_problem(data, sigma, fitted.residual, list(fitted.columns))
+        spans, start = [], problem.x.shape[2] - len(fitted.estimate.values)
+        for own in fitted.named:
+            stop = start + len(own.kept)
+            end = stop + len(own.effect.shape)
+            spans.append((start, stop, end))
+            start = end
+        return _View(problem, tuple(spans), fitted.estimate.values)
+
+    def without(self, k: int, gone: Sequence[int]) -> tuple[Problem, Projection, FloatArray]:
+        """Return the problem as if one name and others were not there, and its columns."""
+        start, stop, end = self.spans[k]
+        size = self.problem.x.shape[2]
+        offset = size - len(self.values)
+        y = self.problem.y
+        for other in (k, *gone):
+            first, last, _ = self.spans[other]
+            values = self.values[first - offset : last - offset]
+            y = y + self.problem.x[:, :, first:last] @ values
+        away = {c for other in gone for c in range(self.spans[other][0], self.spans[other][2])}
+        free = [c for c in range(size) if not start <= c < end and c not in away]
+        problem = replace(self.problem, y=y)
+        return problem, project(problem, free), self.problem.x[:, :, start:stop]

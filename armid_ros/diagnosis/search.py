@@ -22,7 +22,7 @@ from armid_ros.diagnosis.selection import (
     try_group,
 )
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.effects import Effect, Shape
+from armid_ros.effects import CATALOGUE, Effect, Shape
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -32,9 +32,16 @@ _LOOKED_AT, _REFINED = 30, 4
 #: Torques of a cosine above this are one and the same: Coulomb friction is stribeck_friction of a
 #: velocity beyond all that was moved at, viscous friction is thermal_friction warmed at once.
 _IMITATION = 0.98
+#: What holds the arm from outside is another machine or a person: a cause as rich as this many
+#: quantities, which the arm alone has to fail to explain.
+_OUTSIDE = 4
+#: Gains within this share of each other are alike; a lead of less than this share is none.
+_EQUAL, _LEAD = 0.98, 0.02
 #: Shapes that the data give a good start of, and how far from it a search goes: of a peak of a
 #: spectrum [1/rev], of a level near the highest torque (far below it, it would be the torque).
 _NEAR = {'ripple_order': 1.0, 'saturation_torque': 0.08}
+#: How far from a peak of the spectrum its side lobes are looked at [1/rad].
+_LOBES = 3.0
 #: Rounds and evaluations per shape of a refinement.
 _GOLDEN, _ROUNDS = 7, 2
 
@@ -104,9 +111,23 @@ def next_step(
     free: Sequence[int],
     groups: Sequence[Group],
     work: Workspace,
+    total: float = 0.0,
 ) -> tuple[Step | None, Survey, Problem]:
     """
     Look for the group that explains most of what is left.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data; columns of the groups come first.
+    free : sequence of int
+        Columns that are not questioned.
+    groups : sequence of Group
+        What may be named.
+    work : Workspace
+        What columns of other shapes are computed from.
+    total : float
+        Excess before anything was named.
 
     Returns
     -------
@@ -141,19 +162,19 @@ def next_step(
             columns = problem.x[:, :, span]
         trials.append(try_group(problem, projection, score, columns, settings))
     trials.sort(key=lambda trial: -trial.gain)
-    passing = [t for t in trials if acceptable(t, problem, left, settings)]
+    passing = [t for t in trials if acceptable(t, problem, left, settings, total)]
     league = tuple(trials)
     survey = Survey(league, hidden, tuple(scores))
     if not passing:
         return None, survey, problem
-    tied = [passing[0], *_not_beaten(passing, problem, left, settings)]
+    tied = [passing[0], *not_beaten(passing, problem, left, settings)]
     winner = simplest(tied)
     rivals = tuple(
         t
         for t in tied
         if t is not winner
         and not _contains(t, winner, problem, projection)
-        and not _imitates(t, winner)
+        and not imitates(t, winner)
     )
     before = joint_losses(problem, left)
     after = joint_losses(problem, left - winner.torque)
@@ -161,12 +182,25 @@ def next_step(
 
 
 def simplest(tied: Sequence[Trial]) -> Trial:
-    """Return the one with the fewest quantities and shapes; of these, the one that gains most."""
-    return min(tied, key=lambda trial: (_complexity(trial.score.group), -trial.gain))
+    """
+    Return the one with the fewest quantities and shapes.
+
+    Of these, the one that gains most; the first in the catalogue, which goes from the common to
+    the rare, where gains differ by less than their parts of the data do.
+
+    """
+    fewest = min(_complexity(trial.score.group) for trial in tied)
+    simple = [trial for trial in tied if _complexity(trial.score.group) == fewest]
+    most = max(trial.gain for trial in simple)
+    close = [trial for trial in simple if trial.gain >= _EQUAL * most]
+    order = list(CATALOGUE)
+    return min(close, key=lambda trial: order.index(trial.score.group.effect.name))
 
 
 def _complexity(group: Group) -> int:
-    return len(group.kept) + len(group.effect.shapes)
+    outside = _OUTSIDE if group.effect.name in ('human_interaction', 'interface_slack') else 0
+    shapes = 1 if group.effect.name == 'soft_limit' else len(group.effect.shapes)
+    return len(group.kept) + shapes + outside
 
 
 def _best_per_key(scores: Sequence[Score]) -> list[Score]:
@@ -176,7 +210,7 @@ def _best_per_key(scores: Sequence[Score]) -> list[Score]:
     return list(best.values())
 
 
-def _not_beaten(
+def not_beaten(
     passing: Sequence[Trial], problem: Problem, left: FloatArray, settings: DiagnosisSettings
 ) -> list[Trial]:
     """Return the groups that the first does not beat on two held-out parts, or looks like."""
@@ -185,7 +219,7 @@ def _not_beaten(
     for other in passing[1:]:
         lead = (left - other.held_out) ** 2 - (left - best.held_out) ** 2
         z = block_z(problem.fold, lead.sum(axis=1), settings.blocks)
-        worse = lead.sum() > 0.05 * best.gain
+        worse = lead.sum() > _LEAD * best.gain
         beaten = worse and np.sum(z >= settings.rival_z) >= min(2, problem.folds)
         alike = _cosine(best.torque, other.torque) > settings.same_cosine and not worse
         if not beaten or alike:
@@ -209,7 +243,7 @@ def _contains(big: Trial, small: Trial, problem: Problem, projection: Projection
     return bool(np.sum((target - columns @ fit) ** 2) < 0.02 * np.sum(target**2))
 
 
-def _imitates(other: Trial, winner: Trial) -> bool:
+def imitates(other: Trial, winner: Trial) -> bool:
     """Return whether a group with more shapes is there only as the limit of a simpler one."""
     more = _complexity(other.score.group) > _complexity(winner.score.group)
     return more and _cosine(other.torque, winner.torque) > _IMITATION
@@ -224,6 +258,7 @@ def _refine(
 ) -> tuple[Score, FloatArray]:
     """Refine the shape of a group by variable projection; return it with its columns."""
     effect, kept = score.group.effect, score.group.kept
+    lower, upper = (bound[list(kept)] for bound in effect.bounds())
     cache: dict[tuple[float, ...], tuple[float, FloatArray]] = {}
 
     def gain(shape: FloatArray) -> float:
@@ -237,7 +272,9 @@ def _refine(
             flat = projection.rest(weighted).reshape(-1, len(kept))
             own, aim = flat.T @ flat, flat.T @ left.ravel()
             values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
-            cache[key] = float(values @ aim), columns
+            if len(kept) == 1:  # what is not possible is no gain
+                values = np.clip(values, lower, upper)
+            cache[key] = float(2.0 * values @ aim - values @ own @ values), columns
         return cache[key][0]
 
     shape = np.array(effect.shape)
@@ -273,6 +310,10 @@ def _line_search(
         moved[index] = np.exp(x) if positive else x
         return moved
 
+    if kind.unit == '1/rev':  # side lobes beside the peak are almost as high
+        scan = value + np.linspace(-_LOBES, _LOBES, 25)
+        value = max(scan[scan > kind.lower].tolist(), key=lambda x: gain(at(x)))
+        low, high = value - 0.2, value + 0.2
     golden = (np.sqrt(5.0) - 1.0) / 2.0
     a, b = high - golden * (high - low), low + golden * (high - low)
     fa, fb = gain(at(a)), gain(at(b))

@@ -20,6 +20,10 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
+#: A gain in rows too few for blocks to repeat, such as at the peaks where a drive saturates, is
+#: sure when it is this large in each half of a trajectory; noise alone gives some ten.
+_SPARSE_GAIN = 50.0
+
 
 @dataclass(frozen=True)
 class Score:
@@ -147,6 +151,8 @@ def try_group(
     gains = np.array([gain[problem.fold == k].sum(axis=0) for k in range(problem.folds)])
     scored = Score(score.group, values, std, float(gains.sum()), score.visible)
     z = block_z(problem.fold, gain.sum(axis=1), settings.blocks)
+    sparse = _in_both_halves(problem.fold, gain.sum(axis=1))
+    z = np.where(sparse, np.maximum(z, 1.5 * settings.least_z), z)
     return Trial(scored, own_columns @ values, held_out, gains, z, fold_values)
 
 
@@ -163,6 +169,12 @@ def block_z(fold: npt.NDArray[np.intp], gain: FloatArray, blocks: int) -> FloatA
         spread = float(means.std(ddof=1)) / np.sqrt(len(means))
         z[k] = means.mean() / max(spread, 1e-300) if means.any() else 0.0
     return z
+
+
+def _in_both_halves(fold: npt.NDArray[np.intp], gain: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return for which folds a gain that comes in few rows comes in both halves, shape (F,)."""
+    halves = [np.array_split(gain[fold == k], 2) for k in range(int(fold.max()) + 1)]
+    return np.array([min(part.sum() for part in pair) > _SPARSE_GAIN for pair in halves])
 
 
 def excess(problem: Problem, left: FloatArray) -> FloatArray:
@@ -184,13 +196,43 @@ def within_bounds(score: Score) -> bool:
     return bool(np.all(score.values > lower - slack) and np.all(score.values < upper + slack))
 
 
+def replicated(trial: Trial, settings: DiagnosisSettings) -> bool:
+    """
+    Return whether a gain is there in more than one part of the data.
+
+    In two parts clearly; or in one beyond all doubt, the fast one as a rule, with another that
+    agrees and none that disagrees. The values never come from the part that is judged.
+
+    """
+    order = np.sort(trial.z)[::-1]
+    if len(order) < 2:
+        return bool(order[0] >= settings.least_z)
+    carried = order[0] >= 1.5 * settings.least_z and order[1] >= 0.5 * settings.least_z
+    return bool(order[1] >= settings.least_z or (carried and order[-1] > -settings.rival_z))
+
+
 def acceptable(
-    trial: Trial, problem: Problem, left: FloatArray, settings: DiagnosisSettings
+    trial: Trial,
+    problem: Problem,
+    left: FloatArray,
+    settings: DiagnosisSettings,
+    total: float = 0.0,
 ) -> bool:
-    """Return whether a group is possible, replicated, and closes a real share of the gap."""
+    """
+    Return whether a group is possible, replicated, and closes a real share of the gap.
+
+    Parameters
+    ----------
+    total : float
+        Excess before anything was named.
+
+    """
     if not within_bounds(trial.score):
         return False
-    if np.sum(trial.z >= settings.least_z) < min(2, problem.folds) or trial.gain <= 0.0:
+    if trial.gain <= max(0.0, settings.least_of_all * total) or not replicated(trial, settings):
+        return False
+    after = joint_losses(problem, left - trial.torque)
+    if np.any(after < settings.tautology * np.minimum(joint_losses(problem, left), 1.0)):
         return False
     single = len(trial.score.values) == 1
     if single and np.any(trial.fold_values[:, 0] * trial.score.values[0] < 0.0):

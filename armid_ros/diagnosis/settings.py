@@ -30,8 +30,14 @@ class DiagnosisSettings:
         A model that leaves a joint above this is not the whole truth: names are provisional.
     least_share : float
         A group has to close this share of the excess that is left, in the arm or in one joint.
+    least_of_all : float
+        ... and this share of the excess at the beginning: what takes less than a thousandth of a
+        gap is not what was missing.
     least_z : float
         Block z that a gain has to reach on a held-out trajectory to count as replicated.
+    tautology : float
+        A group that leaves a joint less than this share of its noise explains the noise itself:
+        its columns are made of the measured torque.
     rival_z : float
         Block z by which a name has to beat another one to exclude it.
     same_cosine : float
@@ -51,7 +57,9 @@ class DiagnosisSettings:
     consistent_loss: float = 1.2
     partial_loss: float = 1.4
     least_share: float = 0.10
+    least_of_all: float = 0.001
     least_z: float = 3.0
+    tautology: float = 0.8
     rival_z: float = 2.0
     same_cosine: float = 0.95
     least_visible: float = 0.02

@@ -129,6 +129,7 @@ def _findings(explanation: Explanation, arm: ArmModel) -> tuple[Finding, ...]:
     result = []
     for name, indices in merged.items():
         rows = [row for k in indices for row in range(starts[k], starts[k + 1])]
+        rows = [row for row in rows if np.isfinite(std[row])]  # others the data do not tell
         joints = tuple(joint for k in indices for joint in fitted.named[k].effect.joints)
         order = [j for j in arm.robot.joints if j in joints]
         pairs = any(len(fitted.named[k].effect.joints) > 1 for k in indices)
