@@ -3,6 +3,7 @@
 """The command line: what it writes, prints and refuses."""
 
 import json
+from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import main
@@ -79,6 +80,18 @@ def test_identify_writes_model_numbers_and_page(bags, tmp_path):
 def test_identify_prints_json_and_nothing_else(bags, tmp_path):
     result = armid('identify', bags[0], '--robot', ROBOT, '--out', tmp_path / 'o', '--json')
     assert json.loads(result.stdout)['robot'] == ROBOT
+
+
+def test_the_sample_bag_is_the_demo(tmp_path):
+    """Recorded over topics; the friction of the shoulder is the demo's 0.1 N m s/rad."""
+    bag = Path(__file__).parents[2] / 'bags' / 'humanoid_arm_moon'
+    out = tmp_path / 'out'
+    armid('identify', bag, '--robot', '-', '--gravity', 'moon', '--out', out)
+    document = json.loads((out / 'identification.json').read_text())
+    rows = {(row['name'], row['joint']): row for row in document['parameters']}
+    viscous = rows['viscous_coefficient', 'shoulder_pitch']
+    assert abs(viscous['value'] - 0.1) < max(3 * viscous['std'], 0.002)
+    assert document['training']['relative_error_percent'] < 4.0
 
 
 def test_physical_identifications_are_bodies_and_can_be_compared(bags, tmp_path):
