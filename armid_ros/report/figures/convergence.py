@@ -88,7 +88,7 @@ def _title(name: ParameterName) -> str:
     text = name.name
     if not is_rigid(name):
         text = f'{text.replace("_", " ").capitalize()}, {name.joint}'
-    return textwrap.fill(textwrap.shorten(text, 50, placeholder=' ...'), 28)
+    return textwrap.fill(textwrap.shorten(text, 50, placeholder=' ...'), 26)
 
 
 def _telling(
