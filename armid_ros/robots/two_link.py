@@ -167,5 +167,3 @@ def two_link_set(name: str = 'after', path: Path | None = None) -> TwoLinkSet:
     assumed = {key: entry['value'] for key, entry in content['assumptions'].items()}
     parameters = TwoLinkParameters(**content['sets'][name], **content['drive'])
     return TwoLinkSet(parameters, MappingProxyType(assumed))
-
-

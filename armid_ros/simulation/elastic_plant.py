@@ -224,9 +224,7 @@ def _substep(plant: ElasticPlant, state: ElasticState, torque: FloatArray) -> El
     stiffness, offset, ratio = _springs(plant, x[:e] + half * (plant.to_twists @ v_middle))
     force += plant.to_twists.T.dot(offset)
     resist = plant.damping + (plant.to_twists.T * ratio) @ plant.to_twists
-    right = np.column_stack(
-        [-plant.to_twists.T * stiffness, -resist, force, plant.friction.T]
-    )
+    right = np.column_stack([-plant.to_twists.T * stiffness, -resist, force, plant.friction.T])
     solved = dgesv(inertia, right)[2]
     size = len(x)
     a = np.zeros((size, size))
@@ -255,9 +253,7 @@ def _substep(plant: ElasticPlant, state: ElasticState, torque: FloatArray) -> El
     moved = half * (x[2 * e :] + x_next[2 * e :]) + dt**2 / 12.0 * (first - dv)[e:]
     if 0 in modes:
         _hold(plant, state, x_next, modes, moved)
-    return ElasticState(
-        state.steps, state.t + dt, state.q + moved, x_next, dv, modes, memory
-    )
+    return ElasticState(state.steps, state.t + dt, state.q + moved, x_next, dv, modes, memory)
 
 
 def _force(
@@ -288,9 +284,7 @@ def _force(
     return force, memory
 
 
-def _springs(
-    plant: ElasticPlant, twist: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _springs(plant: ElasticPlant, twist: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return stiffness, torque at zero twist (negative) and damping, nothing within a gap."""
     springs = plant.springs
     if not np.any(springs.gap):

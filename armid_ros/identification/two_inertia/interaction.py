@@ -176,9 +176,7 @@ def ideal_response(
     return np.asarray(np.moveaxis(table, 2, 0))
 
 
-def decibel_error(
-    found: npt.NDArray[np.complex128], wanted: npt.NDArray[np.complex128]
-) -> float:
+def decibel_error(found: npt.NDArray[np.complex128], wanted: npt.NDArray[np.complex128]) -> float:
     """Return the root mean square difference of two frequency responses in size [dB]."""
     difference = 20.0 * np.log10(np.abs(found) / np.abs(wanted))
     return float(np.sqrt(np.mean(difference**2)))

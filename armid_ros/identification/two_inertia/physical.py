@@ -143,9 +143,7 @@ def _response(s: ComplexArray, values: FloatArray) -> tuple[ComplexArray, Comple
     return response, derivatives
 
 
-def _first_guess(
-    joint: DecoupledJoint, frequency: FloatArray, found: ComplexArray
-) -> FloatArray:
+def _first_guess(joint: DecoupledJoint, frequency: FloatArray, found: ComplexArray) -> FloatArray:
     size = np.abs(found[:, 0, 0])
     lowest = int(np.argmin(size[frequency > 4.0 * frequency[0]]))
     lowest += int(np.count_nonzero(frequency <= 4.0 * frequency[0]))

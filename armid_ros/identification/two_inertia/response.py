@@ -156,7 +156,11 @@ class _Arm:
         self.eye = np.eye(6)
 
     def advance(
-        self, q2: ComplexArray, x: ComplexArray, dv: ComplexArray, modes: npt.NDArray[np.int_],
+        self,
+        q2: ComplexArray,
+        x: ComplexArray,
+        dv: ComplexArray,
+        modes: npt.NDArray[np.int_],
         torque: ComplexArray,
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray, npt.NDArray[np.int_]]:
         """Return angle of joint 2, state, accelerations and friction modes one step later."""

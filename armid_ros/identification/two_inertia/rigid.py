@@ -88,7 +88,9 @@ def fit_rigid(runs: Sequence[ElasticRun], *, cutoff: float = CUTOFF) -> RigidFit
         ends = round(_ENDS / dt)
         if len(t) <= 2 * ends + 1:
             continue
-        kept = sosfiltfilt(sections, whole, axis=0)[ends : -ends : max(round(0.1 / cutoff / dt), 1)]
+        kept = sosfiltfilt(sections, whole, axis=0)[
+            ends : -ends : max(round(0.1 / cutoff / dt), 1)
+        ]
         tables.append(kept[:, :, :-1])
         torques.append(kept[:, :, -1])
     if not tables:
@@ -124,7 +126,9 @@ def _solve(table: FloatArray, torque: FloatArray, joints: tuple[str, ...]) -> Ri
         scale = np.linalg.norm(rows, axis=0)
         if np.any(scale == 0.0):
             raise IdentificationError('the rigid fit needs motion of both joints; one stands')
-        solution, _, _, sizes = np.linalg.lstsq(rows / scale, (torque / weight).ravel(), rcond=None)
+        solution, _, _, sizes = np.linalg.lstsq(
+            rows / scale, (torque / weight).ravel(), rcond=None
+        )
         if sizes[-1] < 1e-6 * sizes[0]:
             raise IdentificationError(
                 'the slow motion does not tell the rigid parameters apart; let both joints '

@@ -87,6 +87,7 @@ def identify_two_inertia(
     *,
     steps: Sequence[ElasticRun] = (),
     loop: VelocityLoop | None = None,
+    start: TwoLinkParameters | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> TwoInertiaIdentification:
     """
@@ -102,6 +103,9 @@ def identify_two_inertia(
         Step responses under a velocity loop, for the tuning; none leaves that out.
     loop : VelocityLoop, optional
         The loop's gains.
+    start : TwoLinkParameters, optional
+        Where the tuning begins, in place of what step 3a found; Coulomb friction is that of
+        step 1 all the same.
     progress : callable, optional
         Is told the share that is done and what comes next.
 
@@ -133,7 +137,8 @@ def identify_two_inertia(
     tuning = None
     if steps and loop is not None:
         tell(0.5, 'step 3: tuning to step responses')
-        tuning = tune(steps, untuned, loop)
+        begin = untuned if start is None else replace(start, coulomb=untuned.coulomb)
+        tuning = tune(steps, begin, loop)
     tell(1.0, 'done')
     return TwoInertiaIdentification(rigid, measured, joints, fits, untuned, tuning)
 
@@ -148,7 +153,9 @@ def _rigid_guess(rigid: RigidFit, drives: TwoLinkParameters) -> TwoLinkParameter
             'do torques and velocities of a joint have the same sign?'
         )
     alpha = max(first - max(rotor, 0.0), 1.01 * gamma**2 / beta)
-    return replace(drives, alpha=alpha, beta=beta, gamma=gamma, coulomb=rigid.coulomb / drives.gear)
+    return replace(
+        drives, alpha=alpha, beta=beta, gamma=gamma, coulomb=rigid.coulomb / drives.gear
+    )
 
 
 def _physical(fits: tuple[JointFit, JointFit], known: TwoLinkParameters) -> TwoLinkParameters:

@@ -1,0 +1,200 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Two links on springs: the three steps, from bags to parameters."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from armid_ros.cli import options
+from armid_ros.cli.terminal import print_parameters, progress, say
+from armid_ros.errors import RecordingError, RobotError
+from armid_ros.identification.two_inertia import (
+    Accelerometers,
+    identify_two_inertia,
+    read_runs,
+    TwoInertiaIdentification,
+    write_runs,
+)
+from armid_ros.identification.two_inertia.output import elastic_document
+from armid_ros.motion import FloatArray
+from armid_ros.robots import load_robot, Robot
+from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkSet
+from armid_ros.simulation.elastic_run import ElasticSensors, run_all
+from armid_ros.simulation.elastic_signals import resonance_experiments, step_experiments
+from armid_ros.simulation.elastic_two_link import two_link_loop, two_link_plant
+import click
+import numpy as np
+
+#: Noise of the simulated sensors: rates in rad/s, accelerations in rad/s^2, at the joints.
+SENSORS = ElasticSensors(motor_velocity=0.006, link_velocity=0.003, link_acceleration=0.2)
+STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_acceleration=0.2)
+#: Torque of the multisine [N m] rms, and the share of the loop's gains that it runs under.
+EXCITATION_RMS, WEAK = (60.0, 45.0), 0.15
+STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 4))
+STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
+
+
+@click.command(epilog='Example: armid elastic run.mcap --steps steps.mcap --out result')
+@click.argument('bags', nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    '--steps',
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar='BAG',
+    help='Step responses to tune the parameters to.',
+)
+@click.option('--demo', is_flag=True, help='Simulate the shipped arm first, and identify that.')
+@click.option(
+    '--experiments', default=48, show_default=True, help='Of 4 s each, that --demo simulates.'
+)
+@click.option(
+    '--robot', 'robot_source', default=ROBOT, show_default=True, metavar='R', help='Two links.'
+)
+@click.option(
+    '--start',
+    type=click.Choice(['before', 'after']),
+    help='Printed set to begin the tuning with, in place of what was found by then.',
+)
+@click.option('--accelerometers', metavar='R1,R2', help='Distances from their joints [m].')
+@click.option('--gear', metavar='N1,N2', help='Turns of the motors per turn of the joints.')
+@click.option('--kp', metavar='K1,K2', help='Of the velocity loop, at the joints [N m s/rad].')
+@click.option('--ki', metavar='K1,K2', help='Of the velocity loop, at the joints [N m/rad].')
+@options.folder
+@options.seed
+@options.as_json
+def elastic(
+    bags: tuple[Path, ...],
+    steps: tuple[Path, ...],
+    demo: bool,
+    experiments: int,
+    robot_source: str,
+    start: str | None,
+    accelerometers: str | None,
+    gear: str | None,
+    kp: str | None,
+    ki: str | None,
+    out: Path,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Identify a planar two-link arm with elastic joints, in three steps."""
+    from dataclasses import replace
+
+    robot = load_robot(robot_source)
+    if robot.n_joints != 2:
+        raise RobotError(
+            f'{robot.name} has {robot.n_joints} driven joints; this identification is for two '
+            'links that move in a plane'
+        )
+    shipped = two_link_set('after')
+    sensors = Accelerometers.on(
+        robot, _pair(accelerometers, 'accelerometers', shipped.assumptions['accelerometer_radius'])
+    )
+    drives = replace(shipped.parameters, gear=_pair(gear, 'gear', shipped.parameters.gear))
+    loop = two_link_loop(shipped)
+    loop = replace(
+        loop,
+        proportional=_pair(kp, 'kp', loop.proportional),
+        integral=_pair(ki, 'ki', loop.integral),
+    )
+    out.mkdir(parents=True, exist_ok=True)
+    with progress('reading') as tick:
+        if demo:
+            bags, steps = _simulate(shipped, robot, sensors, out, experiments, seed, tick)
+        elif not bags:
+            raise RecordingError('no bag is named; give one, or --demo to simulate one')
+        runs = [run for path in bags for run in read_runs(path, robot, sensors)]
+        responses = [run for path in steps for run in read_runs(path, robot, sensors)]
+        result = identify_two_inertia(
+            runs,
+            drives,
+            steps=responses,
+            loop=loop,
+            start=None if start is None else two_link_set(start).parameters,
+            progress=tick,
+        )
+        tick(1.0, 'drawing')
+        files = _draw(result, shipped, out)
+    document = elastic_document(result, robot_source)
+    (out / 'elastic.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    if as_json:
+        click.echo(json.dumps(document))
+        return
+    _tell(document)
+    say(f'{out}: {", ".join(["elastic.json", *files])}')
+
+
+def _pair(text: str | None, what: str, default: Any) -> FloatArray:
+    """Read two positive numbers."""
+    if text is None:
+        return np.asarray(default, dtype=float)
+    try:
+        values = np.array([float(part) for part in text.split(',')])
+    except ValueError:
+        values = np.empty(0)
+    if values.shape != (2,) or not np.all(values > 0.0):
+        raise RobotError(f"--{what} takes two positive numbers, one for each joint, not '{text}'")
+    return values
+
+
+def _simulate(
+    shipped: TwoLinkSet,
+    robot: Robot,
+    sensors: Accelerometers,
+    out: Path,
+    experiments: int,
+    seed: int,
+    tick: Any,
+) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+    """Write bags of the simulated arm: through the resonances, and steps."""
+    rng = np.random.default_rng(seed)
+    plant = two_link_plant(shipped.parameters)
+    plans = (
+        (
+            out / 'resonances',
+            two_link_loop(shipped, WEAK),
+            resonance_experiments(experiments, rms=EXCITATION_RMS, rng=rng),
+            SENSORS,
+        ),
+        (out / 'steps', two_link_loop(shipped), step_experiments(STEP_POSES, STEPS), STEP_SENSORS),
+    )
+    for path, loop, plan, noise in plans:
+        tick(0.0, f'simulating {path.name}')
+        runs = [noise.measure(run, rng) for run in run_all(plant, loop, plan, tick)]
+        write_runs(path, runs, robot, sensors)
+    return (out / 'resonances',), (out / 'steps',)
+
+
+def _draw(result: TwoInertiaIdentification, shipped: TwoLinkSet, out: Path) -> list[str]:
+    from armid_ros.report.figures.elastic import bode_figure, comparison_figure, step_figure
+    from armid_ros.report.figures.style import save_figure
+
+    figures = {
+        'bode.png': bode_figure(result),
+        'parameters.png': comparison_figure(result, shipped.parameters),
+    }
+    if result.tuning is not None:
+        figures['steps.png'] = step_figure(result.tuning)
+    for name, figure in figures.items():
+        save_figure(figure, out / name)
+    return list(figures)
+
+
+def _tell(document: dict[str, Any]) -> None:
+    print_parameters([*document['parameters'], *document.get('total_damping', [])])
+    for joint in document['joints']:
+        say(
+            f'{joint["joint"]}: antiresonance {joint["antiresonance_hz"]:.2f} Hz, resonance '
+            f'{joint["resonance_hz"]:.2f} Hz, Coulomb torque {joint["coulomb_torque"]:.3g} N m; '
+            f'subspaces and physical parameters {joint["subspaces_against_physical_db"]:.3f} dB '
+            'apart'
+        )
+    if 'tuning' in document:
+        tuning = document['tuning']
+        say(
+            f'step responses: {tuning["rms_before"]:.4g} rad/s unexplained before tuning, '
+            f'{tuning["rms_after"]:.4g} after'
+        )

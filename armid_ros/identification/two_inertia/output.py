@@ -1,0 +1,74 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""elastic.json: what the three steps found, for programs to read."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from armid_ros.arm import parameter_table
+from armid_ros.identification.two_inertia.interaction import decibel_error, ideal_response
+from armid_ros.identification.two_inertia.names import parameter_names, unpack
+from armid_ros.identification.two_inertia.physical import BAND
+from armid_ros.identification.two_inertia.three_steps import TwoInertiaIdentification
+import numpy as np
+
+SCHEMA = 'armid/elastic/1'
+
+
+def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, Any]:
+    """Return an identification of elastic joints as the document that elastic.json holds."""
+    parameters, rigid = result.parameters, result.rigid.estimate
+    names = parameter_names(tuple(joint.joint for joint in result.joints))
+    std = [None] * len(names) if result.tuning is None else list(result.tuning.estimate.std)
+    frequency = np.geomspace(5.0, BAND[1], 200)
+    document: dict[str, Any] = {
+        'schema': SCHEMA,
+        'robot': robot,
+        'rigid': {
+            'relative_error_percent': result.rigid.relative_error,
+            'parameters': parameter_table(rigid.parameters, rigid.values, list(rigid.std)),
+        },
+        'joints': [
+            {
+                'joint': joint.joint,
+                'antiresonance_hz': fit.antiresonance,
+                'resonance_hz': fit.resonance,
+                'interaction_gain': fit.interaction_gain,
+                'subspaces_against_physical_db': decibel_error(
+                    joint.system.response(frequency)[:, 0, 0],
+                    ideal_response(parameters, k, frequency)[:, 0, 0],
+                ),
+                'coulomb_torque': float(parameters.joint_coulomb[k]),
+            }
+            for k, (joint, fit) in enumerate(zip(result.joints, result.fits, strict=True))
+        ],
+        'untuned': parameter_table(names, unpack(result.untuned), [None] * len(names)),
+        'parameters': parameter_table(names, unpack(parameters), std),
+    }
+    if result.tuning is not None:
+        before, after = result.tuning.rms
+        document['tuning'] = {'rms_before': before, 'rms_after': after, 'unit': 'rad/s'}
+        document['total_damping'] = _sums(result)
+    return document
+
+
+def _sums(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
+    """Return dl + dm gear^2 of both joints, which is what is known of the two."""
+    assert result.tuning is not None
+    estimate, gear = result.tuning.estimate, result.parameters.gear
+    rows = []
+    for k, joint in enumerate(result.joints):
+        weights = np.zeros(len(estimate.values))
+        weights[estimate.index('dl', joint.joint)] = 1.0
+        weights[estimate.index('dm', joint.joint)] = gear[k] ** 2
+        rows.append(
+            {
+                'name': 'dl + dm gear^2',
+                'joint': joint.joint,
+                'value': float(weights @ estimate.values),
+                'std': float(np.sqrt(weights @ estimate.covariance @ weights)),
+                'unit': 'N m s/rad',
+            }
+        )
+    return rows
