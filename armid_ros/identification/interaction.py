@@ -28,6 +28,8 @@ from scipy import stats
 _ITERATIONS = 100
 #: Steps below this share of a standard deviation end the iteration.
 _CONVERGED = 1e-3
+#: A step that overshoots is halved so many times.
+_HALVINGS = 10
 #: Of the residuals' mean square at least this share is the torques' own noise.
 _LEAST_SHARE = 0.01
 #: Torque per stiffness below which a spring is not drawn out, root mean square [m^2].
@@ -103,12 +105,13 @@ def identify_interaction(
         If the motion does not show every stiffness, or the iteration does not end.
 
     """
-    theta = _least_squares(problem)
-    uncorrected = theta
+    uncorrected = _least_squares(problem, problem.columns)
+    theta = _start(problem)
     variance = _given(problem, torque_noise)
     for _ in range(_ITERATIONS):
         used = _torque_variance(problem, theta) if variance is None else variance
         step, information = _gauss_newton(problem, theta, used)
+        step = _shortened(problem, theta, step, used)
         theta = theta + step
         if step @ information @ step < _CONVERGED**2 * len(step):
             break
@@ -130,10 +133,39 @@ def identify_interaction(
     )
 
 
-def _least_squares(problem: InteractionProblem) -> FloatArray:
-    w = problem.columns.reshape(-1, problem.columns.shape[2])
+def _start(problem: InteractionProblem) -> FloatArray:
+    """Return one stiffness for all springs by least squares, which noise does not blow up."""
+    count = len(problem.segments)
+    together = problem.columns[:, :, :count].sum(axis=2, keepdims=True)
+    columns = np.concatenate([together, problem.columns[:, :, count:]], axis=2)
+    theta = _least_squares(problem, columns)
+    return np.concatenate([np.full(count, theta[0]), theta[1:]])
+
+
+def _shortened(
+    problem: InteractionProblem, theta: FloatArray, step: FloatArray, variance: FloatArray
+) -> FloatArray:
+    """Return the part of a step that makes the weighted residuals smaller, nothing if none."""
+    before = _loss(problem, theta, variance)
+    for _ in range(_HALVINGS):
+        if _loss(problem, theta + step, variance) <= before:
+            return step
+        step = step / 2.0
+    return np.zeros_like(step)
+
+
+def _loss(problem: InteractionProblem, theta: FloatArray, variance: FloatArray) -> float:
+    by_motion = problem.sensitivity(theta)
+    covariance = by_motion @ problem.motion_noise @ by_motion.transpose(0, 2, 1)
+    residual = problem.residual(theta)
+    pull = np.linalg.solve(covariance + np.diag(variance), residual[..., np.newaxis])[..., 0]
+    return float(np.sum(residual * pull))
+
+
+def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArray:
+    w = columns.reshape(-1, columns.shape[2])
     scale = np.linalg.norm(w, axis=0)
-    springs = scale[: len(problem.segments)]
+    springs = scale[: columns.shape[2] - len(problem.rigid)]
     if not np.all(springs > _DRAWN_OUT * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
         raise IdentificationError(f'{name}: its spring is never drawn out, so nothing shows it')
