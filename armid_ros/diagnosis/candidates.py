@@ -18,7 +18,7 @@ from itertools import combinations, pairwise, permutations, product
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
-from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.effects import Effect
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -75,7 +75,9 @@ class Group:
         return int(self.columns.stop) - int(self.columns.start)
 
 
-def group_effects(arm: ArmModel, library: Sequence[str]) -> Iterator[tuple[Effect, list[Effect]]]:
+def group_effects(
+    arm: ArmModel, kinds: Sequence[type[Effect]]
+) -> Iterator[tuple[Effect, list[Effect]]]:
     """
     Yield effects whose columns are computed together, with the groups they are shared out to.
 
@@ -84,8 +86,8 @@ def group_effects(arm: ArmModel, library: Sequence[str]) -> Iterator[tuple[Effec
     """
     robot = arm.robot
     there = {(e.name, joint) for e in arm.effects for joint in e.joints or ('',)}
-    for name in library:
-        kind = CATALOGUE[name]
+    for kind in kinds:
+        name = kind.name
         if name in _PAIRS:
             for pair in _PAIRS[name](robot.joints):
                 if (name, pair[0]) not in there:
@@ -215,13 +217,15 @@ class Candidates:
     columns: tuple[FloatArray, ...]
 
 
-def candidates(arm: ArmModel, data: Sequence[Trajectory], library: Sequence[str]) -> Candidates:
+def candidates(
+    arm: ArmModel, data: Sequence[Trajectory], kinds: Sequence[type[Effect]]
+) -> Candidates:
     """Compute the columns of every effect that the arm does not have."""
     arm = remembering(arm)
     groups: list[Group] = []
     blocks: list[list[FloatArray]] = [[] for _ in data]
     start = 0
-    for effect, members in group_effects(arm, library):
+    for effect, members in group_effects(arm, kinds):
         for whole, singles in shaped(effect, members, arm, data):
             for block, part in zip(blocks, data, strict=True):
                 block.append(effect_rows(arm, whole, part))

@@ -210,8 +210,9 @@ def _narrower(used: Conditioning, settings: DiagnosisSettings) -> Conditioning:
 
 
 def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:
+    names = [kind.name for kind in settings.kinds]
     hidden = chosen.survey.hidden if chosen.survey is not None else frozenset()
-    return tuple(name for name in settings.library if name in hidden)
+    return tuple(name for name in names if name in hidden)
 
 
 def _bad(

@@ -149,6 +149,8 @@ def _left_out(
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Predict each part of the data with values of the named effects from the other parts."""
     fitted = explanation.fitted
+    if not fitted.named:
+        return list(zip(explanation.reference.residual, fitted.residual, strict=True))
     problem = make_problem(data, sigma, fitted.residual, list(fitted.columns))
     count = len(fitted.estimate.values)
     size = problem.x.shape[2]
@@ -157,7 +159,7 @@ def _left_out(
     left = projection.rest(problem.y)
     flat, owner = columns.reshape(-1, count), np.repeat(problem.fold, problem.y.shape[1])
     change = np.zeros_like(left)
-    for k in range(problem.folds if count else 0):
+    for k in range(problem.folds):
         others = owner != k
         own = flat[others].T @ flat[others]
         step, _ = solve_products(own, flat[others].T @ left.ravel()[others])

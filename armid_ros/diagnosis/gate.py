@@ -21,8 +21,8 @@ import numpy as np
 
 #: A torque follows the model of its own joint when this much of it is the model's ...
 _FOLLOWS = 0.9
-#: ... and that of another joint, when that explains it while its own explains less than this.
-_OWN = 0.5
+#: ... and that of another joint, when that one's is so much more alike, and of the same size.
+_MARGIN = 0.1
 _UNITS = (
     (57.2958, 'a gain of 57.3: degrees against radians'),
     (1000.0, 'N mm instead of N m'),
@@ -87,8 +87,8 @@ def _torques(arm: ArmModel, slopes: FloatArray, correlation: FloatArray) -> list
         others = np.abs(correlation[j]).copy()
         others[j] = 0.0
         best = int(np.argmax(others))
-        swapped = others[best] > _FOLLOWS and abs(own[j]) < _OWN
-        if swapped and abs(correlation[best, best]) < _OWN:
+        clear = others[best] > _FOLLOWS and abs(own[j]) < others[best] - _MARGIN
+        if clear and 0.5 < slopes[j, best] < 2.0 and abs(own[best]) < _FOLLOWS:
             faults.append(
                 f'the torque of {joint} follows what the model has for {joints[best]}: are the '
                 'joints in the right order?'

@@ -82,7 +82,7 @@ def explain(
         if not gap and (survey is not None or base is None):
             break
         if found is None:
-            found = candidates(current.arm, data, settings.library)
+            found = candidates(current.arm, data, settings.kinds)
             columns = [
                 np.concatenate(pair, axis=2)
                 for pair in zip(found.columns, current.columns, strict=True)

@@ -32,6 +32,8 @@ _LOOKED_AT, _REFINED = 30, 4
 #: Torques of a cosine above this are one and the same: Coulomb friction is stribeck_friction of a
 #: velocity beyond all that was moved at, viscous friction is thermal_friction warmed at once.
 _IMITATION = 0.98
+#: Share by which masses of descriptions are off often enough for no payload to be needed.
+_OFF = 0.12
 #: What holds the arm from outside is another machine or a person: a cause as rich as this many
 #: quantities, which the arm alone has to fail to explain.
 _OUTSIDE = 4
@@ -168,7 +170,7 @@ def next_step(
     if not passing:
         return None, survey, problem
     tied = [passing[0], *not_beaten(passing, problem, left, settings)]
-    winner = simplest(tied)
+    winner = _likelier_body(simplest(tied), tied, work.arm)
     rivals = tuple(
         t
         for t in tied
@@ -193,8 +195,21 @@ def simplest(tied: Sequence[Trial]) -> Trial:
     simple = [trial for trial in tied if _complexity(trial.score.group) == fewest]
     most = max(trial.gain for trial in simple)
     close = [trial for trial in simple if trial.gain >= _EQUAL * most]
-    order = list(CATALOGUE)
-    return min(close, key=lambda trial: order.index(trial.score.group.effect.name))
+    order = {name: position for position, name in enumerate(CATALOGUE)}
+    return min(close, key=lambda trial: order.get(trial.score.group.effect.name, len(order)))
+
+
+def _likelier_body(winner: Trial, tied: Sequence[Trial], arm: ArmModel) -> Trial:
+    """Return the link instead of a payload on it where descriptions are off by as much."""
+    group = winner.score.group
+    if group.effect.name != 'payload':
+        return winner
+    link = arm.robot.joints.index(group.effect.joints[0])
+    described = float(arm.robot.rigid_parameters[10 * link])
+    if abs(float(winner.score.values[0])) > _OFF * described:
+        return winner
+    twins = [t for t in tied if t.score.group.key[:2] == ('link_inertia', group.effect.joints)]
+    return twins[0] if twins else winner
 
 
 def _complexity(group: Group) -> int:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from armid_ros.effects import CATALOGUE
+from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.identification import SignalSettings
 
 
@@ -21,6 +21,8 @@ class DiagnosisSettings:
     ----------
     library : tuple of str
         Names that may be given.
+    own : tuple of type
+        Effects of one's own that may be named besides.
     signals : SignalSettings
         Filters; chosen from the recordings by default.
     consistent_loss : float
@@ -53,6 +55,7 @@ class DiagnosisSettings:
     """
 
     library: tuple[str, ...] = tuple(CATALOGUE)
+    own: tuple[type[Effect], ...] = ()
     signals: SignalSettings = field(default_factory=SignalSettings)
     consistent_loss: float = 1.2
     partial_loss: float = 1.4
@@ -65,3 +68,8 @@ class DiagnosisSettings:
     least_visible: float = 0.02
     most_steps: int = 24
     blocks: int = 12
+
+    @property
+    def kinds(self) -> tuple[type[Effect], ...]:
+        """All effects that may be named."""
+        return (*(CATALOGUE[name] for name in self.library), *self.own)

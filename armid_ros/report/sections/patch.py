@@ -36,7 +36,10 @@ class Patch(Section):
     @property
     def added(self) -> list[tuple[str, str]]:
         """Name of each effect, and what it is."""
-        return [(finding.name, CATALOGUE[finding.name].summary) for finding in self.findings]
+        return [
+            (f.name, CATALOGUE[f.name].summary if f.name in CATALOGUE else 'an effect of your own')
+            for f in self.findings
+        ]
 
     @property
     def yaml(self) -> str:
