@@ -21,8 +21,9 @@ import numpy as np
 
 #: A torque follows the model of its own joint when this much of it is the model's ...
 _FOLLOWS = 0.9
-#: ... and that of another joint, when that one's is so much more alike, and of the same size.
-_MARGIN = 0.1
+#: Two joints are exchanged when each one's torque is this near to the other's model, and less than
+#: half as far from it as from its own.
+_ALIKE = 0.6
 _UNITS = (
     (57.2958, 'a gain of 57.3: degrees against radians'),
     (1000.0, 'N mm instead of N m'),
@@ -83,12 +84,12 @@ def _torques(arm: ArmModel, slopes: FloatArray, correlation: FloatArray) -> list
     joints = arm.robot.joints
     faults = []
     own = np.diag(correlation)
+    error = _unlike(slopes, correlation)
     for j, joint in enumerate(joints):
-        others = np.abs(correlation[j]).copy()
-        others[j] = 0.0
-        best = int(np.argmax(others))
-        clear = others[best] > _FOLLOWS and abs(own[j]) < others[best] - _MARGIN
-        if clear and 0.5 < slopes[j, best] < 2.0 and abs(own[best]) < _FOLLOWS:
+        best = int(np.argmin(error[j]))
+        pair = error[j, best], error[best, j]
+        nearer = pair[0] < error[j, j] / 2 and pair[1] < error[best, best] / 2
+        if best != j and max(pair) < _ALIKE and nearer:
             faults.append(
                 f'the torque of {joint} follows what the model has for {joints[best]}: are the '
                 'joints in the right order?'
@@ -106,6 +107,13 @@ def _torques(arm: ArmModel, slopes: FloatArray, correlation: FloatArray) -> list
                         f'takes, {unit}: convert it'
                     )
     return faults
+
+
+def _unlike(slopes: FloatArray, correlation: FloatArray) -> FloatArray:
+    """Return |tau_i - model_j| / |tau_i| of all joints, shape (n, n); 1 for no likeness."""
+    safe = np.where(slopes == 0.0, np.inf, slopes)
+    square = 1.0 - 2.0 * correlation**2 / safe + (correlation / safe) ** 2
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
 def _clipped(recordings: Sequence[Recording]) -> list[str]:

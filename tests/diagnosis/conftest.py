@@ -1,0 +1,104 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A vertical arm of two links, and recordings of it that were made without the simulator."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import Motion
+from armid_ros.recording import Recording
+from armid_ros.robots import robot_from_urdf
+import numpy as np
+import pytest
+
+LINK = """
+  <link name="{name}"><inertial><origin xyz="0 0 {com}"/><mass value="{mass}"/>
+    <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.002"/></inertial></link>
+"""
+JOINT = """
+  <joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>
+    <origin xyz="0 0 {height}"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="50" velocity="6"/></joint>
+"""
+URDF = (
+    '<robot name="two_links"><link name="base"/>'
+    + LINK.format(name='upper', mass=3.0, com=0.15)
+    + LINK.format(name='lower', mass=1.5, com=0.12)
+    + JOINT.format(name='shoulder', parent='base', child='upper', height=0.5)
+    + JOINT.format(name='elbow', parent='upper', child='lower', height=0.35)
+    + '</robot>'
+)
+PERIODS = (5.0, 4.0, 4.0)
+SPEEDS = (0.6, 1.6, 3.2)
+RATE = 200.0
+TORQUE_NOISE, POSITION_NOISE = 0.03, 2e-5
+
+
+class Bench:
+    """Makes recordings of the arm: three speeds of two equal periods each."""
+
+    def __init__(self):
+        self.robot = robot_from_urdf(URDF, gravity='earth')
+        arm = ArmModel(self.robot)
+        arm = arm.with_effect(make_effect('viscous_friction', self.robot), [0.3, 0.2])
+        self.arm = arm.with_effect(make_effect('coulomb_friction', self.robot), [0.5, 0.3])
+
+    def motion(self, speed, period, seed):
+        """Return a motion of sums of harmonics from the second of time 0 on, two periods."""
+        rng = np.random.default_rng(seed)
+        t = np.arange(round((2 * period + 1.0) * RATE)) / RATE
+        q, dq, ddq = np.zeros((3, len(t), 2))
+        for joint in range(2):
+            phases = rng.uniform(0.0, 2 * np.pi, 4)
+            sizes = rng.uniform(0.5, 1.0, 4)
+            w = 2 * np.pi / period * np.arange(1, 5)
+            scale = speed / np.sum(sizes * w / 3)
+            angle = np.outer(t, w) + phases
+            q[:, joint] = scale * np.sin(angle) @ sizes
+            dq[:, joint] = scale * np.cos(angle) @ (sizes * w)
+            ddq[:, joint] = -scale * np.sin(angle) @ (sizes * w**2)
+        return Motion(self.robot.joints, t, q, dq, ddq)
+
+    def recordings(self, hidden=None, seed=0, noise=1.0):
+        """
+        Return recordings.
+
+        Parameters
+        ----------
+        hidden : callable, optional
+            Torque (N, 2) of a motion and the torque of the rigid arm, added to what is measured.
+        seed : int
+            Of motions and noise.
+        noise : float
+            Factor on both noises.
+
+        """
+        rng = np.random.default_rng(seed + 100)
+        result = []
+        for k, (speed, period) in enumerate(zip(SPEEDS, PERIODS, strict=True)):
+            motion = self.motion(speed, period, seed + 10 * k)
+            tau = self.torque(motion)
+            if hidden is not None:
+                tau = tau + hidden(motion, tau)
+            shape = motion.q.shape
+            result.append(
+                Recording(
+                    joints=self.robot.joints,
+                    t=motion.t,
+                    q=motion.q + noise * POSITION_NOISE * rng.normal(size=shape),
+                    tau=tau + noise * TORQUE_NOISE * rng.normal(size=shape),
+                    source=f'speed {speed:g}',
+                )
+            )
+        return result
+
+    def torque(self, motion):
+        """Return rigid body and known friction, written out here."""
+        friction = [0.3, 0.2] * motion.dq + [0.5, 0.3] * np.sign(motion.dq)
+        return inverse_dynamics(self.robot, motion) + friction
+
+
+@pytest.fixture(scope='session')
+def bench():
+    """Return the arm with what is known of it."""
+    return Bench()

@@ -1,0 +1,145 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a diagnosis says of arms in which something is hidden, or nothing."""
+
+from dataclasses import dataclass
+import json
+
+from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
+from armid_ros.effects import Action, CATALOGUE, Effect, Quantity
+import numpy as np
+import pytest
+
+
+def look(bench, recordings, arm=None, **options):
+    return diagnose(arm or bench.arm, recordings, rng=np.random.default_rng(0), **options)
+
+
+def on_elbow(torque):
+    """Return a torque of the elbow alone."""
+    return np.column_stack([np.zeros(len(torque)), torque])
+
+
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_nothing_is_named_where_nothing_is_hidden(bench, seed):
+    found = look(bench, bench.recordings(seed=seed, noise=[0.5, 1.0, 2.0][seed - 1]))
+    assert found.verdict == 'consistent'
+    assert not found.findings
+
+
+def test_values_that_are_off_are_no_effect(bench):
+    robot = bench.robot
+    off = robot.rigid_parameters * np.tile([1.06, 1.04] + [0.95] * 8, robot.n_joints)
+    arm = bench.arm.with_theta(np.concatenate([off, [0.32, 0.19], [0.47, 0.32]]))
+    found = look(bench, bench.recordings(), arm)
+    assert found.verdict == 'consistent'
+
+
+def test_drag_is_named_with_its_coefficient_and_joint(bench):
+    hidden = bench.recordings(lambda m, tau: on_elbow(0.08 * m.dq[:, 1] * np.abs(m.dq[:, 1])))
+    found = look(bench, hidden)
+    (finding,) = found.findings
+    assert (finding.name, finding.joints) == ('quadratic_friction', ('elbow',))
+    assert finding.values[0] == pytest.approx(0.08, abs=4 * finding.std[0])
+    assert found.gap.closed > 0.9
+
+
+def test_an_effect_that_lives_in_the_fast_motion_only_is_found(bench):
+    found = look(bench, bench.recordings(lambda m, tau: on_elbow(0.02 * m.ddq[:, 1])))
+    assert 'rotor_inertia' in {n for f in found.findings for n in (f.name, *f.ambiguous_with)}
+
+
+def test_without_the_true_effect_in_the_library_no_name_is_sure(bench):
+    hidden = bench.recordings(lambda m, tau: on_elbow(0.4 * np.sin(9.0 * m.q[:, 1])))
+    library = tuple(name for name in CATALOGUE if name != 'torque_ripple')
+    found = look(bench, hidden, settings=DiagnosisSettings(library=library))
+    assert found.verdict in ('unknown', 'partial')
+
+
+def test_an_offset_of_the_second_encoder_of_a_planar_arm_cannot_be_seen_after_a_fit(bench):
+    robot = bench.robot
+    off = robot.rigid_parameters * 1.08
+    arm = bench.arm.with_theta(np.concatenate([off, [0.3, 0.2], [0.5, 0.3]]))
+    found = look(bench, bench.recordings(), arm)
+    assert {'payload', 'link_inertia'} <= set(found.not_visible)
+    assert not found.findings
+
+
+def test_what_happens_in_one_period_only_is_not_repeatable(bench):
+    def bumps(motion, tau):
+        t = motion.t
+        slow = np.sin(2 * np.pi * (0.3 + 0.05 * t) * t) * np.exp(-(((t - 3.0) / 1.5) ** 2))
+        return on_elbow(1.5 * slow)
+
+    found = look(bench, bench.recordings(bumps))
+    assert found.verdict == 'not_repeatable'
+    assert 'elbow' in found.summary
+
+
+@pytest.mark.parametrize(
+    ('fault', 'word'),
+    [
+        (lambda tau: tau * [1.0, -1.0], 'opposite sign'),
+        (lambda tau: tau * 1000.0, 'N mm'),
+        (lambda tau: tau[:, ::-1], 'right order'),
+    ],
+)
+def test_faults_of_the_data_are_named_before_physics(bench, fault, word):
+    from dataclasses import replace
+
+    spoilt = [replace(r, tau=fault(r.tau)) for r in bench.recordings()]
+    found = look(bench, spoilt)
+    assert found.verdict == 'bad_data'
+    assert word in found.summary
+    assert not found.findings
+
+
+def test_the_document_has_what_the_schema_says(bench):
+    hidden = bench.recordings(lambda m, tau: on_elbow(np.full(len(m), 0.3)))
+    document = json.loads(json.dumps(diagnosis_document(look(bench, hidden)), allow_nan=False))
+    assert document['schema'] == 'armid/diagnosis/1'
+    assert [effect['name'] for effect in document['effects']] == ['torque_offset']
+    assert set(document['gap']['before']) == {'shoulder', 'elbow'}
+    assert document['gap']['after']['elbow'] < 0.5 * document['gap']['before']['elbow']
+    assert document['where'][0]['joint'] == 'elbow'
+    assert document['candidates'][0]['visible_fraction'] <= 1.0
+    assert set(document) == {
+        'schema',
+        'verdict',
+        'summary',
+        'effects',
+        'where',
+        'gap',
+        'candidates',
+        'not_visible',
+        'model',
+    }
+
+
+@dataclass(frozen=True)
+class CubicSpring(Effect):
+    """A spring that hardens, tau = k q^3: an effect of one's own."""
+
+    name = 'cubic_spring'
+    summary = 'a spring that hardens'
+    quantities = (Quantity('cubic_stiffness', 'N m/rad^3'),)
+
+    def columns(self, motion, arm):
+        """Return q^3."""
+        columns = np.zeros((len(motion), motion.n_joints, len(self.joints)))
+        for position, joint in enumerate(self.indices(motion.joints)):
+            columns[:, joint, position] = motion.q[:, joint] ** 3
+        return columns
+
+    def action(self, values, arm):
+        """Return the torque of the springs."""
+        stiffness = np.zeros(arm.robot.n_joints)
+        stiffness[self.indices(arm.robot.joints)] = values
+        return Action(torque=lambda t, q, dq: stiffness * q**3)
+
+
+def test_an_effect_of_ones_own_is_one_class(bench):
+    hidden = bench.recordings(lambda m, tau: on_elbow(0.4 * m.q[:, 1] ** 3))
+    found = look(bench, hidden, settings=DiagnosisSettings(own=(CubicSpring,)))
+    assert [finding.name for finding in found.findings] == ['cubic_spring']
+    assert found.findings[0].values[0] == pytest.approx(0.4, rel=0.05)

@@ -1,0 +1,62 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The noise floor comes from repeated periods, encoder noise included, of each trajectory."""
+
+from armid_ros.diagnosis.diagnose import _narrower
+from armid_ros.diagnosis.evidence import trajectories
+from armid_ros.diagnosis.floor import find_period, noise_floor
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.identification.signals import conditioning, SignalSettings
+import numpy as np
+import pytest
+
+from tests.diagnosis.conftest import PERIODS
+
+
+def cut(recordings):
+    used = conditioning(recordings, SignalSettings())
+    return trajectories(recordings, _narrower(used, DiagnosisSettings()))
+
+
+def test_the_period_is_found_in_the_positions(bench):
+    data = cut(bench.recordings())
+    for part, period in zip(data, PERIODS, strict=True):
+        lag, _ = find_period(part.motion)
+        step = float(part.motion.t[1] - part.motion.t[0])
+        assert lag * step == pytest.approx(period, abs=2 * step)
+
+
+def test_noise_of_the_encoders_is_inside(bench):
+    quiet = [noise_floor(part, bench.arm) for part in cut(bench.recordings(noise=0.1))]
+    noisy = bench.recordings(noise=0.1)
+    rng = np.random.default_rng(5)
+    shaken = [
+        type(r)(joints=r.joints, t=r.t, q=r.q + 3e-4 * rng.normal(size=r.q.shape), tau=r.tau)
+        for r in noisy
+    ]
+    loud = [noise_floor(part, bench.arm) for part in cut(shaken)]
+    for a, b in zip(quiet, loud, strict=True):
+        assert np.all(b.sigma > 2.0 * a.sigma)
+
+
+def test_what_depends_on_the_motion_alone_cancels(bench):
+    hidden = bench.recordings(lambda m, tau: 0.5 * np.sin(3.0 * m.q))
+    plain = [noise_floor(part, bench.arm).sigma for part in cut(bench.recordings())]
+    with_effect = [noise_floor(part, bench.arm).sigma for part in cut(hidden)]
+    np.testing.assert_allclose(np.array(with_effect), np.array(plain), rtol=0.3)
+
+
+def test_a_floor_without_repetition_is_assumed(bench):
+    recordings = [r.select(slice(0, 700)) for r in bench.recordings()]
+    assert all(noise_floor(part, bench.arm).period is None for part in cut(recordings))
+
+
+def test_each_trajectory_has_a_floor_of_its_own(bench):
+    recordings = bench.recordings(noise=0.3)
+    rng = np.random.default_rng(1)
+    slow, middle, fast = recordings
+    fast = type(fast)(
+        joints=fast.joints, t=fast.t, q=fast.q, tau=fast.tau + 0.3 * rng.normal(size=fast.q.shape)
+    )
+    floors = [noise_floor(part, bench.arm).sigma for part in cut([slow, middle, fast])]
+    assert np.all(floors[2] > 3.0 * floors[0])
