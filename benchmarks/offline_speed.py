@@ -151,9 +151,11 @@ def main():
                 [*command, '--bag', str(bag)], capture_output=True, text=True, check=True
             )
             seconds[name], value, std = json.loads(done.stdout.splitlines()[-1])
+            wall, processor = seconds[name]
             print(
-                f'{name:7s}{seconds[name][0]:8.1f} s, {seconds[name][1]:6.1f} s of processor; viscous friction of joint 1: {value:.4f} +- '
-                f'{std:.4f} N m s/rad (true {FRICTION["viscous_friction"]})'
+                f'{name:7s}{wall:8.1f} s, {processor:6.1f} s of processor; viscous friction of '
+                f'joint 1: {value:.4f} +- {std:.4f} N m s/rad '
+                f'(true {FRICTION["viscous_friction"]})'
             )
         wall, processor = np.divide(seconds['theirs'], seconds['ours'])
         print(f'ratio {wall:.1f} x, of processor time {processor:.1f} x, wanted 10 x')
