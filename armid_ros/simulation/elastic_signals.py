@@ -88,7 +88,7 @@ def resonance_experiments(
         How far the links begin from zero at most [rad].
 
     """
-    size = np.asarray(rms, dtype=float)
+    size, far = np.asarray(rms, dtype=float), np.asarray(reach, dtype=float)
     steps = round(duration / dt)
     t = dt * np.arange(steps)[:, np.newaxis]
     experiments = []
@@ -96,9 +96,9 @@ def resonance_experiments(
         rate = 2.0 * np.pi * rng.uniform(*slow, len(size))
         phase = 2.0 * np.pi * rng.random(len(size))
         ramp = np.minimum(t / 0.2, 1.0)
-        velocity = ramp * speed * np.cos(rate * t + phase)
+        velocity = ramp * np.asarray(speed) * np.cos(rate * t + phase)
         torque = ramp * multisine(steps, dt, band, size, rng)
-        pose = reach * rng.uniform(-1.0, 1.0, len(size))
+        pose = far * rng.uniform(-1.0, 1.0, len(size))
         experiments.append(Experiment(pose, velocity, torque))
     return experiments
 

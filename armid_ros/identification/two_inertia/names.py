@@ -35,7 +35,7 @@ def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
     pairs = vector[3:].reshape(len(PER_JOINT), 2)
     fields = {field: pair for (field, _, _), pair in zip(PER_JOINT, pairs, strict=True)}
     alpha, beta, gamma = vector[:3].tolist()
-    return replace(like, alpha=alpha, beta=beta, gamma=gamma, **fields)  # type: ignore[arg-type]
+    return replace(like, alpha=alpha, beta=beta, gamma=gamma, **fields)
 
 
 def parameter_names(joints: tuple[str, ...]) -> tuple[ParameterName, ...]:

@@ -73,7 +73,7 @@ def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> Joi
     """
     frequency = np.geomspace(*band, _POINTS)
     found = joint.system.response(frequency)
-    s = 2j * np.pi * frequency
+    s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
     start = np.log(_first_guess(joint, frequency, found))
 
     def residual(logarithms: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from armid_ros.identification.two_inertia.names import unpack
 from armid_ros.motion import FloatArray
@@ -23,7 +24,8 @@ from armid_ros.simulation.elastic_run import ElasticRun, VelocityLoop
 import numpy as np
 import numpy.typing as npt
 
-ComplexArray = npt.NDArray[np.complex128]
+#: Real values, or values with an infinitesimal change as their imaginary part.
+DualArray = npt.NDArray[Any]
 #: Imaginary step: its square is lost in rounding, so the derivative has no truncation error.
 _STEP = 1e-30
 _ROUNDS = 16
@@ -101,9 +103,7 @@ def sensitivities(
     return found[:, :, 0].real, np.moveaxis(found.imag / _STEP, 2, 3)
 
 
-def _simulate(
-    steps: Steps, values: FloatArray | ComplexArray, fixed: TwoLinkParameters
-) -> ComplexArray:
+def _simulate(steps: Steps, values: DualArray, fixed: TwoLinkParameters) -> DualArray:
     """Run E experiments with D parameter vectors each; returns (N, E, D, 4)."""
     experiments, sets = len(steps.q), len(values)
     arm = _Arm(np.tile(values, (experiments, 1)), fixed, steps.dt / steps.substeps)
@@ -129,7 +129,7 @@ def _simulate(
 class _Arm:
     """The two links with B parameter vectors, shape (B, 13), for one step of integration."""
 
-    def __init__(self, values: FloatArray | ComplexArray, fixed: TwoLinkParameters, dt: float):
+    def __init__(self, values: DualArray, fixed: TwoLinkParameters, dt: float):
         self.alpha, self.beta, self.gamma = values[:, 0], values[:, 1], values[:, 2]
         self.rotor = values[:, 3:5] * fixed.gear**2
         self.stiffness = values[:, 5:7]
@@ -157,12 +157,12 @@ class _Arm:
 
     def advance(
         self,
-        q2: ComplexArray,
-        x: ComplexArray,
-        dv: ComplexArray,
+        q2: DualArray,
+        x: DualArray,
+        dv: DualArray,
         modes: npt.NDArray[np.int_],
-        torque: ComplexArray,
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, npt.NDArray[np.int_]]:
+        torque: DualArray,
+    ) -> tuple[DualArray, DualArray, DualArray, npt.NDArray[np.int_]]:
         """Return angle of joint 2, state, accelerations and friction modes one step later."""
         dt, a = self.dt, self.a
         middle = q2 + 0.5 * dt * (x[:, 5] + 0.25 * dt * dv[:, 3])
@@ -191,7 +191,7 @@ class _Arm:
         x_next[:, 2:4] = np.where(held, 0.0, x_next[:, 2:4])
         return q2 + moved[:, 5], x_next, last[:, 2:], modes
 
-    def _links(self, q2: ComplexArray, v: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    def _links(self, q2: DualArray, v: DualArray) -> tuple[DualArray, DualArray]:
         """Return the inverse inertia matrix, (B, 2, 2), and centrifugal torques, (B, 2)."""
         cosine, sine = self.gamma * np.cos(q2), self.gamma * np.sin(q2)
         coupling = self.beta + cosine
@@ -208,8 +208,8 @@ class _Arm:
 
 
 def _friction(
-    response: ComplexArray, free: ComplexArray, level: FloatArray, modes: npt.NDArray[np.int_]
-) -> tuple[ComplexArray, npt.NDArray[np.int_]]:
+    response: DualArray, free: DualArray, level: FloatArray, modes: npt.NDArray[np.int_]
+) -> tuple[DualArray, npt.NDArray[np.int_]]:
     """
     Find friction torques: bounds for what slips, whatever stops the rest.
 

@@ -3,8 +3,8 @@
 """
 Step 1: the arm as if its joints were rigid, at frequencies far below its resonances.
 
-tau = (M + diag(mm gear^2)) q'' + h + (dl + dm gear^2) q' + fm gear sgn(q'). Motor and link inertia of
-joint 1 cannot be told apart then, nor motor and link friction of any joint; alpha + mm1 gear^2,
+tau = (M + diag(mm gear^2)) q'' + h + (dl + dm gear^2) q' + fm gear sgn(q'). Motor and link inertia
+of joint 1 cannot be told apart then, nor motor and link friction of any joint; alpha + mm1 gear^2,
 beta, gamma, mm2 gear^2, the sums of friction and the Coulomb torques can.
 
 """
@@ -147,4 +147,4 @@ def _solve(table: FloatArray, torque: FloatArray, joints: tuple[str, ...]) -> Ri
         *(ParameterName('fm gear', joint, 'N m') for joint in joints),
     )
     error = 100.0 * float(np.linalg.norm(left) / np.linalg.norm(torque))
-    return RigidFit(Estimate(names, values, np.linalg.inv(rows.T @ rows)), error)
+    return RigidFit(Estimate(names, values, np.asarray(np.linalg.inv(rows.T @ rows))), error)

@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import get_window
 
+ComplexArray = npt.NDArray[np.complex128]
+
 
 def measured_response(
     experiments: Sequence[Signals],
@@ -20,7 +22,7 @@ def measured_response(
     *,
     window: float = 1.0,
     hold: bool = True,
-) -> tuple[FloatArray, npt.NDArray[np.complex128]]:
+) -> tuple[FloatArray, ComplexArray]:
     """
     Estimate the frequency response from all inputs to all outputs by averaged spectra (H1).
 
@@ -50,22 +52,24 @@ def measured_response(
     """
     size = round(window / dt)
     taper = get_window('hann', size)[:, np.newaxis]
-    cross, power = 0.0, 0.0
+    cross: list[ComplexArray] = []
+    power: list[ComplexArray] = []
     for e in experiments:
         for start in range(0, len(e.u) - size + 1, size // 2):
             part = slice(start, start + size)
             u, y = (
                 np.fft.rfft(taper * (x[part] - x[part].mean(axis=0)), axis=0) for x in (e.u, e.y)
             )
-            cross = cross + np.einsum('kp,km->kpm', y, u.conj())
-            power = power + np.einsum('kl,km->klm', u, u.conj())
-    if isinstance(cross, float) or isinstance(power, float):
+            cross.append(np.einsum('kp,km->kpm', y, u.conj()))
+            power.append(np.einsum('kl,km->klm', u, u.conj()))
+    if not cross:
         raise IdentificationError(
             f'no experiment is as long as the window of {window:g} s of the spectra'
         )
     frequency = np.fft.rfftfreq(size, dt)[1:]
-    response = cross[1:] @ np.linalg.pinv(power[1:], rcond=1e-12, hermitian=True)
+    inverse = np.linalg.pinv(np.sum(power, axis=0)[1:], rcond=1e-12, hermitian=True)
+    response = np.asarray(np.sum(cross, axis=0)[1:] @ inverse)
     if hold:
         s = 2j * np.pi * frequency * dt
         response[:, :, 0] /= ((1.0 - np.exp(-s)) / s)[:, np.newaxis]
-    return frequency, response
+    return np.asarray(frequency, dtype=np.float64), response

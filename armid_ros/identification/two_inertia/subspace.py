@@ -173,7 +173,7 @@ def _observable(
                 [u[:, m * horizon :], u[:, : m * horizon], y[:, : p * horizon],
                  y[:, p * horizon :]]
             )  # fmt: skip
-            triangle = np.linalg.qr(np.vstack([triangle, block]), mode='r')
+            triangle = np.asarray(np.linalg.qr(np.vstack([triangle, block]), mode='r'))
     lower = triangle.T
     past = slice(m * horizon, (2 * m + p) * horizon)
     left, sizes, _ = np.linalg.svd(lower[(2 * m + p) * horizon :, past])
@@ -198,7 +198,7 @@ def _inputs(
     """Fit the input matrix to whole experiments, each with an initial state of its own."""
     m = experiments[0].u.shape[1]
     kept = np.flatnonzero(poles.imag >= 0.0)
-    normal, right = 0.0, 0.0
+    normal, right = [], []
     for e in experiments:
         decay = np.exp(dt * np.outer(np.arange(len(e.u)), poles[kept]))
         start = _real(modal[:, kept], decay, poles[kept])
@@ -209,9 +209,9 @@ def _inputs(
         table, wanted = np.hstack(columns), e.y.T.ravel()
         basis = np.linalg.qr(start)[0]
         table = table - basis @ (basis.T @ table)
-        normal = normal + table.T @ table
-        right = right + table.T @ wanted
-    solution = np.linalg.solve(normal, right).reshape(m, -1).T
+        normal.append(table.T @ table)
+        right.append(table.T @ wanted)
+    solution = np.linalg.solve(np.sum(normal, axis=0), np.sum(right, axis=0)).reshape(m, -1).T
     b = np.zeros((len(poles), m), complex)
     place = 0
     for k in kept:

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from armid_ros.identification.two_inertia import (
     ideal_response,
     MeasuredJoint,
@@ -29,9 +31,15 @@ import numpy as np
 
 _BAND = (2.0, 100.0)
 _LABELS = {
-    'alpha': 'α', 'beta': 'β', 'gamma': 'γ', 'motor_inertia': 'mm', 'stiffness': 'kg',
-    'link_damping': 'dl', 'motor_damping': 'dm', 'spring_damping': 'dg',
-}  # fmt: skip
+    'alpha': r'$\alpha$',
+    'beta': r'$\beta$',
+    'gamma': r'$\gamma$',
+    'motor_inertia': 'mm',
+    'stiffness': 'kg',
+    'link_damping': 'dl',
+    'motor_damping': 'dm',
+    'spring_damping': 'dg',
+}
 
 
 def bode_figure(result: TwoInertiaIdentification) -> Figure:
@@ -63,7 +71,7 @@ def bode_figure(result: TwoInertiaIdentification) -> Figure:
                 'physical parameters',
             ),
         )
-        styles: tuple[dict[str, object], ...] = (
+        styles: tuple[dict[str, Any], ...] = (
             {'color': COLOURS[3], 'linewidth': 1.0},
             {'color': MEASURED, 'linestyle': 'none', 'marker': 'o', 'markersize': 2.4},
             {'color': RESIDUAL, 'linewidth': 2.4, 'alpha': 0.6},

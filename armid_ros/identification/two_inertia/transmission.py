@@ -1,0 +1,232 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Stiffness of a joint with an encoder on either side, and how far it can be told from free play.
+
+The twist of motor against link is compliance times the torque in the transmission, plus half the
+backlash to the side of the flank that carries the load. That torque is the motor's less friction
+and acceleration of the rotor, so what follows the sign and the size of the velocity, and the
+acceleration, is fitted as well. Friction of the motor over stiffness, and lost motion that follows
+the direction of travel, are one number without another measurement; so are viscous friction of
+the motor over stiffness, and a delay between the encoders.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.errors import IdentificationError
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import butter, sosfiltfilt
+
+IntArray = npt.NDArray[np.intp]
+
+CUTOFF = 8.0
+#: Length of the blocks that intervals are drawn from [s], and how often.
+_BLOCK, _DRAWS = 0.5, 400
+#: Torque within which the flank changes, as a share of the median size of the torque.
+_MESHING = 0.05
+#: Velocity below which a joint counts as standing, as a share of the fastest.
+_STANDING = 0.02
+#: Changes of flank that show free play.
+_REVERSALS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class TwoEncoders:
+    """
+    One joint as two encoders and a torque see it.
+
+    Attributes
+    ----------
+    dt : float
+        Time between samples [s].
+    motor, link : ndarray, shape (N,)
+        Positions on either side, both at the joint [rad].
+    torque : ndarray, shape (N,)
+        Of the motor, at the joint [N m].
+
+    """
+
+    dt: float
+    motor: FloatArray
+    link: FloatArray
+    torque: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class TransmissionFit:
+    """
+    Stiffness and free play of one joint, with 95 % intervals.
+
+    Attributes
+    ----------
+    stiffness : tuple of float
+        Value, lower and upper bound with free play as a part of the model [N m/rad].
+    stiffness_alone : tuple of float
+        The same without free play.
+    backlash : tuple of float
+        Whole free play [rad]; NaN within infinite bounds where the load changes flanks too
+        rarely for it to be seen.
+    direction : tuple of float
+        Twist that follows the direction of travel, to either side [rad].
+    delay : tuple of float
+        Twist per velocity: by how much the link's encoder is read later than the motor's [s].
+    correlation : float
+        Of compliance and backlash, -1 to 1; near either end they cannot be told apart.
+    reversals : int
+        Times that the load changed flanks; without any, backlash is an offset.
+    explained : float
+        R^2 of the whole model.
+    explained_alone : float
+        R^2 of the one without free play.
+
+    """
+
+    stiffness: tuple[float, float, float]
+    stiffness_alone: tuple[float, float, float]
+    backlash: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    delay: tuple[float, float, float]
+    correlation: float
+    reversals: int
+    explained: float
+    explained_alone: float
+
+    @property
+    def backlash_seen(self) -> bool:
+        """Whether free play is more than its uncertainty, and can be told from the spring."""
+        return self.backlash[1] > 0.0 and abs(self.correlation) < 0.95
+
+
+def fit_transmission(
+    records: Sequence[TwoEncoders], rng: np.random.Generator, *, cutoff: float = CUTOFF
+) -> TransmissionFit:
+    """
+    Fit spring and free play to recordings of one joint.
+
+    Parameters
+    ----------
+    records : sequence of TwoEncoders
+        Recordings; each has an offset and a slope of its encoders of its own.
+    rng : numpy.random.Generator
+        Draws the blocks that the intervals come from.
+    cutoff : float
+        Of the low-pass filter of all signals [Hz].
+
+    Raises
+    ------
+    IdentificationError
+        If the joint moves too little for it.
+
+    """
+    pieces = [_columns(record, cutoff) for record in records]
+    if sum(len(twist) for _, twist, _, _ in pieces) < 50:
+        raise IdentificationError('the joint hardly moves: its stiffness cannot be found')
+    table, twist, blocks = _joined(pieces)
+    reversals = sum(count for _, _, _, count in pieces)
+    draws = [rng.choice(len(blocks), len(blocks)) for _ in range(_DRAWS)]
+    bare = np.delete(table, 1, axis=1)
+    found_alone, spread_alone = _drawn(bare, twist, blocks, draws)
+    alone = _inverse(found_alone[0], spread_alone[:, 0])
+    explained_alone = _explained(bare, twist, found_alone)
+    if reversals < _REVERSALS:
+        found, spread = (np.insert(x, 1, np.nan, axis=-1) for x in (found_alone, spread_alone))
+        backlash, correlation = (np.nan, -np.inf, np.inf), np.nan
+        explained = explained_alone
+    else:
+        found, spread = _drawn(table, twist, blocks, draws)
+        backlash = _interval(2.0 * found[1], 2.0 * spread[:, 1])
+        correlation = float(np.corrcoef(spread[:, 0], spread[:, 1])[0, 1])
+        explained = _explained(table, twist, found)
+    return TransmissionFit(
+        _inverse(found[0], spread[:, 0]),
+        alone,
+        backlash,
+        _interval(found[2], spread[:, 2]),
+        _interval(found[3], spread[:, 3]),
+        correlation,
+        reversals,
+        explained,
+        explained_alone,
+    )
+
+
+def _columns(record: TwoEncoders, cutoff: float) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    """Return columns, twist, times and the number of flank changes of one recording."""
+    sections = butter(4, cutoff, fs=1.0 / record.dt, output='sos')
+    motor, link, torque = (
+        sosfiltfilt(sections, x) for x in (record.motor, record.link, record.torque)
+    )
+    velocity = np.gradient(motor, record.dt)
+    acceleration = np.gradient(velocity, record.dt)
+    moving = np.abs(velocity) > _STANDING * np.abs(velocity).max()
+    ends = round(0.3 / record.dt)
+    moving[:ends] = moving[-ends:] = False
+    moving &= np.arange(len(moving)) % max(round(0.25 / cutoff / record.dt), 1) == 0
+    flank = np.tanh(torque / (_MESHING * np.median(np.abs(torque))))
+    own = np.column_stack(
+        [torque, flank, np.sign(velocity), velocity, acceleration, motor, np.ones(len(motor))]
+    )
+    changes = int(np.count_nonzero(np.diff(np.sign(torque[moving]))))
+    times = np.asarray(record.dt * np.flatnonzero(moving), dtype=np.float64)
+    return own[moving], np.asarray((motor - link)[moving]), times, changes
+
+
+def _joined(
+    pieces: Sequence[tuple[FloatArray, FloatArray, FloatArray, int]],
+) -> tuple[FloatArray, FloatArray, list[IntArray]]:
+    """Put recordings below each other, with slopes and offsets of their own, and cut blocks."""
+    rows = sum(len(twist) for _, twist, _, _ in pieces)
+    shared, count = 5, len(pieces)
+    table = np.zeros((rows, shared + 2 * count))
+    blocks: list[IntArray] = []
+    twist, at = np.empty(rows), 0
+    for number, (own, values, t, _) in enumerate(pieces):
+        part = slice(at, at + len(values))
+        table[part, :shared] = own[:, :shared]
+        table[part, shared + 2 * number : shared + 2 * number + 2] = own[:, shared:]
+        twist[part] = values
+        labels = (t / _BLOCK).astype(int)
+        blocks += [at + np.flatnonzero(labels == label) for label in np.unique(labels)]
+        at += len(values)
+    return table, twist, blocks
+
+
+def _drawn(
+    table: FloatArray, twist: FloatArray, blocks: list[IntArray], draws: list[IntArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the least-squares solution, and those of blocks drawn at random."""
+    scale = np.linalg.norm(table, axis=0)
+    scaled = table / scale
+    normal = np.array([scaled[b].T @ scaled[b] for b in blocks])
+    right = np.array([scaled[b].T @ twist[b] for b in blocks])
+    found = np.linalg.lstsq(scaled, twist, rcond=None)[0]
+    spread = np.array(
+        [
+            np.linalg.lstsq(normal[d].sum(axis=0), right[d].sum(axis=0), rcond=None)[0]
+            for d in draws
+        ]
+    )
+    return found / scale, spread / scale
+
+
+def _interval(value: float, spread: FloatArray) -> tuple[float, float, float]:
+    lower, upper = np.quantile(spread, [0.025, 0.975])
+    return float(value), float(lower), float(upper)
+
+
+def _inverse(value: float, spread: FloatArray) -> tuple[float, float, float]:
+    """Turn a compliance into a stiffness; infinite where the interval reaches zero."""
+    compliance, lower, upper = _interval(value, spread)
+    bounds = [1.0 / c if c > 0.0 else np.inf for c in (compliance, upper, lower)]
+    return bounds[0], bounds[1], bounds[2]
+
+
+def _explained(table: FloatArray, twist: FloatArray, values: FloatArray) -> float:
+    left = twist - table @ values
+    return 1.0 - float(left @ left / np.sum((twist - twist.mean()) ** 2))

@@ -1,0 +1,231 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The two-link arm with elastic joints: what the three steps reach, wanted against measured.
+
+The plant is the printed set after tuning, simulated by this package and by MuJoCo, an engine with
+other dynamics, integration and friction. Excitation: 48 experiments of 4 s, sensor noise 0.006
+rad/s (motors, at the joints), 0.003 rad/s and 0.2 rad/s^2 (links). Tuning: four steps of 0.5 s,
+beginning at the set before tuning.
+
+"""
+
+from __future__ import annotations
+
+import time
+
+from armid_ros.identification.two_inertia import (
+    decibel_error,
+    decouple,
+    ideal_response,
+    identify_two_inertia,
+    joint_signals,
+    measured_response,
+    tune,
+)
+from armid_ros.identification.two_inertia.names import unpack
+from armid_ros.robots import load_robot
+from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters
+from armid_ros.simulation.elastic_run import (
+    ElasticRun,
+    ElasticSensors,
+    Experiment,
+    run_all,
+    VelocityLoop,
+)
+from armid_ros.simulation.elastic_signals import resonance_experiments, step_experiments
+from armid_ros.simulation.elastic_two_link import modes, two_link_loop, two_link_plant
+import numpy as np
+
+DT = 1e-3
+SENSORS = ElasticSensors(motor_velocity=0.006, link_velocity=0.003, link_acceleration=0.2)
+EXCITATION_RMS, WEAK = (60.0, 45.0), 0.15
+STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 4))
+STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
+MAIN, SPRING_DAMPING = slice(0, 7), slice(11, 13)
+#: Frequencies of the printed set after tuning [Hz], motors free and locked, by pose [deg].
+FREE = {0: (31.5, 63.0), 45: (31.9, 55.7), 90: (33.3, 47.0), 135: (36.4, 42.9), 180: (38.9, 42.2)}
+LOCKED = {0: (14.6, 55.5), 45: (15.5, 47.1), 90: (18.3, 36.4), 180: (27.7, 29.4)}
+#: Steps of MuJoCo per sample: its error falls with the first power of the step.
+FEW, MANY = 20, 200
+
+
+def excitation(count: int, seed: int = 0) -> list[Experiment]:
+    """Return experiments through the resonances."""
+    return resonance_experiments(count, rms=EXCITATION_RMS, rng=np.random.default_rng(seed))
+
+
+def steps() -> list[Experiment]:
+    """Return the steps that parameters are tuned to."""
+    return step_experiments(STEP_POSES, STEPS)
+
+
+def mujoco_arm(parameters: TwoLinkParameters, substeps: int = FEW):
+    """Return the arm as MuJoCo has it: links, rotors on axes of their own, tendons as springs."""
+    import mujoco
+
+    body = parameters.body(load_robot(ROBOT))
+    pi = np.array(body.rigid_parameters).reshape(2, 10)
+    length = float(body.model.jointPlacements[2].translation[0])
+    inertia = pi[:, 9] - pi[:, 1] ** 2 / pi[:, 0]
+    links = [
+        f'<inertial pos="{p[1] / p[0]:.17g} 0 0" mass="{p[0]:.17g}" '
+        f'diaginertia="{i:.17g} {i:.17g} {i:.17g}"/>'
+        for p, i in zip(pi, inertia, strict=True)
+    ]
+    rotors, springs = '', ''
+    for joint in range(2):
+        rotors += (
+            f'<body name="rotor{joint}"><inertial pos="0 0 0" mass="1" '
+            f'diaginertia="1e-9 1e-9 1e-9"/><joint name="m{joint}" axis="0 0 1" '
+            f'armature="{parameters.rotor[joint]:.17g}" '
+            f'damping="{parameters.joint_motor_damping[joint]:.17g}" '
+            f'frictionloss="{parameters.joint_coulomb[joint]:.17g}"/></body>'
+        )
+        springs += (
+            f'<fixed stiffness="{parameters.stiffness[joint]:.17g}" springlength="0" '
+            f'damping="{parameters.spring_damping[joint]:.17g}">'
+            f'<joint joint="m{joint}" coef="1"/><joint joint="l{joint}" coef="-1"/></fixed>'
+        )
+    step = DT / substeps
+    text = f"""<mujoco>
+      <compiler angle="radian" balanceinertia="false"/>
+      <option timestep="{step}" gravity="0 0 0" integrator="implicitfast" tolerance="1e-14"/>
+      <default><joint solreffriction="{2 * step} 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"/>
+      </default>
+      <worldbody>{rotors}
+        <body name="link1">{links[0]}
+          <joint name="l0" axis="0 0 1" damping="{parameters.link_damping[0]:.17g}"/>
+          <body name="link2" pos="{length} 0 0">{links[1]}
+            <joint name="l1" axis="0 0 1" damping="{parameters.link_damping[1]:.17g}"/>
+      </body></body></worldbody>
+      <tendon>{springs}</tendon>
+    </mujoco>"""
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def run_mujoco(model, loop: VelocityLoop, experiment: Experiment) -> ElasticRun:
+    """Run one experiment under the velocity loop, as ``run_elastic`` does."""
+    from armid_ros.motion import Motion
+    import mujoco
+
+    data, substeps = mujoco.MjData(model), round(DT / model.opt.timestep)
+    data.qpos[:] = [*experiment.q, *experiment.q]
+    count = len(experiment.velocity)
+    q, v, a = np.empty((3, count, 4))
+    tau, integral = np.empty((count, 2)), np.zeros(2)
+    extra = np.zeros((count, 2)) if experiment.torque is None else experiment.torque
+    for k in range(count):
+        error = experiment.velocity[k] - data.qvel[:2]
+        integral += DT * error
+        tau[k] = loop.proportional * error + loop.integral * integral + extra[k]
+        data.qfrc_applied[:2] = tau[k]
+        q[k], v[k] = data.qpos, data.qvel
+        mujoco.mj_forward(model, data)
+        a[k] = data.qacc
+        mujoco.mj_step(model, data, substeps)
+    t = DT * np.arange(count)
+    joints = ('joint1', 'joint2')
+    motor = Motion(joints, t, q[:, :2], v[:, :2], a[:, :2], tau)
+    return ElasticRun(motor, Motion(joints, t, q[:, 2:], v[:, 2:], a[:, 2:]), experiment.velocity)
+
+
+def errors(found: TwoLinkParameters, truth: TwoLinkParameters) -> dict[str, float]:
+    """Return the largest error of each kind of parameter [%]."""
+    share = 100.0 * np.abs(unpack(found) / unpack(truth) - 1.0)
+    total = 100.0 * np.abs(found.total_damping / truth.total_damping - 1.0)
+    return {
+        'main': float(share[MAIN].max()),
+        'dg': float(share[SPRING_DAMPING].max()),
+        'sum': float(total.max()),
+    }
+
+
+def tuning(truth_runs: list[ElasticRun], noise: float, loop: VelocityLoop, seed: int):
+    """Tune 'before' to noisy steps; return errors [%] and by how much the step error shrinks."""
+    rng = np.random.default_rng(seed)
+    sensors = ElasticSensors(motor_velocity=noise, link_velocity=noise)
+    start = two_link_set('before').parameters
+    found = tune([sensors.measure(run, rng) for run in truth_runs], start, loop)
+    true = np.stack([run.link.dq[:, 0] for run in truth_runs], axis=1)
+    before, after = (
+        np.sqrt(np.mean((values[:, :, 2] - true) ** 2)) for values in (found.before, found.after)
+    )
+    return errors(found.parameters, two_link_set('after').parameters), float(before / after)
+
+
+def decoupling(runs: list[ElasticRun], parameters: TwoLinkParameters) -> list[tuple[float, float]]:
+    """Return FRF errors [dB], 5 to 60 Hz, by joint: decoupled, and of motor torque alone."""
+    frequency, table = np.geomspace(5.0, 60.0, 200), []
+    for joint, found in enumerate(decouple(runs, parameters)):
+        ideal = ideal_response(parameters, joint, frequency)
+        decoupled = decibel_error(found.system.response(frequency)[:, 0, 0], ideal[:, 0, 0])
+        signals = joint_signals(runs, parameters, joint, decoupled=False)
+        f, coupled = measured_response(signals, DT)
+        band = (f >= 5.0) & (f <= 60.0)
+        ideal = ideal_response(parameters, joint, f[band])
+        table.append((decoupled, decibel_error(coupled[band, 0, 0], ideal[:, 0, 0])))
+    return table
+
+
+def eigenfrequency_error() -> float:
+    """Return the largest difference from the printed frequencies [Hz], which have one decimal."""
+    plant = two_link_plant(two_link_set('after').parameters)
+    worst = 0.0
+    for locked, fixtures in ((False, FREE), (True, LOCKED)):
+        for pose, wanted in fixtures.items():
+            found = modes(plant, np.array([0.0, np.radians(pose)]), locked=locked)[:, 0]
+            worst = max(worst, float(np.abs(found - wanted).max()))
+    return worst
+
+
+def row(what: str, wanted: str, measured: str) -> None:
+    """Print a row of the table."""
+    print(f'{what:58s} {wanted:>16s}  {measured}', flush=True)
+
+
+def main() -> None:
+    """Print the table."""
+    shipped = two_link_set('after')
+    truth = shipped.parameters
+    loop, weak = two_link_loop(shipped), two_link_loop(shipped, WEAK)
+    row('', 'wanted', 'measured')
+    row('eigenfrequencies [Hz off]', '<= 0.05', f'{eigenfrequency_error():.3f}')
+    plant, engine = two_link_plant(truth, substeps=4), mujoco_arm(truth)
+    own = run_all(plant, loop, steps())
+    fine = mujoco_arm(truth, MANY)
+    other = [run_mujoco(fine, loop, experiment) for experiment in steps()]
+    for name, runs, factor in (('own plant', own, 1.0), ('MuJoCo', other, 2.0)):
+        for noise, limits in ((0.002, (0.5, 3.0, 1.0, 150)), (0.02, (5.0, None, None, 20))):
+            found, ratio = tuning(runs, noise, loop, seed=0)
+            head = f'{name}, noise {noise} rad/s: '
+            main_limit, dg, total, smaller = limits
+            row(
+                head + 'main parameters [%]', f'<= {factor * main_limit:g}', f'{found["main"]:.2f}'
+            )
+            if dg is not None and total is not None:
+                row(head + 'dg [%]', f'<= {factor * dg:g}', f'{found["dg"]:.2f}')
+                row(head + 'dl + 2500 dm [%]', f'<= {factor * total:g}', f'{found["sum"]:.2f}')
+            row(head + 'step error', f'>= {smaller} x less', f'{ratio:.0f} x less')
+    rng = np.random.default_rng(1)
+    runs = [SENSORS.measure(run_mujoco(engine, weak, e), rng) for e in excitation(48)]
+    table = decoupling(runs, truth)
+    for joint, (decoupled, coupled) in enumerate(table):
+        row(f'joint {joint + 1}: decoupled FRF [dB rms]', '<= 0.1', f'{decoupled:.3f}')
+        row(f'joint {joint + 1}: motor torque alone [dB rms]', '>= 3', f'{coupled:.2f}')
+    row('worse on link 2', 'yes', 'yes' if table[1][1] > table[0][1] else 'no')
+    rng = np.random.default_rng(2)
+    noisy = ElasticSensors(motor_velocity=0.002, link_velocity=0.002)
+    started = time.perf_counter()
+    result = identify_two_inertia(
+        runs, truth, steps=[noisy.measure(run, rng) for run in other], loop=loop
+    )
+    elapsed = time.perf_counter() - started
+    found = errors(result.parameters, truth)
+    row('three steps on 48 x 4 s (MuJoCo) [s]', '<= 60', f'{elapsed:.1f}')
+    row('  main parameters [%]', '<= 1', f'{found["main"]:.2f}')
+    row('  dg, dl + 2500 dm [%]', '<= 6, 2', f'{found["dg"]:.2f}, {found["sum"]:.2f}')
+
+
+if __name__ == '__main__':
+    main()
