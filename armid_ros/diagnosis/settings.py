@@ -33,7 +33,7 @@ class DiagnosisSettings:
     least_share : float
         A group has to close this share of the excess that is left, in the arm or in one joint.
     least_of_all : float
-        ... and this share of the excess at the beginning: what takes less than a thousandth of a
+        ... and this share of the excess at the beginning: what takes less than some thousandth of a
         gap is not what was missing.
     least_z : float
         Block z that a gain has to reach on a held-out trajectory to count as replicated.
@@ -60,7 +60,7 @@ class DiagnosisSettings:
     consistent_loss: float = 1.2
     partial_loss: float = 1.4
     least_share: float = 0.10
-    least_of_all: float = 0.001
+    least_of_all: float = 0.0015
     least_z: float = 3.0
     tautology: float = 0.8
     rival_z: float = 2.0
