@@ -11,6 +11,7 @@ import sys
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.base import ArmidNode
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
@@ -53,6 +54,9 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
             executor.spin_once(timeout_sec=1.0)  # events: spin() without a time-out hangs
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except RCLError:  # a signal that comes between looking at the context and waiting on it
+        if rclpy.ok():
+            raise
     except ArmidError as error:
         print(error, file=sys.stderr)
         raise SystemExit(2) from None

@@ -2,6 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures for documents show what they are given, with names and units."""
 
+from pathlib import Path
+import subprocess
+import sys
+
 from armid_ros.excitation import DesignSettings, Problem
 from armid_ros.report.figures import (
     convergence_figure,
@@ -110,4 +114,8 @@ def test_figures_are_saved_without_a_display(case, tmp_path, suffix):
     path = tmp_path / f'figure{suffix}'
     save_figure(parameter_figure(case.result.estimate, case.result.estimate.values), path)
     assert path.stat().st_size > 5000
-    assert 'matplotlib.pyplot' not in __import__('sys').modules
+
+
+def test_figures_need_no_global_state():
+    code = 'import armid_ros.report.figures, sys; sys.exit("matplotlib.pyplot" in sys.modules)'
+    subprocess.run([sys.executable, '-c', code], check=True, cwd=Path(__file__).parents[2])
