@@ -26,6 +26,12 @@ import numpy as np
 from scipy import stats
 
 _ITERATIONS = 100
+#: Solutions of linear equations that lead to where the iteration begins.
+_LINEAR = 4
+#: Iterations that take the torques' noise as the residuals have it.
+_FREE = 5
+#: Iterations after which it stays as it is.
+_SETTLED = 25
 #: Steps below this share of a standard deviation end the iteration.
 _CONVERGED = 1e-3
 #: A step that overshoots is halved so many times.
@@ -97,7 +103,8 @@ def identify_interaction(
     problem : InteractionProblem
         Torques, columns and their derivatives: see ``interaction_problem``.
     torque_noise : float or ndarray, shape (n,), optional
-        Standard deviation of the torques [N m]; from the residuals by default.
+        Standard deviation of the torques [N m]; by default as it was measured in a recording, or
+        from the residuals. What residuals have beyond it widens the intervals.
 
     Raises
     ------
@@ -107,9 +114,15 @@ def identify_interaction(
     """
     uncorrected = _least_squares(problem, problem.columns)
     theta = _start(problem)
-    variance = _given(problem, torque_noise)
-    for _ in range(_ITERATIONS):
-        used = _torque_variance(problem, theta) if variance is None else variance
+    given = _given(problem, torque_noise)
+    used = _torque_variance(problem, theta) if given is None else given
+    for _ in range(_LINEAR):
+        theta = _compensated(problem, theta, used)
+        used = _torque_variance(problem, theta) if given is None else given
+    for iteration in range(_ITERATIONS):
+        if given is None and iteration < _SETTLED:  # or the two chase each other
+            share = 1.0 / max(1, iteration - _FREE)
+            used = (1.0 - share) * used + share * _torque_variance(problem, theta)
         step, information = _gauss_newton(problem, theta, used)
         step = _shortened(problem, theta, step, used)
         theta = theta + step
@@ -120,11 +133,13 @@ def identify_interaction(
             'the stiffness does not settle: the angles are too noisy for ways of '
             f'{1e3 * problem.typical_way:.2g} mm; filter them, or move more'
         )
+    freedom = max(1, problem.tau.size - len(theta))
+    excess = max(1.0, _loss(problem, theta, used) / freedom)
     names = tuple(
         ParameterName('interaction_stiffness', joint, 'N/m') for joint in problem.spring_joints
     )
     return Interaction(
-        Estimate(names + problem.rigid, theta, _inverse(information)),
+        Estimate(names + problem.rigid, theta, excess * _inverse(information)),
         read_only(uncorrected),
         problem.segments,
         read_only(np.sqrt(used)),
@@ -140,6 +155,28 @@ def _start(problem: InteractionProblem) -> FloatArray:
     columns = np.concatenate([together, problem.columns[:, :, count:]], axis=2)
     theta = _least_squares(problem, columns)
     return np.concatenate([np.full(count, theta[0]), theta[1:]])
+
+
+def _compensated(
+    problem: InteractionProblem, theta: FloatArray, variance: FloatArray
+) -> FloatArray:
+    """
+    Solve the normal equations less what noise adds to them on average.
+
+    Linear, so that it leads from anywhere to near the solution; weights are those at theta.
+
+    """
+    by_motion = problem.sensitivity(theta)
+    covariance = by_motion @ problem.motion_noise @ by_motion.transpose(0, 2, 1)
+    weight = np.linalg.inv(covariance + np.diag(variance))
+    weighted = np.einsum('nij,njp->nip', weight, problem.columns)
+    each = np.einsum('nij,njpx->nipx', weight, problem.columns_by_motion @ problem.motion_noise)
+    matrix = np.einsum('nip,niq->pq', problem.columns, weighted)
+    matrix -= np.einsum('nipx,niqx->pq', problem.columns_by_motion, each)
+    aim = np.einsum('nip,ni->p', weighted, problem.tau - problem.known)
+    aim += np.einsum('nipx,nix->p', each, problem.known_by_motion)
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    return np.asarray(np.linalg.solve(matrix / np.outer(size, size), aim / size) / size)
 
 
 def _shortened(
@@ -174,6 +211,9 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
 
 
 def _given(problem: InteractionProblem, noise: FloatArray | float | None) -> FloatArray | None:
+    """Return the torques' variance as asked for or as measured in them, if it was."""
+    if noise is None and np.all(problem.torque_noise > 0.0):
+        noise = problem.torque_noise
     if noise is None:
         return None
     return np.broadcast_to(np.asarray(noise, dtype=float) ** 2, problem.tau.shape[1:]).copy()
