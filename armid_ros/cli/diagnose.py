@@ -11,7 +11,8 @@ from armid_ros.arm import ArmModel, load_model, save_model
 from armid_ros.cli import options
 from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
 from armid_ros.diagnosis import diagnose as run
-from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
+from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings, next_run
+from armid_ros.excitation import save_excitation
 from armid_ros.identification import SignalSettings
 from armid_ros.report import hash_files, Provenance, versions
 from armid_ros.report.diagnosis_report import diagnosis_report
@@ -92,6 +93,9 @@ def diagnose(
             files=hash_files([*bags, *validate]), versions=versions(), settings={}, seed=seed
         ),
     )
+    run_next = next_run(result, np.random.default_rng(seed))
+    if run_next is not None:
+        save_excitation(run_next.excitation, out / 'experiment.yaml')
     (out / 'report.html').write_text(page, encoding='utf-8')
     (out / 'diagnosis.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
     if as_json:
@@ -124,4 +128,7 @@ def _show(result: Diagnosis, out: Path) -> None:
         )
     for note in result.notes:
         say(f'note: {note}')
-    say(f'{out}: diagnosis.json, model.yaml, report.html')
+    files = ['diagnosis.json', 'model.yaml', 'report.html']
+    if (out / 'experiment.yaml').exists():
+        files.append('experiment.yaml, a motion that separates the names')
+    say(f'{out}: {", ".join(files)}')

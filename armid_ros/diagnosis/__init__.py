@@ -3,13 +3,23 @@
 """
 Diagnosis: where model and measurement disagree, and which effect is missing.
 
-``diagnose`` looks, ``diagnosis_document`` writes down what it found.
+``diagnose`` looks, ``diagnosis_document`` writes down what it found, ``next_run`` says what to run
+to tell two names apart.
 
 """
 
 from armid_ros.diagnosis.diagnose import diagnose, Diagnosis
+from armid_ros.diagnosis.next_run import next_run, NextRun
 from armid_ros.diagnosis.output import diagnosis_document
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict import Finding
 
-__all__ = ['Diagnosis', 'DiagnosisSettings', 'Finding', 'diagnose', 'diagnosis_document']
+__all__ = [
+    'Diagnosis',
+    'DiagnosisSettings',
+    'Finding',
+    'NextRun',
+    'diagnose',
+    'diagnosis_document',
+    'next_run',
+]

@@ -34,6 +34,9 @@ _LOOKED_AT, _REFINED = 30, 4
 _IMITATION = 0.98
 #: Share by which masses of descriptions are off often enough for no payload to be needed.
 _OFF = 0.12
+#: What acts at peaks of the torque only; in more rows than this its column, which is made of the
+#: measured torque, stands for anything.
+_AT_PEAKS, _PEAK_SHARE = ('actuator_saturation',), 0.2
 #: What holds the arm from outside is another machine or a person: a cause as rich as this many
 #: quantities, which the arm alone has to fail to explain.
 _OUTSIDE = 4
@@ -153,6 +156,8 @@ def next_step(
         columns = problem.x[:, :, score.group.columns]
         if score.gain <= 0.0:
             break
+        if score.group.effect.name in _AT_PEAKS and _share(problem, columns) > _PEAK_SHARE:
+            continue
         promising = refined < _REFINED and score.gain > 0.4 * scores[0].gain
         if score.group.effect.shapes and promising:
             refined += 1
@@ -210,6 +215,13 @@ def _likelier_body(winner: Trial, tied: Sequence[Trial], arm: ArmModel) -> Trial
         return winner
     twins = [t for t in tied if t.score.group.key[:2] == ('link_inertia', group.effect.joints)]
     return twins[0] if twins else winner
+
+
+def _share(problem: Problem, columns: FloatArray) -> float:
+    """Return in what share of a joint's rows a group does something, the busiest joint counting."""
+    size = np.abs(columns).max(axis=2)
+    busy = size > 0.02 * max(float(size.max()), 1e-300)
+    return float(np.max(busy.sum(axis=0) / np.maximum(problem.used.sum(axis=0), 1)))
 
 
 def _complexity(group: Group) -> int:

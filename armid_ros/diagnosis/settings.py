@@ -33,8 +33,8 @@ class DiagnosisSettings:
     least_share : float
         A group has to close this share of the excess that is left, in the arm or in one joint.
     least_of_all : float
-        ... and this share of the excess at the beginning: what takes less than some thousandth of a
-        gap is not what was missing.
+        ... and this share of the excess at the beginning: what takes less than a thousandth or two
+        of a gap is not what was missing.
     least_z : float
         Block z that a gain has to reach on a held-out trajectory to count as replicated.
     tautology : float
