@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import json
 from pathlib import Path
 from typing import Any
@@ -16,11 +17,15 @@ from armid_ros.excitation import (
     Design,
     design,
     DesignSettings,
+    load_environment,
+    Problem,
     Progress,
     save_excitation,
     SPEED_CLASSES,
     TARGETS,
 )
+from armid_ros.identification.signals import conditioning, segments, SignalSettings
+from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.report.figures import excitation_figure, save_figure
 from armid_ros.robots import collision_model
@@ -62,6 +67,19 @@ class Speed(click.ParamType[str | float]):
 @click.option('--criterion', type=click.Choice([c for c in CRITERIA if c != 'T']), default='D')
 @click.option('--target', type=click.Choice(list(TARGETS)), default='all')
 @click.option('--clearance', default=0.01, show_default=True, help='Between links [m].')
+@click.option(
+    '--environment', type=click.Path(path_type=Path), help='YAML with what stands around the arm.'
+)
+@click.option(
+    '--after',
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar='BAG',
+    help='A bag recorded already: add most to what it tells. May be given several times.',
+)
+@click.option('--starts', default=4, show_default=True, help='Searches from other beginnings.')
+@click.option('--iterations', default=150, show_default=True, help='Of each search.')
+@click.option('--time-budget', default=120.0, show_default=True, help='At most so long [s].')
 @options.effects
 @options.gravity
 @options.joints
@@ -77,6 +95,11 @@ def excite(
     criterion: str,
     target: str,
     clearance: float,
+    environment: Path | None,
+    after: tuple[Path, ...],
+    starts: int,
+    iterations: int,
+    time_budget: float,
     effects: str,
     gravity: str,
     joints: str | None,
@@ -96,15 +119,25 @@ def excite(
         criterion=criterion,
         target=target,
         clearance=clearance,
+        starts=starts,
+        iterations=iterations,
+        time_budget=time_budget,
     )
     collision = collision_model(robot)
+    obstacles = load_environment(environment) if environment else ()
     with progress('designing') as tick:
 
         def told(now: Progress) -> None:
             tick(now.done, f'designing, cost {now.cost:.2f}')
 
         result = design(
-            arm, settings, np.random.default_rng(seed), collision=collision, progress=told
+            arm,
+            settings,
+            np.random.default_rng(seed),
+            collision=collision,
+            obstacles=obstacles,
+            prior_information=_known(arm, settings, after, seed) if after else None,
+            progress=told,
         )
     out.mkdir(parents=True, exist_ok=True)
     save_excitation(result.excitation, out / 'excitation.yaml')
@@ -127,6 +160,20 @@ def excite(
     say(f'condition number {document["condition_number"]:.1f}, rank {document["rank"]}')
     say(f'smallest clearance {1e3 * document["clearance"]:.0f} mm, no limit violated')
     say(f'{out}: excitation.yaml, excitation.csv, excitation.png, trajectory (a bag)')
+
+
+def _known(arm: ArmModel, settings: DesignSettings, bags: Sequence[Path], seed: int) -> FloatArray:
+    """Return the information that recordings hold already, shape (r, r)."""
+    recordings = options.read(bags, arm.robot, None)
+    used = conditioning(recordings, SignalSettings())
+    problem = Problem.of(arm, settings, np.random.default_rng(seed))
+    size = len(problem.base.parameters)
+    matrix = np.zeros((size, size))
+    for recording in recordings:
+        for motion in segments(recording, used):
+            thinned = motion.select(slice(None, None, used.decimation))
+            matrix += problem.information(thinned, recording.duration * settings.rate).matrix
+    return matrix
 
 
 def _document(result: Design, clearance: float) -> dict[str, Any]:

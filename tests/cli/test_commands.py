@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 ROBOT = 'humanoid_arm'
+QUICK = ('--starts', 1, '--iterations', 5)
 
 
 def armid(*arguments, code=0):
@@ -108,7 +109,8 @@ def test_physical_identifications_are_bodies_and_can_be_compared(bags, tmp_path)
 
 def test_excite_simulate_identify_in_three_lines(tmp_path):
     plan, run = tmp_path / 'plan', tmp_path / 'run'
-    armid('excite', '--robot', ROBOT, '--gravity', 'moon', '--duration', 10, '--out', plan)
+    arguments = ('--robot', ROBOT, '--gravity', 'moon', '--duration', 10, *QUICK)
+    armid('excite', *arguments, '--out', plan)
     excitation = load_excitation(plan / 'excitation.yaml')
     np.testing.assert_allclose(excitation.duration, 10.0)
     robot = load_robot(ROBOT, gravity='moon')
@@ -123,6 +125,14 @@ def test_excite_simulate_identify_in_three_lines(tmp_path):
     model = out / 'model.yaml'
     again = tmp_path / 'again'
     armid('simulate', '--robot', ROBOT, '--model', model, '--rate', 200, '--out', again)
+
+
+def test_a_second_excitation_adds_to_what_a_bag_tells(bags, tmp_path):
+    """With the bag, every parameter is predicted to be known better than without."""
+    arguments = ('--robot', ROBOT, '--duration', 8, *QUICK, '--json')
+    alone = json.loads(armid('excite', *arguments, '--out', tmp_path / 'a').stdout)
+    after = armid('excite', *arguments, '--after', bags[0], '--out', tmp_path / 'b').stdout
+    assert json.loads(after)['log_det'] > alone['log_det']
 
 
 @pytest.mark.parametrize(
