@@ -44,8 +44,6 @@ from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, load_robot
 import numpy as np
 
-from benchmarks.real_recordings import example_robot
-
 URDF = {
     'panda': 'panda_description/urdf/panda.urdf',
     'ur10': 'ur_description/urdf/ur10_robot.urdf',
@@ -67,7 +65,7 @@ def main():
     parser.add_argument('--random', type=int, default=1000, help='random trajectories')
     parser.add_argument('--no-peer', action='store_true', help='leave figaroh out')
     parser.add_argument('--peer-iterations', type=int, default=100)
-    parser.add_argument('--peer', choices=list(URDF), help=argparse.SUPPRESS)
+    parser.add_argument('--peer', type=Path, help=argparse.SUPPRESS)
     parser.add_argument('--out', type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.peer:
@@ -152,7 +150,7 @@ def held_out_error(problem, trajectory, unseen, rng):
 
 def arm_table(name, arguments, python, file):
     """Compare designs for one arm with random trajectories and with figaroh's."""
-    arm = friction_arm(name)
+    arm = friction_arm(urdf_of(name))
     collision = collision_model(arm.robot)
     clearance = ClearanceModel.of(collision)
     settings = DesignSettings(period=20.0, harmonics=5, n_periods=1, rate=RATE)
@@ -200,9 +198,16 @@ def arm_table(name, arguments, python, file):
     print_scatter(problem, result, rng)
 
 
-def friction_arm(name):
-    """Load an arm of example-robot-data, with friction to be seen."""
-    arm = ArmModel(load_robot(str(example_robot(URDF[name]))))
+def urdf_of(name):
+    """Return the file of an arm of example-robot-data."""
+    from benchmarks.real_recordings import example_robot  # what it imports, the peer has not
+
+    return str(example_robot(URDF[name]))
+
+
+def friction_arm(urdf):
+    """Load an arm with friction to be seen."""
+    arm = ArmModel(load_robot(urdf))
     for effect in ('viscous_friction', 'coulomb_friction'):
         arm = arm.with_effect(make_effect(effect, arm.robot))
     return arm
@@ -252,7 +257,7 @@ def peer_environment(folder):
 def peer_row(name, arguments, python, file, row):
     """Run figaroh in its environment and print what it designed."""
     environment = {**os.environ, 'PYTHONPATH': str(Path(__file__).parents[1])}
-    command = [python, '-m', 'benchmarks.excitation', '--peer', name, '--out', file]
+    command = [python, '-m', 'benchmarks.excitation', '--peer', urdf_of(name), '--out', file]
     options = ['--peer-iterations', str(arguments.peer_iterations), '--seed', str(arguments.seed)]
     done, seconds, cpu = timed(
         lambda: subprocess.run(
@@ -264,12 +269,12 @@ def peer_row(name, arguments, python, file, row):
         print(f'figaroh 1.0.2: no trajectory after {seconds:.0f} s: {"; ".join(lines[-2:])}')
         return
     with np.load(file) as found:
-        joints = friction_arm(name).robot.joints
+        joints = friction_arm(urdf_of(name)).robot.joints
         motion = Motion(joints, found['t'], found['q'], found['dq'], found['ddq'])
     row('figaroh 1.0.2, condition number', motion, seconds, cpu)
 
 
-def figaroh(name, iterations, seed, out):
+def figaroh(urdf, iterations, seed, out):
     """Design with figaroh: two segments of 10 s, 6 waypoints each; runs in its environment."""
     import logging
 
@@ -278,7 +283,7 @@ def figaroh(name, iterations, seed, out):
     from pinocchio.robot_wrapper import RobotWrapper
 
     logging.basicConfig(level=logging.ERROR)
-    arm = friction_arm(name)
+    arm = friction_arm(str(urdf))
     robot, limits, collision = arm.robot, Limits.of(arm.robot), collision_model(arm.robot)
     model = robot.model.copy()
     model.lowerPositionLimit, model.upperPositionLimit = position_range(limits)
@@ -298,7 +303,7 @@ def figaroh(name, iterations, seed, out):
         'collision_checks_per_interval': 4,
     }
     parameters = {
-        'robot_name': name,
+        'robot_name': robot.name,
         'act_idxq': axes,
         'act_idxv': axes,
         'active_joints': list(robot.joints),
@@ -312,7 +317,7 @@ def figaroh(name, iterations, seed, out):
     }
     peer.load_param = lambda robot, file: (trajectory, parameters)
     clear = ClearanceModel.of(collision)
-    first = feasible_pose(arm, limits, np.random.default_rng(seed), clear, 0.02)
+    first = feasible_pose(arm, limits, np.random.default_rng(seed), clear, 0.01)
 
     class Design(peer.BaseOptimalTrajectory):
         def create_ipopt_problem(self, *arguments):
