@@ -140,7 +140,7 @@ def leg_frames(angles: LegAngles, lengths: LegLengths) -> FloatArray:
 
     """
     q8 = angles.knee - angles.hip - angles.ankle
-    rows = (
+    rows: tuple[tuple[FloatArray | float, float, bool], ...] = (
         (np.pi - q8, lengths.foot, False),
         (-np.pi / 2.0 - angles.ankle, lengths.shank, False),
         (angles.knee, lengths.thigh, False),
