@@ -218,7 +218,7 @@ def _likelier_body(winner: Trial, tied: Sequence[Trial], arm: ArmModel) -> Trial
 
 
 def _share(problem: Problem, columns: FloatArray) -> float:
-    """Return in what share of a joint's rows a group does something, the busiest joint counting."""
+    """Return in what share of the rows of the busiest joint a group does something."""
     size = np.abs(columns).max(axis=2)
     busy = size > 0.02 * max(float(size.max()), 1e-300)
     return float(np.max(busy.sum(axis=0) / np.maximum(problem.used.sum(axis=0), 1)))
