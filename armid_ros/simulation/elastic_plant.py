@@ -303,7 +303,10 @@ def _hold(
     for axis, mode in zip(plant.rigid.contacts.axes, modes, strict=True):
         if mode != 0 or axis < 0:
             continue
-        for place in np.flatnonzero(plant.elastic == axis):
+        places = np.flatnonzero(plant.elastic == axis)
+        if not len(places):
+            x[2 * e + axis] = 0.0
+        for place in places:
             if state.x[e + place] == 0.0:
                 x[place] = state.x[place] - moved[axis]
             x[e + place] = 0.0

@@ -1,0 +1,62 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Stiffness of a real arm with two encoders a joint, and how far it can be told from free play.
+
+KUKA KR300, axes 1 to 3, three recordings of 10 s (Weigand et al. 2021), in the folder that the
+environment variable ARMID_DATA names.
+
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import sys
+
+from armid_ros.identification.two_inertia.transmission import fit_transmission, TwoEncoders
+import numpy as np
+from scipy.io import loadmat
+
+GEAR = (1798 / 7, 1872 / 7, 757 / 3)
+PERIOD = 4e-3
+
+
+def kr300(data: Path, axis: int) -> list[TwoEncoders]:
+    """Return the three recordings of an axis, 0 to 2, at the joint and in SI units."""
+    records = []
+    for name in 'ABC':
+        path = data / 'kuka_kr300_weigand' / 'data' / f'recorded_FF_{name}.mat'
+        rec = loadmat(path, struct_as_record=False, squeeze_me=True)['rec']
+        records.append(
+            TwoEncoders(
+                PERIOD,
+                np.radians(rec.act_pos_mot_deg[axis]),
+                np.radians(rec.act_pos_se_deg[axis]),
+                GEAR[axis] * rec.act_torque_abs_nm[axis],
+            )
+        )
+    return records
+
+
+def main() -> int:
+    """Print the table."""
+    folder = os.environ.get('ARMID_DATA')
+    if not folder:
+        print('two_encoders: ARMID_DATA names no folder with recordings', file=sys.stderr)
+        return 0
+    for axis in range(3):
+        fit = fit_transmission(kr300(Path(folder), axis), np.random.default_rng(0))
+        value, low, high = (1e-6 * x for x in fit.stiffness)
+        play = ', '.join(f'{np.degrees(x):.4f}' for x in fit.backlash)
+        delay = ', '.join(f'{1e3 * x:.2f}' for x in fit.delay)
+        print(
+            f'axis {axis + 1}: K {value:.1f} [{low:.1f}, {high:.1f}] 1e6 N m/rad, backlash '
+            f'[{play}] deg, correlation {fit.correlation:.2f}, {fit.reversals} reversals of load, '
+            f'encoders apart by [{delay}] ms, R2 {fit.explained:.3f}'
+        )
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,89 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Fine tuning to closed-loop steps, from the set before tuning to the one after it."""
+
+from __future__ import annotations
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.two_inertia import tune, Tuning
+from armid_ros.identification.two_inertia.names import pack, unpack
+from armid_ros.identification.two_inertia.response import sensitivities, Steps, velocities
+from armid_ros.robots.two_link import two_link_set
+from armid_ros.simulation.elastic_run import ElasticSensors, run_elastic
+from armid_ros.simulation.elastic_two_link import two_link_loop, two_link_plant
+import numpy as np
+import pytest
+
+from benchmarks.elastic import errors, steps, tuning
+
+LOOP = two_link_loop(two_link_set('after'))
+START = two_link_set('before').parameters
+
+
+@pytest.fixture(scope='module')
+def experiments(clean_steps) -> Steps:
+    """Return the experiments to be simulated."""
+    return Steps.of(clean_steps, LOOP)
+
+
+@pytest.mark.parametrize('number', range(4))
+def test_simulation_is_that_of_the_plant(experiments, truth, number) -> None:
+    """The same scheme, written for the links' equations and for any URDF."""
+    run = run_elastic(two_link_plant(truth), LOOP, steps()[number])
+    found = velocities(experiments, truth)[:, number]
+    np.testing.assert_allclose(found[:, :2], run.motor.dq, atol=1e-9)
+    np.testing.assert_allclose(found[:, 2:], run.link.dq, atol=1e-9)
+
+
+def test_derivatives_are_exact(experiments) -> None:
+    """Against central differences, whose own error is about 1e-5 where friction sticks."""
+    values = unpack(START)
+    _, slopes = sensitivities(experiments, START, np.diag(values))
+    for k in range(len(values)):
+        step = np.zeros(len(values))
+        step[k] = 1e-6 * values[k]
+        ends = [velocities(experiments, pack(values + s * step, START)) for s in (1.0, -1.0)]
+        difference = (ends[0] - ends[1]) / 2e-6
+        error = np.abs(difference - slopes[..., k]).max()
+        assert error < 1e-4 * np.abs(slopes[..., k]).max()
+
+
+@pytest.fixture(scope='module')
+def tuned(clean_steps) -> Tuning:
+    """Return the tuning to steps with noise of 0.002 rad/s."""
+    sensors = ElasticSensors(motor_velocity=0.002, link_velocity=0.002)
+    rng = np.random.default_rng(5)
+    return tune([sensors.measure(run, rng) for run in clean_steps], START, LOOP)
+
+
+def test_small_noise(clean_steps, truth, tuned) -> None:
+    true = np.stack([run.link.dq[:, 0] for run in clean_steps], axis=1)
+    before, after = (np.linalg.norm(x[:, :, 2] - true) for x in (tuned.before, tuned.after))
+    found = errors(tuned.parameters, truth)
+    assert found['main'] < 1.0
+    assert found['dg'] < 6.0
+    assert found['sum'] < 2.0
+    assert after < before / 150.0
+
+
+def test_large_noise(clean_steps) -> None:
+    found, smaller = tuning(clean_steps, 0.02, LOOP, seed=1)
+    assert found['main'] < 10.0
+    assert smaller > 20.0
+
+
+def test_intervals_hold_the_truth(truth, tuned) -> None:
+    """All thirteen, the split of friction that is tied included."""
+    off = np.abs(tuned.estimate.values - unpack(truth)) / tuned.estimate.std
+    assert np.all(off < 4.0)
+    assert np.sqrt(np.mean(off**2)) < 2.0
+
+
+def test_friction_of_motor_and_link_is_not_known_apart(tuned) -> None:
+    relative = tuned.estimate.std / tuned.estimate.values
+    assert np.all(relative[7:11] > 10.0 * relative[:7].max())
+
+
+def test_no_steps_are_refused() -> None:
+    with pytest.raises(IdentificationError, match='there are none'):
+        tune([], START, LOOP)
