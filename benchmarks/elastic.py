@@ -33,15 +33,19 @@ from armid_ros.simulation.elastic_run import (
     run_all,
     VelocityLoop,
 )
-from armid_ros.simulation.elastic_signals import resonance_experiments, step_experiments
+from armid_ros.simulation.elastic_signals import (
+    EXCITATION_RMS,
+    resonance_experiments,
+    step_experiments,
+    STEP_POSES,
+    STEPS,
+    WEAK,
+)
 from armid_ros.simulation.elastic_two_link import modes, two_link_loop, two_link_plant
 import numpy as np
 
 DT = 1e-3
 SENSORS = ElasticSensors(motor_velocity=0.006, link_velocity=0.003, link_acceleration=0.2)
-EXCITATION_RMS, WEAK = (60.0, 45.0), 0.15
-STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 4))
-STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
 MAIN, SPRING_DAMPING = slice(0, 7), slice(11, 13)
 #: Frequencies of the printed set after tuning [Hz], motors free and locked, by pose [deg].
 FREE = {0: (31.5, 63.0), 45: (31.9, 55.7), 90: (33.3, 47.0), 135: (36.4, 42.9), 180: (38.9, 42.2)}

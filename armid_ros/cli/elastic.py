@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import json
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,14 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkSet
 from armid_ros.simulation.elastic_run import ElasticSensors, run_all
-from armid_ros.simulation.elastic_signals import resonance_experiments, step_experiments
+from armid_ros.simulation.elastic_signals import (
+    EXCITATION_RMS,
+    resonance_experiments,
+    step_experiments,
+    STEP_POSES,
+    STEPS,
+    WEAK,
+)
 from armid_ros.simulation.elastic_two_link import two_link_loop, two_link_plant
 import click
 import numpy as np
@@ -31,10 +39,6 @@ import numpy as np
 #: Noise of the simulated sensors: rates in rad/s, accelerations in rad/s^2, at the joints.
 SENSORS = ElasticSensors(motor_velocity=0.006, link_velocity=0.003, link_acceleration=0.2)
 STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_acceleration=0.2)
-#: Torque of the multisine [N m] rms, and the share of the loop's gains that it runs under.
-EXCITATION_RMS, WEAK = (60.0, 45.0), 0.15
-STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 4))
-STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
 
 
 @click.command(epilog='Example: armid elastic run.mcap --steps steps.mcap --out result')
@@ -81,8 +85,6 @@ def elastic(
     as_json: bool,
 ) -> None:
     """Identify a planar two-link arm with elastic joints, in three steps."""
-    from dataclasses import replace
-
     robot = load_robot(robot_source)
     if robot.n_joints != 2:
         raise RobotError(

@@ -12,6 +12,7 @@ from armid_ros.robots.two_link import ROBOT, TwoLinkParameters, TwoLinkSet
 from armid_ros.simulation.elastic_plant import ElasticPlant
 from armid_ros.simulation.elastic_run import VelocityLoop
 import numpy as np
+import pinocchio as pin
 
 
 def two_link_arm(parameters: TwoLinkParameters, robot: Robot | None = None) -> ArmModel:
@@ -72,8 +73,6 @@ def modes(plant: ElasticPlant, q: FloatArray, *, locked: bool = False) -> FloatA
         Undamped frequency [Hz] and damping ratio of each oscillation, lowest first.
 
     """
-    import pinocchio as pin
-
     robot, e = plant.rigid.robot, len(plant.elastic)
     inertia = plant.rotors.copy()
     inertia[e:, e:] += pin.crba(robot.model, robot.model.createData(), np.asarray(q, dtype=float))

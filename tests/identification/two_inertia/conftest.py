@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from armid_ros.robots.two_link import two_link_set, TwoLinkParameters
 from armid_ros.simulation.elastic_run import ElasticRun
+from armid_ros.simulation.elastic_signals import WEAK
 from armid_ros.simulation.elastic_two_link import two_link_loop
 import numpy as np
 import pytest
 
-from benchmarks.elastic import excitation, MANY, mujoco_arm, run_mujoco, SENSORS, steps, WEAK
+from benchmarks.elastic import excitation, MANY, mujoco_arm, run_mujoco, SENSORS, steps
 
 
 @pytest.fixture(scope='session')
