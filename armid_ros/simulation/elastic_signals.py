@@ -11,8 +11,8 @@ from armid_ros.simulation.elastic_run import Experiment
 import numpy as np
 import numpy.typing as npt
 
-#: For the shipped two-link arm: torque of the multisine [N m] rms, the share of the loop's gains it
-#: runs under, and steps of the velocities [rad/s] in poses [rad] that tell all parameters apart.
+#: For the shipped two-link arm: torque of the multisine [N m] rms, the share of the loop's gains
+#: it runs under, and steps of velocity [rad/s] in poses [rad] that tell all parameters apart.
 EXCITATION_RMS, WEAK = (60.0, 45.0), 0.15
 STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 4))
 STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
