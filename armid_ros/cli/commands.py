@@ -19,6 +19,7 @@ COMMANDS = {
     'simulate': 'record',
     'identify': 'identify',
     'diagnose': 'diagnose',
+    'elastic': 'elastic',
     'exo': 'exo',
     'compare': 'compare',
     'recover': 'record',

@@ -6,9 +6,9 @@ Multivariable subspace identification: PO-MOESP, of many experiments at once.
 Poles and output matrix come from the column space of what the past tells of the future (Verhaegen
 1994, past inputs and outputs as instruments, `ordinary MOESP` of Verhaegen and Dewilde 1992 with
 past outputs added); the input matrix then follows from a linear regression on whole simulated
-experiments, with free initial states. Kept libraries take one experiment at a time (nfoursid) or
-need a Fortran library of their own (SIPPY); both hold every input over a sample, which a torque
-that comes from the motion of the arm is not.
+experiments, with free initial states. Written here for what the arm needs: many experiments with
+states of their own, and inputs that are not held over a sample, as a torque that comes from the
+motion of the arm is not.
 
 """
 
