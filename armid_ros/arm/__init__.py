@@ -4,5 +4,13 @@
 
 from armid_ros.arm.arm_model import ArmModel
 from armid_ros.arm.model_file import load_model, model_document, parameter_table, save_model
+from armid_ros.arm.torque_slope import TorqueSlope
 
-__all__ = ['ArmModel', 'load_model', 'model_document', 'parameter_table', 'save_model']
+__all__ = [
+    'ArmModel',
+    'TorqueSlope',
+    'load_model',
+    'model_document',
+    'parameter_table',
+    'save_model',
+]

@@ -180,7 +180,7 @@ class ArmModel:
         """Return the sensitivities to the rigid parameters, shape (N, n, 10 n)."""
         link = self.link_motion(motion)
         columns = regressor(self.body, self.felt(link))
-        return self._as_read(motion, self._with_load_friction(motion, columns))
+        return self._as_read(motion, self.with_load_friction(motion, columns))
 
     def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
         """
@@ -201,7 +201,7 @@ class ArmModel:
         """
         columns = effect.columns(motion, self)
         if effect.changes_body:
-            columns = self._with_load_friction(motion, columns)
+            columns = self.with_load_friction(motion, columns)
         return self._as_read(motion, columns, effect)
 
     def effect_columns(self, motion: Motion) -> FloatArray:
@@ -241,7 +241,7 @@ class ArmModel:
         columns = by_q @ change.q
         if not self.quasi_static:
             columns += by_dq @ change.dq + by_ddq @ change.ddq
-        columns = self._with_load_friction(motion, columns)
+        columns = self.with_load_friction(motion, columns)
         law = self._acting.link_torque
         if law is not None:
             columns += _directional(law, link, change)
@@ -287,8 +287,8 @@ class ArmModel:
             tau = own.read(values, motion, tau)
         return columns
 
-    def _with_load_friction(self, motion: Motion, columns: FloatArray) -> FloatArray:
-        """Add to changes of the load what friction in proportion to it adds."""
+    def with_load_friction(self, motion: Motion, columns: FloatArray) -> FloatArray:
+        """Add to changes of the load, (N, n, P), what friction in proportion to it adds."""
         friction = self._acting.dry_friction
         if friction is None or friction.load_share is None:
             return columns

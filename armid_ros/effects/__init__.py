@@ -6,7 +6,6 @@ from armid_ros.effects.action import (
     Action,
     Displacement,
     DryFriction,
-    Hysteresis,
     TorqueLaw,
     Transmission,
 )
@@ -14,6 +13,7 @@ from armid_ros.effects.base import Effect, Quantity, Shape
 from armid_ros.effects.catalogue import CATALOGUE, make_effect, parse_effect
 from armid_ros.effects.merge import merge_actions
 from armid_ros.effects.readings import Displacing, TorqueReading
+from armid_ros.effects.slipping import Hysteresis
 
 __all__ = [
     'CATALOGUE',

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from armid_ros.effects.slipping import Hysteresis
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -74,73 +75,6 @@ class DryFriction:
         if self.load_share is None:
             return np.zeros((*load.shape[:-1], len(self.lower)))
         return np.asarray(self.load_share * np.abs(load @ self.directions.T))
-
-
-@dataclass(frozen=True)
-class Hysteresis:
-    """
-    Friction that grows with the way since the last reversal: m springs that slip.
-
-    The state h of an element, from -1 to 1, follows dh = (1 - h sign(dx)) |dx| / distance along
-    its way x, whatever the speed. Its torque is level * h.
-    Source: Dahl 1968 with exponent 1.
-
-    Attributes
-    ----------
-    directions : ndarray, shape (m, n)
-        Way of each element as a combination of the joint positions.
-    level : ndarray, shape (m,)
-        Torque after a long way [N m].
-    distance : ndarray, shape (m,)
-        Way after which 1 - 1/e of the level is reached, from rest [rad or m].
-
-    """
-
-    directions: FloatArray
-    level: FloatArray
-    distance: FloatArray
-
-    def start(self, dq: FloatArray) -> FloatArray:
-        """Return the state of an arm that has moved like this for long, or rests relaxed (m,)."""
-        return np.asarray(np.sign(self.directions @ dq))
-
-    def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the state, (m,), after a displacement of the joints, (n,), in one direction."""
-        way = self.directions @ dq
-        end = np.sign(way)
-        return np.asarray(end - (end - state) * np.exp(-np.abs(way) / self.distance))
-
-    def torque(self, state: FloatArray) -> FloatArray:
-        """Return the joint torques, shape (..., n) [N m], of states of shape (..., m)."""
-        return np.asarray((self.level * state) @ self.directions)
-
-    def along(self, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """
-        Return the states along a path, shape (N, m).
-
-        Parameters
-        ----------
-        q, dq : ndarray, shape (N, n)
-            Joint positions, in order of time, and velocities.
-
-        """
-        way = q @ self.directions.T
-        states = np.empty_like(way)
-        states[0] = self.start(dq[0])
-        for element, distance in enumerate(self.distance):
-            _slip(way[:, element], states[:, element], float(distance))
-        return states
-
-
-def _slip(way: FloatArray, state: FloatArray, distance: float) -> None:
-    """Fill in the states of one element, from reversal to reversal; the first is given."""
-    step = np.sign(np.diff(way))
-    turns = np.flatnonzero(np.diff(step)) + 1
-    for first, last in zip(np.append(0, turns), np.append(turns, len(step)), strict=True):
-        if last > first:
-            end = step[first]
-            decay = np.exp(-np.abs(way[first + 1 : last + 1] - way[first]) / distance)
-            state[first + 1 : last + 1] = end - (end - state[first]) * decay
 
 
 @dataclass(frozen=True)

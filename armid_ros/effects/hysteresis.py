@@ -7,9 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armid_ros.effects.action import Action, DryFriction, Hysteresis
+from armid_ros.effects.action import Action, DryFriction
 from armid_ros.effects.base import Effect, Quantity, Shape
 from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.slipping import Hysteresis
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 

@@ -10,10 +10,10 @@ from armid_ros.effects.action import (
     Action,
     Displacement,
     DryFriction,
-    Hysteresis,
     TorqueLaw,
     Transmission,
 )
+from armid_ros.effects.slipping import Hysteresis
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np

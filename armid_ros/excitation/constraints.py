@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from armid_ros.arm import TorqueSlope
 from armid_ros.excitation.clearance import ClearanceModel
 from armid_ros.excitation.fourier import fourier_basis
 from armid_ros.excitation.problem import Problem
-from armid_ros.model import inverse_dynamics_derivatives
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
@@ -157,8 +157,8 @@ class Constraints:
         return totals, gradients
 
     def _torque(self, motion: Motion) -> tuple[FloatArray, FloatArray]:
-        limits = self.problem.limits
-        torque, by_q, by_dq, by_ddq = torque_with_derivatives(self.problem, motion)
+        arm, limits = self.problem.arm, self.problem.limits
+        torque, slope = arm.joint_torque(motion), TorqueSlope.of(arm, motion)
         limited = np.flatnonzero(np.isfinite(limits.torque))
         gradients = np.empty((len(limited), motion.n_joints, self.basis[0].shape[1]))
         totals = np.empty(len(limited))
@@ -168,10 +168,11 @@ class Constraints:
             totals[row], weights = self._soft_maximum(
                 np.concatenate([relative, -relative]) - 1.0 + self.reserve
             )
-            signed = ((weights[:count] - weights[count:]) / limits.torque[j])[:, np.newaxis]
+            of_torque = np.zeros_like(torque)
+            of_torque[:, j] = (weights[:count] - weights[count:]) / limits.torque[j]
             gradients[row] = sum(
-                (signed * by[:, j]).T @ basis
-                for by, basis in zip((by_q, by_dq, by_ddq), self.basis, strict=True)
+                by.T @ basis
+                for by, basis in zip(slope.pullback(of_torque), self.basis, strict=True)
             )
         return totals, gradients
 
@@ -196,32 +197,3 @@ class Constraints:
         weights = np.exp(self.sharpness * (excess - largest))
         total = weights.sum()
         return float(largest + np.log(total) / self.sharpness), weights / total
-
-
-def torque_with_derivatives(
-    problem: Problem, motion: Motion
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """
-    Return the torque a motion takes and its derivatives by q, dq and ddq.
-
-    What effects add beside damping and inertia counts against the limit, but is taken as constant
-    in the derivatives.
-
-    Returns
-    -------
-    torque : ndarray, shape (N, n)
-        [N m or N].
-    by_q, by_dq, by_ddq : ndarray, shape (N, n, n)
-        [k, j, m]: derivative of the torque of joint j by the motion of joint m.
-
-    """
-    arm = problem.arm
-    action = arm.action()
-    by_q, by_dq, by_ddq = inverse_dynamics_derivatives(arm.body, arm.felt(motion))
-    if arm.quasi_static:
-        by_dq, by_ddq = np.zeros_like(by_dq), np.zeros_like(by_ddq)
-    if action.damping is not None:
-        by_dq = by_dq + action.damping
-    if action.inertia is not None:
-        by_ddq = by_ddq + action.inertia
-    return arm.joint_torque(motion), by_q, by_dq, by_ddq

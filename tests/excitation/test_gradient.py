@@ -127,7 +127,15 @@ def assert_gradient(objective, problem):
         np.testing.assert_allclose(np.sum(gradient * direction), numeric, rtol=2e-5, atol=1e-7)
 
 
-@pytest.mark.parametrize('effects', [(), ('viscous_friction', 'rotor_inertia')])
+@pytest.mark.parametrize(
+    'effects',
+    [
+        (),
+        ('viscous_friction', 'rotor_inertia'),
+        ('coulomb_friction', 'load_dependent_friction', 'quadratic_friction'),
+        ('presliding_hysteresis', 'joint_spring', 'payload'),
+    ],
+)
 def test_gradient_of_the_constraints(humanoid, humanoid_collision, with_effects, effects):
     settings = DesignSettings(period=5.0, harmonics=2, samples=40)
     arm = with_effects(humanoid, *effects)

@@ -1,0 +1,95 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How the torque of an arm changes with its motion, all effects included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from armid_ros.arm.arm_model import ArmModel
+from armid_ros.effects import Hysteresis, TorqueLaw
+from armid_ros.model import inverse_dynamics_derivatives
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+
+#: Step of the differences of a torque law [rad or m, rad/s or m/s].
+_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class TorqueSlope:
+    """
+    Derivatives of ``ArmModel.joint_torque`` along a motion.
+
+    The direction of motion, which dry friction jumps with, counts as constant, and so does what
+    gives way between motors and links.
+
+    Attributes
+    ----------
+    motion : Motion
+        N samples.
+    by_q, by_dq, by_ddq : ndarray, shape (N, n, n)
+        [k, j, m]: derivative of the torque of joint j by the motion of joint m in that sample.
+    hysteresis : Hysteresis or None
+        What depends on the motion before a sample as well.
+
+    """
+
+    motion: Motion
+    by_q: FloatArray = field(repr=False)
+    by_dq: FloatArray = field(repr=False)
+    by_ddq: FloatArray = field(repr=False)
+    hysteresis: Hysteresis | None
+
+    @classmethod
+    def of(cls, arm: ArmModel, motion: Motion) -> TorqueSlope:
+        """Differentiate the torque of an arm along a motion."""
+        action, link = arm.action(), arm.link_motion(motion)
+        slopes = inverse_dynamics_derivatives(arm.body, arm.felt(link))
+        if arm.quasi_static:
+            slopes = slopes[0], np.zeros_like(slopes[1]), np.zeros_like(slopes[2])
+        together = arm.with_load_friction(motion, np.concatenate(slopes, axis=2))
+        by_q, by_dq, by_ddq = np.split(together, 3, axis=2)
+        if action.damping is not None:
+            by_dq = by_dq + action.damping
+        if action.inertia is not None:
+            by_ddq = by_ddq + action.inertia
+        for law, side in ((action.torque, motion), (action.link_torque, link)):
+            if law is not None:
+                more = _law_slopes(law, side)
+                by_q, by_dq = by_q + more[0], by_dq + more[1]
+        return cls(motion, by_q, by_dq, by_ddq, action.hysteresis)
+
+    def pullback(self, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """
+        Differentiate the sum of weights * torque by q, dq and ddq.
+
+        Parameters
+        ----------
+        weights : ndarray, shape (N, n)
+            One per torque.
+
+        Returns
+        -------
+        tuple of ndarray, each of shape (N, n)
+
+        """
+        row = weights[:, np.newaxis]
+        by_q, by_dq, by_ddq = ((row @ by)[:, 0] for by in (self.by_q, self.by_dq, self.by_ddq))
+        if self.hysteresis is not None:
+            by_q = by_q + self.hysteresis.pullback(self.motion.q, self.motion.dq, weights)
+        return by_q, by_dq, by_ddq
+
+
+def _law_slopes(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Differentiate a torque law by q and dq, by central differences, each (N, n, n)."""
+    n = motion.n_joints
+    slopes = np.empty((2, len(motion), n, n))
+    for argument, joint in np.ndindex(2, n):
+        ends = []
+        for step in (_STEP, -_STEP):
+            state = [motion.q.copy(), motion.dq.copy()]
+            state[argument][:, joint] += step
+            ends.append(law(motion.t, *state))
+        slopes[argument, :, :, joint] = (ends[0] - ends[1]) / (2.0 * _STEP)
+    return slopes[0], slopes[1]

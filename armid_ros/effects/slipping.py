@@ -1,0 +1,125 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Springs that slip: friction that depends on the way since the last reversal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.motion import FloatArray
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Hysteresis:
+    """
+    Friction that grows with the way since the last reversal: m springs that slip.
+
+    The state h of an element, from -1 to 1, follows dh = (1 - h sign(dx)) |dx| / distance along
+    its way x, whatever the speed. Its torque is level * h.
+    Source: Dahl 1968 with exponent 1.
+
+    Attributes
+    ----------
+    directions : ndarray, shape (m, n)
+        Way of each element as a combination of the joint positions.
+    level : ndarray, shape (m,)
+        Torque after a long way [N m].
+    distance : ndarray, shape (m,)
+        Way after which 1 - 1/e of the level is reached, from rest [rad or m].
+
+    """
+
+    directions: FloatArray
+    level: FloatArray
+    distance: FloatArray
+
+    def start(self, dq: FloatArray) -> FloatArray:
+        """Return the state of an arm that has moved like this for long, or rests relaxed (m,)."""
+        return np.asarray(np.sign(self.directions @ dq))
+
+    def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
+        """Return the state, (m,), after a displacement of the joints, (n,), in one direction."""
+        way = self.directions @ dq
+        end = np.sign(way)
+        return np.asarray(end - (end - state) * np.exp(-np.abs(way) / self.distance))
+
+    def torque(self, state: FloatArray) -> FloatArray:
+        """Return the joint torques, shape (..., n) [N m], of states of shape (..., m)."""
+        return np.asarray((self.level * state) @ self.directions)
+
+    def along(self, q: FloatArray, dq: FloatArray) -> FloatArray:
+        """
+        Return the states along a path, shape (N, m).
+
+        Parameters
+        ----------
+        q, dq : ndarray, shape (N, n)
+            Joint positions, in order of time, and velocities.
+
+        """
+        way = q @ self.directions.T
+        states = np.empty_like(way)
+        states[0] = self.start(dq[0])
+        for element, distance in enumerate(self.distance):
+            _slip(way[:, element], states[:, element], float(distance))
+        return states
+
+    def pullback(self, q: FloatArray, dq: FloatArray, weights: FloatArray) -> FloatArray:
+        """
+        Differentiate the sum of weights * torque along a path by its positions.
+
+        Parameters
+        ----------
+        q, dq : ndarray, shape (N, n)
+            As for ``along``.
+        weights : ndarray, shape (N, n)
+            One per torque.
+
+        Returns
+        -------
+        ndarray, shape (N, n)
+            Derivative by q.
+
+        """
+        way, states = q @ self.directions.T, self.along(q, dq)
+        by_state = (weights @ self.directions.T) * self.level
+        by_way = np.zeros_like(way)
+        for element in np.flatnonzero(by_state.any(axis=0)):
+            by_way[:, element] = _slip_pullback(
+                way[:, element],
+                states[:, element],
+                by_state[:, element],
+                float(self.distance[element]),
+            )
+        return np.asarray(by_way @ self.directions)
+
+
+def _stretches(way: FloatArray) -> list[tuple[int, int, float]]:
+    """Return first and last sample of every stretch between reversals, and its direction."""
+    step = np.sign(np.diff(way))
+    turns = np.flatnonzero(np.diff(step)) + 1
+    ends = zip(np.append(0, turns), np.append(turns, len(step)), strict=True)
+    return [(int(a), int(b), float(step[a])) for a, b in ends if b > a]
+
+
+def _slip(way: FloatArray, state: FloatArray, distance: float) -> None:
+    """Fill in the states of one element, from reversal to reversal; the first is given."""
+    for first, last, end in _stretches(way):
+        decay = np.exp(-np.abs(way[first + 1 : last + 1] - way[first]) / distance)
+        state[first + 1 : last + 1] = end - (end - state[first]) * decay
+
+
+def _slip_pullback(
+    way: FloatArray, state: FloatArray, by_state: FloatArray, distance: float
+) -> FloatArray:
+    """Turn derivatives by the states of one element into those by its way, both (N,)."""
+    by_way, by_state = np.zeros_like(way), by_state.copy()
+    for first, last, end in reversed(_stretches(way)):
+        own = slice(first + 1, last + 1)
+        decay = np.exp(-np.abs(way[own] - way[first]) / distance)
+        slope = by_state[own] * (end - state[own]) * end / distance
+        by_way[own] += slope
+        by_way[first] -= slope.sum()
+        by_state[first] += by_state[own] @ decay
+    return by_way
