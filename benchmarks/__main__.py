@@ -6,7 +6,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-LIBRARY = {'__init__', '__main__', 'leg_pair_in_mujoco', 'real_recordings'}
+LIBRARY = {'__init__', '__main__', 'browser', 'leg_pair_in_mujoco', 'real_recordings'}
 
 
 def main() -> int:

@@ -11,17 +11,23 @@ from typing import Any
 from armid_ros.arm import ArmModel, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.cli import options
-from armid_ros.cli.terminal import print_parameters, progress, say
+from armid_ros.cli.origin import provenance
+from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
 from armid_ros.identification import (
+    Identification,
     identification_document,
     IdentificationSettings,
+    PhysicalCertificate,
     PhysicalSettings,
     SignalSettings,
+    Verification,
+    verify,
+    write_document,
 )
 from armid_ros.identification import (
     identify as run,
 )
-from armid_ros.report import hash_files, identification_report, Provenance, versions
+from armid_ros.report import identification_report
 import click
 import numpy as np
 
@@ -56,6 +62,21 @@ import numpy as np
     help='Fit links that can be bodies; writes identified.urdf and identified.mjcf.xml too.',
 )
 @click.option('--total-mass', type=float, help='Of all moving links [kg], with --physical.')
+@click.option(
+    '--box',
+    'boxes',
+    multiple=True,
+    metavar='JOINT=X,Y,Z:X,Y,Z',
+    help='Two corners [m], in the frame of the joint, of a box that contains its link, with '
+    '--physical; may be given several times.',
+)
+@click.option(
+    '--verify/--no-verify',
+    'verifies',
+    default=True,
+    show_default=True,
+    help='Test for encoder noise and simulate along the held-out bags.',
+)
 @click.option('--topic', help='JointState topic, where a bag has several.')
 @options.gravity
 @options.joints
@@ -73,6 +94,8 @@ def identify(
     quasi_static: bool,
     physical: bool,
     total_mass: float | None,
+    boxes: tuple[str, ...],
+    verifies: bool,
     topic: str | None,
     gravity: str,
     joints: str | None,
@@ -82,23 +105,29 @@ def identify(
     """Fit a model with uncertainties to recordings."""
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
-    if total_mass is not None and not physical:
-        raise click.UsageError('--total-mass goes with --physical')
-    settings = IdentificationSettings(
-        method,
-        SignalSettings(cutoff, decimation),
-        PhysicalSettings(total_mass=total_mass) if physical else None,
+    if not physical and (total_mass is not None or boxes):
+        raise click.UsageError('--total-mass and --box go with --physical')
+    known = PhysicalSettings(
+        total_mass=total_mass, boxes=dict(options.box(text, robot) for text in boxes)
     )
+    settings = IdentificationSettings(
+        method, SignalSettings(cutoff, decimation), known if physical else None
+    )
+    rng = np.random.default_rng(seed)
     with progress('reading') as tick:
         recordings = options.read(bags, robot, topic)
         held_out = options.read(validate, robot, topic)
         tick(0.0, 'identifying')
-        result = run(arm, recordings, settings, rng=np.random.default_rng(seed), progress=tick)
+        result = run(arm, recordings, settings, rng=rng, progress=tick)
         validation = {r.source: result.predict([r]) for r in held_out}
-    document = identification_document(result, robot_source, validation)
+        verification = (
+            verify(result, arm, recordings, held_out, rng=rng, progress=tick) if verifies else None
+        )
+    document = identification_document(result, robot_source, validation, verification)
     out.mkdir(parents=True, exist_ok=True)
     source = options.kept_source(robot_source, robot, out)
     save_model(out / 'model.yaml', result.arm, source, result.estimate)
+    exports = _export(result.arm, out) if physical else {}
     page = identification_report(
         result,
         description=arm,
@@ -106,33 +135,66 @@ def identify(
         recordings=recordings,
         validation=validation,
         validation_recordings=held_out,
-        provenance=Provenance(
-            files=hash_files([*bags, *validate]),
-            versions=versions(),
-            settings={name: str(value) for name, value in document['settings'].items()},
-            seed=seed,
-        ),
+        verification=verification,
+        exports=exports,
+        provenance=provenance([*bags, *validate], document['settings'], seed),
     )
     (out / 'report.html').write_text(page, encoding='utf-8')
-    files = ['model.yaml', 'identification.json', 'report.html']
-    if physical:
-        for name, made in (
-            ('identified.urdf', arm_urdf(result.arm)),
-            ('identified.mjcf.xml', arm_mjcf(result.arm)),
-        ):
-            (out / name).write_text(made.text, encoding='utf-8')
-            files.append(name)
-    (out / 'identification.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    write_document(out / 'identification.json', document)
     if as_json:
         click.echo(json.dumps(document))
         return
     print_parameters(document['parameters'])
+    if result.physical is not None:
+        _print_certificate(result.physical)
     for recording in (*recordings, *held_out):
         say(f'{recording.source}: {recording.report.describe()}')
-    for note in (*robot.notes, *result.notes):
-        say(f'note: {note}')
+    _tell(result, verification, robot.notes, exports)
     fitted = document['training']['relative_error_percent']
     say(f'relative error {fitted:.2f} % on the data it was fitted to')
     for entry in document['validation']:
         say(f'relative error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
+    files = ['model.yaml', 'identification.json', 'report.html', *exports]
     say(f'{out}: {", ".join(files)}')
+
+
+def _export(arm: ArmModel, out: Path) -> dict[str, tuple[str, ...]]:
+    """Write the arm for other programs; return what each file has no place for, by its name."""
+    made = {'identified.urdf': arm_urdf(arm), 'identified.mjcf.xml': arm_mjcf(arm)}
+    for name, exported in made.items():
+        (out / name).write_text(exported.text, encoding='utf-8')
+    return {name: exported.without_place for name, exported in made.items()}
+
+
+def _print_certificate(certificate: PhysicalCertificate) -> None:
+    rows = [
+        {
+            'link': link.link,
+            'mass [kg]': f'{link.mass:.4g}',
+            'eigenvalues of the pseudo-inertia': '  '.join(f'{v:.3g}' for v in link.eigenvalues),
+            'constraint': 'active' if link.link in certificate.active else 'inactive',
+        }
+        for link in certificate.links
+    ]
+    print_rows(rows, as_json=False, right=('mass [kg]',))
+
+
+def _tell(
+    result: Identification,
+    verification: Verification | None,
+    robot_notes: tuple[str, ...],
+    exports: dict[str, tuple[str, ...]],
+) -> None:
+    for note in (*robot_notes, *result.notes):
+        say(f'note: {note}')
+    unseen = [u.parameter for u in result.unidentified if u.reason != 'not told from zero']
+    if unseen:
+        named = ', '.join(f'{p.name} of {p.joint}' if '_' in p.name else p.name for p in unseen)
+        say(f'not identified: {named}')
+    for name, lines in exports.items():
+        kinds = dict.fromkeys(line.split(':')[0] for line in lines)
+        if kinds:
+            say(f'{name} has no place for {", ".join(kinds)}; a comment in it has the values')
+    if verification is not None:
+        for sentence in verification.sentences():
+            say(f'check: {sentence}')

@@ -14,6 +14,8 @@ from armid_ros.recording import read_recording, read_robot_description, Recordin
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
 import click
 
+Corners = tuple[Sequence[float], Sequence[float]]
+
 DEFAULT_EFFECTS = 'viscous_friction,coulomb_friction,torque_offset'
 
 robot = click.option(
@@ -69,6 +71,19 @@ def with_effects(arm: ArmModel, names: str) -> ArmModel:
     for name in filter(None, names.split(',')):
         arm = arm.with_effect(make_effect(name, arm.robot))
     return arm
+
+
+def box(text: str, robot: Robot) -> tuple[str, Corners]:
+    """Read --box: a joint of the robot, and two corners [m]."""
+    joint, _, corners = text.partition('=')
+    robot.index(joint)
+    try:
+        lower, upper = ([float(x) for x in corner.split(',')] for corner in corners.split(':'))
+    except ValueError:
+        raise RobotError(
+            f"--box '{text}' has to be JOINT=X,Y,Z:X,Y,Z, two corners in metres"
+        ) from None
+    return joint, (lower, upper)
 
 
 def read(bags: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:

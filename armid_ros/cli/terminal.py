@@ -10,6 +10,7 @@ import json
 from typing import Any, Self
 
 from armid_ros.estimate import Estimate
+from armid_ros.identification.identifiability import told_from_zero
 from armid_ros.motion import FloatArray
 import click
 from rich.console import Console
@@ -60,18 +61,22 @@ def print_rows(rows: Sequence[dict[str, Any]], as_json: bool, right: Sequence[st
 
 
 def print_parameters(rows: Sequence[dict[str, Any]]) -> None:
-    """Print a table of parameters."""
+    """Print a table of parameters; a value that the data do not tell from zero is no number."""
     shown = [
         {
             'parameter': row['name'],
             'joint': row['joint'],
-            'value': f'{row["value"]:.5g}',
+            'value': f'{row["value"]:.5g}' if _told(row) else 'not told from 0',
             'std': '' if row['std'] is None else f'{row["std"]:.2g}',
             'unit': row['unit'],
         }
         for row in rows
     ]
     print_rows(shown, as_json=False, right=('value', 'std'))
+
+
+def _told(row: dict[str, Any]) -> bool:
+    return row['std'] is None or bool(told_from_zero(row['value'], row['std']))
 
 
 def _cell(value: Any) -> str:

@@ -14,9 +14,11 @@ from armid_ros.identification.identify import (
     identify,
     Score,
 )
-from armid_ros.identification.output import identification_document
-from armid_ros.identification.physical import PhysicalCertificate, PhysicalSettings
+from armid_ros.identification.output import identification_document, write_document
+from armid_ros.identification.physical import PhysicalSettings
+from armid_ros.identification.physical_certificate import PhysicalCertificate
 from armid_ros.identification.signals import Conditioning, SignalSettings
+from armid_ros.identification.verification import Verification, verify
 
 __all__ = [
     'Conditioning',
@@ -27,6 +29,9 @@ __all__ = [
     'PhysicalSettings',
     'Score',
     'SignalSettings',
+    'Verification',
     'identification_document',
     'identify',
+    'verify',
+    'write_document',
 ]

@@ -18,7 +18,7 @@ arm; Cook and Stefanski 1994 for the simulation.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.errors import IdentificationError
@@ -90,21 +90,26 @@ class NoiseCheck:
         """Bias in standard deviations of each parameter, shape (r,)."""
         return np.asarray(self.bias / np.where(self.std > 0.0, self.std, np.inf))
 
+    @property
+    def harmless(self) -> bool:
+        """Whether no parameter is biased by a share of its deviation that matters."""
+        return bool(np.max(np.abs(self.relative_bias), initial=0.0) < BIAS_LIMIT)
+
     def sentences(self) -> tuple[str, ...]:
         """Say in words what was found."""
-        noise = ', '.join(f'{value:.2g}' for value in self.position_noise)
+        low, high = self.position_noise.min(), self.position_noise.max()
         found = 'no sign' if self.consistent else 'a sign'
         worst = int(np.argmax(np.abs(self.relative_bias)))
         name = self.instrumental.parameters[worst]
         where = f'{name.name} of {name.joint}' if name.joint else name.name
         size = float(abs(self.relative_bias[worst]))
-        verdict = 'the intervals hold' if size < BIAS_LIMIT else 'the intervals are off by that'
+        verdict = 'the intervals hold' if self.harmless else 'the intervals are off by that'
         return (
             f'Durbin-Wu-Hausman test: {found} that encoder noise biases the parameters '
             f'(statistic {self.statistic:.1f}, {self.freedom:.1f} degrees of freedom, '
             f'p = {self.p_value:.2g})',
-            f'position noise {noise}: the bias that it makes is at most {size:.2g} standard '
-            f'deviations ({where}); {verdict}',
+            f'position noise {low:.2g} to {high:.2g} rad (or m): the bias that it makes is at '
+            f'most {size:.2g} standard deviations ({where}); {verdict}',
         )
 
 
@@ -114,6 +119,7 @@ def check_noise(
     *,
     rng: np.random.Generator,
     repeats: int = 6,
+    progress: Callable[[float], None] | None = None,
 ) -> NoiseCheck:
     """
     Test an identification for the effect of encoder noise and estimate its bias.
@@ -128,6 +134,8 @@ def check_noise(
         Draws the noise of the simulations.
     repeats : int
         Simulations, 2 or more.
+    progress : callable, optional
+        Told the share that is done, 0 to 1.
 
     Returns
     -------
@@ -143,15 +151,18 @@ def check_noise(
     if repeats < 2:
         raise IdentificationError(f'{repeats} simulations do not tell a mean from chance: take 2')
     independent, used = result.base.independent, result.used
+    tick = _steps(repeats + 2, progress)
     problem = regressions(result.arm, independent, recordings, used)
+    tick()
     solution = solve(problem, result.settings.method)
     calm = [_calm(recording, INSTRUMENT_SHARE * used.cutoff_hz) for recording in recordings]
     instruments = regressions(result.arm, independent, calm, used)
+    tick()
     statistic, freedom, values, covariance = _hausman(problem, instruments, solution.weights)
 
     noise = np.sqrt(np.mean([_position_noise(r) ** 2 for r in recordings], axis=0))
     bias, bias_std = _simulated_bias(
-        result, calm, instruments, solution.weights, noise, rng, repeats
+        result, calm, instruments, solution.weights, noise, rng, repeats, tick
     )
     return NoiseCheck(
         statistic=statistic,
@@ -163,6 +174,19 @@ def check_noise(
         bias_std=bias_std,
         std=result.estimate.std,
     )
+
+
+def _steps(count: int, progress: Callable[[float], None] | None) -> Callable[[], None]:
+    """Return what is called after each of some steps of equal length."""
+    done = 0
+
+    def tick() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done / count)
+
+    return tick
 
 
 def _calm(recording: Recording, cutoff_hz: float) -> Recording:
@@ -234,6 +258,7 @@ def _simulated_bias(
     noise: FloatArray,
     rng: np.random.Generator,
     repeats: int,
+    tick: Callable[[], None],
 ) -> tuple[FloatArray, FloatArray]:
     """
     Return how much noisy positions change a fit, and the standard error of that.
@@ -251,6 +276,7 @@ def _simulated_bias(
         again = regressions(result.arm, result.base.independent, noisy, result.used)
         gain = np.linalg.lstsq(_weighted(again, weights, scale), w, rcond=None)[0]
         biases.append(found - np.linalg.solve(gain, found))
+        tick()
     spread = np.std(biases, axis=0, ddof=1) / np.sqrt(repeats)
     return scale * np.mean(biases, axis=0), scale * spread
 

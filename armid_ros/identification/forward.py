@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.signals import Conditioning, segments
+from armid_ros.identification.signals import Conditioning, decimate, segments
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
@@ -42,10 +42,12 @@ class ForwardScore:
     ----------
     source : str
         The recording.
-    joints : tuple of str
-        Joints in column order.
+    joints, units : tuple of str
+        Joints in column order, and the units of their positions.
     position_error : ndarray, shape (n,)
         Root mean square of the position error [rad or m]; times 1000, mrad.
+    torque_error : ndarray, shape (n,)
+        Root mean square of recorded minus predicted torque, filtered as for the fit [N m].
     feedback_torque : ndarray, shape (n,)
         Root mean square of what the feedback had to add [N m].
     motion : Motion
@@ -57,10 +59,20 @@ class ForwardScore:
 
     source: str
     joints: tuple[str, ...]
+    units: tuple[str, ...]
     position_error: FloatArray
+    torque_error: FloatArray
     feedback_torque: FloatArray
     motion: Motion
     simulated: FloatArray
+
+    @property
+    def worst(self) -> str:
+        """The largest position error and its joint, as it is read."""
+        joint = int(np.argmax(self.position_error))
+        return (
+            f'{1e3 * self.position_error[joint]:.3g} m{self.units[joint]} ({self.joints[joint]})'
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,10 +183,14 @@ def forward_validation(
     t = run.truth.t
     recorded = np.column_stack([np.interp(t, reference.t, column) for column in reference.q.T])
     given = controller.feedforward(run.truth)
+    assert motion.tau is not None
+    left = decimate(motion.tau - arm.torque(motion), used)
     return ForwardScore(
         source=recording.source,
         joints=motion.joints,
+        units=arm.robot.position_units,
         position_error=np.sqrt(np.mean((run.truth.q - recorded) ** 2, axis=0)),
+        torque_error=np.sqrt(np.mean(left**2, axis=0)),
         feedback_torque=np.sqrt(np.mean((run.tau - given) ** 2, axis=0)),
         motion=motion,
         simulated=np.column_stack([np.interp(reference.t, t, q) for q in run.truth.q.T]),

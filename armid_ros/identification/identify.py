@@ -11,12 +11,10 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.checks import check_motion, check_torque
+from armid_ros.identification.identifiability import Unidentified, unidentified
 from armid_ros.identification.least_squares import joint_triangles, Method, solve
-from armid_ros.identification.physical import (
-    fit_bodies,
-    PhysicalCertificate,
-    PhysicalSettings,
-)
+from armid_ros.identification.physical import fit_bodies, PhysicalSettings
+from armid_ros.identification.physical_certificate import PhysicalCertificate
 from armid_ros.identification.regression import Regression, regressions
 from armid_ros.identification.signals import Conditioning, conditioning, SignalSettings
 from armid_ros.model import BaseParameters, group_columns, regroup
@@ -125,6 +123,8 @@ class Identification:
     arm : ArmModel
         The model; of all standard parameters with the identified base parameters, those nearest
         to the description's.
+    theory : BaseParameters
+        What any motion of the arm can tell apart.
     base : BaseParameters
         What the data can tell apart, and how it groups the standard parameters.
     estimate : Estimate
@@ -148,6 +148,7 @@ class Identification:
     """
 
     arm: ArmModel
+    theory: BaseParameters
     base: BaseParameters
     estimate: Estimate
     condition_number: float
@@ -157,6 +158,11 @@ class Identification:
     settings: IdentificationSettings
     notes: tuple[str, ...]
     physical: PhysicalCertificate | None = None
+
+    @property
+    def unidentified(self) -> tuple[Unidentified, ...]:
+        """What the data do not tell, and why."""
+        return unidentified(self.theory, self.base, self.estimate)
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
         """Predict the torques of other recordings, filtered like the training data."""
@@ -238,6 +244,7 @@ def identify(
         notes += certificate.sentences()
     return Identification(
         arm=arm.with_theta(theta),
+        theory=theory,
         base=base,
         estimate=estimate,
         condition_number=solution.condition_number,

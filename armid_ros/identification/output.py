@@ -5,17 +5,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import json
+from pathlib import Path
+import re
 from typing import Any
 
 from armid_ros.arm import parameter_table
+from armid_ros.identification.consistency import NoiseCheck
 from armid_ros.identification.identify import Fit, Identification, Score
+from armid_ros.identification.verification import Verification
 from armid_ros.motion import FloatArray
+import numpy as np
 
 SCHEMA = 'armid/identification/1'
 
 
 def identification_document(
-    result: Identification, robot: str, validation: Mapping[str, Sequence[Fit]]
+    result: Identification,
+    robot: str,
+    validation: Mapping[str, Sequence[Fit]],
+    verification: Verification | None = None,
 ) -> dict[str, Any]:
     """
     Return an identification as the document that identification.json holds.
@@ -28,14 +37,27 @@ def identification_document(
         Shipped name or path of the description.
     validation : mapping of str to sequence of Fit
         Predictions of recordings that were not used for fitting, by recording.
+    verification : Verification, optional
+        What the identification was put to.
 
     """
     estimate = result.estimate
-    return {
+    document = {
         'schema': SCHEMA,
         'robot': robot,
         'gravity': [float(g) for g in result.arm.robot.gravity],
         'parameters': parameter_table(estimate.parameters, estimate.values, list(estimate.std)),
+        'covariance': [row[: k + 1].tolist() for k, row in enumerate(estimate.covariance)],
+        'grouping': list(result.base.terms),
+        'not_identified': [
+            {
+                'name': lost.parameter.name,
+                'joint': lost.parameter.joint,
+                'unit': lost.parameter.unit,
+                'reason': lost.reason,
+            }
+            for lost in result.unidentified
+        ],
         'condition_number': result.condition_number,
         'rank': result.base.rank,
         'training': {
@@ -53,6 +75,36 @@ def identification_document(
         },
         'notes': list(result.notes),
         'model': 'model.yaml',
+    }
+    if result.physical is not None:
+        document['physical'] = result.physical.document()
+    if verification is not None:
+        document['verification'] = {
+            'encoder_noise': None
+            if verification.noise is None
+            else _noise(result, verification.noise),
+            'forward': [pair.document() for pair in verification.forward],
+            'left_out': list(verification.left_out),
+        }
+    return document
+
+
+def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
+    """Write a document as JSON, a row of numbers on a line."""
+    text = json.dumps(document, indent=1)
+    rows = re.sub(r'\[\n[^][{}"]*\]', lambda row: ' '.join(row[0].split()), text)
+    Path(path).write_text(rows + '\n', encoding='utf-8')
+
+
+def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:
+    return {
+        'statistic': noise.statistic,
+        'degrees_of_freedom': noise.freedom,
+        'p_value': noise.p_value,
+        'position_noise': _by_joint(result, noise.position_noise),
+        'bias': noise.bias.tolist(),
+        'bias_std': noise.bias_std.tolist(),
+        'largest_bias_in_deviations': float(np.max(np.abs(noise.relative_bias), initial=0.0)),
     }
 
 

@@ -17,7 +17,8 @@ from dataclasses import dataclass, field
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.estimate import Estimate
+from armid_ros.identification.physical_certificate import PhysicalCertificate, walls_reached
 from armid_ros.identification.physical_program import Box, PhysicalProgram
 from armid_ros.identification.regression import Regression
 from armid_ros.model import BaseParameters
@@ -37,9 +38,6 @@ FINEST_FIT = 1e-4
 WEIGHTS = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
 #: The heaviest weight is taken whose held-out error is within this share of the least one.
 TOLERANCE = 1e-3
-#: A pseudo-inertia that has shrunk to this share of the description's in some direction is at the
-#: limit of what a body can be.
-ACTIVE_SHARE = 1e-3
 #: Smallest radius of gyration of a prior [m], for descriptions that give points for links.
 SMALLEST_RADIUS = 0.005
 #: Radius of gyration of a prior for a link of which the description says nothing [m].
@@ -81,79 +79,6 @@ class PhysicalSettings:
                 )
         if self.blocks < 2 or not self.weights or not min(self.weights) > 0.0:
             raise IdentificationError('a prior is weighed by 2 blocks or more, and is positive')
-
-
-@dataclass(frozen=True)
-class PhysicalCertificate:
-    """
-    What shows that an identified arm is made of bodies, and what it cost.
-
-    Attributes
-    ----------
-    links : tuple of Consistency
-        Eigenvalues of every pseudo-inertia, mass, centre, principal moments.
-    shares : ndarray, shape (n,)
-        Smallest size of each pseudo-inertia relative to the prior's, over all directions.
-    at_bound : tuple of ParameterName
-        Effect parameters that their bound holds.
-    weight : float
-        Weight of the prior.
-    tried : tuple of (float, float)
-        Weights that were tried, and the error on the blocks left out, relative to that of
-        unconstrained fits.
-    unconstrained : Estimate
-        The fit without constraints.
-    misfit_ratio : float
-        Weighted error on the training data, relative to the unconstrained fit's.
-    notes : tuple of str
-        What was assumed of links of which the description has no body.
-
-    """
-
-    links: tuple[Consistency, ...]
-    shares: FloatArray
-    at_bound: tuple[ParameterName, ...]
-    weight: float
-    tried: tuple[tuple[float, float], ...]
-    unconstrained: Estimate
-    misfit_ratio: float
-    notes: tuple[str, ...]
-
-    @property
-    def consistent(self) -> bool:
-        """Whether every link is a body."""
-        return all(link.consistent for link in self.links)
-
-    @property
-    def held_out_ratio(self) -> float:
-        """Error on blocks left out with the chosen weight, relative to unconstrained fits'."""
-        return dict(self.tried)[self.weight]
-
-    @property
-    def active(self) -> tuple[str, ...]:
-        """Links that are at the limit of what a body can be."""
-        near = self.shares < ACTIVE_SHARE
-        return tuple(link.link for link, at in zip(self.links, near, strict=True) if at)
-
-    def sentences(self) -> tuple[str, ...]:
-        """Say in words what was found."""
-        least = min(self.links, key=lambda link: float(link.eigenvalues[0]))
-        said = [
-            f'every link is a body: the smallest eigenvalue of a pseudo-inertia is '
-            f'{least.eigenvalues[0]:.3g} ({least.link})',
-            f'constraints cost {100.0 * (self.misfit_ratio - 1.0):.2f} % of torque error on the '
-            f'training data and {100.0 * (self.held_out_ratio - 1.0):+.2f} % on blocks left out; '
-            f'weight of the description {self.weight:.0e}',
-        ]
-        if self.active:
-            said.append(
-                f'at the limit of what a body can be: {", ".join(self.active)}; '
-                'the model lacks an effect there, or the data say little'
-            )
-        if self.at_bound:
-            names = ', '.join(f'{p.name} of {p.joint}' for p in self.at_bound)
-            said.append(f'held by their bounds: {names}')
-        return (*said, *self.notes)
 
 
 def fit_bodies(
@@ -230,6 +155,12 @@ def fit_bodies(
             ]
         ),
         at_bound=tuple(name for name, at in zip(names, held, strict=True) if at),
+        at_wall=tuple(
+            f'{arm.robot.joints[link]} at {wall}'
+            for link, box in boxes.items()
+            for wall in walls_reached(rigid[link], box)
+        ),
+        total_mass=settings.total_mass,
         weight=weight,
         tried=tried,
         unconstrained=unconstrained,

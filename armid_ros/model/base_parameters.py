@@ -63,6 +63,15 @@ class BaseParameters:
         """Number of base parameters r."""
         return len(self.parameters)
 
+    @property
+    def terms(self) -> tuple[dict[str, float], ...]:
+        """Factor of each standard parameter in each base parameter, as their names have them."""
+        symbols = [_symbol(parameter) for parameter in self.standard]
+        return tuple(
+            {symbols[column]: float(row[column]) for column in np.flatnonzero(row)}
+            for row in self.grouping
+        )
+
     def values(self, theta: npt.ArrayLike) -> FloatArray:
         """Return the base parameters, shape (r,), of standard parameters, shape (P,)."""
         return np.asarray(self.grouping @ np.asarray(theta, dtype=float))

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.comparison import Change, Comparison
+from armid_ros.identification.identifiability import HALF_WIDTH
 from armid_ros.report.families import full_label, is_rigid
 from armid_ros.report.notation import counted, digits, pretty
 from armid_ros.report.page import Page
@@ -15,7 +16,6 @@ from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.changes import Changes
 from armid_ros.report.sections.facts import Asked
 from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.parameters import HALF_WIDTH
 from armid_ros.report.sections.verdict import Verdict
 
 #: Changes that are told in a sentence each; the table has all.

@@ -7,20 +7,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification import Fit, Identification
+from armid_ros.identification import Fit, Identification, Verification
 from armid_ros.recording import Recording
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted
-from armid_ros.report.page import Page
+from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.correlations import Correlations
 from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
+from armid_ros.report.sections.encoder_noise import EncoderNoise
 from armid_ros.report.sections.excitation import Excitation
 from armid_ros.report.sections.facts import Asked
 from armid_ros.report.sections.fit import FitSection
+from armid_ros.report.sections.forward import Forward
 from armid_ros.report.sections.next_steps import NextSteps
 from armid_ros.report.sections.origin import Origin
 from armid_ros.report.sections.parameters import Parameters
+from armid_ros.report.sections.physical import PhysicalSection
 from armid_ros.report.sections.residuals import Residuals
 from armid_ros.report.sections.verdict import Verdict
 from armid_ros.report.sections.whiteness import WhitenessSection
@@ -37,6 +40,8 @@ def identification_report(
     recordings: Sequence[Recording],
     validation: Mapping[str, Sequence[Fit]],
     validation_recordings: Sequence[Recording] = (),
+    verification: Verification | None = None,
+    exports: Mapping[str, Sequence[str]] | None = None,
     provenance: Provenance | None = None,
 ) -> str:
     """
@@ -56,6 +61,10 @@ def identification_report(
         Predictions of recordings that were not used for fitting, by recording.
     validation_recordings : sequence of Recording
         Those recordings.
+    verification : Verification, optional
+        What the identification was put to.
+    exports : mapping of str to sequence of str, optional
+        Files for other programs, and what each has no place for.
     provenance : Provenance, optional
         Files, versions, settings, seed.
 
@@ -72,18 +81,20 @@ def identification_report(
     held_out = [fit for fits in validation.values() for fit in fits]
     role = 'held-out' if held_out else 'training'
     shown = held_out or list(result.training)
-    judgement = judge(result, validation, [*recordings, *validation_recordings])
+    judgement = judge(result, validation, [*recordings, *validation_recordings], verification)
     quality = [
         *(RecordingQuality.of(recording, 'training') for recording in recordings),
         *(RecordingQuality.of(recording, 'held-out') for recording in validation_recordings),
     ]
-    sections = [
+    sections: list[Section] = [
         Verdict(judgement.grade, _TONES[judgement.grade], judgement.sentences, judgement.beware),
         Asked(_asked(result, robot, list(training), list(validation))),
         DataQuality(quality),
         FitSection(arm.robot, training, validation),
+        *_forward(result, verification),
         Residuals(arm.robot, shown, role),
-        Parameters(result.estimate, result.base.values(description.theta)),
+        Parameters(result.estimate, result.base.values(description.theta), result.unidentified),
+        *_physical(result, exports or {}),
         Correlations(result.estimate),
         Excitation(
             result.condition_number,
@@ -91,6 +102,7 @@ def identification_report(
             directions(result.estimate, torque_scale(result)),
         ),
         WhitenessSection(arm.robot, shown, role),
+        *_noise(result, verification),
         NextSteps(judgement.next_steps),
         Origin(provenance or Provenance()),
     ]
@@ -99,6 +111,22 @@ def identification_report(
         f'{counted(len(validation), "held-out recording")}'
     )
     return Page(f'Identification of {arm.robot.name}', subtitle, sections).html()
+
+
+def _forward(result: Identification, verification: Verification | None) -> list[Section]:
+    if verification is None or not verification.forward:
+        return []
+    return [Forward(result.arm.robot, verification.forward)]
+
+
+def _physical(result: Identification, exports: Mapping[str, Sequence[str]]) -> list[Section]:
+    return [] if result.physical is None else [PhysicalSection(result.physical, exports)]
+
+
+def _noise(result: Identification, verification: Verification | None) -> list[Section]:
+    if verification is None or verification.noise is None:
+        return []
+    return [EncoderNoise(result.arm.robot, verification.noise)]
 
 
 def _asked(

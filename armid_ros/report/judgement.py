@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
-from armid_ros.identification import Fit, Identification, Score
+from armid_ros.identification import Fit, Identification, Score, Verification
+from armid_ros.identification.identifiability import told_from_zero
 from armid_ros.recording import Recording
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, digits
@@ -68,6 +69,7 @@ def judge(
     result: Identification,
     validation: Mapping[str, Sequence[Fit]],
     recordings: Sequence[Recording],
+    verification: Verification | None = None,
 ) -> Judgement:
     """
     Judge an identification.
@@ -80,6 +82,8 @@ def judge(
         Predictions of held-out recordings.
     recordings : sequence of Recording
         What was read, for what was wrong with it.
+    verification : Verification, optional
+        What the identification was put to.
 
     """
     training = Score.of(result.training)
@@ -90,17 +94,30 @@ def judge(
         *_error_findings(result, training, held_out),
         *_residual_findings(result, fits or result.training),
         *_excitation_findings(result),
-        *(Finding(note[0].upper() + note[1:] + '.') for note in result.notes),
+        *_verification_findings(verification),
+        *(Finding(note[0].upper() + note[1:] + '.') for note in _notes(result)),
     ]
     steps = [finding.step for finding in findings if finding.step]
     if held_out is not None and not steps:
         steps = ['Nothing stands in the way of using this model in the range it was tested in.']
     return Judgement(
         grade=_grade(held_out),
-        sentences=_sentences(result, training, held_out, len(validation), len(recordings)),
+        sentences=(
+            *_sentences(result, training, held_out, len(validation), len(recordings)),
+            *_simulated(verification),
+        ),
         beware=tuple(finding.text for finding in findings if finding.text),
         next_steps=tuple(dict.fromkeys(steps)),
     )
+
+
+def _notes(result: Identification) -> list[str]:
+    """Return the notes; of a certificate what holds the fit, for the rest is good news."""
+    given = result.physical
+    if given is None:
+        return list(result.notes)
+    said = set(given.sentences()) - set(given.activity) - set(given.notes)
+    return [note for note in result.notes if note not in said]
 
 
 def _grade(held_out: Score | None) -> Grade:
@@ -136,6 +153,16 @@ def _sentences(
         f'{digits(held_out.relative_error_percent)} % '
         f'({digits(training.relative_error_percent)} % on the data it was fitted to).'
     )
+
+
+def _simulated(verification: Verification | None) -> list[str]:
+    if verification is None or not verification.forward:
+        return []
+    worst = max(verification.forward, key=lambda pair: float(pair.after.position_error.max()))
+    before = '' if worst.before is None else f'; before, {worst.before.worst}'
+    return [
+        f'Driven by the recorded torques, it is off by at most {worst.after.worst} rms{before}.'
+    ]
 
 
 def _data_findings(recordings: Sequence[Recording]) -> list[Finding]:
@@ -210,13 +237,13 @@ def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Find
 def _excitation_findings(result: Identification) -> list[Finding]:
     findings = []
     estimate = result.estimate
-    small = np.abs(estimate.values) < 2.0 * estimate.std
-    lost = [full_label(estimate.parameters[k]) for k in np.flatnonzero(small)]
+    told = told_from_zero(estimate.values, estimate.std)
+    lost = [full_label(estimate.parameters[k]) for k in np.flatnonzero(~told)]
     if lost:
         findings.append(
             Finding(
-                f'{len(lost)} of {len(estimate.parameters)} parameters are smaller than their '
-                f'uncertainty: {", ".join(lost[:_NAMED])}'
+                f'{len(lost)} of {len(estimate.parameters)} parameters are not told '
+                f'from zero: {", ".join(lost[:_NAMED])}'
                 + (f' and {len(lost) - _NAMED} more' if len(lost) > _NAMED else '')
                 + '. Use the model for torques, not these values one by one.'
             )
@@ -226,6 +253,22 @@ def _excitation_findings(result: Identification) -> list[Finding]:
             Finding(
                 f'The excitation is weak: condition number {result.condition_number:.3g}.',
                 'Design an excitation for this robot and record that.',
+            )
+        )
+    return findings
+
+
+def _verification_findings(verification: Verification | None) -> list[Finding]:
+    if verification is None:
+        return []
+    findings = [Finding(text[0].upper() + text[1:] + '.') for text in verification.left_out]
+    if verification.noise is not None and not verification.noise.harmless:
+        size = float(np.max(np.abs(verification.noise.relative_bias)))
+        findings.append(
+            Finding(
+                'Noise of the encoders biases parameters, by up to '
+                f'{digits(size)} standard deviations: their intervals are off by that.',
+                'Lower the cut-off of the position filter (--cutoff), or move faster.',
             )
         )
     return findings

@@ -13,7 +13,9 @@ def pretty(unit: str) -> str:
 
 
 def digits(value: float, count: int = 2) -> str:
-    """Return a number with significant digits, zeros kept: '2.0', not '2'."""
+    """Return a number with significant digits, zeros kept: '2.0', not '2'; 178, not 1.8e+02."""
+    if 10.0**count <= abs(value) < 1e5:
+        return f'{value:.0f}'
     return f'{value:#.{count}g}'.rstrip('.')
 
 

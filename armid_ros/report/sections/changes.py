@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.identification.comparison import Change, Comparison
+from armid_ros.identification.identifiability import HALF_WIDTH
 from armid_ros.report.families import is_rigid, parameter_families
 from armid_ros.report.notation import digits, pretty
 from armid_ros.report.page import Section
-from armid_ros.report.sections.parameters import HALF_WIDTH
 
 
 @dataclass(frozen=True)

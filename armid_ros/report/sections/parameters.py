@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.estimate import Estimate
+from armid_ros.identification.identifiability import HALF_WIDTH, Unidentified
 from armid_ros.motion import FloatArray
-from armid_ros.report.families import is_rigid, parameter_families
+from armid_ros.report.families import full_label, is_rigid, parameter_families
 from armid_ros.report.notation import digits, pretty
 from armid_ros.report.page import Section
 import numpy as np
-
-#: Half width of a 95 % interval in standard deviations.
-HALF_WIDTH = 1.96
 
 
 @dataclass(frozen=True)
@@ -51,14 +49,26 @@ class Row:
 
     @property
     def text(self) -> tuple[str, str, str]:
-        """Estimate and half width, to the digit that the half width leaves; described value."""
+        """
+        Estimate and half width, to the digit that the half width leaves; described value.
+
+        An estimate that is not told from zero is no number.
+
+        """
         described = f'{self.described:.3g}' if self.known else 'none'
+        if not self.told:
+            return 'not told from 0', f'{self.reach:.2g}', described
         if not (np.isfinite(self.reach) and self.reach > 0.0):
             return f'{self.value:.4g}', '0', described
         decimals = max(0, 1 - int(np.floor(np.log10(self.reach))))
         if decimals > 7 or max(abs(self.value), self.reach) >= 1e7:
             return f'{self.value:.3g}', f'{self.reach:.2g}', described
         return f'{self.value:.{decimals}f}', f'{self.reach:.{decimals}f}', described
+
+    @property
+    def told(self) -> bool:
+        """Whether the interval leaves out zero."""
+        return self.reach <= 0.0 or abs(self.value) > self.reach
 
     @property
     def changed(self) -> bool:
@@ -68,7 +78,7 @@ class Row:
     @property
     def relative(self) -> str:
         """Half width as a share of the value, or that it is larger."""
-        if abs(self.value) <= self.reach:
+        if not self.told:
             return '> 100 %'
         return f'{digits(100.0 * self.reach / abs(self.value))} %'
 
@@ -89,6 +99,8 @@ class Parameters(Section):
         P parameters.
     described : ndarray, shape (P,)
         Values of the description; zero for effects it does not know.
+    unidentified : sequence of Unidentified
+        What the data do not tell.
 
     """
 
@@ -97,6 +109,16 @@ class Parameters(Section):
 
     estimate: Estimate
     described: FloatArray
+    unidentified: Sequence[Unidentified] = ()
+
+    @property
+    def lost(self) -> dict[str, list[str]]:
+        """Reasons why parameters have no row, and these parameters."""
+        found: dict[str, list[str]] = {}
+        for one in self.unidentified:
+            if one.parameter not in self.estimate.parameters:
+                found.setdefault(one.reason, []).append(full_label(one.parameter))
+        return found
 
     @property
     def families(self) -> Sequence[tuple[str, str, Sequence[Row]]]:

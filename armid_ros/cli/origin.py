@@ -1,0 +1,40 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where a result comes from, as its report tells it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from datetime import datetime
+from pathlib import Path
+import shlex
+import sys
+from typing import Any
+
+from armid_ros.report import hash_files, Provenance, versions
+
+
+def provenance(
+    paths: Iterable[Path], settings: Mapping[str, Any] | None = None, seed: int | None = None
+) -> Provenance:
+    """
+    Return what is needed to get the result of the command that runs again.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        What it reads; files and folders.
+    settings : mapping of str to object, optional
+        What it uses.
+    seed : int, optional
+        Of its random numbers.
+
+    """
+    return Provenance(
+        files=hash_files(paths),
+        versions=versions(),
+        settings={name: str(value) for name, value in (settings or {}).items()},
+        seed=seed,
+        command=shlex.join(['armid', *sys.argv[1:]]),
+        created=datetime.now().astimezone().isoformat(' ', 'seconds'),
+    )

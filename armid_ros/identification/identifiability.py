@@ -1,0 +1,89 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which parameters some data do not tell, and why: they are shown as such, not as numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.model import BaseParameters
+import numpy as np
+import numpy.typing as npt
+
+#: Half width of a 95 % interval in standard deviations.
+HALF_WIDTH = 1.96
+
+Reason = Literal[
+    'no motion of this arm shows it',
+    'this motion does not show it',
+    'this motion shows it only together with others',
+    'not told from zero',
+]
+
+
+@dataclass(frozen=True)
+class Unidentified:
+    """
+    A parameter that the data do not tell.
+
+    Attributes
+    ----------
+    parameter : ParameterName
+        A standard parameter, or a base parameter.
+    reason : str
+        Why.
+
+    """
+
+    parameter: ParameterName
+    reason: Reason
+
+
+def told_from_zero(values: npt.ArrayLike, std: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    """Return where the 95 % interval of an estimate leaves out zero."""
+    return np.asarray(np.abs(values) > HALF_WIDTH * np.asarray(std, dtype=float))
+
+
+def unidentified(
+    theory: BaseParameters, base: BaseParameters, estimate: Estimate
+) -> tuple[Unidentified, ...]:
+    """
+    List what some data do not tell.
+
+    Parameters
+    ----------
+    theory : BaseParameters
+        What any motion can tell apart.
+    base : BaseParameters
+        What the data tell apart of it.
+    estimate : Estimate
+        The base parameters.
+
+    """
+    seen = np.any(base.grouping, axis=0)
+    found = [
+        Unidentified(name, 'no motion of this arm shows it')
+        for name, shown in zip(theory.standard, np.any(theory.grouping, axis=0), strict=True)
+        if not shown
+    ]
+    kept = set(base.independent.tolist())
+    for name, column in zip(theory.parameters, theory.independent, strict=True):
+        if column not in kept:
+            together = bool(seen[column])
+            found.append(
+                Unidentified(
+                    name,
+                    'this motion shows it only together with others'
+                    if together
+                    else 'this motion does not show it',
+                )
+            )
+    told = told_from_zero(estimate.values, estimate.std)
+    found += [
+        Unidentified(name, 'not told from zero')
+        for name, sure in zip(estimate.parameters, told, strict=True)
+        if not sure
+    ]
+    return tuple(found)

@@ -1,0 +1,82 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Held-out recordings, simulated in closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armid_ros.identification.forward import ForwardScore
+from armid_ros.identification.verification import ForwardValidation
+from armid_ros.report.bars import Bar, BarChart
+from armid_ros.report.charts import Chart, Role, Series, thinned
+from armid_ros.report.notation import digits, torque_unit
+from armid_ros.report.page import Section
+from armid_ros.robots import Robot
+
+
+@dataclass(frozen=True)
+class Forward(Section):
+    """
+    Position error of the description and of the identified arm, driven by recorded torques.
+
+    Attributes
+    ----------
+    robot : Robot
+        Gives joints and units.
+    pairs : sequence of ForwardValidation
+        One a held-out recording.
+
+    """
+
+    title: ClassVar[str] = 'Forward validation'
+    template: ClassVar[str] = 'forward.html'
+
+    robot: Robot
+    pairs: Sequence[ForwardValidation]
+
+    @property
+    def drawn(self) -> list[tuple[ForwardValidation, BarChart, Chart]]:
+        """Recording, errors of its joints, and the error of the worst over time."""
+        return [(pair, self._bars(pair), self._chart(pair)) for pair in self.pairs]
+
+    def _bars(self, pair: ForwardValidation) -> BarChart:
+        roles: list[tuple[Role, str, ForwardScore]] = [('after', 'identified', pair.after)]
+        if pair.before is not None:
+            roles.insert(0, ('before', 'description', pair.before))
+        rows = []
+        for joint, name in enumerate(self.robot.joints):
+            unit = torque_unit(self.robot, joint)
+            bars = [
+                Bar(
+                    1e3 * float(score.position_error[joint]),
+                    role,
+                    f'{digits(1e3 * score.position_error[joint])} m{score.units[joint]}, '
+                    f'{digits(score.torque_error[joint])} {unit}',
+                )
+                for role, _, score in roles
+            ]
+            rows.append((name, bars))
+        return BarChart(rows, 'mrad', [(role, label) for role, label, _ in roles], True)
+
+    def _chart(self, pair: ForwardValidation) -> Chart:
+        joint = int(pair.after.position_error.argmax())
+        motion = pair.after.motion
+        errors: list[tuple[str, Role, ForwardScore]] = [('identified', 'after', pair.after)]
+        if pair.before is not None:
+            errors.insert(0, ('description', 'before', pair.before))
+        curves = [1e3 * (s.simulated[:, joint] - motion.q[:, joint]) for _, _, s in errors]
+        kept = thinned(*curves)
+        return Chart(
+            motion.t[kept],
+            [
+                Series(label, curve[kept], role)
+                for (label, role, _), curve in zip(errors, curves, strict=True)
+            ],
+            'time [s]',
+            f'{self.robot.joints[joint]}: error [m{pair.after.units[joint]}]',
+            height=190,
+            symmetric=True,
+        )
