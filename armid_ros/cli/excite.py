@@ -9,63 +9,113 @@ import json
 from pathlib import Path
 from typing import Any
 
-from armid_ros.arm import ArmModel
+from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import options
+from armid_ros.cli.excitation_files import Plan, require_free, WAYPOINT_RATE, write_plan
 from armid_ros.cli.terminal import progress, say
+from armid_ros.effects import parse_effect
 from armid_ros.excitation import (
     CRITERIA,
     Design,
-    design,
+    design_speeds,
     DesignSettings,
     load_environment,
     Problem,
     Progress,
-    save_excitation,
     SPEED_CLASSES,
     TARGETS,
+    whole_period,
 )
 from armid_ros.identification.signals import conditioning, segments, SignalSettings
 from armid_ros.motion import FloatArray
-from armid_ros.recording import write_joint_trajectory
-from armid_ros.report.figures import excitation_figure, save_figure
 from armid_ros.robots import collision_model
 import click
 import numpy as np
 
-#: Waypoints per second of the JointTrajectory; controllers interpolate between them.
-WAYPOINT_RATE = 50.0
+#: Of the run-in and the run-out [s], and at most this share of the duration.
+_RUN_IN, _RUN_IN_SHARE = 2.0, 0.1
 
 
-class Speed(click.ParamType[str | float]):
-    """A speed class or a share of the velocity and acceleration limits."""
+class Speeds(click.ParamType[tuple[str | float, ...]]):
+    """Speed classes, or shares of the velocity and acceleration limits, with commas."""
 
-    name = 'speed'
+    name = 'speeds'
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> str | float:
-        """Read one."""
-        if value in SPEED_CLASSES:
-            return str(value)
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str | float, ...]:
+        """Read them."""
+        return tuple(self._one(part.strip()) for part in str(value).split(','))
+
+    def _one(self, text: str) -> str | float:
+        if text in SPEED_CLASSES:
+            return text
         try:
-            return float(value)
+            return float(text)
         except ValueError:
-            self.fail(f'{value}: neither one of {", ".join(SPEED_CLASSES)} nor a number')
+            self.fail(f"'{text}' is neither one of {', '.join(SPEED_CLASSES)} nor a number")
 
 
 @click.command(epilog='Example: armid excite --robot ur5.urdf --duration 40 --out plan')
 @options.robot
 @options.folder
 @click.option('--duration', default=44.0, show_default=True, help='From rest to rest [s].')
-@click.option('--periods', default=2, show_default=True, help='Identical periods in it.')
+@click.option(
+    '--periods',
+    type=click.IntRange(min=2),
+    default=2,
+    show_default=True,
+    help='Identical periods in it; their difference is the noise.',
+)
 @click.option('--harmonics', default=5, show_default=True, help='Per joint.')
 @click.option(
     '--speed',
-    type=Speed(),
+    'speeds',
+    type=Speeds(),
+    metavar='S,...',
     default='fast',
     show_default=True,
-    help=f'{", ".join(SPEED_CLASSES)}, or a share of the limits.',
+    help=f'{", ".join(SPEED_CLASSES)}, or a share of the limits; several: a folder for each.',
 )
-@click.option('--criterion', type=click.Choice([c for c in CRITERIA if c != 'T']), default='D')
-@click.option('--target', type=click.Choice(list(TARGETS)), default='all')
+@click.option('--criterion', type=click.Choice(list(CRITERIA)), default='D', show_default=True)
+@click.option(
+    '--target',
+    type=click.Choice(list(TARGETS)),
+    default='all',
+    show_default=True,
+    help='; '.join(f'{name}: {what}' for name, what in TARGETS.items()),
+)
+@click.option(
+    '--focus',
+    default='',
+    metavar='E,...',
+    help='Effects to see best, everything else being fitted too.',
+)
+@options.effects
+@click.option(
+    '--effect',
+    'texts',
+    multiple=True,
+    metavar='NAME:k=v',
+    help='An effect of known size, which counts against the torque limits.',
+)
+@click.option(
+    '--rival',
+    metavar='E,...|none',
+    help='With --criterion T: what may be there in place of --effect.',
+)
+@click.option(
+    '--model', type=click.Path(path_type=Path), help='model.yaml with what is known of the arm.'
+)
+@click.option('--start', metavar='Q,...', help='Pose to leave from and return to [rad or m].')
+@click.option(
+    '--acceleration',
+    metavar='A[,...]',
+    help='Limit of each joint [rad/s^2 or m/s^2]; top speed in 0.25 s by default.',
+)
+@click.option(
+    '--torque-noise',
+    metavar='N[,...]',
+    help='Standard deviation at each joint [N m or N]; 1 % of the torque limit by default.',
+)
 @click.option('--clearance', default=0.01, show_default=True, help='Between links [m].')
 @click.option(
     '--environment', type=click.Path(path_type=Path), help='YAML with what stands around the arm.'
@@ -79,8 +129,9 @@ class Speed(click.ParamType[str | float]):
 )
 @click.option('--starts', default=4, show_default=True, help='Searches from other beginnings.')
 @click.option('--iterations', default=150, show_default=True, help='Of each search.')
-@click.option('--time-budget', default=120.0, show_default=True, help='At most so long [s].')
-@options.effects
+@click.option(
+    '--time-budget', default=120.0, show_default=True, help='At most so long for a design [s].'
+)
 @options.gravity
 @options.joints
 @options.seed
@@ -91,75 +142,91 @@ def excite(
     duration: float,
     periods: int,
     harmonics: int,
-    speed: str | float,
+    speeds: tuple[str | float, ...],
     criterion: str,
     target: str,
+    focus: str,
+    effects: str,
+    texts: tuple[str, ...],
+    rival: str | None,
+    model: Path | None,
+    start: str | None,
+    acceleration: str | None,
+    torque_noise: str | None,
     clearance: float,
     environment: Path | None,
     after: tuple[Path, ...],
     starts: int,
     iterations: int,
     time_budget: float,
-    effects: str,
     gravity: str,
     joints: str | None,
     seed: int,
     as_json: bool,
 ) -> None:
     """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
-    robot = options.open_robot(robot_source, gravity, joints)
-    arm = options.with_effects(ArmModel(robot), effects)
-    run_in = min(2.0, 0.1 * duration)
+    robot = options.open_robot(robot_source, gravity, joints, after)
+    arm = ArmModel(robot) if model is None else load_model(model, robot)
+    arm = options.with_effects(arm, effects)
+    other = None if rival is None else options.with_effects(arm, rival.removesuffix('none'))
+    arm = options.with_effects(arm, focus)
+    for text in texts:
+        arm = arm.with_effect(*parse_effect(text, robot))
+    run_in = min(_RUN_IN, _RUN_IN_SHARE * duration)
     settings = DesignSettings(
-        period=(duration - 2.0 * run_in) / periods,
+        period=whole_period(duration, periods, run_in, WAYPOINT_RATE),
         n_periods=periods,
         run_in=run_in,
         harmonics=harmonics,
-        speed=speed,
         criterion=criterion,
         target=target,
+        focus=tuple(name.partition('@')[0] for name in focus.split(',') if name),
+        start=options.per_joint(start, robot, '--start'),
+        acceleration=options.per_joint(acceleration, robot, '--acceleration'),
+        noise=options.per_joint(torque_noise, robot, '--torque-noise'),
         clearance=clearance,
         starts=starts,
         iterations=iterations,
         time_budget=time_budget,
     )
-    collision = collision_model(robot)
-    obstacles = load_environment(environment) if environment else ()
+    plan = Plan(
+        arm,
+        robot_source,
+        collision_model(robot),
+        load_environment(environment) if environment else (),
+        (*after, *filter(None, (model, environment))),
+        seed,
+    )
+    folders = {speed: out if len(speeds) == 1 else out / f'{speed}' for speed in speeds}
+    for folder in folders.values():
+        require_free(folder)
     with progress('designing') as tick:
 
-        def told(now: Progress) -> None:
-            tick(now.done, f'designing, cost {now.cost:.2f}')
+        def told(speed: str | float, now: Progress) -> None:
+            done = (speeds.index(speed) + now.done) / len(speeds)
+            tick(done, f'designing {speed}, cost {now.cost:.2f}')
 
-        result = design(
+        designs = design_speeds(
             arm,
             settings,
             np.random.default_rng(seed),
-            collision=collision,
-            obstacles=obstacles,
+            speeds=speeds,
+            collision=plan.collision,
+            obstacles=plan.obstacles,
             prior_information=_known(arm, settings, after, seed) if after else None,
+            rival=other,
             progress=told,
         )
-    out.mkdir(parents=True, exist_ok=True)
-    save_excitation(result.excitation, out / 'excitation.yaml')
-    save_excitation(result.excitation, out / 'excitation.csv')
-    motion = result.excitation.motion(WAYPOINT_RATE)
-    write_joint_trajectory(out / 'trajectory', motion, robot_description=robot.urdf)
-    figure = excitation_figure(
-        robot,
-        result.excitation,
-        collision=collision,
-        margin=clearance,
-        information=result.information,
-    )
-    save_figure(figure, out / 'excitation.png')
-    document = _document(result, float(collision.path_clearance(motion.q).min()))
-    (out / 'excitation.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
-    if as_json:
-        click.echo(json.dumps(document))
-        return
-    say(f'condition number {document["condition_number"]:.1f}, rank {document["rank"]}')
-    say(f'smallest clearance {1e3 * document["clearance"]:.0f} mm, no limit violated')
-    say(f'{out}: excitation.yaml, excitation.csv, excitation.png, trajectory (a bag)')
+        tick(1.0, 'writing')
+        documents = {speed: write_plan(folders[speed], plan, designs[speed]) for speed in designs}
+    for speed, document in documents.items():
+        if as_json:
+            click.echo(json.dumps(document))
+        else:
+            _tell(folders[speed], designs[speed], document)
+    missing = [str(speed) for speed in speeds if speed not in designs]
+    if missing:
+        click.echo(f'interrupted before {", ".join(missing)}', err=True)
 
 
 def _known(arm: ArmModel, settings: DesignSettings, bags: Sequence[Path], seed: int) -> FloatArray:
@@ -172,22 +239,21 @@ def _known(arm: ArmModel, settings: DesignSettings, bags: Sequence[Path], seed: 
     for recording in recordings:
         for motion in segments(recording, used):
             thinned = motion.select(slice(None, None, used.decimation))
-            matrix += problem.information(thinned, recording.duration * settings.rate).matrix
+            duration = float(motion.t[-1] - motion.t[0])
+            matrix += problem.information(thinned, duration * settings.rate).matrix
     return matrix
 
 
-def _document(result: Design, clearance: float) -> dict[str, Any]:
-    information = result.information
-    return {
-        'schema': 'armid/excitation/1',
-        'joints': list(result.excitation.joints),
-        'duration': result.excitation.duration,
-        'condition_number': information.condition,
-        'log_det': information.log_det,
-        'rank': len(information.parameters),
-        'clearance': clearance,
-        'parameters': [
-            {'name': name.name, 'joint': name.joint, 'std': float(std), 'unit': name.unit}
-            for name, std in zip(information.parameters, information.std, strict=True)
-        ],
-    }
+def _tell(folder: Path, result: Design, document: dict[str, Any]) -> None:
+    unseen = sum(row['std'] is None for row in document['parameters'])
+    say(
+        f'{result.settings.speed}: condition number {document["condition_number"] or np.inf:.1f}, '
+        f'{len(document["parameters"])} parameters' + (f', {unseen} not seen' if unseen else '')
+    )
+    if document['clearance'] is None:
+        say('no limit violated; no bodies to keep apart')
+    else:
+        say(f'smallest clearance {1e3 * document["clearance"]:.0f} mm, no limit violated')
+    if result.stopped:
+        say(f'stopped early ({result.stopped}): the best so far, not what the seed would give')
+    say(f'{folder}: excitation.yaml, excitation.csv, trajectory (a bag), report.html')

@@ -10,9 +10,11 @@ from pathlib import Path
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import RobotError
+from armid_ros.motion import FloatArray
 from armid_ros.recording import read_recording, read_robot_description, Recording
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
 import click
+import numpy as np
 
 Corners = tuple[Sequence[float], Sequence[float]]
 
@@ -67,9 +69,11 @@ def open_robot(source: str, gravity: str, joints: str | None, bags: Sequence[Pat
 
 
 def with_effects(arm: ArmModel, names: str) -> ArmModel:
-    """Add the effects that --effects names."""
+    """Add the effects that --effects names, but for those that the arm has."""
     for name in filter(None, names.split(',')):
-        arm = arm.with_effect(make_effect(name, arm.robot))
+        effect = make_effect(name, arm.robot)
+        if (effect.name, effect.joints) not in [(own.name, own.joints) for own in arm.effects]:
+            arm = arm.with_effect(effect)
     return arm
 
 
@@ -84,6 +88,22 @@ def box(text: str, robot: Robot) -> tuple[str, Corners]:
             f"--box '{text}' has to be JOINT=X,Y,Z:X,Y,Z, two corners in metres"
         ) from None
     return joint, (lower, upper)
+
+
+def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
+    """Read one number for all joints, or one for each; None where there is no text."""
+    if text is None:
+        return None
+    try:
+        values = np.array([float(part) for part in text.split(',')])
+    except ValueError:
+        values = np.empty(0)
+    if len(values) not in (1, robot.n_joints) or not np.all(np.isfinite(values)):
+        raise RobotError(
+            f'{option} takes a number, or {robot.n_joints} with commas for '
+            f"{', '.join(robot.joints)}; not '{text}'"
+        )
+    return np.broadcast_to(values, robot.n_joints).copy()
 
 
 def read(bags: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:

@@ -12,7 +12,12 @@ from rest to rest.
 from armid_ros.excitation.clearance import Approach, ClearanceModel
 from armid_ros.excitation.criteria import CRITERIA, Information
 from armid_ros.excitation.design import Design, design, design_speeds, evaluate, Progress
-from armid_ros.excitation.environment import load_environment, Obstacle, with_obstacles
+from armid_ros.excitation.environment import (
+    load_environment,
+    Obstacle,
+    obstacles_alone,
+    with_obstacles,
+)
 from armid_ros.excitation.feasibility import excitation_faults, Faults, trajectory_faults
 from armid_ros.excitation.files import load_excitation, save_excitation
 from armid_ros.excitation.fourier import FourierTrajectory
@@ -21,12 +26,13 @@ from armid_ros.excitation.limits import (
     Limits,
     require_within,
     SPEED_CLASSES,
+    used_shares,
     Violation,
 )
 from armid_ros.excitation.problem import Problem
 from armid_ros.excitation.random_trajectory import random_feasible
 from armid_ros.excitation.schedule import Excitation
-from armid_ros.excitation.settings import DesignSettings, TARGETS
+from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
 
 __all__ = [
     'Approach',
@@ -52,9 +58,12 @@ __all__ = [
     'excitation_faults',
     'load_environment',
     'load_excitation',
+    'obstacles_alone',
     'random_feasible',
     'require_within',
     'save_excitation',
     'trajectory_faults',
+    'used_shares',
+    'whole_period',
     'with_obstacles',
 ]

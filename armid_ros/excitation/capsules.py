@@ -55,7 +55,7 @@ class Capsules:
         centres, halves = np.zeros((len(bodies), 3)), np.zeros((len(bodies), 3))
         radii = np.full(len(bodies), np.inf)
         for number, body in enumerate(bodies):
-            points, skin = _outline(body.geometry)
+            points, skin = outline(body.geometry)
             if len(points):
                 middle, half, radius = _smallest_capsule(points)
                 centres[number] = body.placement.act(middle)
@@ -125,7 +125,7 @@ def _segment_distance(between: FloatArray, first: FloatArray, second: FloatArray
     return np.asarray(np.linalg.norm(gap, axis=-1))
 
 
-def _outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
+def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
     """Return points and a radius about their convex hull that contain a shape; none if endless."""
     if isinstance(shape, coal.Convex):
         return np.array(shape.points()), 0.0

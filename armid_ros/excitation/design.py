@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 import time
 
@@ -15,7 +16,7 @@ from armid_ros.excitation.criteria import Information
 from armid_ros.excitation.environment import Obstacle, with_obstacles
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.limits import Limits, SPEED_CLASSES
-from armid_ros.excitation.parallel import search_all, Task
+from armid_ros.excitation.parallel import INTERRUPTED, search_all, Task
 from armid_ros.excitation.placing import placed
 from armid_ros.excitation.problem import Problem
 from armid_ros.excitation.schedule import Excitation
@@ -56,6 +57,10 @@ class Design:
     information : Information
         What the whole run, all periods recorded, tells about the base parameters, what was known
         before included.
+    described : ndarray, shape (r,)
+        Values of these parameters in the prior model.
+    noise : ndarray, shape (n,)
+        Torque noise that was reckoned with [N m or N].
     cost : float
         What was made small; see `SpectralCriterion`.
     limits : Limits
@@ -70,6 +75,8 @@ class Design:
 
     excitation: Excitation
     information: Information
+    described: FloatArray
+    noise: FloatArray
     cost: float
     limits: Limits
     settings: DesignSettings
@@ -146,15 +153,18 @@ def design_speeds(
     speeds: Sequence[str | float] = tuple(SPEED_CLASSES),
     collision: CollisionModel | None = None,
     obstacles: Sequence[Obstacle] = (),
+    prior_information: FloatArray | None = None,
+    rival: ArmModel | None = None,
     progress: Callable[[str | float, Progress], None] | None = None,
 ) -> dict[str | float, Design]:
     """
-    Design one trajectory for every speed class; see `design`.
+    Design one trajectory for every speed class, each as `design` finds it on its own.
 
     Returns
     -------
     dict
-        A design for every speed, in the order given.
+        A design for every speed, in the order given; KeyboardInterrupt leaves out those that were
+        not begun.
 
     """
     if settings.limits is not None:
@@ -171,11 +181,15 @@ def design_speeds(
         designs[speed] = design(
             arm,
             replace(settings, speed=speed),
-            rng,
+            deepcopy(rng),
             collision=collision,
             obstacles=obstacles,
+            prior_information=prior_information,
+            rival=rival,
             progress=tell,
         )
+        if designs[speed].stopped == INTERRUPTED:
+            break
     return designs
 
 
@@ -212,7 +226,10 @@ def evaluate(
     if prior_information is not None:
         information = replace(information, matrix=information.matrix + prior_information)
     cost = exact_cost(problem, trajectory, prior_information)
-    return Design(excitation, information, cost, problem.limits, settings, stopped)
+    described = problem.base.values(problem.arm.theta)
+    return Design(
+        excitation, information, described, problem.noise, cost, problem.limits, settings, stopped
+    )
 
 
 def _clearance(

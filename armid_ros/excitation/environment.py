@@ -140,6 +140,13 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
     return replace(collision, geometry=geometry)
 
 
+def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
+    """Return the bodies of ``with_obstacles``, each checked against the obstacles only."""
+    geometry = collision.geometry.copy()
+    geometry.removeAllCollisionPairs()
+    return with_obstacles(replace(collision, geometry=geometry), obstacles)
+
+
 def load_environment(path: str | Path) -> tuple[Obstacle, ...]:
     """
     Read obstacles from a YAML file: a list of mappings with the attributes of `Obstacle`.

@@ -220,6 +220,27 @@ def require_within(limits: Limits, motion: Motion, torque: FloatArray | None = N
         raise TrajectoryError('; '.join(str(violation) for violation in violations))
 
 
+def used_shares(limits: Limits, motion: Motion, torque: FloatArray) -> dict[str, FloatArray]:
+    """
+    Say how much of every limit a motion uses.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n,)
+        'position': share of the range that is passed through; 'velocity', 'acceleration' and
+        'torque': largest absolute value over the limit. 0 where there is no limit.
+
+    """
+    shares = {'position': np.ptp(motion.q, axis=0) / (limits.upper - limits.lower)}
+    for name, values, bound in (
+        ('velocity', motion.dq, limits.velocity),
+        ('acceleration', motion.ddq, limits.acceleration),
+        ('torque', torque, limits.torque),
+    ):
+        shares[name] = np.abs(values).max(axis=0) / bound
+    return shares
+
+
 def _violations(limits: Limits, motion: Motion, torque: FloatArray | None) -> Iterator[Violation]:
     slack = _ROUNDING * np.where(np.isfinite(limits.upper), np.abs(limits.upper) + 1.0, 1.0)
     checks: list[tuple[str, str, FloatArray, FloatArray, FloatArray]] = [

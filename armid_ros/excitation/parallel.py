@@ -24,6 +24,9 @@ import numpy as np
 #: One thread of linear algebra per process: the matrices are small.
 _ONE_THREAD = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
 
+#: Why searches did not end by themselves.
+INTERRUPTED, OUT_OF_TIME = 'interrupted', 'time budget'
+
 #: How often the time budget is looked at while the processes are silent [s].
 _PATIENCE = 0.2
 
@@ -100,7 +103,7 @@ def search_all(
     except KeyboardInterrupt:
         if board.best is None:
             raise
-        stopped = 'interrupted'
+        stopped = INTERRUPTED
     if board.best is None:
         budget = task.problem.settings.time_budget
         raise TrajectoryError(f'nothing was found within the time budget of {budget:g} s')
@@ -145,7 +148,7 @@ def _here(
 
         search(task.problem, task.clearance, task.prior, rng, report)
         if clock() > deadline:
-            return 'time budget'
+            return OUT_OF_TIME
     return ''
 
 
@@ -188,7 +191,7 @@ def _in_processes(
                     raise message
                 board.note(number, *message)
             if clock() > deadline:
-                return 'time budget'
+                return OUT_OF_TIME
         return ''
     finally:
         for connection, (_, worker) in running.items():

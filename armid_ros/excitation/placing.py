@@ -18,7 +18,7 @@ import numpy as np
 _ENTRIES = 48
 
 #: Factor by which the run-in is made longer, and how often.
-_LONGER, _TRIES = 1.5, 8
+_LONGER, _TRIES = 1.5, 12
 
 
 def placed(
@@ -39,7 +39,7 @@ def placed(
     settings, limits = problem.settings, problem.limits
     _require_start(problem, clearance)
     run_in = settings.run_in
-    reasons = ''
+    last = ''
     for _ in range(_TRIES):
         runs = [
             Excitation(
@@ -54,9 +54,9 @@ def placed(
             faults = excitation_faults(problem.arm, limits, run, clearance, settings.clearance)
             if not faults:
                 return run
-            reasons = reasons or str(faults)
+            last = f'in {run_in:.3g} s, {faults}'
         run_in *= _LONGER
-    raise TrajectoryError(f'no way into the trajectory and out of it: {reasons}')
+    raise TrajectoryError(f'no way into the trajectory and out of it; {last}')
 
 
 def _effort(problem: Problem, run: Excitation) -> float:

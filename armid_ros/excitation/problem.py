@@ -84,7 +84,9 @@ class Problem:
             If the arm has no such parameter, or no motion can tell it from the rival.
 
         """
-        limits = settings.limits or Limits.of(arm.robot, speed=settings.speed)
+        limits = settings.limits or Limits.of(
+            arm.robot, speed=settings.speed, acceleration=settings.acceleration
+        )
         noise = _noise(arm, settings)
         if (settings.criterion == 'T') != (rival is not None):
             raise TrajectoryError(
@@ -215,7 +217,7 @@ def _rival_criterion(
         raise TrajectoryError(
             f'no motion can tell the two models apart: what the rival lacks is {names}, with '
             f'parameters {np.array2string(values[~own], precision=3)}, and it can make the same '
-            'torques'
+            'torques' + ('' if values.any() else '; give what it lacks a size')
         )
     return RivalCriterion(own.astype(float), values)
 

@@ -155,8 +155,8 @@ class Excitation:
     def _blended(
         self, t: FloatArray, before: FloatArray, after: FloatArray, start: FloatArray
     ) -> Motion:
-        """Mix the start pose and the orbit with a weight that rises smoothly from 0 to 1."""
-        orbit = self.trajectory.motion(t - self.run_in)
+        """Mix the start pose and the orbit, as it gets going, with a weight from 0 to 1."""
+        orbit = self._along_orbit(t, before, after)
         sign = np.where(after > 0.0, -1.0, 1.0)
         share = 1.0 - np.maximum(before, after)
         weight = _step(share)[:, np.newaxis]

@@ -40,8 +40,11 @@ class DesignSettings:
         Pose to start from and to end in [rad or m]; None: poses on the trajectory.
     speed : str or float
         'slow', 'medium', 'fast' or a share of the velocity and acceleration limits.
+    acceleration : ndarray, shape (n,), or None
+        What the drives can do [rad/s^2 or m/s^2], which no URDF says; None: the top speed in
+        0.25 s. ``speed`` applies to it.
     limits : Limits or None
-        Limits in place of those of the robot; ``speed`` does not apply to them.
+        Limits in place of all of those; ``speed`` does not apply to them.
     clearance : float
         Distance to keep between bodies that may touch [m].
     criterion : str
@@ -82,6 +85,7 @@ class DesignSettings:
     run_in: float = 2.0
     start: FloatArray | None = None
     speed: str | float = 'fast'
+    acceleration: FloatArray | None = None
     limits: Limits | None = None
     clearance: float = 0.01
     criterion: str = 'D'
@@ -132,3 +136,33 @@ class DesignSettings:
                 f'{self.samples} samples of a period cannot show {self.harmonics} harmonics; '
                 f'take {8 * self.harmonics} or more'
             )
+
+
+def whole_period(duration: float, n_periods: int, run_in: float, rate: float) -> float:
+    """
+    Return the period that fills a run, a whole number of samples long [s].
+
+    Parameters
+    ----------
+    duration : float
+        From rest to rest [s]; the run may become half a sample a period longer or shorter.
+    n_periods : int
+        How often the period is run through.
+    run_in : float
+        Duration of the run-in, and of the run-out [s].
+    rate : float
+        Samples per second [Hz].
+
+    Raises
+    ------
+    TrajectoryError
+        If less than a second is left for a period.
+
+    """
+    period = (duration - 2.0 * run_in) / n_periods
+    if not 1.0 <= period < np.inf:
+        raise TrajectoryError(
+            f'duration {duration:g} s leaves {period:.3g} s for each of {n_periods} '
+            'periods; give it more time, or fewer periods'
+        )
+    return round(period * rate) / rate

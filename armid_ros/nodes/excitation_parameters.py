@@ -18,6 +18,7 @@ from armid_ros.excitation import (
     load_excitation,
     require_within,
     SPEED_CLASSES,
+    whole_period,
 )
 from armid_ros.motion import Motion
 from armid_ros.nodes.parameters import NodeParameter
@@ -83,14 +84,8 @@ def make_excitation(value: Values, rate: float) -> Excitation:
     for name in filter(None, value('effects')):
         arm = arm.with_effect(make_effect(name, robot))
     periods, run_in = value('n_periods'), value('run_in')
-    period = (value('duration') - 2.0 * run_in) / periods
-    if period < 1.0:
-        raise TrajectoryError(
-            f'duration {value("duration"):g} s leaves {period:.3g} s for each of {periods} '
-            'periods; give it more time, or fewer periods'
-        )
     settings = DesignSettings(
-        period=round(period * rate) / rate,
+        period=whole_period(value('duration'), periods, run_in, rate),
         harmonics=value('harmonics'),
         n_periods=periods,
         run_in=run_in,

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from armid_ros.model import point_motion
 from armid_ros.motion import FloatArray
+from armid_ros.report.strip import SIDE, Strip, svg_points
 from armid_ros.robots import Robot
 from armid_ros.simulation.leg_pair import PairMotion, TiedPair
 import numpy as np
@@ -56,43 +57,27 @@ def draw_poses(
         for robot, motion in ((pair.robot, motions.own), (pair.other, motions.other))
     ]
     everything = np.concatenate([line for group in lines for line in group], axis=1)
-    left, low = everything.min(axis=(0, 1)) - _MARGIN
-    right, high = everything.max(axis=(0, 1)) + _MARGIN
-    pitch = (right - left) * _SCALE
+    strip = Strip.around(everything.reshape(-1, 2), len(rows), _MARGIN, _SCALE)
     geometry = pair.geometry(motions.own.select(rows), motions.other.select(rows))
-
-    def place(points: FloatArray, pose: int) -> FloatArray:
-        return np.stack(
-            [pose * pitch + _SCALE * (points[..., 0] - left), _SCALE * (high - points[..., 1])],
-            axis=-1,
-        )
-
     drawn = [
         tuple(
-            ' '.join(f'{x:.1f},{y:.1f}' for x, y in place(line[pose], pose))
+            svg_points(strip.place(line[pose], pose))
             for pose in range(len(rows))
             for line in group
         )
         for group in lines
     ]
     ties = [
-        tuple(np.round(place(_ends(start, way), pose), 1).ravel().tolist())
+        tuple(np.round(strip.place(_ends(start, way), pose), 1).ravel().tolist())
         for pose in range(len(rows))
         for start, way in zip(geometry.other_position[pose], geometry.way[pose], strict=True)
     ]
-    return Drawing(
-        round(pitch * len(rows), 1),
-        round((high - low) * _SCALE + 30.0, 1),
-        drawn[0],
-        drawn[1],
-        tuple(ties),
-        tuple((round((k + 0.5) * pitch, 1), text) for k, text in enumerate(captions)),
-    )
+    return Drawing(*strip.size, drawn[0], drawn[1], tuple(ties), strip.captions(captions))
 
 
 def _ends(start: FloatArray, way: FloatArray) -> FloatArray:
     """Return both ends of a spring, drawn out of proportion, shape (2, 2) [m]."""
-    return np.stack([start, start + _MAGNIFIED * way])[:, [0, 2]]
+    return SIDE.flat(np.stack([start, start + _MAGNIFIED * way]))
 
 
 def _lines(robot: Robot, q: FloatArray) -> list[FloatArray]:
@@ -106,5 +91,5 @@ def _lines(robot: Robot, q: FloatArray) -> list[FloatArray]:
         following = None if last else np.array(robot.model.jointPlacements[body + 2].translation)
         if following is None or np.linalg.norm(following) < 1e-9:
             end, _ = point_motion(robot, joint, (6.0 if last else 1.8) * lever, q)
-            spurs.append(np.stack([origins[body + 1], end], axis=1)[..., [0, 2]])
-    return [np.stack(origins, axis=1)[..., [0, 2]], *spurs]
+            spurs.append(SIDE.flat(np.stack([origins[body + 1], end], axis=1)))
+    return [SIDE.flat(np.stack(origins, axis=1)), *spurs]

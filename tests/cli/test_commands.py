@@ -135,6 +135,30 @@ def test_a_second_excitation_adds_to_what_a_bag_tells(bags, tmp_path):
     assert json.loads(after)['log_det'] > alone['log_det']
 
 
+def test_speed_classes_come_in_folders_each_as_it_is_alone(tmp_path):
+    arguments = ('--robot', ROBOT, '--duration', 8.33, *QUICK, '--json')
+    several = armid('excite', *arguments, '--speed', 'slow,0.6', '--out', tmp_path / 'all').stdout
+    slow, medium = (json.loads(line) for line in several.splitlines())
+    assert (slow['speed'], medium['speed']) == ('slow', 0.6)
+    assert max(slow['limits_used']['velocity']) <= 1.0
+    for name in ('excitation.yaml', 'excitation.csv', 'excitation.json', 'report.html'):
+        assert (tmp_path / 'all' / 'slow' / name).is_file()
+    alone = armid('excite', *arguments, '--speed', '0.6', '--out', tmp_path / 'one').stdout
+    assert json.loads(alone)['cost'] == medium['cost']
+    again = armid('excite', *arguments, '--speed', '0.6', '--out', tmp_path / 'one', code=2)
+    assert 'exists already' in again.stderr
+
+
+def test_a_run_is_designed_to_tell_two_explanations_apart(tmp_path):
+    arguments = ('--robot', ROBOT, '--duration', 8, *QUICK, '--criterion', 'T', '--effects', '')
+    size = 'quadratic_friction@elbow_pitch:quadratic_coefficient=0.05'
+    rival = ('--rival', 'viscous_friction,coulomb_friction')
+    armid('excite', *arguments, '--effect', size, *rival, '--out', tmp_path / 'plan')
+    assert 'torque that a rival' in (tmp_path / 'plan' / 'report.html').read_text()
+    sizeless = ('--effect', 'quadratic_friction', *rival, '--out', tmp_path / 'no')
+    assert 'give what it lacks a size' in armid('excite', *arguments, *sizeless, code=2).stderr
+
+
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
@@ -155,6 +179,12 @@ def test_a_second_excitation_adds_to_what_a_bag_tells(bags, tmp_path):
         (('simulate', '--robot', ROBOT, '--out', '{bag}'), '{bag}'),
         (('recover', 'no.mcap', '--out', 'o'), 'no.mcap'),
         (('excite', '--robot', ROBOT, '--clearance', '5', '--out', 'o'), 'clearance'),
+        (('excite', '--robot', ROBOT, '--focus', 'stiction', '--out', 'o'), 'viscous_friction'),
+        (('excite', '--robot', ROBOT, '--focus', 'payload', '--out', 'o'), "'effects'"),
+        (('excite', '--robot', ROBOT, '--rival', 'payload', '--out', 'o'), "criterion 'T'"),
+        (('excite', '--robot', ROBOT, '--start', '1,2', '--out', 'o'), 'wrist_pitch'),
+        (('excite', '--robot', ROBOT, '--duration', '2', '--out', 'o'), 'duration 2 s'),
+        (('excite', '--robot', ROBOT, '--speed', '1.5', '--out', 'o'), 'share of the limits'),
     ],
 )
 def test_bad_input_is_one_line_with_the_answer(arguments, message, bags, tmp_path, monkeypatch):

@@ -30,6 +30,33 @@ def browser(tmp_path_factory):
     browser.close()
 
 
+DRAWN = (
+    '[...document.querySelectorAll("figure.chart canvas")].filter(canvas => '
+    'new Set(canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height)'
+    '.data).size > 8).length'
+)
+
+
+@pytest.fixture
+def charts_drawn(browser, tmp_path):
+    """Return a function that opens a page, all of it, and counts the charts that are drawn."""
+
+    def count(html, width, dark):
+        path = tmp_path / 'report.html'
+        path.write_text(html, encoding='utf-8')
+        browser.open(path, width, dark=dark)
+        browser.run('document.querySelectorAll("details").forEach(d => { d.open = true; })')
+        browser.run(
+            'new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))'
+        )
+        assert browser.complaints == []
+        assert all(url.startswith(('file:', 'data:')) for url in browser.requested)
+        assert browser.run('document.documentElement.scrollWidth') <= width
+        return browser.run(DRAWN)
+
+    return count
+
+
 @dataclass(frozen=True)
 class Case:
     """An identification with everything it came from."""

@@ -6,15 +6,12 @@ from pathlib import Path
 import subprocess
 import sys
 
-from armid_ros.excitation import DesignSettings, Problem
 from armid_ros.report.figures import (
     convergence_figure,
-    excitation_figure,
     parameter_figure,
     save_figure,
     torque_figure,
 )
-from armid_ros.robots import collision_model
 import matplotlib
 import numpy as np
 import pytest
@@ -76,37 +73,6 @@ def test_convergence_figure_shows_all_parameters_and_says_the_unit(case):
     assert f'All {len(estimate.parameters)} parameters' in written
     assert 'kg m²' in written and 'time [s]' in written
     assert figure.axes[-1].get_yscale() == 'log'
-
-
-@pytest.fixture(scope='module')
-def excitation_drawing(case):
-    robot = case.truth.robot
-    rng = np.random.default_rng(1)
-    problem = Problem.of(case.truth, DesignSettings(period=8.0), rng)
-    information = problem.information(case.excitation.motion(20.0), 1000)
-    return excitation_figure(
-        robot,
-        case.excitation,
-        collision=collision_model(robot),
-        margin=0.01,
-        information=information,
-    )
-
-
-def test_excitation_figure_keeps_the_limits_in_sight(case, excitation_drawing):
-    robot = case.truth.robot
-    for joint in range(robot.n_joints):
-        axes = excitation_drawing.axes[joint]
-        assert axes.get_title(loc='left') == robot.joints[joint]
-        bottom, top = axes.get_ylim()
-        assert bottom < robot.lower[joint] and top > robot.upper[joint]
-
-
-def test_excitation_figure_says_the_smallest_clearance(case, excitation_drawing):
-    path = case.excitation.at(np.linspace(0.0, case.excitation.duration, 400)).q
-    smallest = 100.0 * collision_model(case.truth.robot).path_clearance(path).min()
-    title = excitation_drawing.axes[case.truth.robot.n_joints].get_title(loc='left')
-    assert f'never less than {smallest:.1f} cm' in title
 
 
 @pytest.mark.parametrize('suffix', ['.png', '.svg', '.pdf'])

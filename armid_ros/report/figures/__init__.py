@@ -8,14 +8,12 @@ Each function returns a ``matplotlib.figure.Figure``; ``save_figure`` writes it.
 """
 
 from armid_ros.report.figures.convergence import convergence_figure
-from armid_ros.report.figures.excitation import excitation_figure
 from armid_ros.report.figures.parameters import parameter_figure
 from armid_ros.report.figures.style import save_figure
 from armid_ros.report.figures.torque import torque_figure
 
 __all__ = [
     'convergence_figure',
-    'excitation_figure',
     'parameter_figure',
     'save_figure',
     'torque_figure',

@@ -1,0 +1,222 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a designed excitation: is it fit to run, and what will it show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.excitation import (
+    ClearanceModel,
+    CRITERIA,
+    Design,
+    DesignSettings,
+    Obstacle,
+    obstacles_alone,
+    SPEED_CLASSES,
+    TARGETS,
+    used_shares,
+    with_obstacles,
+)
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.report.families import full_label
+from armid_ros.report.notation import counted, digits, pretty, torque_unit
+from armid_ros.report.page import Page, Section
+from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.facts import Asked
+from armid_ros.report.sections.origin import Origin
+from armid_ros.report.sections.plan import (
+    ArmPoses,
+    Foreseen,
+    Harmonics,
+    PlannedClearance,
+    PlannedMotion,
+)
+from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.silhouettes import draw_silhouettes
+from armid_ros.robots import CollisionModel
+import numpy as np
+
+_SAMPLES, _POSES, _WAY = 600, 6, 150
+
+
+def excitation_report(
+    design: Design,
+    arm: ArmModel,
+    *,
+    robot: str,
+    collision: CollisionModel,
+    obstacles: Sequence[Obstacle] = (),
+    provenance: Provenance | None = None,
+) -> str:
+    """
+    Return report.html of a design.
+
+    Parameters
+    ----------
+    design : Design
+        What was found.
+    arm : ArmModel
+        Prior model, for the torque.
+    robot : str
+        Shipped name or path of the description.
+    collision : CollisionModel
+        Bodies of the arm.
+    obstacles : sequence of Obstacle
+        What stands around it.
+    provenance : Provenance, optional
+        Files, versions, settings, seed.
+
+    Returns
+    -------
+    str
+        One HTML file that loads nothing.
+
+    """
+    run, limits = design.excitation, design.limits
+    motion = run.at(np.linspace(0.0, run.duration, _SAMPLES))
+    torque = arm.joint_torque(motion)
+    motion = replace(motion, tau=torque)
+    bodies = {'links from each other': collision}
+    if obstacles:
+        bodies['arm from its environment'] = obstacles_alone(collision, obstacles)
+    curves = {
+        name: model.path_clearance(motion.q)
+        for name, model in bodies.items()
+        if len(model.geometry.collisionPairs)
+    }
+    whole = with_obstacles(collision, obstacles)
+    instants = run.run_in + np.arange(_POSES) * run.trajectory.period / _POSES
+    sections: list[Section] = [
+        _verdict(design, motion, ClearanceModel.of(whole), collision.notes),
+        Asked(_asked(design, arm, robot, obstacles)),
+        ArmPoses(
+            draw_silhouettes(
+                whole,
+                run.at(instants).q,
+                [f'{t:.1f} s' for t in instants],
+                run.trajectory.one_period(_WAY).q,
+            ),
+            ', '.join(obstacle.name for obstacle in obstacles),
+        ),
+        Foreseen(design),
+        PlannedMotion(limits, motion, used_shares(limits, motion, torque)),
+        PlannedClearance(motion.t, curves, design.settings.clearance, collision.notes),
+        Harmonics(run.trajectory),
+        Origin(provenance or Provenance()),
+    ]
+    subtitle = (
+        f'{robot} · {run.duration:.4g} s · {run.n_periods} periods · {design.settings.speed}'
+    )
+    return Page(f'Excitation of {arm.robot.name}', subtitle, sections).html()
+
+
+def _verdict(
+    design: Design, motion: Motion, clearance: ClearanceModel, notes: Sequence[str]
+) -> Verdict:
+    """Say how much is seen, what is known worst, and that nothing is hit."""
+    information, settings = design.information, design.settings
+    std, names = information.std, information.parameters
+    unseen = [full_label(name) for name, s in zip(names, std, strict=True) if not np.isfinite(s)]
+    seen = len(names) - len(unseen)
+    sentences = [f'The run tells {seen} of {len(names)} parameters apart.']
+    if not unseen:
+        sentences = [
+            f'The run tells all {len(names)} parameters apart; the condition number of the '
+            f'weighted regressor is {information.condition:.3g}.'
+        ]
+        worst = int(np.argmax(std / information.scale))
+        sentences.append(
+            f'Known worst will be {full_label(names[worst])}: ± {digits(float(std[worst]))} '
+            f'{pretty(names[worst].unit)}.'
+        )
+    sentences.append(_kept(design, motion, clearance))
+    beware = []
+    if unseen:
+        beware.append(f'Not seen at all: {", ".join(unseen)}.')
+    if design.stopped:
+        beware.append(
+            f'The search was stopped early ({design.stopped}): this is the best so far, and the '
+            'same seed need not give it again.'
+        )
+    if settings.acceleration is None and settings.limits is None:
+        beware.append(
+            'A URDF has no acceleration limits; each joint was taken to reach its top speed in '
+            '0.25 s.'
+        )
+    if settings.noise is None:
+        beware.append(
+            'The deviations are for a torque noise of 1 % of the torque limits, which nobody has '
+            'measured.'
+        )
+    if notes:
+        beware.append('Not all bodies were looked at; see Clearance.')
+    tone = 'bad' if unseen else 'fair' if design.stopped else 'good'
+    return Verdict('blind' if unseen else 'fit to run', tone, sentences, beware)
+
+
+def _kept(design: Design, motion: Motion, clearance: ClearanceModel) -> str:
+    """Say that limits and clearance are kept, and where it is tightest."""
+    assert motion.tau is not None
+    shares = used_shares(design.limits, motion, motion.tau)
+    name, share = max(shares.items(), key=lambda item: float(item[1].max()))
+    joint = design.limits.joints[int(share.argmax())]
+    text = f'It keeps every limit, nearest is the {name} of {joint} at {100.0 * share.max():.0f} %'
+    nearest = clearance.closest(motion)
+    if nearest is None:
+        return f'{text}.'
+    return (
+        f'{text}; nothing comes closer than {nearest.first} and {nearest.second}, '
+        f'{100.0 * nearest.distance:.1f} cm apart at {nearest.time:.1f} s.'
+    )
+
+
+def _asked(
+    design: Design, arm: ArmModel, robot: str, obstacles: Sequence[Obstacle]
+) -> list[tuple[str, str]]:
+    settings, run = design.settings, design.excitation
+    criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
+    focus = f'; above all {", ".join(settings.focus)}' if settings.focus else ''
+    start = 'the trajectory itself' if run.start is None else _numbers(run.start)
+    return [
+        ('Robot', robot),
+        ('Joints', ', '.join(run.joints)),
+        ('Gravity', f'({_numbers(arm.robot.gravity)}) m/s²'),
+        ('Effects', ', '.join(effect.name for effect in arm.effects) or 'none'),
+        ('To be seen', f'{TARGETS[settings.target]}{focus}'),
+        ('Criterion', criterion),
+        ('Speed', _speed(settings)),
+        (
+            'Run',
+            f'{run.n_periods} periods of {run.trajectory.period:.4g} s, '
+            f'{counted(run.trajectory.harmonics, "harmonic")}, {run.run_in:.3g} s to get in and '
+            f'as long to get out; from {start}',
+        ),
+        ('Torque noise', f'{_noise(design, arm)} at {settings.rate:g} Hz'),
+        ('Clearance', f'{100.0 * settings.clearance:g} cm'),
+        ('Around the arm', ', '.join(o.name for o in obstacles) or 'nothing'),
+        (
+            'Search',
+            f'{counted(settings.starts, "start")}, at most {settings.iterations} iterations each',
+        ),
+    ]
+
+
+def _speed(settings: DesignSettings) -> str:
+    if settings.limits is not None:
+        return 'limits of your own'
+    name = settings.speed
+    share = SPEED_CLASSES[name] if isinstance(name, str) else name
+    return f'{name}: {100.0 * share:.0f} % of the velocity and acceleration limits'
+
+
+def _noise(design: Design, arm: ArmModel) -> str:
+    return ', '.join(
+        f'{value:.3g} {torque_unit(arm.robot, j)}' for j, value in enumerate(design.noise)
+    )
+
+
+def _numbers(values: FloatArray) -> str:
+    return ', '.join(f'{value:.3g}' for value in values)

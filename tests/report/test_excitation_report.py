@@ -1,0 +1,119 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The page about a planned run says what it will show, and that it is fit to run."""
+
+from dataclasses import replace
+import json
+import re
+
+from armid_ros.excitation import DesignSettings, evaluate, Obstacle, Problem
+from armid_ros.report.excitation_report import excitation_report
+from armid_ros.report.sections.plan import PlannedClearance
+from armid_ros.report.silhouettes import draw_silhouettes
+from armid_ros.robots import collision_model, robot_from_urdf
+import numpy as np
+import pytest
+
+TABLE = Obstacle('table <b>', 'box', (1.0, 1.0, 0.1), (0.0, 0.0, -1.5))
+BARE = (
+    '<robot name="bare"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 0.4"/>'
+    '<mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
+    '<joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/>'
+    '<axis xyz="0 1 0"/></joint></robot>'
+)
+
+
+@pytest.fixture(scope='module')
+def planned(case):
+    """Return what evaluating the excitation of the case gives."""
+    settings = DesignSettings(period=8.0, n_periods=1)
+    return evaluate(Problem.of(case.truth, settings, np.random.default_rng(1)), case.excitation)
+
+
+@pytest.fixture(scope='module')
+def html(case, planned):
+    return excitation_report(
+        planned,
+        case.truth,
+        robot='humanoid_arm',
+        collision=collision_model(case.truth.robot),
+        obstacles=[TABLE],
+    )
+
+
+def charts(html):
+    """Return the data of all charts."""
+    found = re.findall(r'<script type="application/json">(.*?)</script>', html, re.DOTALL)
+    return [json.loads(text) for text in found]
+
+
+def test_every_joint_is_shown_against_its_limits(case, planned, html):
+    shown = charts(html)
+    n = case.truth.robot.n_joints
+    for j in range(n):
+        position, velocity, acceleration, torque = shown[4 * j : 4 * j + 4]
+        limits = planned.limits
+        np.testing.assert_allclose(
+            [level['y'] for level in position['levels']], [limits.lower[j], limits.upper[j]]
+        )
+        for chart, limit in (
+            (velocity, limits.velocity),
+            (acceleration, limits.acceleration),
+            (torque, limits.torque),
+        ):
+            assert [level['y'] for level in chart['levels']] == [-limit[j], limit[j]]
+            assert np.abs(chart['series'][0]['y']).max() <= limit[j] * (1.0 + 1e-4)
+
+
+def test_clearance_is_that_of_links_and_that_of_the_environment(case, html):
+    chart = charts(html)[-1]
+    own, around = (np.array(series['y']) / 100.0 for series in chart['series'])
+    robot = case.truth.robot
+    q = case.excitation.at(np.linspace(0.0, case.excitation.duration, 600)).q
+    np.testing.assert_allclose(own, collision_model(robot).path_clearance(q), atol=1e-4)
+    assert around.min() > 0.0
+    assert [series['label'] for series in chart['series']] == [
+        'links from each other',
+        'arm from its environment',
+    ]
+
+
+def test_every_parameter_is_listed_with_its_deviation(planned, html):
+    for name in planned.information.parameters:
+        assert name.name in html or name.joint in html
+    assert 'fit to run' in html and 'not seen' not in html
+    assert 'table &lt;b&gt;' in html and '<b>' not in html
+
+
+def test_what_the_run_does_not_show_comes_first(case, planned):
+    matrix = planned.information.matrix.copy()
+    matrix[0], matrix[:, 0] = 0.0, 0.0
+    blind = replace(planned, information=replace(planned.information, matrix=matrix))
+    page = excitation_report(
+        blind, case.truth, robot='r', collision=collision_model(case.truth.robot)
+    )
+    assert 'Not seen at all: ' in page and '>blind<' in page
+
+
+def test_nothing_to_keep_apart_is_said(planned):
+    assert 'nothing to keep apart' in PlannedClearance(np.arange(3.0), {}, 0.01, ()).html()
+
+
+def test_bodies_are_drawn_where_they_are():
+    """A rod that hangs is below its hinge, one that stands above it."""
+    robot = robot_from_urdf(BARE)
+    drawing = draw_silhouettes(
+        collision_model(robot), np.array([[0.0], [np.pi]]), ['up', 'down'], np.zeros((2, 1))
+    )
+    up, down = (height for _, height in drawing.tips)
+    assert down - up > 0.35 * drawing.height
+    assert [text for _, text in drawing.captions] == ['up', 'down']
+
+
+@pytest.mark.parametrize('width', [1200, 390])
+def test_browser_draws_every_chart_and_pose(browser, charts_drawn, html, width):
+    assert charts_drawn(html, width, dark=False) == html.count('<figure class="chart"') > 24
+    sizes = browser.run(
+        '[...document.querySelectorAll("#poses polygon")].map(p => p.getBBox().height)'
+    )
+    assert len(sizes) >= 6 * 7 and min(sizes) > 1.0
