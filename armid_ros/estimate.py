@@ -5,10 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import re
 
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
+
+_RIGID = re.compile(r'(m[xyz]?|I[xyz]{2})\d+( |$)')
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,11 @@ class ParameterName:
     name: str
     joint: str
     unit: str
+
+    @property
+    def rigid(self) -> bool:
+        """Whether it is a mass, moment or inertia of a link, or a grouping led by one."""
+        return _RIGID.match(self.name) is not None
 
 
 @dataclass(frozen=True)

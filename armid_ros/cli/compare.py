@@ -8,10 +8,10 @@ import json
 from pathlib import Path
 
 from armid_ros.cli import options
+from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import say
 from armid_ros.identification.comparison import compare as run
-from armid_ros.identification.comparison import read_parameters
-from armid_ros.report import hash_files, Provenance, versions
+from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.report.compare_report import compare_report, tell
 import click
 
@@ -31,7 +31,7 @@ def compare(before: Path, after: Path, out: Path, as_json: bool) -> None:
     first, second = read_parameters(before), read_parameters(after)
     comparison = run(first, second)
     files = [Path(first.source), Path(second.source)]
-    page = compare_report(comparison, Provenance(files=hash_files(files), versions=versions()))
+    page = compare_report(comparison, provenance(files))
     out.mkdir(parents=True, exist_ok=True)
     (out / 'report.html').write_text(page, encoding='utf-8')
     document = comparison.document()

@@ -84,9 +84,9 @@ def box(text: str, robot: Robot) -> tuple[str, Corners]:
     try:
         lower, upper = ([float(x) for x in corner.split(',')] for corner in corners.split(':'))
     except ValueError:
-        raise RobotError(
-            f"--box '{text}' has to be JOINT=X,Y,Z:X,Y,Z, two corners in metres"
-        ) from None
+        lower = upper = []
+    if len(lower) != 3 or len(upper) != 3:
+        raise RobotError(f"--box '{text}' has to be JOINT=X,Y,Z:X,Y,Z, two corners in metres")
     return joint, (lower, upper)
 
 

@@ -33,8 +33,14 @@ def provenance(
     return Provenance(
         files=hash_files(paths),
         versions=versions(),
-        settings={name: str(value) for name, value in (settings or {}).items()},
+        settings={name: _text(value) for name, value in (settings or {}).items()},
         seed=seed,
         command=shlex.join(['armid', *sys.argv[1:]]),
         created=datetime.now().astimezone().isoformat(' ', 'seconds'),
     )
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list):
+        return ', '.join(map(_text, value))
+    return f'{value:.6g}' if isinstance(value, float) else str(value)

@@ -7,48 +7,31 @@ With dozens of parameters one in twenty is outside its 95 % interval by chance, 
 held against each other (Holm 1979): a change is called one if the whole list of changes is free of
 chance finds with 95 % probability.
 
+Where both have their covariance, the effects of each joint and the links are looked at as a whole
+too: parameters that are hard to tell apart can differ together beyond doubt and none of them
+alone. A change of the links is held against that of a load on one of them.
+
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-import json
-from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
+from armid_ros.identification.load_change import find_load, LoadChange
+from armid_ros.identification.parameters_file import Parameters
+from armid_ros.motion import FloatArray
 import numpy as np
 from scipy.special import erfc
-import yaml
+from scipy.stats import chi2
 
 #: Probability that the list of changes has a chance find in it.
 CHANCE = 0.05
-_SCHEMAS = ('armid/identification/1', 'armid/model/1')
-
-
-@dataclass(frozen=True)
-class Parameters:
-    """
-    What a file says of an arm.
-
-    Attributes
-    ----------
-    source : str
-        The file.
-    robot : str
-        What it calls the robot.
-    values : mapping of ParameterName to (float, float)
-        Value and standard deviation of every parameter that was identified on its own.
-    error_percent : float or None
-        Relative torque error on held-out data, or on training data where there is none.
-
-    """
-
-    source: str
-    robot: str
-    values: dict[ParameterName, tuple[float, float]]
-    error_percent: float | None
+#: Directions of a covariance below this share of the largest, all scaled, are rounding.
+_ROUNDING = 1e-10
 
 
 @dataclass(frozen=True)
@@ -95,6 +78,30 @@ class Change:
 
 
 @dataclass(frozen=True)
+class GroupChange:
+    """
+    Parameters that are looked at as a whole.
+
+    Attributes
+    ----------
+    joint : str
+        Whose effects; empty for the rigid body.
+    parameters : tuple of ParameterName
+        What is in it, two or more.
+    p_value : float
+        Probability that chance alone makes them differ as much.
+    changed : bool
+        Whether they differ by more than chance.
+
+    """
+
+    joint: str
+    parameters: tuple[ParameterName, ...]
+    p_value: float
+    changed: bool
+
+
+@dataclass(frozen=True)
 class Comparison:
     """
     Two identifications.
@@ -107,6 +114,10 @@ class Comparison:
         Every parameter that both have, in the order of the first.
     only_before, only_after : tuple of ParameterName
         What the other does not have.
+    groups : tuple of GroupChange
+        Effects of every joint and the rigid body as a whole; empty without covariances.
+    load : LoadChange or None
+        The load on one link that explains all changes of the rigid body.
 
     """
 
@@ -115,6 +126,19 @@ class Comparison:
     changes: tuple[Change, ...]
     only_before: tuple[ParameterName, ...]
     only_after: tuple[ParameterName, ...]
+    groups: tuple[GroupChange, ...] = ()
+    load: LoadChange | None = None
+
+    @property
+    def anything(self) -> bool:
+        """Whether something changed, alone or as a whole."""
+        return any(c.changed for c in self.changes) or any(g.changed for g in self.groups)
+
+    @property
+    def changed_together(self) -> tuple[GroupChange, ...]:
+        """Groups that changed though none of their parameters did beyond doubt."""
+        sure = {change.parameter for change in self.changed}
+        return tuple(g for g in self.groups if g.changed and not sure.intersection(g.parameters))
 
     @property
     def changed(self) -> tuple[Change, ...]:
@@ -141,6 +165,16 @@ class Comparison:
                 }
                 for c in self.changes
             ],
+            'groups': [
+                {
+                    'joint': g.joint,
+                    'parameters': [p.name for p in g.parameters],
+                    'p_value': g.p_value,
+                    'changed': g.changed,
+                }
+                for g in self.groups
+            ],
+            'load': None if self.load is None else self.load.document(),
             'only_before': [{'name': p.name, 'joint': p.joint} for p in self.only_before],
             'only_after': [{'name': p.name, 'joint': p.joint} for p in self.only_after],
         }
@@ -162,88 +196,82 @@ def compare(before: Parameters, after: Parameters) -> Comparison:
             f'{before.source} and {after.source} have no identified parameter in common; '
             'are they of one robot, in one gravity?'
         )
-    pairs = [(*before.values[name], *after.values[name]) for name in shared]
-    beyond = _beyond_chance(np.array(pairs))
+    pairs = np.array([(*before.values[name], *after.values[name]) for name in shared])
+    difference = pairs[:, 2] - pairs[:, 0]
+    covariance = before.covariance_of(shared) + after.covariance_of(shared)
+    joint = before.covariance is not None and after.covariance is not None
+    groups = _groups(shared) if joint else []
+    chance = CHANCE / 2.0 if groups else CHANCE
+    single = _beyond_chance(_single_chances(pairs), chance)
+    together = [_group_chance(difference[g], covariance[np.ix_(g, g)]) for g in groups]
     changes = tuple(
-        Change(name, pair[0], pair[2], pair[1], pair[3], bool(sure))
-        for name, pair, sure in zip(shared, pairs, beyond, strict=True)
+        Change(name, pair[0], pair[2], pair[1], pair[3], sure)
+        for name, pair, sure in zip(shared, pairs.tolist(), single, strict=True)
     )
+    found = tuple(
+        GroupChange(
+            '' if shared[group[0]].rigid else shared[group[0]].joint,
+            tuple(shared[k] for k in group),
+            p_value,
+            sure,
+        )
+        for group, p_value, sure in zip(
+            groups, together, _beyond_chance(together, chance), strict=True
+        )
+    )
+    rigid = [k for k, name in enumerate(shared) if name.rigid]
+    moved = any(changes[k].changed for k in rigid) or any(g.changed and not g.joint for g in found)
+    load = None
+    if joint and moved:
+        load = find_load(
+            [before.terms.get(shared[k], {}) for k in rigid],
+            difference[rigid],
+            covariance[np.ix_(rigid, rigid)],
+        )
     return Comparison(
         before,
         after,
         changes,
         tuple(name for name in before.values if name not in after.values),
         tuple(name for name in after.values if name not in before.values),
+        found,
+        load,
     )
 
 
-def read_parameters(path: str | Path) -> Parameters:
-    """
-    Read what was identified.
-
-    Parameters
-    ----------
-    path : str or Path
-        Folder of an identification, its identification.json, or a model.yaml.
-
-    Raises
-    ------
-    ModelError
-        Naming the file and what is wrong in it.
-
-    """
-    path = Path(path)
-    if path.is_dir():
-        kept = [path / name for name in ('identification.json', 'model.yaml')]
-        found = [file for file in kept if file.is_file()]
-        if not found:
-            raise ModelError(
-                f'{path}: neither identification.json nor model.yaml is in it; '
-                'name the folder that armid identify wrote'
-            )
-        path = found[0]
-    try:
-        text = path.read_text(encoding='utf-8')
-        document = json.loads(text) if path.suffix == '.json' else yaml.safe_load(text)
-    except OSError as error:
-        raise ModelError(f'{path}: {error.strerror}') from error
-    except (ValueError, yaml.YAMLError) as error:
-        reason = ' '.join(str(error).split())
-        raise ModelError(f'{path}: neither JSON nor YAML: {reason}') from error
-    if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
-        raise ModelError(f"{path}: its 'schema' has to be {' or '.join(_SCHEMAS)}")
-    try:
-        return _parameters(str(path), document)
-    except (KeyError, TypeError, ValueError) as error:
-        raise ModelError(f'{path}: {type(error).__name__} {error} is missing or wrong') from error
+def _groups(names: Sequence[ParameterName]) -> list[list[int]]:
+    """Return the positions of the rigid body, and of the effects of each joint; two or more."""
+    groups: dict[str, list[int]] = {}
+    for position, name in enumerate(names):
+        groups.setdefault('' if name.rigid else f'effects of {name.joint}', []).append(position)
+    return [group for group in groups.values() if len(group) > 1]
 
 
-def _parameters(source: str, document: dict[str, Any]) -> Parameters:
-    rows = list(document.get('parameters', document.get('rigid_parameters', [])))
-    for effect in document.get('effects', []):
-        rows += effect['parameters']
-    values = {
-        ParameterName(row['name'], row['joint'], row['unit']): (
-            float(row['value']),
-            float(row['std']),
-        )
-        for row in rows
-        if row['std'] is not None
-    }
-    scores = [*document.get('validation', []), document.get('training')]
-    error = scores[0]['relative_error_percent'] if scores[0] else None
-    return Parameters(source, str(document['robot']), values, error)
-
-
-def _beyond_chance(pairs: np.ndarray[Any, np.dtype[np.float64]]) -> list[bool]:
-    """Tell which differences are beyond chance (Holm 1979); rows are value, std, value, std."""
+def _single_chances(pairs: FloatArray) -> list[float]:
+    """Return how likely each difference is by chance; rows are value, std, value, std."""
     std = np.hypot(pairs[:, 1], pairs[:, 3])
     size = np.abs(pairs[:, 2] - pairs[:, 0])
     safe = np.where(std > 0.0, std, 1.0)
-    chance = np.where(std > 0.0, erfc(size / safe / np.sqrt(2.0)), (size == 0.0).astype(float))
-    beyond = [False] * len(pairs)
-    for tried, index in enumerate(np.argsort(chance)):
-        if chance[index] > CHANCE / (len(pairs) - tried):
+    chances = np.where(std > 0.0, erfc(size / safe / np.sqrt(2.0)), (size == 0.0).astype(float))
+    return [float(chance) for chance in chances]
+
+
+def _group_chance(difference: FloatArray, covariance: FloatArray) -> float:
+    """Return how likely differences are by chance, all together."""
+    std = np.sqrt(np.diag(covariance))
+    if not np.all(std > 0.0):
+        return 1.0
+    sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
+    kept = sizes > _ROUNDING * sizes[-1]
+    along = axes[:, kept].T @ (difference / std)
+    return float(chi2.sf(np.sum(along**2 / sizes[kept]), int(kept.sum())))
+
+
+def _beyond_chance(chances: Sequence[float], allowed: float) -> list[bool]:
+    """Tell which are beyond chance, with a probability of one chance find among all (Holm)."""
+    beyond = [False] * len(chances)
+    for tried, index in enumerate(np.argsort(chances)):
+        if chances[index] > allowed / (len(chances) - tried):
             break
         beyond[int(index)] = True
     return beyond

@@ -101,7 +101,8 @@ class NoiseCheck:
         found = 'no sign' if self.consistent else 'a sign'
         worst = int(np.argmax(np.abs(self.relative_bias)))
         name = self.instrumental.parameters[worst]
-        where = f'{name.name} of {name.joint}' if name.joint else name.name
+        leader = name.name.split(' ')[0]
+        where = f'{leader} of {name.joint}' if name.joint else leader
         size = float(abs(self.relative_bias[worst]))
         verdict = 'the intervals hold' if self.harmless else 'the intervals are off by that'
         return (

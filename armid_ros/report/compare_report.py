@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.estimate import ParameterName
-from armid_ros.identification.comparison import Change, Comparison
+from armid_ros.identification.comparison import Change, Comparison, GroupChange
 from armid_ros.identification.identifiability import HALF_WIDTH
-from armid_ros.report.families import full_label, is_rigid
+from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, digits, pretty
 from armid_ros.report.page import Page
 from armid_ros.report.provenance import Provenance
@@ -42,7 +42,7 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
 
     """
     sentences = tell(comparison)
-    changed = bool(comparison.changed)
+    changed = comparison.anything
     sections = [
         Verdict(
             'changed' if changed else 'unchanged',
@@ -62,7 +62,8 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
 def tell(comparison: Comparison) -> tuple[str, ...]:
     """Say in words what changed, the surest first; the first sentence is the sum of it."""
     changed, count = comparison.changed, len(comparison.changes)
-    if not changed:
+    together = [_together(group) for group in comparison.changed_together]
+    if not comparison.anything:
         return (
             f'None of {counted(count, "parameter")} changed beyond its uncertainty.',
             _least_visible(comparison.changes),
@@ -70,24 +71,58 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
     joints = list(dict.fromkeys(c.parameter.joint for c in changed if c.parameter.joint))
     where = f', at {", ".join(joints)}' if joints else ''
     first = f'{len(changed)} of {counted(count, "parameter")} changed beyond uncertainty{where}.'
+    if comparison.load is not None:
+        together.insert(0, _load(comparison))
     told = [_sentence(change) for change in changed[:_TOLD]]
     if len(changed) > _TOLD:
         told.append(f'{len(changed) - _TOLD} more are in the table.')
-    rigid = [c for c in changed if is_rigid(c.parameter)]
-    if len(rigid) >= 3 and len(rigid) > len(changed) - len(rigid):
+    rigid = [c for c in changed if c.parameter.rigid]
+    if comparison.load is None and len(rigid) >= 3 and len(rigid) > len(changed) - len(rigid):
         last = rigid[0].parameter.joint
         told.append(
             f'Mostly inertial parameters changed, {last} the surest: a tool or load was added or '
             'taken away, or the gravity or mounting is another.'
         )
-    return (first, *told)
+    return (first, *together, *told)
+
+
+def _load(comparison: Comparison) -> str:
+    load = comparison.load
+    assert load is not None
+    joints = {_number(c.parameter): c.parameter.joint for c in comparison.changes}
+    verb = 'was added to' if load.mass > 0.0 else 'was taken off'
+    where = ''
+    if load.center is not None:
+        where = f', its centre at ({", ".join(f"{x:.3f}" for x in load.center)}) m of its joint'
+    rivals = ''
+    if load.rivals:
+        others = ', '.join(joints[link] for link in load.rivals)
+        rivals = f'; on the link of {others} it would do so as well'
+    return (
+        f'A load of {abs(load.mass):.3g} ± {digits(HALF_WIDTH * load.mass_std)} kg {verb} '
+        f'the link of {joints[load.link]}{where}: that explains every change of the inertial '
+        f'parameters{rivals}.'
+    )
+
+
+def _number(name: ParameterName) -> int:
+    """Return the number of the link that leads a rigid parameter, 0 for others."""
+    return int(name.name.split(' ')[0].lstrip('Imxyz')) if name.rigid else 0
+
+
+def _together(group: GroupChange) -> str:
+    what = f'What acts at {group.joint}' if group.joint else 'The rigid body'
+    return (
+        f'{what} changed as a whole (p = {group.p_value:.1g}), though no single one of its '
+        f'{len(group.parameters)} parameters is beyond doubt.'
+    )
 
 
 def _sentence(change: Change) -> str:
     verb = 'rose' if change.difference > 0.0 else 'fell'
     unit = pretty(change.parameter.unit)
     label = full_label(change.parameter)
-    if is_rigid(change.parameter):
+    if change.parameter.rigid:
         label = f'Inertial parameter {label} of {change.parameter.joint}'
     label = label[0].upper() + label[1:]
     share = ''
@@ -102,7 +137,7 @@ def _sentence(change: Change) -> str:
 
 def _least_visible(changes: Sequence[Change]) -> str:
     """Say how large a change would have had to be, of the kinds that wear changes."""
-    worn = [c for c in changes if not is_rigid(c.parameter)] or list(changes)
+    worn = [c for c in changes if not c.parameter.rigid] or list(changes)
     known = [c for c in worn if abs(c.before) > 0.0]
     if not known:
         return 'Nothing is known of how large a change would have been seen.'
@@ -123,6 +158,12 @@ def _beware(comparison: Comparison) -> tuple[str, ...]:
             lines.append(
                 f'{counted(len(names), "parameter")} in the {side} only cannot be compared: '
                 f'{_named(names)}. Different motions or effects group parameters differently.'
+            )
+    for given in (comparison.before, comparison.after):
+        if given.covariance is None:
+            lines.append(
+                f'{given.source} has deviations without covariance: parameters are compared one '
+                'by one alone, and changes that only show in several of them go unseen.'
             )
     if comparison.before.robot != comparison.after.robot:
         lines.append(

@@ -22,7 +22,7 @@ def parameter_families(names: tuple[ParameterName, ...]) -> dict[str, list[int]]
     families: dict[str, list[int]] = {}
     kinds = {'kg m^2': 'Inertias', 'kg m': 'First moments', 'kg': 'Masses'}
     for position, name in enumerate(names):
-        kind = kinds.get(name.unit) if is_rigid(name) else None
+        kind = kinds.get(name.unit) if name.rigid else None
         title = kind or name.name.replace('_', ' ').capitalize()
         known = families.get(title)
         if known and names[known[0]].unit != name.unit:
@@ -31,14 +31,9 @@ def parameter_families(names: tuple[ParameterName, ...]) -> dict[str, list[int]]
     return families
 
 
-def is_rigid(name: ParameterName) -> bool:
-    """Whether a parameter is a mass, moment or inertia of a link, or a grouping of such."""
-    return name.name.lstrip('-').startswith(('I', 'm')) and '_' not in name.name
-
-
 def short_label(name: ParameterName) -> str:
     """Return a label that fits an axis: the leading symbol of a grouping, or the joint."""
-    if not is_rigid(name):
+    if not name.rigid:
         return name.joint or name.name
     leader = name.name.split(' ')[0]
     return leader if leader == name.name else f'{leader} *'
@@ -46,7 +41,7 @@ def short_label(name: ParameterName) -> str:
 
 def full_label(name: ParameterName) -> str:
     """Return a short label that says the kind as well: 'Izz1', 'Coulomb torque of elbow'."""
-    if is_rigid(name):
+    if name.rigid:
         return name.name.split(' ')[0]
     kind = name.name.replace('_', ' ').replace('coulomb', 'Coulomb')
     return f'{kind} of {name.joint}' if name.joint else kind

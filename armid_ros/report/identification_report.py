@@ -83,13 +83,16 @@ def identification_report(
     shown = held_out or list(result.training)
     judgement = judge(result, validation, [*recordings, *validation_recordings], verification)
     quality = [
-        *(RecordingQuality.of(recording, 'training') for recording in recordings),
-        *(RecordingQuality.of(recording, 'held-out') for recording in validation_recordings),
+        *(RecordingQuality.of(r, 'training', training.get(r.source, ())) for r in recordings),
+        *(
+            RecordingQuality.of(r, 'held-out', validation.get(r.source, ()))
+            for r in validation_recordings
+        ),
     ]
     sections: list[Section] = [
         Verdict(judgement.grade, _TONES[judgement.grade], judgement.sentences, judgement.beware),
         Asked(_asked(result, robot, list(training), list(validation))),
-        DataQuality(quality),
+        DataQuality(quality, arm.robot),
         FitSection(arm.robot, training, validation),
         *_forward(result, verification),
         Residuals(arm.robot, shown, role),

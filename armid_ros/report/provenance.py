@@ -13,7 +13,7 @@ import platform
 
 _BLOCK = 1 << 20
 #: Packages whose version can change a result.
-_PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'mcap')
+_PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
 
 
 @dataclass(frozen=True)

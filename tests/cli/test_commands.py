@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 ROBOT = 'humanoid_arm'
+PHYSICAL = ('identify', '{bag}', '--robot', ROBOT, '--out', 'o', '--physical')
 QUICK = ('--starts', 1, '--iterations', 5)
 
 
@@ -107,6 +108,61 @@ def test_physical_identifications_are_bodies_and_can_be_compared(bags, tmp_path)
     assert (tmp_path / 'compared' / 'report.html').is_file()
 
 
+def test_physical_identification_prints_its_certificate_and_its_checks(bags, tmp_path):
+    out = tmp_path / 'out'
+    arguments = ('--robot', ROBOT, '--physical', '--total-mass', 2.8, '--validate', bags[1])
+    box = 'wrist_pitch=-0.1,-0.1,-0.1:0.1,0.1,0.1'
+    text = armid('identify', bags[0], *arguments, '--box', box, '--out', out).stdout
+    document = json.loads((out / 'identification.json').read_text())
+    links = document['physical']['links']
+    assert len(links) == 6
+    assert min(min(link['eigenvalues']) for link in links) > 0.0
+    assert sum(link['mass'] for link in links) == pytest.approx(2.8, rel=1e-6)
+    for expected in (
+        'eigenvalues of the pseudo-inertia',
+        f'{links[0]["eigenvalues"][0]:.3g}',
+        'the masses add up to 2.8 kg, as given',
+        'identified.urdf has no place for torque_offset',
+        'Durbin-Wu-Hausman test',
+        'simulated in closed loop',
+        'not told from 0',
+        'not identified: m1',
+    ):
+        assert expected in text
+    (forward,) = document['verification']['forward']
+    assert max(forward['after']['position_rms'].values()) < 0.01
+    assert document['verification']['encoder_noise']['p_value'] > 0.0
+    page = (out / 'report.html').read_text()
+    assert 'Physical consistency' in page
+    assert 'Forward validation' in page
+
+
+def test_checks_can_be_left_out(bags, tmp_path):
+    out = tmp_path / 'out'
+    text = armid('identify', bags[0], '--robot', ROBOT, '--no-verify', '--out', out).stdout
+    assert 'check:' not in text
+    assert 'verification' not in json.loads((out / 'identification.json').read_text())
+
+
+def test_a_load_between_two_days_is_said_in_words(tmp_path):
+    robot = load_robot(ROBOT)
+    arm = ArmModel(robot)
+    held = 0.2 * np.array([1.0, 0.0, 0.0, 0.05, 0.004, 0.0, 0.004, 0.0, 0.0, 0.001])
+    loaded = arm.with_effect(make_effect('payload', robot), held)
+    for name, day, seed in (('before', arm, 0), ('after', loaded, 1)):
+        bag = bag_of(tmp_path / f'{name}_bag', day, seed)
+        armid('identify', bag, '--robot', ROBOT, '--no-verify', '--out', tmp_path / name)
+    days = (tmp_path / 'before', tmp_path / 'after')
+    text = armid('compare', *days, '--out', tmp_path / 'compared').stdout
+    assert 'kg was added to the link of wrist_pitch' in text
+    document = json.loads((tmp_path / 'compared' / 'comparison.json').read_text())
+    assert abs(document['load']['mass'] - 0.2) < 3.0 * document['load']['mass_std']
+    assert (
+        'was added to the link of wrist_pitch'
+        in (tmp_path / 'compared' / 'report.html').read_text()
+    )
+
+
 def test_excite_simulate_identify_in_three_lines(tmp_path):
     plan, run = tmp_path / 'plan', tmp_path / 'run'
     arguments = ('--robot', ROBOT, '--gravity', 'moon', '--duration', 10, *QUICK)
@@ -173,6 +229,10 @@ def test_a_run_is_designed_to_tell_two_explanations_apart(tmp_path):
             'elbow_pitch',
         ),
         (('identify', '{bag}', '--robot', ROBOT, '--topic', '/x', '--out', 'o'), '/joint_states'),
+        ((*PHYSICAL, '--box', 'elbow=0,0,0:1,1,1'), 'elbow_pitch'),
+        ((*PHYSICAL, '--box', 'elbow_pitch=0:1'), 'JOINT=X,Y,Z:X,Y,Z'),
+        ((*PHYSICAL, '--box', 'elbow_pitch=1,1,1:0,0,0'), 'has to be below'),
+        ((*PHYSICAL, '--total-mass', -1), 'total mass -1'),
         (('simulate', '--robot', ROBOT, '--gravity', 'mars', '--out', 'o'), 'mars'),
         (('simulate', '--robot', ROBOT, '--effect', 'payload:m=1', '--out', 'o'), 'payload_m'),
         (('simulate', '--robot', ROBOT, '--model', 'none.yaml', '--out', 'o'), 'none.yaml'),

@@ -4,9 +4,12 @@ import json
 
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
-from armid_ros.identification.comparison import compare, Parameters, read_parameters
+from armid_ros.identification.comparison import compare
+from armid_ros.identification.parameters_file import Parameters, read_parameters
 import numpy as np
 import pytest
+
+SYMBOLS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
 
 
 def parameters(values, std, source='a'):
@@ -39,6 +42,78 @@ def test_what_only_one_has_is_listed():
     assert comparison.only_before == ()
 
 
+def correlated(rng, size):
+    """Return a covariance whose parameters are hard to tell apart."""
+    factors = rng.normal(size=(size, size)) * np.logspace(0, -2, size)
+    return factors @ factors.T
+
+
+def drawn(rng, names, truth, covariance, terms=None):
+    """Return an estimate of some parameters with its covariance."""
+    values = rng.multivariate_normal(truth, covariance)
+    std = np.sqrt(np.diag(covariance))
+    table = {n: (float(v), float(s)) for n, v, s in zip(names, values, std, strict=True)}
+    return Parameters('a', 'arm', table, 5.0, covariance, terms or {})
+
+
+FRICTION = [ParameterName(f'coefficient_{k}', 'elbow', 'N m') for k in range(4)]
+LINKS = [ParameterName(f'{s}{k}', f'joint_{k}', 'kg') for k in (1, 2) for s in SYMBOLS]
+
+
+def test_with_covariances_too_19_of_20_lists_are_free_of_chance_finds():
+    rng = np.random.default_rng(0)
+    names = [*FRICTION, *LINKS]
+    covariance = correlated(rng, len(names))
+    truth = np.zeros(len(names))
+    alarms = 0
+    for _ in range(400):
+        alarms += compare(*(drawn(rng, names, truth, covariance) for _ in range(2))).anything
+    assert 0.02 < alarms / 400 < 0.085
+
+
+def test_what_no_parameter_shows_alone_all_of_a_joint_do():
+    """Two coefficients that only their sum is known of, which changes."""
+    covariance = np.array([[1.0, -0.9999], [-0.9999, 1.0]])
+    before, after = (
+        Parameters(source, 'arm', dict.fromkeys(FRICTION[:2], (value, 1.0)), 5.0, covariance)
+        for source, value in (('a', 0.0), ('b', 0.1))
+    )
+    comparison = compare(before, after)
+    assert not comparison.changed
+    (group,) = comparison.changed_together
+    assert group.joint == 'elbow'
+    assert group.p_value < 1e-6
+
+
+def test_a_load_is_found_on_its_link_with_its_mass_and_centre():
+    rng = np.random.default_rng(0)
+    terms = {name: {name.name: 1.0} for name in LINKS}
+    truth = np.zeros(len(LINKS))
+    load = truth.copy()
+    load[10:14] = 0.5, 0.0, 0.05, 0.1
+    covariance = 1e-6 * np.eye(len(LINKS))
+    comparison = compare(
+        drawn(rng, LINKS, truth, covariance, terms), drawn(rng, LINKS, load, covariance, terms)
+    )
+    found = comparison.load
+    assert found.link == 2
+    assert not found.rivals
+    assert abs(found.mass - 0.5) < 4.0 * found.mass_std < 0.01
+    np.testing.assert_allclose(found.center, [0.0, 0.1, 0.2], atol=0.02)
+
+
+def test_a_change_of_two_links_is_no_load():
+    rng = np.random.default_rng(0)
+    terms = {name: {name.name: 1.0} for name in LINKS}
+    covariance = 1e-6 * np.eye(len(LINKS))
+    truth, other = np.zeros(len(LINKS)), np.ones(len(LINKS))
+    comparison = compare(
+        drawn(rng, LINKS, truth, covariance, terms), drawn(rng, LINKS, other, covariance, terms)
+    )
+    assert comparison.changed
+    assert comparison.load is None
+
+
 def test_known_exactly_and_equal_is_no_change():
     assert compare(parameters([1.0], [0.0]), parameters([1.0], [0.0])).changed == ()
 
@@ -69,6 +144,14 @@ class TestRefusals:
         path = tmp_path / 'identification.json'
         path.write_text('{"schema":')
         with pytest.raises(ModelError, match='neither JSON nor YAML'):
+            read_parameters(path)
+
+    def test_a_covariance_of_another_size(self, tmp_path):
+        path = tmp_path / 'identification.json'
+        rows = [{'name': 'm1', 'joint': 'a', 'value': 1, 'std': 1, 'unit': 'kg'}]
+        document = {'schema': 'armid/identification/1', 'robot': 'x', 'parameters': rows}
+        path.write_text(json.dumps({**document, 'covariance': [[1.0], [0.0, 1.0]]}))
+        with pytest.raises(ModelError, match='no triangle of 1 rows'):
             read_parameters(path)
 
     def test_a_row_without_a_name(self, tmp_path):

@@ -22,7 +22,9 @@ def recording(arm):
 def test_the_true_arm_follows_its_own_torques(arm, recording):
     score = forward_validation(arm, recording, USED)
     assert 1e3 * score.position_error.max() < 2.0
+    assert score.torque_error.max() < 2e-3
     assert score.simulated.shape == score.motion.q.shape
+    assert 'mrad' in score.worst
 
 
 def test_missing_friction_moves_the_arm_by_its_torque_over_the_stiffness(arm, recording):

@@ -1,5 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
+import json
+
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError, RobotError
 from armid_ros.identification import IdentificationSettings, identify, Score
@@ -108,6 +110,26 @@ def test_links_stay_in_their_boxes(drawing, recording):
     center = pi[1:4] / pi[0]
     assert np.all(center > lower)
     assert np.all(center < upper)
+
+
+def test_a_box_too_small_is_said_to_hold_the_link(drawing, recording, bodies):
+    """Half as wide as the body that torques show."""
+    assert not bodies.physical.at_wall
+    settings = PhysicalSettings(boxes={'wrist_pitch': ([-0.02] * 3, [0.02, 0.02, 0.03])})
+    certificate = run(drawing, recording, settings).physical
+    assert certificate.at_wall
+    assert all(wall.startswith('wrist_pitch at ') for wall in certificate.at_wall)
+    assert any('at the limit of the box' in line for line in certificate.activity)
+
+
+def test_certificate_is_for_programs_too(bodies):
+    document = json.loads(json.dumps(bodies.physical.document()))
+    assert document['consistent']
+    np.testing.assert_array_equal(
+        [link['eigenvalues'] for link in document['links']],
+        [link.eigenvalues for link in bodies.physical.links],
+    )
+    assert document['held_out_ratio'] in [row['held_out_ratio'] for row in document['tried']]
 
 
 def test_box_conditions_hold_for_mass_inside_and_fail_outside():

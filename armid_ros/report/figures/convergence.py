@@ -8,7 +8,7 @@ import textwrap
 
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray
-from armid_ros.report.families import is_rigid, parameter_families
+from armid_ros.report.families import parameter_families
 from armid_ros.report.figures.parameters import HALF_WIDTH
 from armid_ros.report.figures.style import (
     COLOURS,
@@ -86,7 +86,7 @@ def convergence_figure(
 def _title(name: ParameterName) -> str:
     """Return a parameter's name in at most two lines."""
     text = name.name
-    if not is_rigid(name):
+    if not name.rigid:
         text = f'{text.replace("_", " ").capitalize()}, {name.joint}'
     return textwrap.fill(textwrap.shorten(text, 50, placeholder=' ...'), 26)
 

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from armid_ros.identification.comparison import Change, Comparison
 from armid_ros.identification.identifiability import HALF_WIDTH
-from armid_ros.report.families import is_rigid, parameter_families
+from armid_ros.report.families import parameter_families
 from armid_ros.report.notation import digits, pretty
 from armid_ros.report.page import Section
 
@@ -33,7 +33,7 @@ class ChangeRow:
     def label(self) -> str:
         """The parameter, or its joint where the heading says the kind."""
         name = self.change.parameter
-        return name.name if is_rigid(name) else name.joint or name.name
+        return name.name if name.rigid else name.joint or name.name
 
     @property
     def texts(self) -> tuple[str, str, str]:

@@ -8,9 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from armid_ros.identification import Fit
 from armid_ros.recording import Recording
 from armid_ros.report.judgement import unharmed
+from armid_ros.report.notation import digits, torque_unit
 from armid_ros.report.page import Section
+from armid_ros.report.repeatability import Repeatability
+from armid_ros.robots import Robot
 import numpy as np
 
 
@@ -37,6 +41,8 @@ class RecordingQuality:
         What reading it met.
     clean : bool
         Whether that was nothing.
+    repeatability : Repeatability or None
+        What its periods differ by; None where nothing repeats.
 
     """
 
@@ -49,9 +55,10 @@ class RecordingQuality:
     clock: str
     description: str
     clean: bool
+    repeatability: Repeatability | None
 
     @staticmethod
-    def of(recording: Recording, role: str) -> RecordingQuality:
+    def of(recording: Recording, role: str, fits: Sequence[Fit] = ()) -> RecordingQuality:
         """Measure a recording."""
         steps = np.diff(recording.t) if len(recording) > 1 else np.zeros(1)
         period = recording.period or 1.0
@@ -66,6 +73,7 @@ class RecordingQuality:
             clock=recording.clock,
             description=recording.report.describe(),
             clean=unharmed(recording),
+            repeatability=Repeatability.of(fits) if fits else None,
         )
 
 
@@ -78,6 +86,8 @@ class DataQuality(Section):
     ----------
     recordings : sequence of RecordingQuality
         Training data first.
+    robot : Robot or None
+        Gives joints and units, where repeatability is shown.
 
     """
 
@@ -85,3 +95,29 @@ class DataQuality(Section):
     template: ClassVar[str] = 'data_quality.html'
 
     recordings: Sequence[RecordingQuality]
+    robot: Robot | None = None
+
+    @property
+    def repeating(self) -> list[tuple[str, float, list[tuple[str, str, str, float]]]]:
+        """Recording, period, and each joint: what varies, the residual, what repeats of it."""
+        if self.robot is None:
+            return []
+        return [
+            (recording.source, recording.repeatability.period, _rows(recording, self.robot))
+            for recording in self.recordings
+            if recording.repeatability is not None
+        ]
+
+
+def _rows(recording: RecordingQuality, robot: Robot) -> list[tuple[str, str, str, float]]:
+    given = recording.repeatability
+    assert given is not None
+    return [
+        (
+            joint,
+            f'{digits(given.varying[k])} {torque_unit(robot, k)}',
+            f'{digits(given.residual[k])} {torque_unit(robot, k)}',
+            100.0 * float(given.repeating_share[k]),
+        )
+        for k, joint in enumerate(robot.joints)
+    ]

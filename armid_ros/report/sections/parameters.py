@@ -11,7 +11,7 @@ from typing import ClassVar
 from armid_ros.estimate import Estimate
 from armid_ros.identification.identifiability import HALF_WIDTH, Unidentified
 from armid_ros.motion import FloatArray
-from armid_ros.report.families import full_label, is_rigid, parameter_families
+from armid_ros.report.families import full_label, parameter_families
 from armid_ros.report.notation import digits, pretty
 from armid_ros.report.page import Section
 import numpy as np
@@ -132,7 +132,7 @@ class Parameters(Section):
                     names[k].name,
                     names[k].joint,
                     pretty(names[k].unit),
-                    is_rigid(names[k]),
+                    names[k].rigid,
                     float(values[k]),
                     float(reach[k]),
                     float(self.described[k]),

@@ -1,0 +1,143 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a file says of an arm: identification.json, or model.yaml with less of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+import json
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import ModelError
+from armid_ros.estimate import ParameterName
+from armid_ros.motion import FloatArray
+import numpy as np
+import yaml
+
+_SCHEMAS = ('armid/identification/1', 'armid/model/1')
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """
+    What a file says of an arm.
+
+    Attributes
+    ----------
+    source : str
+        The file.
+    robot : str
+        What it calls the robot.
+    values : mapping of ParameterName to (float, float)
+        Value and standard deviation of every parameter that was identified on its own.
+    error_percent : float or None
+        Relative torque error on held-out data, or on training data where there is none.
+    covariance : ndarray, shape (P, P), or None
+        Of the values in their order; None if the file does not have it.
+    terms : mapping of ParameterName to (mapping of str to float)
+        Factors of the standard parameters that each value groups, where the file has them.
+
+    """
+
+    source: str
+    robot: str
+    values: dict[ParameterName, tuple[float, float]]
+    error_percent: float | None
+    covariance: FloatArray | None = None
+    terms: Mapping[ParameterName, Mapping[str, float]] = field(default_factory=dict)
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviations of the values, shape (P,)."""
+        return np.array([std for _, std in self.values.values()])
+
+    def covariance_of(self, names: Sequence[ParameterName]) -> FloatArray:
+        """Return the covariance of some values; diagonal if the file has but deviations."""
+        order = {name: position for position, name in enumerate(self.values)}
+        chosen = [order[name] for name in names]
+        if self.covariance is None:
+            return np.asarray(np.diag(self.std[chosen] ** 2))
+        return np.asarray(self.covariance[np.ix_(chosen, chosen)])
+
+
+def read_parameters(path: str | Path) -> Parameters:
+    """
+    Read what was identified.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder of an identification, its identification.json, or a model.yaml.
+
+    Raises
+    ------
+    ModelError
+        Naming the file and what is wrong in it.
+
+    """
+    path = Path(path)
+    if path.is_dir():
+        kept = [path / name for name in ('identification.json', 'model.yaml')]
+        found = [file for file in kept if file.is_file()]
+        if not found:
+            raise ModelError(
+                f'{path}: neither identification.json nor model.yaml is in it; '
+                'name the folder that armid identify wrote'
+            )
+        path = found[0]
+    try:
+        text = path.read_text(encoding='utf-8')
+        document = json.loads(text) if path.suffix == '.json' else yaml.safe_load(text)
+    except OSError as error:
+        raise ModelError(f'{path}: {error.strerror}') from error
+    except (ValueError, yaml.YAMLError) as error:
+        reason = ' '.join(str(error).split())
+        raise ModelError(f'{path}: neither JSON nor YAML: {reason}') from error
+    if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
+        raise ModelError(f"{path}: its 'schema' has to be {' or '.join(_SCHEMAS)}")
+    try:
+        return parameters_of(str(path), document)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ModelError(f'{path}: {type(error).__name__} {error} is missing or wrong') from error
+
+
+def parameters_of(source: str, document: dict[str, Any]) -> Parameters:
+    """
+    Return what a document of identification.json or model.yaml says.
+
+    Raises
+    ------
+    KeyError, TypeError or ValueError
+        If something is missing or wrong.
+
+    """
+    rows = list(document.get('parameters', document.get('rigid_parameters', [])))
+    for effect in document.get('effects', []):
+        rows += effect['parameters']
+    values = {
+        ParameterName(row['name'], row['joint'], row['unit']): (
+            float(row['value']),
+            float(row['std']),
+        )
+        for row in rows
+        if row['std'] is not None
+    }
+    covariance = _covariance(document.get('covariance'), len(values))
+    terms = dict(zip(values, document.get('grouping', []), strict=False))
+    scores = [*document.get('validation', []), document.get('training')]
+    error = scores[0]['relative_error_percent'] if scores[0] else None
+    return Parameters(source, str(document['robot']), values, error, covariance, terms)
+
+
+def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
+    """Return the matrix of a lower triangle."""
+    if rows is None:
+        return None
+    if [len(row) for row in rows] != list(range(1, size + 1)):
+        raise ValueError(f'a covariance that is no triangle of {size} rows')
+    matrix = np.zeros((size, size))
+    for index, row in enumerate(rows):
+        matrix[index, : index + 1] = matrix[: index + 1, index] = row
+    return matrix
