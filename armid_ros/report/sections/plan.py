@@ -11,7 +11,7 @@ from typing import ClassVar
 from armid_ros.excitation import Design, FourierTrajectory, Limits
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.report.charts import Chart, Level, Series
-from armid_ros.report.families import is_rigid, parameter_families
+from armid_ros.report.families import parameter_families
 from armid_ros.report.notation import digits, pretty
 from armid_ros.report.page import Section
 from armid_ros.report.silhouettes import Silhouettes
@@ -151,7 +151,7 @@ class Foreseen(Section):
             (
                 title,
                 pretty(names[members[0]].unit),
-                is_rigid(names[members[0]]),
+                names[members[0]].rigid,
                 self._rows(members),
             )
             for title, members in parameter_families(names).items()
@@ -165,7 +165,7 @@ class Foreseen(Section):
         rows = []
         for k in sorted(members, key=lambda k: float(size[k])):
             name, std, value = information.parameters[k], information.std[k], described[k]
-            seen, known = bool(np.isfinite(std)), is_rigid(name) or value != 0.0
+            seen, known = bool(np.isfinite(std)), name.rigid or value != 0.0
             relative = f'{digits(100.0 * std / abs(value))} %' if value and seen else ''
             rows.append(
                 (
