@@ -166,7 +166,7 @@ def _simulate(
     for path, loop, plan, noise in plans:
         tick(0.0, f'simulating {path.name}')
         runs = [noise.measure(run, rng) for run in run_all(plant, loop, plan, tick)]
-        write_runs(path, runs, robot, sensors)
+        write_runs(path, runs, robot, sensors.on_links(robot))
     return (out / 'resonances',), (out / 'steps',)
 
 

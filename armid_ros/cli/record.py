@@ -8,14 +8,23 @@ from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import options
-from armid_ros.cli.terminal import progress, say
+from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.effects import parse_effect
 from armid_ros.excitation import design, DesignSettings, load_excitation
+from armid_ros.identification.two_inertia import write_runs
+from armid_ros.motion import Motion
 from armid_ros.recording import recover as recover_bag
 from armid_ros.recording import write_recording
 from armid_ros.robots import collision_model
-from armid_ros.simulation import Sensors
+from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run
+from armid_ros.simulation.elastic_arm import ElasticArm, record
+from armid_ros.simulation.elastic_setup import (
+    elastic_joints,
+    make_elastic_arm,
+    no_rotor,
+    shipped_arm,
+)
 import click
 import numpy as np
 
@@ -35,8 +44,18 @@ import numpy as np
     '--trajectory', type=click.Path(path_type=Path), help='A YAML or CSV of armid excite.'
 )
 @click.option('--rate', default=1000.0, show_default=True, help='Recorded samples per second.')
+@click.option(
+    '--loop-gain',
+    default=1.0,
+    show_default=True,
+    help='Share of the gains of the velocity loops that drive elastic joints.',
+)
 @click.option('--torque-noise', default=0.0, help='Standard deviation [N m].')
 @click.option('--position-noise', default=0.0, help='Standard deviation [rad].')
+@click.option('--velocity-noise', default=0.0, help='Standard deviation [rad/s].')
+@click.option(
+    '--acceleration-noise', default=0.0, help='Of accelerometers on links with springs [m/s^2].'
+)
 @click.option('--resolution', default=0.0, help='Step of the encoders [rad].')
 @options.gravity
 @options.joints
@@ -48,21 +67,37 @@ def simulate(
     model: Path | None,
     trajectory: Path | None,
     rate: float,
+    loop_gain: float,
     torque_noise: float,
     position_noise: float,
+    velocity_noise: float,
+    acceleration_noise: float,
     resolution: float,
     gravity: str,
     joints: str | None,
     seed: int,
 ) -> None:
-    """Let a simulated arm follow a trajectory and record it."""
+    """
+    Let a simulated arm follow a trajectory and record it.
+
+    Joints with joint_elasticity and rotor_inertia have motors with a motion of their own; such an
+    arm is recorded on both sides of its springs.
+
+    """
     rng = np.random.default_rng(seed)
     robot = options.open_robot(robot_source, gravity, joints)
-    arm = load_model(model, robot) if model else ArmModel(robot)
+    arm, drives = (load_model(model, robot), None) if model else shipped_arm(robot)
     for text in texts:
         arm = arm.with_effect(*parse_effect(text, robot))
+    springs, rotorless = elastic_joints(arm)
+    if rotorless:
+        say(no_rotor(rotorless))
     sensors = Sensors(
-        torque_noise=torque_noise, position_noise=position_noise, resolution=resolution
+        torque_noise=torque_noise,
+        position_noise=position_noise,
+        velocity_noise=velocity_noise,
+        acceleration_noise=acceleration_noise,
+        resolution=resolution,
     )
     with progress('designing a trajectory') as tick:
         if trajectory:
@@ -72,12 +107,25 @@ def simulate(
             excitation = design(
                 ArmModel(robot), settings, rng, collision=collision_model(robot)
             ).excitation
+        motion = excitation.motion(1000.0)
         tick(0.0, 'simulating')
-        measured = run(
-            arm, excitation.motion(1000.0), rng=rng, sensors=sensors, rate=rate, progress=tick
-        )
-    write_recording(out, measured, robot_description=robot.urdf)
-    say(f'{out}: {len(measured.t)} samples of {robot.n_joints} joints, {measured.t[-1]:.1f} s')
+        if springs and not rotorless:
+            elastic = make_elastic_arm(
+                arm, rng=rng, drives=drives, gain=loop_gain, sensors=sensors
+            )
+            samples, sides = _both_sides(out, elastic, motion, rate, tick), ' on both sides'
+        else:
+            measured = run(arm, motion, rng=rng, sensors=sensors, rate=rate, progress=tick)
+            write_recording(out, measured, robot_description=robot.urdf)
+            samples, sides = len(measured.t), ''
+    say(f'{out}: {samples} samples of {robot.n_joints} joints{sides}, {motion.t[-1]:.1f} s')
+
+
+def _both_sides(out: Path, arm: ElasticArm, motion: Motion, rate: float, tick: Tick) -> int:
+    """Let an arm with elastic joints follow a motion, and write what motors and links did."""
+    measured = record(arm, Reference.of(motion), rate=rate, progress=tick)
+    write_runs(out, [measured], arm.plant.robot, arm.accelerometers)
+    return len(measured.motor)
 
 
 @click.command(epilog='Example: armid recover crashed/crashed_0.mcap --out whole')

@@ -15,7 +15,15 @@ from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.parameters import NodeParameter
 from armid_ros.robots import load_robot, parse_gravity
+from armid_ros.robots.two_link import TwoLinkSet
 from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Sensors, SimulatedArm
+from armid_ros.simulation.elastic_arm import ElasticArm
+from armid_ros.simulation.elastic_setup import (
+    elastic_joints,
+    make_elastic_arm,
+    no_rotor,
+    shipped_arm,
+)
 import numpy as np
 
 Values = Callable[[str], Any]
@@ -36,7 +44,7 @@ ARM_PARAMETERS = (
     NodeParameter(
         'controller',
         'computed_torque',
-        'What makes it follow its trajectory.',
+        'What makes an arm with rigid joints follow its trajectory.',
         choices=('computed_torque', 'gravity_pd'),
     ),
     NodeParameter('torque_noise', [0.0], 'Standard deviation, one or one a joint.', 'N m or N'),
@@ -45,19 +53,31 @@ ARM_PARAMETERS = (
     NodeParameter('resolution', [0.0], 'Encoder step, one or one a joint; 0: none.', 'rad or m'),
     NodeParameter('velocity_from_encoder', False, 'Differentiate positions for the velocity.'),
     NodeParameter('torque_delay', 0, 'Steps by which torque is read late.', lower=0, upper=100000),
+    NodeParameter(
+        'acceleration_noise', 0.0, 'Standard deviation; of links on springs.', 'm/s^2', lower=0.0
+    ),
+    NodeParameter(
+        'loop_gain',
+        1.0,
+        'Share of the gains of the velocity loops that drive elastic joints.',
+        lower=0.0,
+        upper=10.0,
+    ),
     NodeParameter('seed', 0, 'Of the noise.', lower=0, upper=2**62),
     NodeParameter('time_step', 0.001, 'Of the integration.', 's', lower=1e-5, upper=0.01),
 )
 
 
-def make_arm(value: Values) -> SimulatedArm:
+def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm | ElasticArm:
     """
-    Make the simulated arm that parameters describe.
+    Make the simulated arm that parameters describe, elastic where its joints are.
 
     Parameters
     ----------
     value : callable
         Returns the value of a parameter of `ARM_PARAMETERS`.
+    warn : callable
+        Is told what cannot be simulated as the model has it.
 
     Raises
     ------
@@ -65,38 +85,50 @@ def make_arm(value: Values) -> SimulatedArm:
         If robot, model, effects or sensors are not valid or do not fit each other.
 
     """
-    plant = Plant(_model(value), dt=value('time_step'))
-    n = plant.robot.n_joints
-    controllers = {'computed_torque': ComputedTorque, 'gravity_pd': GravityPD}
+    arm, drives = _model(value)
+    n, dt = arm.robot.n_joints, value('time_step')
+    rng = np.random.default_rng(value('seed'))
     start = _numbers(value('start'), n, 'start') if value('start') else None
-    return SimulatedArm(
-        plant,
-        rng=np.random.default_rng(value('seed')),
-        controller=controllers[value('controller')](plant.arm),
-        sensors=Sensors(
-            torque_noise=_per_joint(value('torque_noise'), n, 'torque_noise'),
-            position_noise=_per_joint(value('position_noise'), n, 'position_noise'),
-            velocity_noise=_per_joint(value('velocity_noise'), n, 'velocity_noise'),
-            resolution=_per_joint(value('resolution'), n, 'resolution'),
-            velocity_from_encoder=value('velocity_from_encoder'),
-            torque_delay=value('torque_delay'),
-        ),
-        start=start,
+    sensors = Sensors(
+        torque_noise=_per_joint(value('torque_noise'), n, 'torque_noise'),
+        position_noise=_per_joint(value('position_noise'), n, 'position_noise'),
+        velocity_noise=_per_joint(value('velocity_noise'), n, 'velocity_noise'),
+        resolution=_per_joint(value('resolution'), n, 'resolution'),
+        velocity_from_encoder=value('velocity_from_encoder'),
+        torque_delay=value('torque_delay'),
+        acceleration_noise=value('acceleration_noise'),
     )
+    springs, rotorless = elastic_joints(arm)
+    if rotorless:
+        warn(no_rotor(rotorless))
+    elif springs:
+        return make_elastic_arm(
+            arm,
+            rng=rng,
+            drives=drives,
+            gain=value('loop_gain'),
+            dt=dt,
+            sensors=sensors,
+            start=start,
+        )
+    plant = Plant(arm, dt=dt)
+    controllers = {'computed_torque': ComputedTorque, 'gravity_pd': GravityPD}
+    controller = controllers[value('controller')](plant.arm)
+    return SimulatedArm(plant, rng=rng, controller=controller, sensors=sensors, start=start)
 
 
-def _model(value: Values) -> ArmModel:
-    gravity = value('gravity')
+def _model(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:
+    gravity, drives = value('gravity'), None
     if value('model'):
         arm = load_model(value('model'))
         if gravity:
             arm = replace(arm, robot=arm.robot.with_gravity(parse_gravity(gravity)))
     else:
-        arm = ArmModel(load_robot(value('robot'), gravity=gravity or 'earth'))
+        arm, drives = shipped_arm(load_robot(value('robot'), gravity=gravity or 'earth'))
     for text in filter(None, value('effects')):
         effect, values = parse_effect(text, arm.robot)
         arm = arm.with_effect(effect, values)
-    return arm
+    return arm, drives
 
 
 def _numbers(text: str, count: int, name: str) -> FloatArray:

@@ -32,6 +32,7 @@ from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.simulation import SimulatedArm
+from armid_ros.simulation.elastic_arm import ElasticArm
 from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.logging import LoggingSeverity
@@ -83,7 +84,7 @@ OnProgress = Callable[[Progress], None]
 
 
 def run_lockstep(
-    arm: SimulatedArm,
+    arm: SimulatedArm | ElasticArm,
     excitation: Excitation,
     identifier: OnlineIdentifier,
     bag: Path,
@@ -104,7 +105,7 @@ def run_lockstep(
 
     Parameters
     ----------
-    arm : SimulatedArm
+    arm : SimulatedArm or ElasticArm
         The arm.
     excitation : Excitation
         What it shall do.

@@ -11,11 +11,13 @@ from typing import Any
 from armid_ros.errors import TrajectoryError
 from armid_ros.nodes.arm_parameters import ARM_PARAMETERS, make_arm
 from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.elastic_topics import ElasticTopics
 from armid_ros.nodes.parameters import NodeParameter
 from armid_ros.nodes.process import run
 from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.nodes.trajectories import read_trajectory
 from armid_ros.simulation import Reference, SimulatedArm
+from armid_ros.simulation.elastic_arm import ElasticArm, ElasticSample
 from armid_ros.simulation.run import whole_steps
 from rclpy.clock import Clock, ClockType
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -40,7 +42,9 @@ class SimulatedArmNode(ArmidNode):
     A simulated arm on topics.
 
     In real time its stamps are those of the system clock. At another real_time_factor it also
-    publishes /clock. With use_sim_time it moves as far as /clock does, and no further.
+    publishes /clock. With use_sim_time it moves as far as /clock does, and no further. An arm
+    with elastic joints is read on both sides: joint_states are its motors', link/joint_states its
+    links', reference/joint_states what its drives are asked for, and <link>/imu accelerometers.
 
     """
 
@@ -66,14 +70,17 @@ class SimulatedArmNode(ArmidNode):
     )
 
     def __init__(
-        self, arm: SimulatedArm | None = None, start_ns: int | None = None, **kwargs: Any
+        self,
+        arm: SimulatedArm | ElasticArm | None = None,
+        start_ns: int | None = None,
+        **kwargs: Any,
     ) -> None:
         """
         Make the node.
 
         Parameters
         ----------
-        arm : SimulatedArm, optional
+        arm : SimulatedArm or ElasticArm, optional
             The arm; by default the one the parameters describe.
         start_ns : int, optional
             Stamp of the beginning [ns]; by default that of the node's clock.
@@ -82,7 +89,7 @@ class SimulatedArmNode(ArmidNode):
 
         """
         super().__init__('simulated_arm', **kwargs)
-        self._arm = arm or make_arm(self.value)
+        self._arm = arm or make_arm(self.value, self.get_logger().warn)
         rate = self.value('rate')
         self._dt_ns = round(self._arm.plant.dt * 1e9)
         self._stride = whole_steps(1.0 / rate, self._arm.plant.dt, f'a rate of {rate:g} Hz')
@@ -100,6 +107,9 @@ class SimulatedArmNode(ArmidNode):
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
         )
         self._message = JointState(name=list(self._arm.joints))
+        self._sides = None
+        if isinstance(self._arm, ElasticArm):
+            self._sides = ElasticTopics(self, self._arm)
         self._clock_due, self._clock_period = 0, round(1e9 / self.value('clock_rate'))
         self._clock_publisher = None
         if not self._follows and self._factor != 1.0:
@@ -150,6 +160,8 @@ class SimulatedArmNode(ArmidNode):
         message.velocity = sample.dq.tolist()
         message.effort = sample.tau.tolist()
         self._states.publish(message)
+        if self._sides is not None and isinstance(sample, ElasticSample):
+            self._sides.publish(sample, stamp)
         return stamp_ns
 
     def publish_clock(self) -> None:

@@ -32,7 +32,7 @@ def read_trajectory(message: JointTrajectory) -> Reference:
     times = [p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in message.points]
     fields = {
         name: _field(message.points, name, len(joints))
-        for name in ('positions', 'velocities', 'accelerations')
+        for name in ('positions', 'velocities', 'accelerations', 'effort')
     }
     if fields['positions'] is None:
         raise TrajectoryError('trajectory: its points have no positions')
@@ -42,6 +42,7 @@ def read_trajectory(message: JointTrajectory) -> Reference:
         fields['positions'],
         fields['velocities'],
         fields['accelerations'],
+        fields['effort'],
     )
 
 

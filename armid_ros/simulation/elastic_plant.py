@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-An arm whose motors drive its links through springs: the plant, and one step of it.
+An arm whose motors drive its links through springs.
 
 Where a transmission gives way, motor and link have velocities of their own. Motors carry rotor
 inertia, drive torque and all friction of the arm's effects; links carry the rigid body and what is
@@ -15,15 +15,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import Transmission
+from armid_ros.effects import Action, Transmission
+from armid_ros.effects.transmission import Backlash, JointElasticity
 from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import FloatArray, read_only
-from armid_ros.simulation.box_complementarity import Modes, solve_box_complementarity
+from armid_ros.robots import Robot
+from armid_ros.simulation.box_complementarity import Modes
 from armid_ros.simulation.plant import limit_slack, Plant
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
-from scipy.linalg.lapack import dgesv
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +96,9 @@ class ElasticPlant:
     rotors: FloatArray = field(init=False, repr=False)
     damping: FloatArray = field(init=False, repr=False)
     friction: FloatArray = field(init=False, repr=False)
+    sensing: Action = field(init=False, repr=False)
+    pull: FloatArray = field(init=False, repr=False)
+    loose: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Collect what the effects do on either side."""
@@ -135,15 +139,29 @@ class ElasticPlant:
             'to_twists': to_twists,
             'rotors': to_motors.T @ rotors @ to_motors,
             'damping': to_motors.T @ rigid.damping @ to_motors + to_links.T @ link @ to_links,
+            'sensing': _sensing(self.arm),
             'friction': np.ascontiguousarray(rigid.contacts.directions @ to_motors),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
+        object.__setattr__(self, 'loose', bool(np.any(self.springs.gap)))
+        pull = self.pull_of(self.springs.stiffness, self.springs.damping)
+        object.__setattr__(self, 'pull', read_only(pull))
+
+    @property
+    def robot(self) -> Robot:
+        """The rigid body as the effects make it."""
+        return self.rigid.robot
 
     @property
     def joints(self) -> tuple[str, ...]:
         """Joint names in column order."""
         return self.rigid.robot.joints
+
+    def pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
+        """Return what springs and friction do per state, shape (e + n, e + e + n)."""
+        w = self.to_twists
+        return np.hstack([-w.T * stiffness, -self.damping - (w.T * damping) @ w])
 
     def state(self, q: npt.ArrayLike, dq: npt.ArrayLike = 0.0) -> ElasticState:
         """
@@ -179,6 +197,15 @@ class ElasticPlant:
         e = len(self.elastic)
         return state.q, state.x[2 * e :], state.dv[e:]
 
+    def motor_acceleration(self, state: ElasticState) -> FloatArray:
+        """Return the accelerations of the motors at the joints, shape (n,)."""
+        return np.asarray(self.to_motors.dot(state.dv))
+
+    def given(self, torque: FloatArray) -> FloatArray:
+        """Return what the drives give where a torque is asked for, shape (n,) [N m]."""
+        drive = self.rigid.action.drive
+        return torque if drive is None else drive(torque)
+
     def require_range(self, state: ElasticState) -> None:
         """Raise TrajectoryError if a link is beyond a limit; there are no stops to hold it."""
         robot = self.rigid.robot
@@ -192,121 +219,12 @@ class ElasticPlant:
             )
 
 
-def elastic_step(plant: ElasticPlant, state: ElasticState, torque: FloatArray) -> ElasticState:
-    """
-    Integrate one step under a constant actuator torque, shape (n,) [N m].
-
-    The springs, dampers and inertias of the moment are a linear system. It is integrated by the
-    Pade approximation (2, 2) of its exponential, which is A-stable, so that no spring is too
-    stiff for the step, and of fourth order, so that its frequencies stay where they are: 0.005 %
-    off at ten steps a period. What is not linear is taken at the middle of the substep. Dry
-    friction is complementary to the velocity at the end, as in the rigid plant.
-
-    """
-    for _ in range(plant.substeps):
-        state = _substep(plant, state, torque)
-    steps = state.steps + 1
-    return ElasticState(
-        steps, steps * plant.dt, state.q, state.x, state.dv, state.modes, state.memory
-    )
-
-
-def _substep(plant: ElasticPlant, state: ElasticState, torque: FloatArray) -> ElasticState:
-    rigid, e = plant.rigid, len(plant.elastic)
-    dt, x = rigid.dt, state.x
-    speed = x[e:]
-    half = 0.5 * dt
-    q_middle = state.q + half * (x[2 * e :] + 0.5 * half * state.dv[e:])
-    v_middle = speed + half * state.dv
-    force, memory = _force(plant, state, torque, q_middle, v_middle)
-    inertia = plant.rotors.copy()
-    inertia[e:, e:] += pin.crba(rigid.robot.model, rigid.data, q_middle)
-    stiffness, offset, ratio = _springs(plant, x[:e] + half * (plant.to_twists @ v_middle))
-    force += plant.to_twists.T.dot(offset)
-    resist = plant.damping + (plant.to_twists.T * ratio) @ plant.to_twists
-    right = np.column_stack([-plant.to_twists.T * stiffness, -resist, force, plant.friction.T])
-    solved = dgesv(inertia, right)[2]
-    size = len(x)
-    a = np.zeros((size, size))
-    a[:e, e:] = plant.to_twists
-    a[e:] = solved[:, :size]
-    z = dt * a
-    even = np.eye(size) + (z @ z) / 12.0
-    inputs = np.zeros((size, 1 + len(plant.friction)))
-    inputs[e:] = dt * solved[:, size:]
-    inputs[:, 0] += even @ x + 0.5 * (z @ x)
-    after = dgesv(even - 0.5 * z, inputs)[2]
-    x_next, modes, rub = after[:, 0], state.modes, np.zeros(len(plant.friction))
-    if modes:
-        response = after[:, 1:]
-        law = rigid.contacts
-        if law.friction is not None:
-            model, data = rigid.robot.model, rigid.data
-            law = law.under(pin.rnea(model, data, q_middle, v_middle[e:], state.dv[e:]))
-        rub, modes = solve_box_complementarity(
-            law.law, plant.friction @ response[e:], plant.friction @ x_next[e:], modes
-        )
-        x_next = x_next - response @ rub
-    constant = solved[:, size] - solved[:, size + 1 :] @ rub
-    dv = a[e:] @ x_next + constant
-    first = a[e:] @ x + constant
-    moved = half * (x[2 * e :] + x_next[2 * e :]) + dt**2 / 12.0 * (first - dv)[e:]
-    if 0 in modes:
-        _hold(plant, state, x_next, modes, moved)
-    return ElasticState(state.steps, state.t + dt, state.q + moved, x_next, dv, modes, memory)
-
-
-def _force(
-    plant: ElasticPlant,
-    state: ElasticState,
-    torque: FloatArray,
-    q: FloatArray,
-    v: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Return what acts on motors and links at the middle of a substep, and the new memory."""
-    rigid, action, e = plant.rigid, plant.rigid.action, len(plant.elastic)
-    t = np.asarray(state.t + 0.5 * rigid.dt)
-    motor_speed = plant.to_motors.dot(v)
-    motor_position = q.copy()
-    motor_position[plant.elastic] += state.x[:e] + 0.5 * rigid.dt * (plant.to_twists @ v)
-    drive = torque - rigid.constant
-    if action.torque is not None:
-        drive = drive - action.torque(t, motor_position, motor_speed)
-    memory = state.memory
-    if action.hysteresis is not None:
-        half = action.hysteresis.advance(memory, 0.5 * rigid.dt * motor_speed)
-        drive = drive - action.hysteresis.torque(half)
-        memory = action.hysteresis.advance(memory, rigid.dt * motor_speed)
-    force = plant.to_motors.T.dot(drive)
-    force[e:] -= pin.nonLinearEffects(rigid.robot.model, rigid.data, q, v[e:])
-    if action.link_torque is not None:
-        force[e:] -= action.link_torque(t, q, v[e:])
-    return force, memory
-
-
-def _springs(plant: ElasticPlant, twist: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return stiffness, torque at zero twist (negative) and damping, nothing within a gap."""
-    springs = plant.springs
-    if not np.any(springs.gap):
-        return springs.stiffness, np.zeros_like(twist), springs.damping
-    meshes = np.abs(twist) > springs.gap
-    stiffness = np.where(meshes, springs.stiffness, 0.0)
-    offset = stiffness * springs.gap * np.sign(twist)
-    return stiffness, offset, np.where(meshes, springs.damping, 0.0)
-
-
-def _hold(
-    plant: ElasticPlant, state: ElasticState, x: FloatArray, modes: Modes, moved: FloatArray
-) -> None:
-    """Keep motors that were and are stuck where they are, without rounding."""
-    e = len(plant.elastic)
-    for axis, mode in zip(plant.rigid.contacts.axes, modes, strict=True):
-        if mode != 0 or axis < 0:
-            continue
-        places = np.flatnonzero(plant.elastic == axis)
-        if not len(places):
-            x[2 * e + axis] = 0.0
-        for place in places:
-            if state.x[e + place] == 0.0:
-                x[place] = state.x[place] - moved[axis]
-            x[e + place] = 0.0
+def _sensing(arm: ArmModel) -> Action:
+    """Return what effects make of the readings of motors, which their springs do not change."""
+    kept = [
+        (effect, values)
+        for effect, values in zip(arm.effects, arm.values, strict=True)
+        if not isinstance(effect, JointElasticity | Backlash)
+    ]
+    bare = ArmModel(arm.robot, tuple(e for e, _ in kept), tuple(v for _, v in kept))
+    return bare.action()

@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.simulation.elastic_plant import elastic_step, ElasticPlant
+from armid_ros.simulation.elastic_integrator import elastic_step
+from armid_ros.simulation.elastic_plant import ElasticPlant
 import numpy as np
 import numpy.typing as npt
 
@@ -36,6 +37,10 @@ class VelocityLoop:
         """Freeze the gains."""
         object.__setattr__(self, 'proportional', read_only(self.proportional))
         object.__setattr__(self, 'integral', read_only(self.integral))
+
+    def torque(self, error: FloatArray, integral: FloatArray) -> FloatArray:
+        """Return the torque for errors of velocity [rad/s] and their integral [rad], (n,)."""
+        return np.asarray(self.proportional * error + self.integral * integral)
 
     @classmethod
     def of_drive(
@@ -83,12 +88,19 @@ class ElasticRun:
         is the drives' [N m], constant from each sample to the next; the links have none.
     reference : ndarray, shape (N, n)
         Reference of the velocity loop [rad/s].
+    integral : ndarray, shape (n,), or None
+        What the integral of the loop held at the beginning [rad]; None for nothing. A motor that
+        sticks keeps it from one experiment to the next.
+    felt : ndarray, shape (n, N, 3), or None
+        What accelerometers on the links read [m/s^2], where it is not what they should read.
 
     """
 
     motor: Motion
     link: Motion
     reference: FloatArray
+    integral: FloatArray | None = None
+    felt: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +167,7 @@ def run_elastic(plant: ElasticPlant, loop: VelocityLoop, experiment: Experiment)
         q_l[k], v_l[k], a_l[k] = plant.link(state)
         error = experiment.velocity[k] - v_m[k]
         integral += plant.dt * error
-        asked = loop.proportional * error + loop.integral * integral + extra[k]
+        asked = loop.torque(error, integral) + extra[k]
         tau[k] = np.clip(asked, -limit, limit)
         state = elastic_step(plant, state, tau[k])
     plant.require_range(state)

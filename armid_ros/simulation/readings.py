@@ -51,45 +51,82 @@ class RecentPast:
 
     Parameters
     ----------
-    plant : Plant
-        The arm.
-    state : State
-        Where it starts.
-    torque : ndarray, shape (n,)
-        What its drives are asked for there.
+    action : Action
+        What the effects do to the readings.
+    dt : float
+        Time between samples [s].
+    joints : tuple of str
+        Their names.
     delay : int
         Steps by which the torque sensors are late.
 
     """
 
-    def __init__(self, plant: Plant, state: State, torque: FloatArray, delay: int = 0) -> None:
-        self._plant = plant
+    def __init__(self, action: Action, dt: float, joints: tuple[str, ...], delay: int = 0) -> None:
+        self._action = action
+        self._dt = dt
+        self._joints = joints
         self._delay = delay
-        steps = plant.action.reading_memory / plant.dt
-        self._length = int(np.ceil(steps)) + delay + _NEIGHBOURS
+        self._length = int(np.ceil(action.reading_memory / dt)) + delay + _NEIGHBOURS
+        self._rows = np.empty((0, 5, len(joints)))
+
+    @classmethod
+    def of(cls, plant: Plant, state: State, torque: FloatArray, delay: int = 0) -> RecentPast:
+        """
+        Return the past of an arm that stands at its beginning.
+
+        Parameters
+        ----------
+        plant : Plant
+            The arm.
+        state : State
+            Where it starts.
+        torque : ndarray, shape (n,)
+            What its drives are asked for there.
+        delay : int
+            Steps by which the torque sensors are late.
+
+        """
+        past = cls(plant.action, plant.dt, plant.robot.joints, delay)
         zero = np.zeros_like(torque)
-        self._rows = np.stack([state.q, state.dq, zero, torque, torque])[np.newaxis]
-        self._steps = state.steps
+        now = np.stack([state.q, state.dq, zero, torque, torque])
+        past.append(now[np.newaxis], state.steps)
+        return past
+
+    def append(self, rows: FloatArray, steps: int) -> None:
+        """
+        Take in samples.
+
+        Parameters
+        ----------
+        rows : ndarray, shape (N, 5, n)
+            Position, velocity, acceleration, torque that drives gave and were asked for.
+        steps : int
+            Step of the last of them.
+
+        """
+        self._rows = np.concatenate([self._rows, rows])[-self._length :]
+        self._steps = steps
 
     def extend(self, trace: Trace) -> None:
         """Take in what happened."""
-        drive = self._plant.action.drive
+        drive = self._action.drive
         asked = np.concatenate([trace.tau, trace.torque[np.newaxis]])
         given = asked if drive is None else drive(asked)
         q = np.concatenate([trace.q[1:], trace.state.q[np.newaxis]])
         dq = np.concatenate([trace.dq[1:], trace.state.dq[np.newaxis]])
         means = [(x[1:] + x[:-1]) / 2 for x in (given, asked)]
-        new = np.stack([q, dq, trace.ddq, *means], axis=1)
-        self._rows = np.concatenate([self._rows, new])[-self._length :]
-        self._steps = trace.state.steps
+        self.append(np.stack([q, dq, trace.ddq, *means], axis=1), trace.state.steps)
 
     def latest(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return position, velocity and torque as read now, each of shape (n,)."""
         count = len(self._rows)
         q, dq, ddq, given, asked = self._rows.transpose(1, 0, 2)
-        t = self._plant.times(self._steps - count + 1, count)
-        if count == 1:
-            return q[0], dq[0], asked[0]
-        truth = Motion(self._plant.robot.joints, t, q, dq, ddq, given)
-        q, dq, tau = readings(self._plant.action, truth, asked)
-        return q[-1], dq[-1], tau[max(-1 - self._delay, -count)]
+        late = max(-1 - self._delay, -count)
+        if count == 1 or (self._action.reading is None and self._action.displacement is None):
+            return q[-1], dq[-1], asked[late]
+        steps = np.arange(self._steps - count + 1, self._steps + 1)
+        t = np.asarray(self._dt * steps, dtype=np.float64)
+        truth = Motion(self._joints, t, q, dq, ddq, given)
+        q, dq, tau = readings(self._action, truth, asked)
+        return q[-1], dq[-1], tau[late]

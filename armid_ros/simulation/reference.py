@@ -39,6 +39,9 @@ class Reference:
         Position [rad or m].
     dq, ddq : ndarray, shape (K, n), or None
         Velocity and acceleration; an acceleration needs a velocity.
+    tau : ndarray, shape (K, n), or None
+        Torque on top of what follows the waypoints, straight from each to the next [N m]; for
+        arms whose controllers take one.
 
     """
 
@@ -47,11 +50,14 @@ class Reference:
     q: FloatArray
     dq: FloatArray | None = None
     ddq: FloatArray | None = None
+    tau: FloatArray | None = None
     _coefficients: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Freeze the waypoints, check them, and find the polynomials between them."""
-        names = [name for name in ('t', 'q', 'dq', 'ddq') if getattr(self, name) is not None]
+        names = [
+            name for name in ('t', 'q', 'dq', 'ddq', 'tau') if getattr(self, name) is not None
+        ]
         for name in names:
             object.__setattr__(self, name, read_only(getattr(self, name)))
         if self.t.ndim != 1 or not len(self.t):
@@ -110,12 +116,16 @@ class Reference:
         Returns
         -------
         Motion
-            Position, velocity and acceleration, without torque.
+            Position, velocity and acceleration, and torque where there is one.
 
         """
+        tau = None
+        if self.tau is not None:
+            columns = [np.interp(t, self.t, column, 0.0, 0.0) for column in self.tau.T]
+            tau = np.column_stack(columns)
         if len(self.t) == 1:
             q = np.broadcast_to(self.q[0], (len(t), len(self.joints)))
-            return Motion(self.joints, t, q, np.zeros_like(q), np.zeros_like(q))
+            return Motion(self.joints, t, q, np.zeros_like(q), np.zeros_like(q), tau)
         segment = np.clip(np.searchsorted(self.t, t, side='right') - 1, 0, len(self.t) - 2)
         span = (self.t[segment + 1] - self.t[segment])[:, np.newaxis]
         outside = ((t < self.t[0]) | (t > self.t[-1]))[:, np.newaxis]
@@ -127,7 +137,7 @@ class Reference:
             q = q * u + c[segment]
         q = np.where((t > self.t[-1])[:, np.newaxis], self.q[-1], q)
         dq, ddq = (np.where(outside, 0.0, x) for x in (dq / span, ddq / span**2))
-        return Motion(self.joints, t, q, dq, ddq)
+        return Motion(self.joints, t, q, dq, ddq, tau)
 
     def for_robot(self, robot: Robot) -> Reference:
         """
@@ -154,9 +164,11 @@ class Reference:
         if self.joints == robot.joints:
             return self
         order = [self.joints.index(joint) for joint in robot.joints]
-        dq = None if self.dq is None else self.dq[:, order]
-        ddq = None if self.ddq is None else self.ddq[:, order]
-        return Reference(robot.joints, self.t, self.q[:, order], dq, ddq)
+        dq, ddq, tau = (
+            None if values is None else values[:, order]
+            for values in (self.dq, self.ddq, self.tau)
+        )
+        return Reference(robot.joints, self.t, self.q[:, order], dq, ddq, tau)
 
     def after(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Reference:
         """
@@ -171,6 +183,7 @@ class Reference:
             np.vstack([q, self.q]),
             None if self.dq is None else np.vstack([dq, self.dq]),
             None if self.ddq is None else np.vstack([ddq, self.ddq]),
+            None if self.tau is None else np.vstack([np.zeros_like(q), self.tau]),
         )
 
     def require_limits(self, robot: Robot, dt: float) -> None:

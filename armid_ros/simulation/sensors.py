@@ -32,6 +32,8 @@ class Sensors:
         the time between them, instead of the true one; the noise comes on top.
     torque_delay : int
         Steps of the plant by which the torque reading is older than the position reading.
+    acceleration_noise : float
+        Standard deviation of accelerometers on the links, where an arm has them [m/s^2].
 
     """
 
@@ -41,13 +43,15 @@ class Sensors:
     resolution: float | FloatArray = 0.0
     velocity_from_encoder: bool = False
     torque_delay: int = 0
+    acceleration_noise: float = 0.0
     _noisy: bool = field(init=False, repr=False)
     _counted: npt.NDArray[np.bool_] = field(init=False, repr=False)
     _size: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse negative values, and see what there is to do."""
-        for name in ('torque_noise', 'position_noise', 'velocity_noise', 'resolution'):
+        noises = ('torque_noise', 'position_noise', 'velocity_noise', 'acceleration_noise')
+        for name in (*noises, 'resolution'):
             value = np.asarray(getattr(self, name), dtype=float)
             if not np.all(np.isfinite(value)) or np.any(value < 0.0):
                 raise ModelError(f'sensors: {name} has to be 0 or more, not {value.tolist()}')
@@ -56,9 +60,10 @@ class Sensors:
                 f'sensors: torque_delay is a whole number of steps, not {self.torque_delay}'
             )
 
-        noises = (self.torque_noise, self.position_noise, self.velocity_noise)
         resolution = np.asarray(self.resolution, dtype=float)
-        object.__setattr__(self, '_noisy', any(np.any(np.asarray(std)) for std in noises))
+        object.__setattr__(
+            self, '_noisy', any(np.any(np.asarray(getattr(self, name))) for name in noises[:3])
+        )
         object.__setattr__(self, '_counted', resolution > 0.0)
         object.__setattr__(self, '_size', np.where(resolution > 0.0, resolution, 1.0))
 

@@ -4,24 +4,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.errors import TrajectoryError
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 from armid_ros.simulation.closed_loop import command, run, Targets, Trace
 from armid_ros.simulation.controller import ComputedTorque, Controller
+from armid_ros.simulation.course import Course
 from armid_ros.simulation.plant import middle_position, Plant, State
 from armid_ros.simulation.readings import RecentPast
 from armid_ros.simulation.reference import Reference
 from armid_ros.simulation.sensors import Sensors
 import numpy as np
 import numpy.typing as npt
-
-#: How far the first point of a trajectory that begins at once may be from where the arm is to be
-#: [rad or m], and how fast it may begin or end [rad/s or m/s].
-START_TOLERANCE = 0.01
-REST_TOLERANCE = 1e-3
 
 #: Steps of the reference that are evaluated in one go.
 _BLOCK = 1000
@@ -91,6 +86,7 @@ class SimulatedArm:
         self._rng = rng
         start = middle_position(self.plant.robot) if start is None else start
         self._home = start
+        self._course = Course(self.plant.robot, self.plant.dt)
         self.reset()
 
     @property
@@ -106,7 +102,7 @@ class SimulatedArm:
     @property
     def ends_at(self) -> float:
         """Time at which the trajectory ends, or has ended [s]."""
-        return self._start * self.plant.dt + self._reference.duration
+        return self._course.ends_at
 
     def reset(self, steps: int = 0) -> None:
         """
@@ -120,10 +116,10 @@ class SimulatedArm:
         """
         self._state = self.plant.state(self._home, steps=steps)
         self._previous: FloatArray | None = None
-        position = self._state.q
-        self._follow(Reference(self.joints, np.zeros(1), position[np.newaxis]))
+        self._course.hold(self._state.q, steps)
+        self._set_off()
         delay = self.sensors.torque_delay
-        self._past = RecentPast(self.plant, self._state, self._torque, delay)
+        self._past = RecentPast.of(self.plant, self._state, self._torque, delay)
 
     def set_trajectory(self, reference: Reference) -> None:
         """
@@ -140,22 +136,8 @@ class SimulatedArm:
             rest. The arm goes on with what it was doing.
 
         """
-        curve = reference.for_robot(self.plant.robot)
-        now = self._desired(self._state.steps, 1)
-        if curve.dq is not None:
-            self._require_none('ends with', curve.dq[-1], REST_TOLERANCE, '/s', 'stop it')
-        if curve.t[0] > 0.0:
-            curve = curve.after(now.q[0], now.dq[0], now.ddq[0])
-        else:
-            advice = 'give its first point a later time, to get there'
-            self._require_none(
-                'starts away by', curve.q[0] - now.q[0], START_TOLERANCE, '', advice
-            )
-            if curve.dq is not None:
-                jump = curve.dq[0] - now.dq[0]
-                self._require_none('starts with a jump of', jump, REST_TOLERANCE, '/s', advice)
-        curve.require_limits(self.plant.robot, self.plant.dt)
-        self._follow(curve)
+        self._course.begin(reference, self._state.steps)
+        self._set_off()
 
     def advance(self, steps: int = 1) -> Sample:
         """
@@ -181,20 +163,15 @@ class SimulatedArm:
             left -= taken
         return self._read(steps * self.plant.dt)
 
-    def _follow(self, reference: Reference) -> None:
-        """Do what the reference says from now on."""
-        self._reference, self._start = reference, self._state.steps
+    def _set_off(self) -> None:
+        """Do what the course says from now on."""
         self._look_ahead()
         self._torque = command(self.plant, self.controller, self._state, self._targets, 0)
 
     def _look_ahead(self) -> None:
         """Evaluate the reference from now on, for some time."""
         self._first = self._state.steps
-        self._targets = Targets.of(self._desired(self._first, _BLOCK + 1), self.controller)
-
-    def _desired(self, first: int, count: int) -> Motion:
-        motion = self._reference.sample(self.plant.times(first - self._start, count))
-        return replace(motion, t=self.plant.times(first, count))
+        self._targets = Targets.of(self._course.desired(self._first, _BLOCK + 1), self.controller)
 
     def _record(self, trace: Trace) -> None:
         """Keep where the arm is, and what the sensors have yet to read."""
@@ -207,15 +184,3 @@ class SimulatedArm:
         q, dq, tau = self.sensors.measure(q, dq, tau, dt, self._rng, self._previous)
         self._previous = q[0]
         return Sample(state.steps, state.t, q[0], dq[0], tau[0])
-
-    def _require_none(
-        self, what: str, values: FloatArray, tolerance: float, per: str, advice: str
-    ) -> None:
-        """Refuse a trajectory that has more of something than rounding, in any joint."""
-        worst = int(np.argmax(np.abs(values)))
-        if abs(values[worst]) > tolerance:
-            unit = self.plant.robot.position_units[worst] + per
-            raise TrajectoryError(
-                f"trajectory: joint '{self.joints[worst]}' {what} {values[worst]:.4g} {unit}, "
-                f'more than {tolerance:g} {unit}; {advice}'
-            )

@@ -7,9 +7,14 @@ from __future__ import annotations
 import json
 
 from armid_ros.cli.elastic import elastic
+from armid_ros.cli.record import simulate
 from armid_ros.errors import RecordingError, RobotError
+from armid_ros.excitation import Excitation, FourierTrajectory, save_excitation
+from armid_ros.identification.two_inertia import Accelerometers, read_runs
+from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from click.testing import CliRunner
+import numpy as np
 import pytest
 
 
@@ -49,6 +54,27 @@ def test_bags_give_the_same_again_and_no_steps_leave_out_the_tuning(folder, tmp_
     again = json.loads((tmp_path / 'again' / 'elastic.json').read_text())
     assert 'tuning' not in again
     assert again['untuned'] == json.loads((folder / 'elastic.json').read_text())['untuned']
+
+
+def test_a_simulated_arm_on_springs_is_recorded_on_both_sides(tmp_path) -> None:
+    trajectory = tmp_path / 'swing.yaml'
+    swing = FourierTrajectory(
+        ('joint1', 'joint2'), 1.0, np.zeros(2), np.full((2, 1), 0.5), np.zeros((2, 1))
+    )
+    save_excitation(Excitation(swing, 1, 0.5), trajectory)
+    arguments = ['--robot', 'two_link_elastic', '--trajectory', str(trajectory), '--out']
+    result = CliRunner().invoke(simulate, [*arguments, str(tmp_path / 'bag')])
+    assert result.exit_code == 0 and 'both sides' in result.stdout
+    robot, radius = load_robot('two_link_elastic'), [0.4, 0.4]
+    (run,) = read_runs(tmp_path / 'bag', robot, Accelerometers.on(robot, radius))
+    parameters = two_link_set('after').parameters
+    spring = parameters.stiffness * (run.motor.q - run.link.q)
+    spring += parameters.spring_damping * (run.motor.dq - run.link.dq)
+    inertia = np.array([parameters.mass_matrix(angle) for angle in run.link.q[:, 1]])
+    load = np.einsum('nij,nj->ni', inertia, run.link.ddq) + parameters.link_damping * run.link.dq
+    still = np.abs(run.link.dq).max(axis=1) < 0.05  # where nothing is centrifugal
+    assert np.count_nonzero(still) > 10
+    np.testing.assert_allclose(spring[still], load[still], atol=0.02 * np.abs(load).max())
 
 
 @pytest.mark.parametrize(

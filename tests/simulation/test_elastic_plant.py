@@ -12,7 +12,8 @@ from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import Plant, step
-from armid_ros.simulation.elastic_plant import elastic_step, ElasticPlant
+from armid_ros.simulation.elastic_integrator import elastic_step
+from armid_ros.simulation.elastic_plant import ElasticPlant
 from armid_ros.simulation.elastic_run import Experiment, run_elastic, VelocityLoop
 from armid_ros.simulation.elastic_signals import step_experiments
 from armid_ros.simulation.elastic_two_link import modes, two_link_loop, two_link_plant

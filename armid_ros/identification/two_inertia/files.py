@@ -3,10 +3,11 @@
 """
 Experiments with a two-link arm as bags.
 
-/motor/joint_states has positions, velocities and torques of the motors as seen at the joints,
-/link/joint_states positions and velocities of the links, /reference/joint_states what the velocity
-loop was asked for, and an Imu topic per link the accelerometer on its axis, x outwards and y
-sideways. A pause in the stamps ends an experiment.
+/joint_states (or /motor/joint_states) has positions, velocities and torques of the motors as seen
+at the joints, /link/joint_states positions and velocities of the links, /reference/joint_states
+what the velocity loops are asked for, and an Imu topic per link the accelerometer on its axis, x
+outwards and y sideways. An experiment is a stretch in which the loops are asked to move: standing
+ends it, and so does a pause in the stamps.
 
 """
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
 
 from armid_ros.errors import RecordingError
@@ -24,18 +26,25 @@ from armid_ros.recording import (
     read_recording,
     Recording,
     string_cdr,
+    topics,
     write_joint_states,
 )
+from armid_ros.recording.elastic_topics import imu_topic, LINK, MOTOR, REFERENCE
 from armid_ros.recording.imu import read_accelerations, write_accelerations
 from armid_ros.recording.message_types import STRING
 from armid_ros.robots import Robot
+from armid_ros.simulation.accelerometers import LinkAccelerometers
 from armid_ros.simulation.elastic_run import ElasticRun
 import numpy as np
 import numpy.typing as npt
 
-MOTOR, LINK, REFERENCE = '/motor/joint_states', '/link/joint_states', '/reference/joint_states'
+#: Where the motors may be instead.
+_OTHER_MOTOR = '/motor/joint_states'
 _PAUSE_NS = 10**9
-_EARTH = 9.81
+#: Share of the samples that all topics have to have.
+_SHARED = 0.9
+#: How long the loops are asked to stand between two experiments [s], and the shortest one [s].
+_STANDING, _SHORTEST = 0.1, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +70,9 @@ class Accelerometers:
         offset = np.asarray(robot.model.jointPlacements[2].translation)
         return cls(np.asarray(radius, dtype=float), float(np.hypot(offset[0], offset[1])))
 
-    def readings(self, link: Motion) -> tuple[FloatArray, FloatArray]:
-        """Return what the two of them read along a motion, each of shape (N, 3) [m/s^2]."""
-        cosine, sine = np.cos(link.q[:, 1]), np.sin(link.q[:, 1])
-        (v1, v2), (a1, a2) = link.dq.T, link.ddq.T
-        first, second = self.radius
-        up = np.full(len(link), _EARTH)
-        inner = np.column_stack([-first * v1**2, first * a1, up])
-        outwards = self.length * (a1 * sine - v1**2 * cosine) - second * (v1 + v2) ** 2
-        sideways = self.length * (a1 * cosine + v1**2 * sine) + second * (a1 + a2)
-        return inner, np.column_stack([outwards, sideways, up])
+    def on_links(self, robot: Robot) -> LinkAccelerometers:
+        """Return them as sensors of a simulated robot."""
+        return LinkAccelerometers(robot, np.outer(self.radius, [1.0, 0.0, 0.0]))
 
     def accelerations(
         self, q: FloatArray, dq: FloatArray, first: FloatArray, second: FloatArray
@@ -92,10 +94,10 @@ class Accelerometers:
 
 
 def write_runs(
-    path: str | Path, runs: Sequence[ElasticRun], robot: Robot, sensors: Accelerometers
+    path: str | Path, runs: Sequence[ElasticRun], robot: Robot, sensors: LinkAccelerometers
 ) -> None:
     """
-    Write experiments to a bag, one after the other with a pause of 1 s.
+    Write experiments with any arm to a bag, one after the other with a pause of 1 s.
 
     Raises
     ------
@@ -112,12 +114,13 @@ def write_runs(
             motor, link = run.motor, run.link
             stamps = start + np.rint((motor.t - motor.t[0]) * 1e9).astype(np.int64)
             dt = float(np.median(np.diff(motor.t)))
-            asked = link.q[0] + dt * np.cumsum(run.reference, axis=0)
+            asked = motor.q[0] + dt * np.cumsum(run.reference, axis=0)
             write_joint_states(writer, MOTOR, joints, stamps, motor.q, motor.dq, motor.tau)
             write_joint_states(writer, LINK, joints, stamps, link.q, link.dq)
             write_joint_states(writer, REFERENCE, joints, stamps, asked, run.reference)
-            for name, values in zip(robot.links, sensors.readings(link), strict=True):
-                write_accelerations(writer, _imu(name), name, stamps, values)
+            felt = sensors.readings(link) if run.felt is None else run.felt
+            for name, values in zip(robot.links, felt, strict=True):
+                write_accelerations(writer, imu_topic(name), name, stamps, values)
             start = int(stamps[-1]) + _PAUSE_NS
 
 
@@ -128,51 +131,86 @@ def read_runs(path: str | Path, robot: Robot, sensors: Accelerometers) -> list[E
     Raises
     ------
     RecordingError
-        A topic or quantity is missing, or the samples of two topics are not of the same time.
+        A topic or quantity is missing, the samples of two topics are not of the same time, or the
+        loops are never asked to move.
 
     """
-    motor, link, asked = (
-        read_recording(path, joints=robot.joints, topic=topic)
-        for topic in (MOTOR, LINK, REFERENCE)
-    )
-    first, second = (read_accelerations(path, _imu(name)) for name in robot.links)
-    stamps = _stamps(motor)
-    for other, topic in (
-        (_stamps(link), LINK),
-        (_stamps(asked), REFERENCE),
-        (first[0], _imu(robot.links[0])),
-        (second[0], _imu(robot.links[1])),
-    ):
-        if len(other) != len(stamps) or np.any(np.abs(other - stamps) > 1000):
-            raise RecordingError(
-                f'{path}: {topic} has {len(other)} samples and {MOTOR} {len(stamps)}, or not at '
-                'the same times; record all topics with the same stamps'
-            )
-    if motor.dq is None or motor.tau is None or link.dq is None or asked.dq is None:
+    motors = _OTHER_MOTOR if _OTHER_MOTOR in {topic.name for topic in topics(path)} else MOTOR
+    names = (motors, LINK, REFERENCE)
+    recordings = [read_recording(path, joints=robot.joints, topic=topic) for topic in names]
+    if recordings[0].tau is None or any(recording.dq is None for recording in recordings):
         raise RecordingError(
-            f'{path}: velocities of {MOTOR}, {LINK} and {REFERENCE}, and torques of {MOTOR}, are '
-            'needed; one of them was not recorded'
+            f'{path}: velocities of {motors}, {LINK} and {REFERENCE}, and torques of {motors}, '
+            'are needed; one of them was not recorded'
         )
-    ddq = sensors.accelerations(link.q, link.dq, first[1], second[1])
-    period = np.median(np.diff(motor.t))
-    cuts = np.flatnonzero(np.diff(motor.t) > 5.0 * period) + 1
+    felt = [read_accelerations(path, imu_topic(name)) for name in robot.links]
+    stamps = [*map(_microseconds, recordings), *(np.rint(f[0] / 1000).astype(int) for f in felt)]
+    common = _common(path, (*names, *map(imu_topic, robot.links)), stamps)
+    motor, link, asked = (
+        recording.select(np.flatnonzero(np.isin(own, common)))
+        for recording, own in zip(recordings, stamps, strict=False)
+    )
+    first, second = (
+        values[np.searchsorted(own, common, sorter=np.argsort(own))]
+        for (_, values), own in zip(felt, stamps[3:], strict=True)
+    )
+    assert motor.dq is not None and motor.tau is not None
+    assert link.dq is not None and asked.dq is not None
+    ddq = sensors.accelerations(link.q, link.dq, first, second)
+    period = float(np.median(np.diff(motor.t)))
+    left = asked.q - motor.q
     runs = []
-    for rows in np.split(np.arange(len(stamps)), cuts):
-        t = period * np.arange(len(rows))
-        zero = np.zeros((len(rows), 2))
+    for stood, start, stop in _experiments(motor.t, np.any(asked.dq != 0.0, axis=1), period):
+        rows = slice(start, stop)
+        t = np.asarray(period * np.arange(stop - start), dtype=np.float64)
+        zero = np.zeros((stop - start, 2))
         runs.append(
             ElasticRun(
                 Motion(robot.joints, t, motor.q[rows], motor.dq[rows], zero, motor.tau[rows]),
                 Motion(robot.joints, t, link.q[rows], link.dq[rows], ddq[rows]),
                 asked.dq[rows],
+                left[stood:start].mean(axis=0) if stood < start else np.zeros(2),
             )
+        )
+    if not runs:
+        raise RecordingError(
+            f'{path}: {REFERENCE} asks for no motion of {_SHORTEST:g} s or more; record what the '
+            'velocity loops are asked for'
         )
     return runs
 
 
-def _imu(link: str) -> str:
-    return f'/{link}/imu'
+def _experiments(
+    t: FloatArray, moving: npt.NDArray[np.bool_], period: float
+) -> list[tuple[int, int, int]]:
+    """Return stretches of motion: a sample from which on it stood, the first and the end."""
+    pause, shortest = round(_STANDING / period), round(_SHORTEST / period)
+    found = []
+    cuts = np.flatnonzero(np.diff(t) > 1.5 * period) + 1
+    for rows in np.split(np.arange(len(t)), cuts):
+        active = rows[moving[rows]]
+        stood = int(rows[0])
+        for part in np.split(active, np.flatnonzero(np.diff(active) > pause) + 1):
+            if len(part) >= shortest:
+                start = int(part[0])
+                found.append((max(stood, start - pause), start, int(part[-1]) + 1))
+            stood = int(part[-1]) + 1 if len(part) else stood
+    return found
 
 
-def _stamps(recording: Recording) -> npt.NDArray[np.int64]:
-    return np.asarray(recording.start_ns + np.rint(recording.t * 1e9), dtype=np.int64)
+def _microseconds(recording: Recording) -> npt.NDArray[np.int64]:
+    return np.asarray(np.rint(recording.start_ns / 1000 + recording.t * 1e6), dtype=np.int64)
+
+
+def _common(
+    path: str | Path, names: Sequence[str], stamps: Sequence[npt.NDArray[np.int64]]
+) -> npt.NDArray[np.int64]:
+    """Return the stamps that all topics have [us]; a few lost messages are no harm."""
+    common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
+    if len(common) < _SHARED * max(map(len, stamps)):
+        counts = ', '.join(f'{name} ({len(s)})' for name, s in zip(names, stamps, strict=True))
+        raise RecordingError(
+            f'{path}: of the samples of {counts} only {len(common)} have the same stamps; stamp '
+            'alike what is measured at one time, and record all of it'
+        )
+    return common

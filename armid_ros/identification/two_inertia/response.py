@@ -46,6 +46,8 @@ class Steps:
         Time between samples, at which the loop acts [s].
     loop : VelocityLoop
         Gains.
+    integral : ndarray, shape (E, 2)
+        What the integral of the loop holds at first [rad].
     substeps : int
         Parts that a sample is integrated in.
 
@@ -55,6 +57,7 @@ class Steps:
     reference: FloatArray
     dt: float
     loop: VelocityLoop
+    integral: FloatArray
     substeps: int = 2
 
     @classmethod
@@ -67,6 +70,7 @@ class Steps:
             np.stack([run.reference[:count] for run in runs], axis=1),
             float(t[-1] - t[0]) / (len(t) - 1),
             loop,
+            np.array([np.zeros(2) if run.integral is None else run.integral for run in runs]),
         )
 
 
@@ -113,7 +117,7 @@ def _simulate(steps: Steps, values: DualArray, fixed: TwoLinkParameters) -> Dual
     x = np.zeros((size, 6), dtype)
     dv = np.zeros((size, 4), dtype)
     modes = np.zeros((size, 2), int)
-    integral = np.zeros((size, 2), dtype)
+    integral = np.repeat(steps.integral, sets, axis=0).astype(dtype)
     limit = np.repeat(steps.reference, sets, axis=1)
     out = np.empty((len(steps.reference), size, 4), np.complex128)
     for k, reference in enumerate(limit):

@@ -20,7 +20,7 @@ SENSORS = Accelerometers.on(ROBOT, [0.4, 0.3])
 @pytest.fixture
 def bag(tmp_path, clean_steps):
     """Write the steps to a bag."""
-    write_runs(tmp_path / 'steps', clean_steps, ROBOT, SENSORS)
+    write_runs(tmp_path / 'steps', clean_steps, ROBOT, SENSORS.on_links(ROBOT))
     return tmp_path / 'steps'
 
 
@@ -37,7 +37,7 @@ def test_runs_come_back(bag, clean_steps) -> None:
 
 
 def test_the_bag_is_a_recording_like_any_other(bag, clean_steps) -> None:
-    recording = read_recording(bag, joints=ROBOT.joints, topic='/motor/joint_states')
+    recording = read_recording(bag, joints=ROBOT.joints, topic='/joint_states')
     assert len(recording) == sum(len(run.motor) for run in clean_steps)
     assert len(recording.report.gaps) == len(clean_steps) - 1
 
@@ -56,7 +56,7 @@ def test_accelerometers_measure_what_geometry_says() -> None:
     link = Motion(
         ROBOT.joints, np.zeros(1), q[2:3], np.array([[1.3, -0.7]]), np.array([[5.0, 8.0]])
     )
-    reading = SENSORS.readings(link)[1][0]
+    reading = SENSORS.on_links(ROBOT).readings(link)[1][0]
     np.testing.assert_allclose(reading[:2], [[c, s], [-s, c]] @ world, atol=1e-5)
 
 
