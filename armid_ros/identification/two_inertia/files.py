@@ -138,12 +138,12 @@ def read_runs(path: str | Path, robot: Robot, sensors: Accelerometers) -> list[E
     motors = _OTHER_MOTOR if _OTHER_MOTOR in {topic.name for topic in topics(path)} else MOTOR
     names = (motors, LINK, REFERENCE)
     recordings = [read_recording(path, joints=robot.joints, topic=topic) for topic in names]
+    felt = [read_accelerations(path, imu_topic(name)) for name in robot.links]
     if recordings[0].tau is None or any(recording.dq is None for recording in recordings):
         raise RecordingError(
             f'{path}: velocities of {motors}, {LINK} and {REFERENCE}, and torques of {motors}, '
             'are needed; one of them was not recorded'
         )
-    felt = [read_accelerations(path, imu_topic(name)) for name in robot.links]
     stamps = [*map(_microseconds, recordings), *(np.rint(f[0] / 1000).astype(int) for f in felt)]
     common = _common(path, (*names, *map(imu_topic, robot.links)), stamps)
     motor, link, asked = (
