@@ -48,7 +48,7 @@ class Commands(click.Group):
         try:
             return super().invoke(ctx)
         except ArmidError as error:
-            click.echo(f'armid: {error}', err=True)
+            click.echo(f'armid: {" ".join(str(error).split())}', err=True)
             sys.exit(2)
 
 

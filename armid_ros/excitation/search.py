@@ -259,7 +259,9 @@ def _solve(
     def limits(z: FloatArray) -> tuple[FloatArray, FloatArray]:
         if not last or last[0][0] != z.tobytes():
             values, gradients = constraints.value(z.reshape(scale.shape) * scale)
-            last[:] = [(z.tobytes(), -values, -(gradients * scale).reshape(len(values), -1))]
+            last[:] = [
+                (z.tobytes(), -values, -(gradients * scale).reshape(len(values), scale.size))
+            ]
         return last[0][1:]
 
     def step(z: FloatArray) -> None:

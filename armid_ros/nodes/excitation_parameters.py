@@ -110,7 +110,13 @@ def _loaded(path: str, robot: Robot, clearance: float) -> Excitation:
     run = excitation.at(t)
     order = [run.joints.index(joint) for joint in robot.joints]
     motion = Motion(robot.joints, t, run.q[:, order], run.dq[:, order], run.ddq[:, order])
-    limits = Limits.of(robot, speed=1.0, torque_fraction=1.0, position_margin=0.0)
+    limits = Limits.of(
+        robot,
+        speed=1.0,
+        torque_fraction=1.0,
+        position_margin=0.0,
+        acceleration=np.full(robot.n_joints, np.inf),  # no description knows it
+    )
     require_within(limits, motion, ArmModel(robot).torque(motion))
     closest = collision_model(robot).path_clearance(motion.q)
     worst = int(np.argmin(closest))

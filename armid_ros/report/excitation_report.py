@@ -146,6 +146,14 @@ def _verdict(
             'A URDF has no acceleration limits; each joint was taken to reach its top speed in '
             '0.25 s.'
         )
+    free = [
+        f'{name} of {joint}'
+        for name, bound in (('velocity', design.limits.velocity), ('torque', design.limits.torque))
+        for joint, limit in zip(design.limits.joints, bound, strict=True)
+        if not np.isfinite(limit)
+    ]
+    if free:
+        beware.append(f'The description has no limit to the {", ".join(free)}.')
     if settings.noise is None:
         beware.append(
             'The deviations are for a torque noise of 1 % of the torque limits, which nobody has '

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.arm import ArmModel
+from armid_ros.cli.excite import excite
 from armid_ros.errors import ArmidError
 from armid_ros.excitation import (
     Excitation,
@@ -16,7 +17,9 @@ from armid_ros.excitation import (
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode, slowed
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.trajectories import read_trajectory
+from armid_ros.recording import read_joint_trajectory
 from armid_ros.robots import load_robot
+from click.testing import CliRunner
 import numpy as np
 import pytest
 from trajectory_msgs.msg import JointTrajectory
@@ -35,6 +38,17 @@ def excitation(robot):
     limits = Limits.of(robot, speed='medium')
     rng = np.random.default_rng(3)
     return Excitation(random_feasible(ArmModel(robot), limits, 4.0, 3, rng), 1, 1.0)
+
+
+@pytest.fixture(scope='module')
+def plans(tmp_path_factory):
+    """Run armid excite for two speed classes, hurriedly, with drives as good as they may be."""
+    out = tmp_path_factory.mktemp('plans')
+    options = '--robot humanoid_arm --duration 8 --speed slow,fast --acceleration 30'
+    hurry = '--starts 1 --iterations 2'
+    result = CliRunner().invoke(excite, [*options.split(), *hurry.split(), '--out', str(out)])
+    assert result.exit_code == 0, result.output
+    return out
 
 
 def waiting_publisher(bench, excitation, **parameters):
@@ -133,6 +147,18 @@ def test_a_file_is_loaded(bench, excitation, tmp_path):
     node = bench.add(ExcitationPublisherNode, file=str(tmp_path / 'run.yaml'), start=False)
     assert node.duration == pytest.approx(3.0 + excitation.duration)
     assert load_excitation(tmp_path / 'run.yaml').joints == excitation.joints
+
+
+@pytest.mark.parametrize('speed', ['slow', 'fast'])
+def test_what_armid_excite_writes_is_run_as_its_bag_has_it(bench, plans, robot, speed):
+    planned = read_joint_trajectory(plans / speed / 'trajectory', joints=robot.joints)
+    messages = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+    file = str(plans / speed / 'excitation.yaml')
+    waiting_publisher(bench, None, file=file, rate=50.0).start()
+    _, reference = sent(bench, messages, 1)
+    np.testing.assert_allclose(reference.t - APPROACH, planned.t, atol=1e-6)
+    for name in ('q', 'dq', 'ddq'):
+        np.testing.assert_allclose(getattr(reference, name), getattr(planned, name), atol=1e-9)
 
 
 @pytest.mark.parametrize(
