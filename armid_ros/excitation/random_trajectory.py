@@ -121,11 +121,11 @@ def feasible_pose(
     held = load.max(axis=1) <= 1.0
     if not held.any():
         best = int(load.max(axis=1).argmin())
-        j = int(load[best].argmax())
+        worst = int(load[best].argmax())
         raise TrajectoryError(
-            f'joint {limits.joints[j]}: torque limit {limits.torque[j]:.4g} '
-            f'{limits.unit("torque", j)}, but no pose keeps all torque limits at once; in the '
-            f'best one holding still takes {load[best, j] * limits.torque[j]:.4g} there'
+            f'joint {limits.joints[worst]}: torque limit {limits.torque[worst]:.4g} '
+            f'{limits.unit("torque", worst)}, but no pose keeps all torque limits at once; in the '
+            f'best one holding still takes {load[best, worst] * limits.torque[worst]:.4g} there'
         )
     if clearance is None:
         best = np.flatnonzero(held)[int(np.argmin(load[held].max(axis=1)))]
