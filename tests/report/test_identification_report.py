@@ -6,8 +6,12 @@ from dataclasses import replace
 from html.parser import HTMLParser
 import re
 
+from armid_ros.identification import IdentificationSettings, identify, PhysicalSettings, verify
+from armid_ros.motion import Motion
 from armid_ros.report import hash_files, identification_report, Provenance, versions
+from armid_ros.report.repeatability import Repeatability
 from armid_ros.report.sections.fit import FitSection
+from armid_ros.report.sections.parameters import Parameters
 import numpy as np
 import pytest
 
@@ -86,6 +90,21 @@ def page(html):
 
 
 @pytest.fixture(scope='module')
+def whole(case):
+    """Return the report of a fit among bodies that was put to every test."""
+    settings = IdentificationSettings(physical=PhysicalSettings())
+    rng = np.random.default_rng(0)
+    training, held_out = case.recordings[:1], case.recordings[1:]
+    result = identify(case.description, training, settings, rng=rng)
+    return report_of(
+        case,
+        result=result,
+        verification=verify(result, case.description, training, held_out, rng=rng),
+        exports={'identified.urdf': ('torque_offset: torque_offset of elbow = 0.1 N m',) * 3},
+    )
+
+
+@pytest.fixture(scope='module')
 def hostile(case):
     """Return the report of a robot with a joint and a bag that are named like a script."""
     robot = replace(case.result.arm.robot, joints=(HOSTILE, *case.result.arm.robot.joints[1:]))
@@ -144,6 +163,64 @@ def test_everything_asked_for_is_there(case, page):
         assert file.sha256 in page.text
     assert case.recordings[0].report.describe() in page.text
     assert f'{case.result.condition_number:.3g}' in page.text
+
+
+def test_what_was_put_to_a_test_has_a_section(case, whole):
+    reader = Reader()
+    reader.feed(whole)
+    added = {'Forward validation', 'Physical consistency', 'Encoder noise'}
+    assert set(reader.headings) - set(TITLES) == added
+    assert [title for title in reader.headings if title not in added] == TITLES
+    for link in case.result.arm.robot.links:
+        assert link in reader.text
+    for expected in (
+        'Every link is a body',
+        'Durbin-Wu-Hausman test',
+        'Driven by the recorded torques',
+        'identified.urdf has no place for torque_offset (3 values)',
+    ):
+        assert expected in reader.text
+    assert re.search(r'[0-9.]+ mrad, [0-9.]+ N m', reader.text)
+
+
+def test_what_the_data_do_not_tell_is_no_number(case):
+    """A parameter of zero, with an interval as wide as it is."""
+    estimate = case.result.estimate
+    values = estimate.values.copy()
+    values[0] = 0.5 * estimate.std[0]
+    section = Parameters(replace(estimate, values=values), 0.0 * values)
+    rows = [row for _, _, rows in section.families for row in rows]
+    (row,) = (row for row in rows if row.value == values[0])
+    assert row.text[0] == 'not told from 0'
+    assert f'{values[0]:.3g}' not in section.html()
+
+
+def test_periods_show_what_of_the_residual_repeats(case):
+    """Noise that differs between two periods of 8 s does not repeat; a bias does."""
+    ((_, (fit, *_)),) = case.validation.items()
+    motion, noise = (
+        fit.motion,
+        0.1 * np.random.default_rng(0).normal(size=(2, *fit.predicted.shape)),
+    )
+    step = motion.t[1] - motion.t[0]
+    twice = Motion(
+        motion.joints,
+        step * np.arange(2 * len(motion)),
+        *(np.concatenate([x, x]) for x in (motion.q, motion.dq, motion.ddq, motion.tau)),
+    )
+    noise[:, :, 0] += 0.3
+    repeated = replace(
+        fit,
+        motion=twice,
+        predicted=twice.tau - noise.reshape(len(twice), -1),
+        informative=np.ones(twice.q.shape, dtype=bool),
+    )
+    found = Repeatability.of([repeated])
+    assert found.period == pytest.approx(step * len(motion), abs=2 * step)
+    np.testing.assert_allclose(found.varying, 0.1, rtol=0.3)
+    assert found.repeating_share[0] > 0.8
+    assert found.repeating_share[1:].max() < 0.4
+    assert Repeatability.of([fit]) is None
 
 
 def test_nothing_is_loaded(page, html):
@@ -207,8 +284,8 @@ def test_browser_draws_every_chart_without_complaint(charts_drawn, html, width, 
 
 
 @pytest.mark.parametrize('width', [1280, 390])
-def test_page_is_not_wider_than_the_screen(browser, tmp_path, html, hostile, width):
-    for number, text in enumerate((html, hostile)):
+def test_page_is_not_wider_than_the_screen(browser, tmp_path, html, whole, hostile, width):
+    for number, text in enumerate((html, whole, hostile)):
         path = tmp_path / f'report{number}.html'
         path.write_text(text, encoding='utf-8')
         browser.open(path, width)
