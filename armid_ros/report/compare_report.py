@@ -10,7 +10,7 @@ from armid_ros.estimate import ParameterName
 from armid_ros.identification.comparison import Change, Comparison, GroupChange
 from armid_ros.identification.identifiability import HALF_WIDTH
 from armid_ros.report.families import full_label
-from armid_ros.report.notation import counted, digits, pretty
+from armid_ros.report.notation import counted, measured, pretty
 from armid_ros.report.page import Page
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.changes import Changes
@@ -73,9 +73,10 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
     first = f'{len(changed)} of {counted(count, "parameter")} changed beyond uncertainty{where}.'
     if comparison.load is not None:
         together.insert(0, _load(comparison))
-    told = [_sentence(change) for change in changed[:_TOLD]]
-    if len(changed) > _TOLD:
-        told.append(f'{len(changed) - _TOLD} more are in the table.')
+    apart = [c for c in changed if comparison.load is None or not c.parameter.rigid]
+    told = [_sentence(change) for change in apart[:_TOLD]]
+    if len(apart) > _TOLD:
+        told.append(f'The table has {len(apart) - _TOLD} more.')
     rigid = [c for c in changed if c.parameter.rigid]
     if comparison.load is None and len(rigid) >= 3 and len(rigid) > len(changed) - len(rigid):
         last = rigid[0].parameter.joint
@@ -99,7 +100,7 @@ def _load(comparison: Comparison) -> str:
         others = ', '.join(joints[link] for link in load.rivals)
         rivals = f'; on the link of {others} it would do so as well'
     return (
-        f'A load of {abs(load.mass):.3g} ± {digits(HALF_WIDTH * load.mass_std)} kg {verb} '
+        f'A load of {" ± ".join(measured(abs(load.mass), HALF_WIDTH * load.mass_std))} kg {verb} '
         f'the link of {joints[load.link]}{where}: that explains every change of the inertial '
         f'parameters{rivals}.'
     )
@@ -129,9 +130,10 @@ def _sentence(change: Change) -> str:
     if abs(change.before) > HALF_WIDTH * change.before_std:
         share = f' ({100.0 * change.difference / abs(change.before):+.0f} %)'
     sure = f'{abs(change.deviations):.0f} standard deviations' if change.std > 0.0 else 'exactly'
+    by = ' ± '.join(measured(abs(change.difference), HALF_WIDTH * change.std))
     return (
         f'{label} {verb} from {change.before:.4g} to {change.after:.4g} {unit}{share}, '
-        f'by {digits(abs(change.difference))} ± {digits(HALF_WIDTH * change.std)}: {sure}.'
+        f'by {by}: {sure}.'
     )
 
 

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import math
+
 from armid_ros.robots import Robot
 
 
@@ -17,6 +19,16 @@ def digits(value: float, count: int = 2) -> str:
     if 10.0**count <= abs(value) < 1e5:
         return f'{value:.0f}'
     return f'{value:#.{count}g}'.rstrip('.')
+
+
+def measured(value: float, reach: float) -> tuple[str, str]:
+    """Return a value and the half width of its interval, to the digit that this leaves."""
+    if not (math.isfinite(reach) and reach > 0.0):
+        return f'{value:.4g}', '0'
+    decimals = max(0, 1 - math.floor(math.log10(reach)))
+    if decimals > 7 or max(abs(value), reach) >= 1e7:
+        return f'{value:.3g}', f'{reach:.2g}'
+    return f'{value:.{decimals}f}', f'{reach:.{decimals}f}'
 
 
 def counted(number: int, what: str, plural: str = '') -> str:

@@ -12,7 +12,7 @@ from armid_ros.estimate import Estimate
 from armid_ros.identification.identifiability import HALF_WIDTH, Unidentified
 from armid_ros.motion import FloatArray
 from armid_ros.report.families import full_label, parameter_families
-from armid_ros.report.notation import digits, pretty
+from armid_ros.report.notation import digits, measured, pretty
 from armid_ros.report.page import Section
 import numpy as np
 
@@ -58,12 +58,7 @@ class Row:
         described = f'{self.described:.3g}' if self.known else 'none'
         if not self.told:
             return 'not told from 0', f'{self.reach:.2g}', described
-        if not (np.isfinite(self.reach) and self.reach > 0.0):
-            return f'{self.value:.4g}', '0', described
-        decimals = max(0, 1 - int(np.floor(np.log10(self.reach))))
-        if decimals > 7 or max(abs(self.value), self.reach) >= 1e7:
-            return f'{self.value:.3g}', f'{self.reach:.2g}', described
-        return f'{self.value:.{decimals}f}', f'{self.reach:.{decimals}f}', described
+        return (*measured(self.value, self.reach), described)
 
     @property
     def told(self) -> bool:
