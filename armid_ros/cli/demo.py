@@ -15,7 +15,7 @@ from armid_ros.cli.terminal import ConvergenceTable, progress, say
 from armid_ros.effects import make_effect
 from armid_ros.errors import RecordingError
 from armid_ros.excitation import design, DesignSettings, Excitation, save_excitation
-from armid_ros.identification import identification_document, identify, Score
+from armid_ros.identification import identification_document, identify, Score, write_document
 from armid_ros.identification.online import OnlineIdentifier
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_recording
@@ -94,7 +94,7 @@ def demo(gravity: str, rate: float, out: Path, seed: int, as_json: bool) -> None
         'held_out': _held_out_error(result.arm, truth, rng),
     }
     save_model(out / 'model.yaml', result.arm, ROBOT, result.estimate)
-    (out / 'identification.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    write_document(out / 'identification.json', document)
     with progress('drawing'):
         _draw(out, robot, result, history, target, result.base.values(truth.theta))
     if as_json:

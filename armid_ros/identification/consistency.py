@@ -55,7 +55,7 @@ class NoiseCheck:
     statistic : float
         Durbin-Wu-Hausman statistic.
     freedom : float
-        Its degrees of freedom: what is expected of it if encoder noise does nothing.
+        Its degrees of freedom, 1 or more: what is expected of it if encoder noise does nothing.
     p_value : float
         Probability of a larger one if encoder noise did nothing.
     instrumental : Estimate
@@ -168,7 +168,7 @@ def check_noise(
     return NoiseCheck(
         statistic=statistic,
         freedom=freedom,
-        p_value=float(chi2.sf(statistic, max(freedom, 1.0))),
+        p_value=float(chi2.sf(statistic, freedom)),
         instrumental=Estimate(result.base.parameters, values, covariance),
         position_noise=noise,
         bias=bias,
@@ -237,7 +237,7 @@ def _hausman(
     along = axes.T @ ((other - plain) * unit)
     statistic = float(np.sum(along**2 / (sizes + NEGLIGIBLE**2)))
     freedom = float(np.sum(sizes / (sizes + NEGLIGIBLE**2)))  # what to expect of it
-    return statistic, freedom, other / scale, covariance / np.outer(scale, scale)
+    return statistic, max(freedom, 1.0), other / scale, covariance / np.outer(scale, scale)
 
 
 def _position_noise(recording: Recording) -> FloatArray:

@@ -27,7 +27,7 @@ from armid_ros.report.sections.physical import PhysicalSection
 from armid_ros.report.sections.residuals import Residuals
 from armid_ros.report.sections.verdict import Verdict
 from armid_ros.report.sections.whiteness import WhitenessSection
-from armid_ros.report.statistics import directions, torque_scale
+from armid_ros.report.statistics import directions, torque_reach, torque_scale
 
 _TONES = {'good': 'good', 'usable': 'fair', 'unproven': 'fair', 'poor': 'bad'}
 
@@ -93,7 +93,7 @@ def identification_report(
         Verdict(judgement.grade, _TONES[judgement.grade], judgement.sentences, judgement.beware),
         Asked(_asked(result, robot, list(training), list(validation))),
         DataQuality(quality, arm.robot),
-        FitSection(arm.robot, training, validation),
+        FitSection(arm.robot, training, validation, torque_reach(result, shown)),
         *_forward(result, verification),
         Residuals(arm.robot, shown, role),
         Parameters(result.estimate, result.base.values(description.theta), result.unidentified),

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification import Fit, Identification
+from armid_ros.identification.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -121,6 +122,20 @@ def torque_scale(result: Identification) -> FloatArray:
     columns = result.arm.columns(motion.select(chosen))[:, :, result.base.independent]
     noise = np.where(result.joint_std > 0.0, result.joint_std, 1.0)
     return np.asarray(np.sqrt(np.mean((columns / noise[:, np.newaxis]) ** 2, axis=(0, 1))))
+
+
+def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
+    """
+    Return how far the uncertainty of the parameters moves the predicted torque, shape (n,).
+
+    Half widths of 95 % intervals, root mean square over a motion [N m].
+
+    """
+    motion = max(fits, key=lambda fit: len(fit.motion)).motion
+    chosen = np.unique(np.linspace(0, len(motion) - 1, _SAMPLES).astype(np.intp))
+    columns = result.arm.columns(motion.select(chosen))[:, :, result.base.independent]
+    variance = np.sum((columns @ result.estimate.covariance) * columns, axis=2)
+    return np.asarray(HALF_WIDTH * np.sqrt(variance.mean(axis=0)))
 
 
 def directions(estimate: Estimate, scale: FloatArray) -> tuple[Direction, ...]:

@@ -258,7 +258,7 @@ def test_residual_at_rest_is_drawn_apart(case):
     informative = fits[0].informative.copy()
     informative[10:20, 2] = False
     resting = replace(fits[0], informative=informative)
-    section = FitSection(case.result.arm.robot, {}, {source: (resting,)})
+    section = FitSection(case.result.arm.robot, {}, {source: (resting,)}, np.zeros(6))
     still, moving = section.shown[0].joints[2].residual.series
     residual = resting.residual[:, 2]
     np.testing.assert_array_equal(still.y[10:20], residual[10:20])

@@ -7,7 +7,14 @@ from dataclasses import replace
 from armid_ros.identification import Fit
 from armid_ros.motion import Motion
 from armid_ros.report.judgement import judge
-from armid_ros.report.statistics import correlations, directions, torque_scale, Trend, Whiteness
+from armid_ros.report.statistics import (
+    correlations,
+    directions,
+    torque_reach,
+    torque_scale,
+    Trend,
+    Whiteness,
+)
 import numpy as np
 import pytest
 
@@ -108,3 +115,14 @@ def test_what_reading_met_is_said(case):
     dirty = replace(case.recordings[0], report=report)
     judgement = judge(case.result, case.validation, [dirty])
     assert any('17' in line and dirty.source in line for line in judgement.beware)
+
+
+def test_reach_of_the_torque_holds_what_noise_does_to_it(case):
+    """Of the error of the predicted torque, the true one being known."""
+    (fit,) = case.validation[case.recordings[1].source]
+    reach = torque_reach(case.result, [fit])
+    columns = case.truth.columns(fit.motion)[:, :, case.result.base.independent]
+    error = columns @ (case.result.estimate.values - case.result.base.values(case.truth.theta))
+    rms = np.sqrt(np.mean(error**2, axis=0))
+    assert np.all(rms < 2.0 * reach)
+    assert np.median(rms / reach) > 0.1

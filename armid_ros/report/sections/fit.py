@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.identification import Fit, Score
+from armid_ros.motion import FloatArray
 from armid_ros.report.bars import Bar, BarChart
 from armid_ros.report.charts import Chart, joined, joined_time, Role, Series, thinned
 from armid_ros.report.notation import digits, torque_unit
@@ -49,6 +50,8 @@ class FitSection(Section):
         Data it was fitted to, by recording.
     validation : mapping of str to sequence of Fit
         Held-out data, by recording.
+    reach : ndarray, shape (n,)
+        Half width of the 95 % interval of the predicted torque [N m].
 
     """
 
@@ -58,6 +61,15 @@ class FitSection(Section):
     robot: Robot
     training: Mapping[str, Sequence[Fit]]
     validation: Mapping[str, Sequence[Fit]]
+    reach: FloatArray
+
+    @property
+    def certainty(self) -> str:
+        """Half width of the interval of every joint's torque in words."""
+        return ', '.join(
+            f'{name} ±{digits(self.reach[joint])} {torque_unit(self.robot, joint)}'
+            for joint, name in enumerate(self.robot.joints)
+        )
 
     @property
     def bars(self) -> BarChart:
