@@ -104,7 +104,7 @@ class Chain:
                 rotation[:, i] = base @ about
                 position[:, i] = origin
         direction = np.einsum('knij,nj->kni', rotation, self.axes)
-        moving = np.cross(position, direction)
+        moving = cross(position, direction)
         slides = self.prismatic[:, np.newaxis]
         axes = np.concatenate(
             [np.where(slides, direction, moving), np.where(slides, 0.0, direction)], axis=2

@@ -154,18 +154,17 @@ class ClearanceModel:
         Pairs further apart than that may be missing from the answer or in it.
 
         """
-        sample, pair = np.nonzero(self._bound(q) < reach)
-        distance, normal, points = self._measure(q, sample, pair)
+        pose = self.chain.pose(q)
+        sample, pair = np.nonzero(self.capsules.distance(pose, self.pairs) < reach)
+        distance, normal, point = self._measure(q, sample, pair)
         keep = distance < reach
         sample, pair, distance = sample[keep], pair[keep], distance[keep]
-        axes = self.chain.pose(q).axes[sample]  # (m, n, 6)
-        point = np.where(
-            (self.between[pair] > 0.0)[..., np.newaxis],
-            points[keep][:, 1, np.newaxis],
-            points[keep][:, 0, np.newaxis],
-        )
-        motion = axes[..., :3] + cross(axes[..., 3:], point)
-        along = np.einsum('mjc,mc->mj', motion, normal[keep])
+        normal, point = normal[keep], point[keep, np.newaxis]
+        axes = pose.axes[sample]  # (m, n, 6)
+        other = point + (distance[:, np.newaxis] * normal)[:, np.newaxis]
+        moved = np.where((self.between[pair] > 0.0)[..., np.newaxis], other, point)
+        motion = axes[..., :3] + cross(axes[..., 3:], moved)
+        along = np.einsum('mjc,mc->mj', motion, normal)
         return NearPairs(sample, pair, distance, along * self.between[pair])
 
     def smallest(self, q: FloatArray, reach: float = np.inf) -> FloatArray:
@@ -288,11 +287,11 @@ class ClearanceModel:
     def _measure(
         self, q: FloatArray, sample: IntArray, pair: IntArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Measure pairs in samples: distances, normals (first to second), nearest points."""
+        """Measure pairs in samples: distances, normals to the second, points of the first."""
         model, geometry = self.collision.robot.model, self.collision.geometry
         data, placed = model.createData(), geometry.createData()
         distance = np.empty(len(sample))
-        normal, points = np.empty((len(sample), 3)), np.empty((len(sample), 2, 3))
+        normal, point = np.empty((2, len(sample), 3))
         current = -1
         for row in np.argsort(sample, kind='stable'):
             if sample[row] != current:
@@ -300,8 +299,8 @@ class ClearanceModel:
                 pin.updateGeometryPlacements(model, data, geometry, placed, q[current])
             result = pin.computeDistance(geometry, placed, int(self.numbers[pair[row]]))
             distance[row], normal[row] = result.min_distance, result.normal
-            points[row, 0], points[row, 1] = result.getNearestPoint1(), result.getNearestPoint2()
-        return distance, normal, points
+            point[row] = result.getNearestPoint1()
+        return distance, normal, point
 
     def _approach(self, pair: int, time: float, distance: float) -> Approach:
         first, second = (body_name(self.collision, int(body)) for body in self.pairs[pair])
