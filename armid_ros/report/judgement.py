@@ -136,8 +136,11 @@ def _sentences(
         for effect in result.arm.effects
     ]
     time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
+    count = counted(result.base.rank, 'parameter')
+    if result.base.rank < result.theory.rank:
+        count = f'{result.base.rank} of the {counted(result.theory.rank, "parameter")}'
     what = (
-        f'{counted(result.base.rank, "parameter")} of {robot.name} '
+        f'{count} of {robot.name} '
         f'({counted(robot.n_joints, "joint")}; rigid body'
         + ''.join(f', {effect}' for effect in effects)
         + f') identified from {time:.0f} s of motion.'

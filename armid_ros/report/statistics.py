@@ -117,9 +117,7 @@ class Direction:
 
 def torque_scale(result: Identification) -> FloatArray:
     """Return the torque one unit of each parameter makes, in residual deviations, shape (r,)."""
-    motion = max(result.training, key=lambda fit: len(fit.motion)).motion
-    chosen = np.unique(np.linspace(0, len(motion) - 1, _SAMPLES).astype(np.intp))
-    columns = result.arm.columns(motion.select(chosen))[:, :, result.base.independent]
+    columns = _some_columns(result, result.training)
     noise = np.where(result.joint_std > 0.0, result.joint_std, 1.0)
     return np.asarray(np.sqrt(np.mean((columns / noise[:, np.newaxis]) ** 2, axis=(0, 1))))
 
@@ -131,9 +129,7 @@ def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     Half widths of 95 % intervals, root mean square over a motion [N m].
 
     """
-    motion = max(fits, key=lambda fit: len(fit.motion)).motion
-    chosen = np.unique(np.linspace(0, len(motion) - 1, _SAMPLES).astype(np.intp))
-    columns = result.arm.columns(motion.select(chosen))[:, :, result.base.independent]
+    columns = _some_columns(result, fits)
     variance = np.sum((columns @ result.estimate.covariance) * columns, axis=2)
     return np.asarray(HALF_WIDTH * np.sqrt(variance.mean(axis=0)))
 
@@ -156,3 +152,10 @@ def correlations(estimate: Estimate) -> FloatArray:
     """Return the correlation of every pair of parameters, shape (P, P)."""
     std = np.where(estimate.std > 0.0, estimate.std, 1.0)
     return np.asarray(np.clip(estimate.covariance / np.outer(std, std), -1.0, 1.0))
+
+
+def _some_columns(result: Identification, fits: Sequence[Fit]) -> FloatArray:
+    """Return columns of the base parameters at samples of the longest stretch, shape (M, n, r)."""
+    motion = max(fits, key=lambda fit: len(fit.motion)).motion
+    chosen = np.unique(np.linspace(0, len(motion) - 1, _SAMPLES).astype(np.intp))
+    return np.asarray(result.arm.columns(motion.select(chosen))[:, :, result.base.independent])

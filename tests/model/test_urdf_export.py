@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 import re
 
+from armid_ros.arm import ArmModel, load_model, save_model
+from armid_ros.arm.export import arm_mjcf, arm_urdf
+from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics, random_motion
 from armid_ros.model.mjcf_export import export_mjcf
@@ -123,6 +126,23 @@ def test_pinocchio_and_mujoco_agree_with_the_model(robot):
     np.testing.assert_allclose(mujoco_torque(mjcf, robot, motion), tau, atol=bound)
     bare = re.sub(r'(damping|friction)="[^"]*"|friction=\'[^\']*\'', '', without_shapes(urdf))
     np.testing.assert_allclose(mujoco_torque(bare, robot, motion), tau, atol=bound)
+
+
+def test_exports_agree_with_the_model_file_friction_and_rotors_included(robot, tmp_path):
+    """What model.yaml says, but for dry friction, in Pinocchio and in MuJoCo."""
+    arm = ArmModel(robot)
+    for name, value in (('viscous_friction', 0.3), ('rotor_inertia', 0.02)):
+        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
+    save_model(tmp_path / 'model.yaml', arm, robot.name)
+    model = load_model(tmp_path / 'model.yaml', robot)
+    motion = random_motion(robot, 30, np.random.default_rng(1))
+    tau = model.torque(motion)
+    bound = 1e-9 * np.abs(tau).max()
+    in_mujoco = mujoco_torque(arm_mjcf(model).text, robot, motion)
+    np.testing.assert_allclose(in_mujoco, tau, atol=bound)
+    read_again = read(arm_urdf(model).text, robot)
+    in_pinocchio = inverse_dynamics(read_again, motion) + read_again.urdf_damping * motion.dq
+    np.testing.assert_allclose(in_pinocchio + 0.02 * motion.ddq, tau, atol=bound)
 
 
 def test_damping_and_armature_act_in_mujoco():
