@@ -21,6 +21,8 @@ from armid_ros.identification.two_inertia import (
 )
 from armid_ros.identification.two_inertia.output import elastic_document
 from armid_ros.motion import FloatArray
+from armid_ros.report.elastic_report import elastic_report
+from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkSet
 from armid_ros.simulation.elastic_run import ElasticSensors, run_all
@@ -120,13 +122,26 @@ def elastic(
         )
         tick(1.0, 'drawing')
         files = _draw(result, shipped, out)
+        page = elastic_report(
+            result,
+            robot.name,
+            known=shipped.parameters,
+            source='Table 1 of the source, after tuning',
+            provenance=Provenance(
+                files=hash_files([*bags, *steps]),
+                versions=versions(),
+                settings={'start of the tuning': start or 'what step 3a found'},
+                seed=seed if demo else None,
+            ),
+        )
+        (out / 'report.html').write_text(page, encoding='utf-8')
     document = elastic_document(result, robot_source)
     (out / 'elastic.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
     if as_json:
         click.echo(json.dumps(document))
         return
     _tell(document)
-    say(f'{out}: {", ".join(["elastic.json", *files])}')
+    say(f'{out}: {", ".join(["elastic.json", "report.html", *files])}')
 
 
 def _pair(text: str | None, what: str, default: Any) -> FloatArray:

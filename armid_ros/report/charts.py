@@ -11,7 +11,7 @@ for dark and one for paper.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 import json
 from typing import Any, Literal
 
@@ -77,6 +77,27 @@ class Level:
 
 
 @dataclass(frozen=True)
+class Mark:
+    """
+    A vertical line.
+
+    Attributes
+    ----------
+    x : float
+        Where.
+    label : str
+        What it is; written beside its foot.
+    before : bool
+        Whether that is to its left.
+
+    """
+
+    x: float
+    label: str = ''
+    before: bool = False
+
+
+@dataclass(frozen=True)
 class Chart:
     """
     Curves over a common axis that a reader can zoom into.
@@ -95,6 +116,10 @@ class Chart:
         Charts with the same name zoom together; empty for none.
     levels : sequence of Level
         Horizontal lines.
+    marks : sequence of Mark
+        Vertical lines.
+    logarithmic : bool
+        Whether the abscissa is; it has to be positive.
     symmetric : bool
         Whether zero is in the middle of the ordinate.
     legend : bool
@@ -109,6 +134,8 @@ class Chart:
     height: int = 220
     link: str = ''
     levels: Sequence[Level] = ()
+    marks: Sequence[Mark] = ()
+    logarithmic: bool = False
     symmetric: bool = False
     legend: bool = True
 
@@ -128,7 +155,9 @@ class Chart:
             'link': self.link,
             'symmetric': self.symmetric,
             'legend': self.legend,
+            'logarithmic': self.logarithmic,
             'levels': [{'y': level.y, 'label': level.label} for level in self.levels],
+            'marks': [asdict(mark) for mark in self.marks],
             'series': [
                 {
                     'label': series.label,

@@ -44,6 +44,7 @@ def test_demo_finds_the_springs(folder) -> None:
         'parameters.png',
         'steps.png',
     }
+    assert 'The springs have' in (folder / 'report.html').read_text(encoding='utf-8')
 
 
 def test_bags_give_the_same_again_and_no_steps_leave_out_the_tuning(folder, tmp_path) -> None:

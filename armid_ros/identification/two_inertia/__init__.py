@@ -11,6 +11,7 @@ all of them. Source: Oaki and Adachi 2008.
 
 from armid_ros.identification.two_inertia.files import Accelerometers, read_runs, write_runs
 from armid_ros.identification.two_inertia.interaction import (
+    coupled_response,
     decibel_error,
     decouple,
     DecoupledJoint,
@@ -39,6 +40,7 @@ __all__ = [
     'fit_rigid',
     'RigidFit',
     'decouple',
+    'coupled_response',
     'DecoupledJoint',
     'ideal_response',
     'interaction_torques',

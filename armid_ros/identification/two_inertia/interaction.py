@@ -176,6 +176,39 @@ def ideal_response(
     return np.asarray(np.moveaxis(table, 2, 0))
 
 
+def coupled_response(
+    parameters: TwoLinkParameters, angles: npt.ArrayLike, frequency: npt.ArrayLike
+) -> npt.NDArray[np.complex128]:
+    """
+    Return the frequency response of both joints together, each from its own motor alone.
+
+    Parameters
+    ----------
+    parameters : TwoLinkParameters
+        The arm.
+    angles : array_like, shape (S,)
+        Poses of joint 2 to take the mean over [rad]; the arm is at rest in each, and the other
+        motor is free.
+    frequency : array_like, shape (K,)
+        [Hz].
+
+    Returns
+    -------
+    ndarray of complex, shape (K, 2)
+        From motor torque to motor velocity of each joint [rad/s / (N m)].
+
+    """
+    s = 2j * np.pi * np.asarray(frequency, dtype=float)[:, np.newaxis, np.newaxis]
+    spring = np.diag(parameters.stiffness) / s + np.diag(parameters.spring_damping)
+    motor = np.diag(parameters.rotor) * s + np.diag(parameters.joint_motor_damping) + spring
+    mean = np.zeros((len(s), 2), complex)
+    for angle in (poses := np.asarray(angles, dtype=float)):
+        link = parameters.mass_matrix(angle) * s + np.diag(parameters.link_damping) + spring
+        inverse = np.linalg.inv(motor - spring @ np.linalg.solve(link, spring))
+        mean += np.diagonal(inverse, axis1=1, axis2=2) / len(poses)
+    return mean
+
+
 def decibel_error(found: npt.NDArray[np.complex128], wanted: npt.NDArray[np.complex128]) -> float:
     """Return the root mean square difference of two frequency responses in size [dB]."""
     difference = 20.0 * np.log10(np.abs(found) / np.abs(wanted))

@@ -49,11 +49,11 @@ def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, 
     if result.tuning is not None:
         before, after = result.tuning.rms
         document['tuning'] = {'rms_before': before, 'rms_after': after, 'unit': 'rad/s'}
-        document['total_damping'] = _sums(result)
+        document['total_damping'] = total_damping(result)
     return document
 
 
-def _sums(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
+def total_damping(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
     """Return dl + dm gear^2 of both joints, which is what is known of the two."""
     assert result.tuning is not None
     estimate, gear = result.tuning.estimate, result.parameters.gear

@@ -23,6 +23,9 @@ from armid_ros.simulation.elastic_run import ElasticRun, VelocityLoop
 import numpy as np
 import numpy.typing as npt
 
+#: Quantiles of the poses that stand for all of them.
+_SHARES = np.linspace(0.02, 0.98, 25)
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredJoint:
@@ -63,6 +66,10 @@ class TwoInertiaIdentification:
         Step 3a, of both joints.
     untuned : TwoLinkParameters
         Parameters after step 3a.
+    experiments : int
+        Number of experiments through the resonances.
+    angles : ndarray, shape (S,)
+        Poses of joint 2 that the experiments went through [rad].
     tuning : Tuning or None
         Step 3b, where there were step responses.
 
@@ -73,6 +80,8 @@ class TwoInertiaIdentification:
     joints: tuple[DecoupledJoint, DecoupledJoint]
     fits: tuple[JointFit, JointFit]
     untuned: TwoLinkParameters
+    experiments: int
+    angles: FloatArray
     tuning: Tuning | None
 
     @property
@@ -140,7 +149,10 @@ def identify_two_inertia(
         begin = untuned if start is None else replace(start, coulomb=untuned.coulomb)
         tuning = tune(steps, begin, loop)
     tell(1.0, 'done')
-    return TwoInertiaIdentification(rigid, measured, joints, fits, untuned, tuning)
+    angles = np.quantile(np.concatenate([run.link.q[:, 1] for run in runs]), _SHARES)
+    return TwoInertiaIdentification(
+        rigid, measured, joints, fits, untuned, len(runs), angles, tuning
+    )
 
 
 def _rigid_guess(rigid: RigidFit, drives: TwoLinkParameters) -> TwoLinkParameters:

@@ -73,16 +73,26 @@
   function rangeX(spec) {
     const [start, end] = [spec.x[0], spec.x[spec.x.length - 1]];
     const exact = spec.series.every((entry) => entry.kind === 'line' || entry.kind === 'band');
-    const pad = exact ? 0 : 0.025 * (end - start || 1);
+    const pad = exact || spec.logarithmic ? 0 : 0.025 * (end - start || 1);
     return (u, low, high) => {
       if (low == null) return [0, 1];
       return low <= start && high >= end ? [start - pad, end + pad] : [low, high];
     };
   }
 
-  function axis(label, side, whole = false) {
+  // 1, 2 and 5 times powers of ten; equal steps where fewer than two of them are in sight.
+  function decades(u, index, low, high) {
+    const found = [];
+    for (let power = 10 ** Math.floor(Math.log10(low)); power <= high; power *= 10) {
+      found.push(...[1, 2, 5].map((n) => n * power).filter((v) => v >= low && v <= high));
+    }
+    return found.length > 1 ? found : [0, 1, 2, 3, 4].map((k) => low + (k / 4) * (high - low));
+  }
+
+  function axis(label, side, {whole = false, logarithmic = false} = {}) {
     const vertical = side === 3;
     return {
+      ...(logarithmic ? {splits: decades, filter: (u, splits) => splits} : {}),
       ...(whole ? {incrs: [1, 2, 5, 10, 20, 50, 100]} : {}),
       label: label || null, side, font, labelFont: font, labelSize: 18, labelGap: 0, gap: 4,
       stroke: () => colour.soft,
@@ -91,6 +101,31 @@
       values: (u, splits) => splits.map((value) => (value == null ? '' : String(Number(value.toPrecision(6))))),
       grid: {stroke: () => colour.grid, width: 1},
       ticks: {stroke: () => colour.line, width: 1, size: 4},
+    };
+  }
+
+  function drawMarks(spec) {
+    return (u) => {
+      const {ctx, bbox} = u;
+      ctx.save();
+      ctx.strokeStyle = ctx.fillStyle = colour.soft;
+      ctx.lineWidth = uPlot.pxRatio;
+      ctx.font = `${10 * uPlot.pxRatio}px system-ui, sans-serif`;
+      ctx.setLineDash([4 * uPlot.pxRatio, 3 * uPlot.pxRatio]);
+      for (const mark of spec.marks) {
+        const x = u.valToPos(mark.x, 'x', true);
+        if (x < bbox.left || x > bbox.left + bbox.width) continue;
+        ctx.beginPath();
+        ctx.moveTo(x, bbox.top);
+        ctx.lineTo(x, bbox.top + bbox.height);
+        ctx.stroke();
+        const fits = x + ctx.measureText(mark.label).width + 4 * uPlot.pxRatio < bbox.left + bbox.width;
+        const left = mark.before || !fits;
+        ctx.textAlign = left ? 'right' : 'left';
+        const foot = (left && !mark.before ? 18 : 5) * uPlot.pxRatio;
+        ctx.fillText(mark.label, x + (left ? -4 : 4) * uPlot.pxRatio, bbox.top + bbox.height - foot);
+      }
+      ctx.restore();
     };
   }
 
@@ -191,12 +226,13 @@
     }
     const plot = new uPlot({
       width: figure.clientWidth, height: spec.height, series, bands, padding: [8, 12, 0, 0],
-      scales: {x: {time: false, range: rangeX(spec)}, y: {range: rangeY(spec)}},
-      axes: [axis(spec.xlabel, 2, spec.x.every(Number.isInteger)), axis(spec.ylabel, 3)],
+      scales: {x: {time: false, range: rangeX(spec), distr: spec.logarithmic ? 3 : 1}, y: {range: rangeY(spec)}},
+      axes: [axis(spec.xlabel, 2, {whole: spec.x.every(Number.isInteger), logarithmic: spec.logarithmic}),
+        axis(spec.ylabel, 3)],
       legend: {show: spec.legend, markers: {width: 3}},
       cursor: {y: false, drag: {x: true, y: false}, points: {size: 6},
         ...(spec.link ? {sync: {key: spec.link, scales: ['x', null]}} : {})},
-      hooks: {draw: [drawLevels(spec)], setScale: [share(spec, figure)]},
+      hooks: {draw: [drawLevels(spec), drawMarks(spec)], setScale: [share(spec, figure)]},
     }, data, figure);
     charts.set(figure, {plot, spec});
     touch(plot, spec);
