@@ -12,6 +12,7 @@ from typing import Any
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import options
 from armid_ros.cli.excitation_files import Plan, require_free, WAYPOINT_RATE, write_plan
+from armid_ros.cli.excite_springs import COURSES, refuse_other_options, write_course
 from armid_ros.cli.terminal import progress, say
 from armid_ros.effects import parse_effect
 from armid_ros.excitation import (
@@ -32,6 +33,8 @@ from armid_ros.robots import collision_model
 import click
 import numpy as np
 
+#: The kind of trajectory that is designed.
+FOURIER = 'fourier'
 #: Of the run-in and the run-out [s], and at most this share of the duration.
 _RUN_IN, _RUN_IN_SHARE = 2.0, 0.1
 
@@ -57,6 +60,19 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
 @click.command(epilog='Example: armid excite --robot ur5.urdf --duration 40 --out plan')
 @options.robot
 @options.folder
+@click.option(
+    '--kind',
+    type=click.Choice([FOURIER, *COURSES]),
+    default=FOURIER,
+    show_default=True,
+    help='Designed; or for elastic joints, a bag alone: multisines of torque on the move, steps.',
+)
+@click.option(
+    '--share',
+    default=0.1,
+    show_default=True,
+    help='Of the torque limits (multisine, rms) or of the velocity limits (steps).',
+)
 @click.option('--duration', default=44.0, show_default=True, help='From rest to rest [s].')
 @click.option(
     '--periods',
@@ -139,6 +155,8 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
 def excite(
     robot_source: str,
     out: Path,
+    kind: str,
+    share: float,
     duration: float,
     periods: int,
     harmonics: int,
@@ -166,6 +184,10 @@ def excite(
 ) -> None:
     """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
     robot = options.open_robot(robot_source, gravity, joints, after)
+    if kind != FOURIER:
+        refuse_other_options(click.get_current_context())
+        write_course(kind, robot, duration, share, clearance, environment, seed, out)
+        return
     arm = ArmModel(robot) if model is None else load_model(model, robot)
     arm = options.with_effects(arm, effects)
     other = None if rival is None else options.with_effects(arm, rival.removesuffix('none'))

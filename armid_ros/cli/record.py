@@ -12,10 +12,9 @@ from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.effects import parse_effect
 from armid_ros.excitation import design, DesignSettings, load_excitation
 from armid_ros.identification.two_inertia import write_runs
-from armid_ros.motion import Motion
+from armid_ros.recording import read_waypoints, write_recording
 from armid_ros.recording import recover as recover_bag
-from armid_ros.recording import write_recording
-from armid_ros.robots import collision_model
+from armid_ros.robots import collision_model, Robot
 from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run
 from armid_ros.simulation.elastic_arm import ElasticArm, record
@@ -41,7 +40,7 @@ import numpy as np
 )
 @click.option('--model', type=click.Path(path_type=Path), help='A model.yaml of armid identify.')
 @click.option(
-    '--trajectory', type=click.Path(path_type=Path), help='A YAML or CSV of armid excite.'
+    '--trajectory', type=click.Path(path_type=Path), help='A YAML, CSV or bag of armid excite.'
 )
 @click.option('--rate', default=1000.0, show_default=True, help='Recorded samples per second.')
 @click.option(
@@ -100,30 +99,37 @@ def simulate(
         resolution=resolution,
     )
     with progress('designing a trajectory') as tick:
-        if trajectory:
-            excitation = load_excitation(trajectory)
-        else:
-            settings = DesignSettings(period=10.0, starts=1, candidates=10, iterations=1)
-            excitation = design(
-                ArmModel(robot), settings, rng, collision=collision_model(robot)
-            ).excitation
-        motion = excitation.motion(1000.0)
+        reference = _reference(robot, trajectory, rng)
         tick(0.0, 'simulating')
         if springs and not rotorless:
             elastic = make_elastic_arm(
                 arm, rng=rng, drives=drives, gain=loop_gain, sensors=sensors
             )
-            samples, sides = _both_sides(out, elastic, motion, rate, tick), ' on both sides'
+            samples, sides = _both_sides(out, elastic, reference, rate, tick), ' on both sides'
         else:
-            measured = run(arm, motion, rng=rng, sensors=sensors, rate=rate, progress=tick)
+            measured = run(arm, reference, rng=rng, sensors=sensors, rate=rate, progress=tick)
             write_recording(out, measured, robot_description=robot.urdf)
             samples, sides = len(measured.t), ''
-    say(f'{out}: {samples} samples of {robot.n_joints} joints{sides}, {motion.t[-1]:.1f} s')
+    say(f'{out}: {samples} samples of {robot.n_joints} joints{sides}, {reference.duration:.1f} s')
 
 
-def _both_sides(out: Path, arm: ElasticArm, motion: Motion, rate: float, tick: Tick) -> int:
-    """Let an arm with elastic joints follow a motion, and write what motors and links did."""
-    measured = record(arm, Reference.of(motion), rate=rate, progress=tick)
+def _reference(robot: Robot, path: Path | None, rng: np.random.Generator) -> Reference:
+    """Return the trajectory in a file or bag of armid excite, or one that is made in a hurry."""
+    if path is not None and (path.is_dir() or path.suffix in ('.mcap', '.db3')):
+        read = read_waypoints(path, robot.joints)
+        return Reference(read.joints, read.t, read.q, read.dq, read.ddq, read.tau)
+    if path is not None:
+        return Reference.of(load_excitation(path).motion(1000.0))
+    settings = DesignSettings(period=10.0, starts=1, candidates=10, iterations=1)
+    collision = collision_model(robot)
+    return Reference.of(
+        design(ArmModel(robot), settings, rng, collision=collision).excitation.motion(1000.0)
+    )
+
+
+def _both_sides(out: Path, arm: ElasticArm, reference: Reference, rate: float, tick: Tick) -> int:
+    """Let an arm with elastic joints follow a trajectory, and write what both sides did."""
+    measured = record(arm, reference, rate=rate, progress=tick)
     write_runs(out, [measured], arm.plant.robot, arm.accelerometers)
     return len(measured.motor)
 

@@ -24,6 +24,7 @@ from armid_ros.recording.string_message import read_robot_description, string_cd
 from armid_ros.recording.trajectory import (
     joint_trajectory_cdr,
     read_joint_trajectory,
+    read_waypoints,
     write_joint_trajectory,
 )
 from armid_ros.recording.writer import BagWriter
@@ -41,6 +42,7 @@ __all__ = [
     'joint_trajectory_cdr',
     'write_joint_trajectory',
     'read_joint_trajectory',
+    'read_waypoints',
     'recover',
     'RecoveryReport',
     'write_joint_states',

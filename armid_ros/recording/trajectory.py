@@ -5,8 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray, Motion
@@ -21,14 +22,74 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
 
-def joint_trajectory_cdr(motion: Motion, *, stamp_ns: int = 0, frame_id: str = '') -> bytes:
+class Waypoints(Protocol):
+    """
+    What a JointTrajectory can say: a `Motion`, or less than that.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        n joint names.
+    t : ndarray, shape (K,)
+        Time from the start [s].
+    q : ndarray, shape (K, n)
+        Positions.
+    dq, ddq, tau : ndarray, shape (K, n), or None
+        Velocities, accelerations and efforts.
+
+    """
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joint names."""
+        ...
+
+    @property
+    def t(self) -> FloatArray:
+        """Times [s]."""
+        ...
+
+    @property
+    def q(self) -> FloatArray:
+        """Positions."""
+        ...
+
+    @property
+    def dq(self) -> FloatArray | None:
+        """Velocities."""
+        ...
+
+    @property
+    def ddq(self) -> FloatArray | None:
+        """Accelerations."""
+        ...
+
+    @property
+    def tau(self) -> FloatArray | None:
+        """Efforts."""
+        ...
+
+
+@dataclass(frozen=True)
+class ReadWaypoints:
+    """The waypoints that a message has; see `Waypoints`."""
+
+    joints: tuple[str, ...]
+    t: FloatArray
+    q: FloatArray
+    dq: FloatArray | None
+    ddq: FloatArray | None
+    tau: FloatArray | None
+
+
+def joint_trajectory_cdr(motion: Waypoints, *, stamp_ns: int = 0, frame_id: str = '') -> bytes:
     """
     Serialise a motion as one trajectory_msgs/JointTrajectory.
 
     Parameters
     ----------
-    motion : Motion
-        Positions, velocities and accelerations over time; time_from_start is its time.
+    motion : Motion or other Waypoints
+        What to do over time; time_from_start is its time.
     stamp_ns : int
         When to start [ns]; 0 means now.
     frame_id : str
@@ -37,16 +98,19 @@ def joint_trajectory_cdr(motion: Motion, *, stamp_ns: int = 0, frame_id: str = '
     """
     store = get_typestore(Stores.ROS2_JAZZY)
     types = store.types
-    nothing = np.empty(0)
+    nothing = np.empty((len(motion.t), 0))
+    dq, ddq, tau = (
+        nothing if values is None else values for values in (motion.dq, motion.ddq, motion.tau)
+    )
     points: list[Any] = []
     for sample, time in enumerate(np.rint(motion.t * 1e9).astype(np.int64).tolist()):
         seconds, nanoseconds = divmod(time, 10**9)
         points.append(
             types['trajectory_msgs/msg/JointTrajectoryPoint'](
                 positions=motion.q[sample],
-                velocities=motion.dq[sample],
-                accelerations=motion.ddq[sample],
-                effort=nothing,
+                velocities=dq[sample],
+                accelerations=ddq[sample],
+                effort=tau[sample],
                 time_from_start=types['builtin_interfaces/msg/Duration'](
                     sec=seconds, nanosec=nanoseconds
                 ),
@@ -66,7 +130,7 @@ def joint_trajectory_cdr(motion: Motion, *, stamp_ns: int = 0, frame_id: str = '
 
 def write_joint_trajectory(
     path: str | Path,
-    motion: Motion,
+    motion: Waypoints,
     *,
     topic: str = '/joint_trajectory',
     robot_description: str | None = None,
@@ -79,8 +143,8 @@ def write_joint_trajectory(
     ----------
     path : str or Path
         The bag directory to be made; it must not exist.
-    motion : Motion
-        The motion; its torque is not written.
+    motion : Motion or other Waypoints
+        What to do; its torque, if it has one, is effort on top of what follows it.
     topic : str
         Topic of the message.
     robot_description : str, optional
@@ -121,8 +185,8 @@ def read_joint_trajectory(
     Returns
     -------
     Motion
-        The reference, without torque. Velocities and accelerations that the message does not give
-        are differences of positions and velocities.
+        The reference, with the effort it has. Velocities and accelerations that the message does
+        not give are differences of positions and velocities.
 
     Raises
     ------
@@ -130,6 +194,16 @@ def read_joint_trajectory(
         There is no such bag or topic, or the trajectory does not name a joint or is not valid.
 
     """
+    read = read_waypoints(path, joints, topic=topic)
+    dq = np.gradient(read.q, read.t, axis=0) if read.dq is None else read.dq
+    ddq = np.gradient(dq, read.t, axis=0) if read.ddq is None else read.ddq
+    return Motion(read.joints, read.t, read.q, dq, ddq, read.tau)
+
+
+def read_waypoints(
+    path: str | Path, joints: Sequence[str], *, topic: str | None = None
+) -> ReadWaypoints:
+    """Read what the last JointTrajectory of a bag says itself; see `read_joint_trajectory`."""
     with Bag(path) as bag:
         chosen = _choose_topic(bag, topic)
         cdr = b''
@@ -142,10 +216,10 @@ def read_joint_trajectory(
         message: Any = store_for(chosen.message_type).deserialize_cdr(cdr, JOINT_TRAJECTORY)
     except SerdeError as error:
         raise RecordingError(f'{where}: the trajectory cannot be decoded: {error}') from error
-    return _motion(where, message, tuple(joints))
+    return _waypoints(where, message, tuple(joints))
 
 
-def _motion(where: str, message: Any, joints: tuple[str, ...]) -> Motion:
+def _waypoints(where: str, message: Any, joints: tuple[str, ...]) -> ReadWaypoints:
     """Take a decoded message apart."""
     names = list(message.joint_names)
     missing = [joint for joint in joints if joint not in names]
@@ -173,12 +247,11 @@ def _motion(where: str, message: Any, joints: tuple[str, ...]) -> Motion:
             )
         return np.array(rows, np.float64)[:, columns]
 
-    q, dq, ddq = quantity('positions'), quantity('velocities'), quantity('accelerations')
+    q = quantity('positions')
     if q is None:
         raise RecordingError(f'{where}: the points have no positions')
-    dq = np.gradient(q, t, axis=0) if dq is None else dq
-    ddq = np.gradient(dq, t, axis=0) if ddq is None else ddq
-    return Motion(joints, t, q, dq, ddq)
+    rates = quantity('velocities'), quantity('accelerations')
+    return ReadWaypoints(joints, t, q, *rates, quantity('effort'))
 
 
 def _choose_topic(bag: Bag, wanted: str | None) -> Topic:

@@ -10,6 +10,7 @@ from armid_ros.cli import main
 from armid_ros.cli.commands import COMMANDS
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.excitation import load_excitation
+from armid_ros.identification.two_inertia import Accelerometers, read_runs
 from armid_ros.motion import Motion
 from armid_ros.recording import read_joint_trajectory, read_recording, write_recording
 from armid_ros.robots import load_robot
@@ -213,6 +214,23 @@ def test_a_run_is_designed_to_tell_two_explanations_apart(tmp_path):
     assert 'torque that a rival' in (tmp_path / 'plan' / 'report.html').read_text()
     sizeless = ('--effect', 'quadratic_friction', *rival, '--out', tmp_path / 'no')
     assert 'give what it lacks a size' in armid('excite', *arguments, *sizeless, code=2).stderr
+
+
+@pytest.mark.parametrize(('kind', 'experiments'), [('multisine', 1), ('steps', 2)])
+def test_what_shows_springs_is_followed_by_the_elastic_arm(tmp_path, kind, experiments):
+    robot, rng = load_robot('two_link_elastic'), ('--seed', 1)
+    plan, run = tmp_path / 'plan', tmp_path / 'run'
+    armid('excite', '--robot', robot.name, '--kind', kind, '--duration', 7, *rng, '--out', plan)
+    armid('simulate', '--robot', robot.name, '--trajectory', plan / 'trajectory', '--out', run)
+    runs = read_runs(run, robot, Accelerometers.on(robot, [0.4, 0.4]))
+    assert len(runs) == experiments
+    if kind == 'multisine':
+        assert np.all(runs[0].motor.tau.std(axis=0) > 0.05 * robot.torque_limit)
+
+
+def test_options_of_a_design_do_not_go_with_steps(tmp_path):
+    arguments = ('excite', '--robot', 'two_link_elastic', '--kind', 'steps', '--starts', 3)
+    assert '--starts does not go' in armid(*arguments, '--out', tmp_path / 'o', code=2).stderr
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,13 @@ from armid_ros.recording import (
     joint_trajectory_cdr,
     read_joint_trajectory,
     read_robot_description,
+    read_waypoints,
     topics,
     write_joint_trajectory,
     write_recording,
 )
 from armid_ros.recording.message_types import JOINT_TRAJECTORY
+from armid_ros.recording.trajectory import ReadWaypoints
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
@@ -39,6 +41,14 @@ def test_a_trajectory_is_read_back_exactly_in_the_order_asked(motion, tmp_path):
     assert back.tau is None
     assert read_robot_description(tmp_path / 'bag') == '<robot/>'
     assert {topic.type_name for topic in topics(tmp_path / 'bag')} >= {JOINT_TRAJECTORY}
+
+
+def test_efforts_are_written_and_what_is_not_known_is_left_out(motion, tmp_path):
+    waypoints = ReadWaypoints(('a', 'b'), motion.t, motion.q, None, None, 5.0 * motion.q)
+    write_joint_trajectory(tmp_path / 'bag', waypoints)
+    back = read_waypoints(tmp_path / 'bag', ('b', 'a'))
+    assert back.dq is None and back.ddq is None
+    np.testing.assert_array_equal(back.tau, 5.0 * motion.q[:, [1, 0]])
 
 
 def test_rates_that_are_not_given_are_differences(motion, tmp_path):

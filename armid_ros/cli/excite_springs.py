@@ -1,0 +1,60 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What shows elastic joints: multisines through the resonances, and steps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armid_ros.cli.excitation_files import BAG, require_free
+from armid_ros.cli.terminal import say
+from armid_ros.excitation import load_environment, with_obstacles
+from armid_ros.motion import FloatArray
+from armid_ros.recording import write_joint_trajectory
+from armid_ros.robots import collision_model, Robot
+from armid_ros.simulation.elastic_courses import multisine_course, step_course
+import click
+import numpy as np
+
+#: Each with what it is made of, and the options of armid excite that it takes.
+COURSES = {'multisine': multisine_course, 'steps': step_course}
+_TAKES = {
+    'robot_source', 'out', 'kind', 'share', 'duration', 'clearance', 'environment', 'gravity',
+    'joints', 'seed',
+}  # fmt: skip
+
+
+def refuse_other_options(context: click.Context) -> None:
+    """Raise a UsageError where an option was given that only a designed trajectory takes."""
+    default = click.core.ParameterSource.DEFAULT
+    for option in context.command.params:
+        name = str(option.name)
+        if name not in _TAKES and context.get_parameter_source(name) is not default:
+            raise click.UsageError(
+                f'{option.opts[0]} does not go with --kind {context.params["kind"]}'
+            )
+
+
+def write_course(
+    kind: str,
+    robot: Robot,
+    duration: float,
+    share: float,
+    clearance: float,
+    environment: Path | None,
+    seed: int,
+    out: Path,
+) -> None:
+    """Write the trajectory as a bag."""
+    require_free(out)
+    obstacles = load_environment(environment) if environment else ()
+    bodies = with_obstacles(collision_model(robot), obstacles)
+
+    def clear(q: FloatArray) -> bool:
+        inside = np.all((q >= robot.lower) & (q <= robot.upper))
+        return bool(inside) and float(bodies.path_clearance(q).min()) >= clearance
+
+    course = COURSES[kind](robot, duration, share, np.random.default_rng(seed), clear)
+    out.mkdir(parents=True, exist_ok=True)
+    write_joint_trajectory(out / BAG, course, robot_description=robot.urdf)
+    say(f'{out / BAG}: {len(course.t)} waypoints, {course.duration:.1f} s')
