@@ -190,15 +190,19 @@ def compare(before: Parameters, after: Parameters) -> Comparison:
         If they have no parameter in common.
 
     """
-    shared = [name for name in before.values if name in after.values]
+    first, second = max(
+        ((before.told_as(after), after), (before, after.told_as(before))),
+        key=lambda pair: len(pair[0].values.keys() & pair[1].values.keys()),
+    )
+    shared = [name for name in first.values if name in second.values]
     if not shared:
         raise ModelError(
             f'{before.source} and {after.source} have no identified parameter in common; '
             'are they of one robot, in one gravity?'
         )
-    pairs = np.array([(*before.values[name], *after.values[name]) for name in shared])
+    pairs = np.array([(*first.values[name], *second.values[name]) for name in shared])
     difference = pairs[:, 2] - pairs[:, 0]
-    covariance = before.covariance_of(shared) + after.covariance_of(shared)
+    covariance = first.covariance_of(shared) + second.covariance_of(shared)
     joint = before.covariance is not None and after.covariance is not None
     groups = _groups(shared) if joint else []
     chance = CHANCE / 2.0 if groups else CHANCE
@@ -224,7 +228,7 @@ def compare(before: Parameters, after: Parameters) -> Comparison:
     load = None
     if joint and moved:
         load = find_load(
-            [before.terms.get(shared[k], {}) for k in rigid],
+            [first.terms.get(shared[k], {}) for k in rigid],
             difference[rigid],
             covariance[np.ix_(rigid, rigid)],
         )
@@ -232,8 +236,8 @@ def compare(before: Parameters, after: Parameters) -> Comparison:
         before,
         after,
         changes,
-        tuple(name for name in before.values if name not in after.values),
-        tuple(name for name in after.values if name not in before.values),
+        tuple(name for name in before.values if name not in second.values),
+        tuple(name for name in after.values if name not in first.values),
         found,
         load,
     )

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import json
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,8 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import yaml
 
+#: A grouping is a combination of others if this share of it is left at most.
+_SAME_GROUPING = 1e-6
 _SCHEMAS = ('armid/identification/1', 'armid/model/1')
 
 
@@ -60,6 +62,33 @@ class Parameters:
         if self.covariance is None:
             return np.asarray(np.diag(self.std[chosen] ** 2))
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
+
+    def told_as(self, other: Parameters) -> Parameters:
+        """
+        Return the values with those of another grouping that follow from them.
+
+        A motion that shows less groups more: its parameters are combinations of those of a richer
+        one.
+
+        """
+        names = [name for name in other.terms if name not in self.values]
+        if self.covariance is None or not names or len(self.terms) < len(self.values):
+            return self
+        own = [self.terms[name] for name in self.values]
+        theirs = [other.terms[name] for name in names]
+        keys = list(dict.fromkeys(key for row in (*own, *theirs) for key in row))
+        mine, wanted = _matrix(own, keys), _matrix(theirs, keys)
+        factors = np.linalg.lstsq(mine.T, wanted.T, rcond=None)[0].T
+        left = np.linalg.norm(factors @ mine - wanted, axis=1)
+        follows = left < _SAME_GROUPING * np.linalg.norm(wanted, axis=1)
+        factors = np.concatenate([np.eye(len(own)), factors[follows]])
+        covariance = factors @ self.covariance @ factors.T
+        values = factors[len(own) :] @ [value for value, _ in self.values.values()]
+        std = np.sqrt(np.diag(covariance))[len(own) :]
+        told = [name for name, sure in zip(names, follows, strict=True) if sure]
+        more = {n: (float(v), float(s)) for n, v, s in zip(told, values, std, strict=True)}
+        terms = {**self.terms, **{name: other.terms[name] for name in told}}
+        return replace(self, values={**self.values, **more}, covariance=covariance, terms=terms)
 
 
 def read_parameters(path: str | Path) -> Parameters:
@@ -129,6 +158,10 @@ def parameters_of(source: str, document: dict[str, Any]) -> Parameters:
     scores = [*document.get('validation', []), document.get('training')]
     error = scores[0]['relative_error_percent'] if scores[0] else None
     return Parameters(source, str(document['robot']), values, error, covariance, terms)
+
+
+def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatArray:
+    return np.array([[row.get(key, 0.0) for key in keys] for row in rows])
 
 
 def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:

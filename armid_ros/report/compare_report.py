@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.comparison import Change, Comparison, GroupChange
-from armid_ros.identification.identifiability import HALF_WIDTH
+from armid_ros.identification.identifiability import HALF_WIDTH, told_from_zero
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, measured, pretty
 from armid_ros.report.page import Page
@@ -91,18 +91,20 @@ def _load(comparison: Comparison) -> str:
     load = comparison.load
     assert load is not None
     joints = {_number(c.parameter): c.parameter.joint for c in comparison.changes}
+    named = [
+        f'the link of {joints[number]}' if number in joints else f'link {number}'
+        for number in (load.link, *load.rivals)
+    ]
     verb = 'was added to' if load.mass > 0.0 else 'was taken off'
     where = ''
     if load.center is not None:
-        where = f', its centre at ({", ".join(f"{x:.3f}" for x in load.center)}) m of its joint'
+        where = f', its centre at ({", ".join(f"{x:z.3f}" for x in load.center)}) m of its joint'
     rivals = ''
     if load.rivals:
-        others = ', '.join(joints[link] for link in load.rivals)
-        rivals = f'; on the link of {others} it would do so as well'
+        rivals = f'; on {" or ".join(named[1:])} it would do so as well'
     return (
         f'A load of {" ± ".join(measured(abs(load.mass), HALF_WIDTH * load.mass_std))} kg {verb} '
-        f'the link of {joints[load.link]}{where}: that explains every change of the inertial '
-        f'parameters{rivals}.'
+        f'{named[0]}{where}: that explains every change of the inertial parameters{rivals}.'
     )
 
 
@@ -140,7 +142,7 @@ def _sentence(change: Change) -> str:
 def _least_visible(changes: Sequence[Change]) -> str:
     """Say how large a change would have had to be, of the kinds that wear changes."""
     worn = [c for c in changes if not c.parameter.rigid] or list(changes)
-    known = [c for c in worn if abs(c.before) > 0.0]
+    known = [c for c in worn if told_from_zero(c.before, c.before_std)]
     if not known:
         return 'Nothing is known of how large a change would have been seen.'
     shares = sorted(3.5 * c.std / abs(c.before) for c in known)

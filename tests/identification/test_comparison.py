@@ -102,6 +102,33 @@ def test_a_load_is_found_on_its_link_with_its_mass_and_centre():
     np.testing.assert_allclose(found.center, [0.0, 0.1, 0.2], atol=0.02)
 
 
+def test_a_motion_that_shows_less_is_compared_with_one_that_shows_more():
+    """One that shows a sum only, against one that shows both; and the other way round."""
+    both = [ParameterName(name, 'elbow', 'kg m') for name in ('mx1', 'my1')]
+    together = ParameterName('mx1 + 2 my1', 'elbow', 'kg m')
+    rich = Parameters(
+        'a',
+        'arm',
+        {both[0]: (1.0, 0.1), both[1]: (2.0, 0.1)},
+        5.0,
+        0.01 * np.eye(2),
+        {name: {name.name: 1.0} for name in both},
+    )
+    poor = Parameters(
+        'b',
+        'arm',
+        {together: (7.0, 0.3)},
+        5.0,
+        np.array([[0.09]]),
+        {together: {'mx1': 1, 'my1': 2}},
+    )
+    for pair, sign in (((rich, poor), 1.0), ((poor, rich), -1.0)):
+        (change,) = compare(*pair).changes
+        assert change.parameter == together
+        assert change.difference == pytest.approx(sign * 2.0)
+        assert change.std == pytest.approx(np.sqrt(0.09 + 0.05))
+
+
 def test_a_change_of_two_links_is_no_load():
     rng = np.random.default_rng(0)
     terms = {name: {name.name: 1.0} for name in LINKS}
