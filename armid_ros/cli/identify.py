@@ -13,6 +13,7 @@ from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.cli import options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
+from armid_ros.errors import IdentificationError
 from armid_ros.identification import (
     Identification,
     identification_document,
@@ -106,7 +107,7 @@ def identify(
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
     if not physical and (total_mass is not None or boxes):
-        raise click.UsageError('--total-mass and --box go with --physical')
+        raise IdentificationError('--total-mass and --box go with --physical')
     known = PhysicalSettings(
         total_mass=total_mass, boxes=dict(options.box(text, robot) for text in boxes)
     )

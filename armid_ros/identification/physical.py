@@ -69,7 +69,7 @@ class PhysicalSettings:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
-        if self.total_mass is not None and not self.total_mass > 0.0:
+        if self.total_mass is not None and not 0.0 < self.total_mass < np.inf:
             raise IdentificationError(f'total mass {self.total_mass} kg: it has to be positive')
         for joint, (lower, upper) in self.boxes.items():
             if len(lower) != 3 or len(upper) != 3 or not np.all(np.less(lower, upper)):

@@ -16,6 +16,9 @@ import numpy as np
 #: A pseudo-inertia that has shrunk to this share of the description's in some direction is at the
 #: limit of what a body can be; a distance of this share of a box is none.
 ACTIVE_SHARE = 1e-3
+#: Bodies that predict held-out torques worse than this, relative to an unconstrained fit, are not
+#: those of the arm.
+DEAR = 1.03
 
 
 @dataclass(frozen=True)
@@ -78,8 +81,14 @@ class PhysicalCertificate:
 
     @property
     def activity(self) -> tuple[str, ...]:
-        """Say which constraints hold the fit; empty if none does."""
+        """Say which constraints hold the fit, and when they do it harm; empty if none does."""
         said = []
+        if self.held_out_ratio > DEAR:
+            said.append(
+                f'constraints cost {100.0 * (self.held_out_ratio - 1.0):.1f} % of torque error on '
+                'blocks left out: a mass or box that was given is not that of the arm, or the '
+                'model lacks an effect'
+            )
         if self.active:
             said.append(
                 f'at the limit of what a body can be: {", ".join(self.active)}; '

@@ -251,6 +251,8 @@ def test_options_of_a_design_do_not_go_with_steps(tmp_path):
         ((*PHYSICAL, '--box', 'elbow_pitch=0:1'), 'JOINT=X,Y,Z:X,Y,Z'),
         ((*PHYSICAL, '--box', 'elbow_pitch=1,1,1:0,0,0'), 'has to be below'),
         ((*PHYSICAL, '--total-mass', -1), 'total mass -1'),
+        ((*PHYSICAL, '--total-mass', 'inf'), 'total mass inf'),
+        ((*PHYSICAL[:-1], '--total-mass', 1), 'go with --physical'),
         (('simulate', '--robot', ROBOT, '--gravity', 'mars', '--out', 'o'), 'mars'),
         (('simulate', '--robot', ROBOT, '--effect', 'payload:m=1', '--out', 'o'), 'payload_m'),
         (('simulate', '--robot', ROBOT, '--model', 'none.yaml', '--out', 'o'), 'none.yaml'),

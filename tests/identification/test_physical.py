@@ -101,6 +101,15 @@ def test_total_mass_is_kept_and_improves_what_torques_do_not_say(arm, drawing, r
     assert np.linalg.norm(found - true) < np.linalg.norm(plain - true)
 
 
+def test_a_mass_that_is_not_the_arms_is_said_to_cost(drawing, recording, bodies):
+    """A tenth of what it weighs."""
+    assert not any('constraints cost' in line for line in bodies.physical.activity)
+    total = 0.1 * float(drawing.robot.rigid_parameters[::10].sum())
+    certificate = run(drawing, recording, PhysicalSettings(total_mass=total)).physical
+    assert certificate.held_out_ratio > 1.03
+    assert 'not that of the arm' in certificate.activity[0]
+
+
 def test_links_stay_in_their_boxes(drawing, recording):
     lower, upper = np.array([-0.05, -0.05, -0.02]), np.array([0.05, 0.05, 0.12])
     settings = PhysicalSettings(boxes={'wrist_pitch': (lower, upper)})
