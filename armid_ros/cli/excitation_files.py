@@ -47,8 +47,10 @@ class Plan:
         Bodies of the robot.
     obstacles : sequence of Obstacle
         What stands around it.
+    after : sequence of Path
+        Bags that it adds to.
     files : sequence of Path
-        What was read beside the robot.
+        What else was read beside the robot.
     seed : int
         Of the search.
 
@@ -58,6 +60,7 @@ class Plan:
     robot: str
     collision: CollisionModel
     obstacles: Sequence[Obstacle]
+    after: Sequence[Path]
     files: Sequence[Path]
     seed: int
 
@@ -84,8 +87,9 @@ def write_plan(folder: Path, plan: Plan, result: Design) -> dict[str, Any]:
         robot=plan.robot,
         collision=plan.collision,
         obstacles=plan.obstacles,
+        after=[str(bag) for bag in plan.after],
         provenance=Provenance(
-            files=hash_files([plan.robot, *plan.files]),
+            files=hash_files([plan.robot, *plan.after, *plan.files]),
             versions=versions(),
             seed=plan.seed,
         ),

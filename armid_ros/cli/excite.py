@@ -216,7 +216,8 @@ def excite(
         robot_source,
         collision_model(robot),
         load_environment(environment) if environment else (),
-        (*after, *filter(None, (model, environment))),
+        after,
+        tuple(filter(None, (model, environment))),
         seed,
     )
     folders = {speed: out if len(speeds) == 1 else out / f'{speed}' for speed in speeds}

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state_encoder import Measured
 from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for, STRING
 from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.source import Topic
@@ -22,52 +23,12 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
 
-class Waypoints(Protocol):
-    """
-    What a JointTrajectory can say: a `Motion`, or less than that.
-
-    Attributes
-    ----------
-    joints : tuple of str
-        n joint names.
-    t : ndarray, shape (K,)
-        Time from the start [s].
-    q : ndarray, shape (K, n)
-        Positions.
-    dq, ddq, tau : ndarray, shape (K, n), or None
-        Velocities, accelerations and efforts.
-
-    """
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Joint names."""
-        ...
-
-    @property
-    def t(self) -> FloatArray:
-        """Times [s]."""
-        ...
-
-    @property
-    def q(self) -> FloatArray:
-        """Positions."""
-        ...
-
-    @property
-    def dq(self) -> FloatArray | None:
-        """Velocities."""
-        ...
+class Waypoints(Measured, Protocol):
+    """What a JointTrajectory can say: a `Motion`, or less than that; torques are its efforts."""
 
     @property
     def ddq(self) -> FloatArray | None:
-        """Accelerations."""
-        ...
-
-    @property
-    def tau(self) -> FloatArray | None:
-        """Efforts."""
-        ...
+        """Accelerations, shape (N, n)."""
 
 
 @dataclass(frozen=True)

@@ -49,6 +49,7 @@ def excitation_report(
     robot: str,
     collision: CollisionModel,
     obstacles: Sequence[Obstacle] = (),
+    after: Sequence[str] = (),
     provenance: Provenance | None = None,
 ) -> str:
     """
@@ -66,6 +67,8 @@ def excitation_report(
         Bodies of the arm.
     obstacles : sequence of Obstacle
         What stands around it.
+    after : sequence of str
+        Recordings that the design adds to.
     provenance : Provenance, optional
         Files, versions, settings, seed.
 
@@ -91,7 +94,7 @@ def excitation_report(
     instants = run.run_in + np.arange(_POSES) * run.trajectory.period / _POSES
     sections: list[Section] = [
         _verdict(design, motion, ClearanceModel.of(whole), collision.notes),
-        Asked(_asked(design, arm, robot, obstacles)),
+        Asked(_asked(design, arm, robot, obstacles, after)),
         ArmPoses(
             draw_silhouettes(
                 whole,
@@ -182,7 +185,11 @@ def _kept(design: Design, motion: Motion, clearance: ClearanceModel) -> str:
 
 
 def _asked(
-    design: Design, arm: ArmModel, robot: str, obstacles: Sequence[Obstacle]
+    design: Design,
+    arm: ArmModel,
+    robot: str,
+    obstacles: Sequence[Obstacle],
+    after: Sequence[str],
 ) -> list[tuple[str, str]]:
     settings, run = design.settings, design.excitation
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
