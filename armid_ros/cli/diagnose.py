@@ -9,12 +9,12 @@ from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_model, save_model
 from armid_ros.cli import options
+from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings, next_run
 from armid_ros.excitation import save_excitation
 from armid_ros.identification import SignalSettings
-from armid_ros.report import hash_files, Provenance, versions
 from armid_ros.report.diagnosis_report import diagnosis_report
 import click
 import numpy as np
@@ -89,9 +89,7 @@ def diagnose(
         recordings=recordings,
         validation=held_out,
         patch=(out / 'model.yaml').read_text(encoding='utf-8'),
-        provenance=Provenance(
-            files=hash_files([*bags, *validate]), versions=versions(), settings={}, seed=seed
-        ),
+        provenance=provenance([*bags, *validate], seed=seed),
     )
     run_next = next_run(result, np.random.default_rng(seed))
     if run_next is not None:

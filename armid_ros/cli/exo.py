@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.cli import options
+from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say, Tick
 from armid_ros.errors import ModelError
 from armid_ros.identification.interaction import identify_interaction, Interaction
@@ -16,7 +17,6 @@ from armid_ros.identification.interaction_recording import recorded_interaction_
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import BagWriter, read_recording, Recording, write_joint_states
 from armid_ros.report.exo_report import exo_report, GaitChecks
-from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots.assumptions import read_assumptions
 from armid_ros.simulation.gait import Gait, read_gait
 from armid_ros.simulation.leg_pair import (
@@ -110,11 +110,8 @@ def exo(
         truth=truth if simulated else None,
         gait=checks,
         assumptions=read_assumptions(),
-        provenance=Provenance(
-            files=hash_files([bag]),
-            versions=versions(),
-            settings={'inertias': inertias, 'topics': topics},
-            seed=seed if simulated else None,
+        provenance=provenance(
+            [bag], {'inertias': inertias, 'topics': topics}, seed if simulated else None
         ),
     )
     (out / 'report.html').write_text(page, encoding='utf-8')
