@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import re
+from statistics import NormalDist
 
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, read_only
@@ -75,6 +76,11 @@ class Estimate:
     def std(self) -> FloatArray:
         """Standard deviations, shape (P,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    def interval(self, confidence: float = 0.95) -> FloatArray:
+        """Return lower and upper ends of confidence intervals, shape (P, 2)."""
+        reach = NormalDist().inv_cdf(0.5 + confidence / 2.0) * self.std
+        return np.column_stack([self.values - reach, self.values + reach])
 
     def index(self, name: str, joint: str = '') -> int:
         """Return the position of a parameter; ModelError lists those that exist."""

@@ -23,7 +23,6 @@ from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.interaction_problem import InteractionProblem
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
-from scipy import stats
 
 _ITERATIONS = 100
 #: Solutions of linear equations that lead to where the iteration begins.
@@ -88,8 +87,7 @@ class Interaction:
 
     def interval(self, confidence: float = 0.95) -> FloatArray:
         """Return lower and upper ends of confidence intervals, shape (S, 2) [N/m]."""
-        reach = stats.norm.ppf(0.5 + confidence / 2.0) * self.std
-        return np.column_stack([self.stiffness - reach, self.stiffness + reach])
+        return self.estimate.interval(confidence)[: len(self.segments)]
 
 
 def identify_interaction(

@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.errors import IdentificationError, RecordingError
+from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.causal import (
     CausalFilter,
@@ -16,6 +16,8 @@ from armid_ros.identification.causal import (
     ROW_RATE_RATIO,
     TripleLag,
 )
+from armid_ros.identification.change import Change, change_candidates
+from armid_ros.identification.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.recursive import RecursiveLeastSquares
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
@@ -62,6 +64,8 @@ class OnlineSettings:
         Missing samples that are interpolated across; a longer gap restarts the filters.
     measured_velocity : bool
         Differentiate the measured velocity instead of the position.
+    changes : ChangeSettings or None
+        How readily a change of the arm is believed; None does not look for any.
 
     """
 
@@ -75,6 +79,7 @@ class OnlineSettings:
     period: float | None = None
     max_gap: int = 10
     measured_velocity: bool = False
+    changes: ChangeSettings | None = field(default_factory=ChangeSettings)
 
 
 @dataclass(frozen=True)
@@ -167,6 +172,10 @@ class OnlineIdentifier:
             start=self.base.values(arm.theta),
             scale_covariance=settings.torque_noise is None,
         )
+        self._watch = None
+        if settings.changes is not None:
+            candidates = change_candidates(arm, self.base)
+            self._watch = ChangeWatch(self._estimator, candidates, settings.changes)
         self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
         self._held = np.array([joint in held for joint in robot.joints])
@@ -180,6 +189,8 @@ class OnlineIdentifier:
         """Forget everything that was learned, and set the counters to zero."""
         self._filter.reset()
         self._estimator.reset()
+        if self._watch is not None:
+            self._watch.reset()
 
     def update(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
@@ -216,12 +227,21 @@ class OnlineIdentifier:
         return self._learn(motion, step, used)
 
     def estimate(self) -> Estimate:
-        """Return values and covariance of the base parameters."""
-        return self._estimator.estimate
+        """Return values and covariance of the base parameters, errors that last included."""
+        estimate = self._estimator.estimate
+        if self._watch is None:
+            return estimate
+        factor = self._watch.widening
+        return replace(estimate, covariance=estimate.covariance * np.outer(factor, factor))
 
     def model(self) -> ArmModel:
         """Return the arm with the estimate, otherwise as near as possible to what it was."""
         return self.arm.with_theta(self.base.lift(self._estimator.values, self.arm.theta))
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What has changed about the arm since the last reset, oldest first."""
+        return () if self._watch is None else tuple(self._watch.changes)
 
     @property
     def condition_number(self) -> float:
@@ -252,6 +272,8 @@ class OnlineIdentifier:
     def _begin(self) -> None:
         """Start the row filter anew, together with the motion filter."""
         self._row_filter.reset()
+        if self._watch is not None:
+            self._watch.interrupt()
         self._generation = self._filter.generation
         self._last_row = None
         self._last_moving[:] = -np.inf
@@ -276,9 +298,12 @@ class OnlineIdentifier:
         filtered = self._row_filter.update(step, stacked)[2].reshape(n, rank + 1)
         rows, measured = filtered[:, :rank], filtered[:, rank]
         gain, independent = self._noise_of_row(step)
-        scale = 1.0 / gain
-        innovation = self._estimator.update(rows * scale, measured * scale, used * independent)
         stamp = motion.t - (self.delay or 0.0)
+        sample = rows / gain, measured / gain, np.asarray(used * independent)
+        if self._watch is None:
+            innovation = self._estimator.update(*sample)
+        else:
+            innovation = self._watch.update(stamp, *sample)
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
 
     def _rows(self, motion: CausalMotion) -> FloatArray:
@@ -306,52 +331,6 @@ class OnlineIdentifier:
             self._bandwidth = _bandwidth(pole, self._row_filter.pole, 0.5 / period)
         independent = min(1.0, self._bandwidth * min(step, self._row_period))
         return float(np.sqrt(period * self._bandwidth)), independent
-
-
-@dataclass(frozen=True)
-class JointOrder:
-    """
-    Where the joints of a robot are in a message that names its joints in an order of its own.
-
-    Attributes
-    ----------
-    joints : tuple of str
-        The joints that are wanted, in the order that is wanted.
-
-    """
-
-    joints: tuple[str, ...]
-
-    def map(self, names: Sequence[str]) -> npt.NDArray[np.intp]:
-        """
-        Return the positions of the wanted joints among the names; others are left out.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Joint names of the message, such as JointState.name.
-
-        Returns
-        -------
-        ndarray of int, shape (n,)
-            ``position[indices]`` is in the order that is wanted.
-
-        Raises
-        ------
-        RecordingError
-            If joints are missing or named twice; the message lists them.
-
-        """
-        missing = [joint for joint in self.joints if joint not in names]
-        if missing:
-            raise RecordingError(
-                f'joint states without {", ".join(missing)}; they name '
-                f'{", ".join(names) or "no joints"}'
-            )
-        twice = [joint for joint in self.joints if list(names).count(joint) > 1]
-        if twice:
-            raise RecordingError(f'joint states name {", ".join(twice)} twice')
-        return np.array([list(names).index(joint) for joint in self.joints], dtype=np.intp)
 
 
 def _row_rate(settings: OnlineSettings) -> float:

@@ -16,9 +16,11 @@ that what a strong burst of motion taught is forgotten late by the weak motion a
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, read_only
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
@@ -36,6 +38,31 @@ _LOSS_RATIO = 2.0
 #: The most that one sample may take away from the old information in any direction.
 _LARGEST_LOSS = 0.5
 _BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """
+    What an estimator knew at some time, to return to.
+
+    Attributes
+    ----------
+    root : ndarray, shape (P, P)
+        Upper triangle R; the information is R^T R.
+    values : ndarray, shape (P,)
+        Estimated parameters.
+    squares, freedom : float
+        Weighted squares of the residuals, and observations beyond the parameters.
+    samples : int
+        Samples used.
+
+    """
+
+    root: FloatArray
+    values: FloatArray
+    squares: float
+    freedom: float
+    samples: int
 
 
 class RecursiveLeastSquares:
@@ -142,7 +169,7 @@ class RecursiveLeastSquares:
         used = float(counts.sum())
         if used == 0.0:
             return innovation
-        scale = np.sqrt(counts) if self._noise is None else np.sqrt(counts) / self._noise
+        scale = self.scale(counts)
         rows = rows * scale[:, np.newaxis]
         if self._forgetting < 1.0:
             self._replace(rows, innovation * scale)
@@ -154,6 +181,45 @@ class RecursiveLeastSquares:
         self.samples += 1
         return innovation
 
+    def scale(self, weights: FloatArray) -> FloatArray:
+        """Return what gives rows of these weights noise of variance 1, shape (m,) [1/(N m)]."""
+        root = np.sqrt(weights)
+        return root if self._noise is None else root / self._noise
+
+    def learned(self) -> Learned:
+        """Return what is known now."""
+        return Learned(
+            read_only(self._root), self._values, self._squares, self._freedom, self.samples
+        )
+
+    def restore(self, learned: Learned) -> None:
+        """Return to what was known."""
+        self._take(np.array(learned.root, order='F'), learned.values)
+        self._squares, self._freedom = learned.squares, learned.freedom
+        self.samples = learned.samples
+
+    def reopen(self, directions: FloatArray) -> None:
+        """
+        Forget the values along some directions, and nothing else.
+
+        The parameters become theta + directions delta, where nothing is known of delta: beside
+        R theta = z stands delta = 0 within PRIOR_STD, and delta is eliminated by reflections.
+
+        Parameters
+        ----------
+        directions : ndarray, shape (P, k)
+            Independent combinations of parameters that may have changed.
+
+        """
+        size, count = directions.shape
+        unit = directions / np.linalg.norm(directions, axis=0)
+        stacked = np.zeros((size + count, count + size))
+        stacked[:size, :count], stacked[:size, count:] = -self._root @ unit, self._root
+        stacked[size:, :count] = np.eye(count) / PRIOR_STD
+        root = np.asarray(np.linalg.qr(stacked, mode='r'))[count:, count:]
+        self._take(np.asfortranarray(root), self._values)
+        self._freedom -= count
+
     @property
     def values(self) -> FloatArray:
         """Estimated parameters, shape (P,)."""
@@ -163,8 +229,12 @@ class RecursiveLeastSquares:
     def covariance(self) -> FloatArray:
         """Covariance of the values, shape (P, P)."""
         inverse, _ = lapack.dtrtri(self._root)
-        factor = self.variance_factor if self._scale else 1.0
-        return np.asarray(inverse @ inverse.T * factor)
+        return np.asarray(inverse @ inverse.T * self.covariance_factor)
+
+    @property
+    def covariance_factor(self) -> float:
+        """What the covariance is multiplied by: the variance factor, or 1 for known noise."""
+        return self.variance_factor if self._scale else 1.0
 
     @property
     def variance_factor(self) -> float:
@@ -227,6 +297,10 @@ class RecursiveLeastSquares:
         self._values = self._values + step[:, 0]
         self._squares *= self._forgetting
         self._freedom *= self._forgetting
+
+    def _take(self, root: FloatArray, values: FloatArray) -> None:
+        self._root, self._values = root, values
+        self._right = np.asfortranarray((root @ values)[:, np.newaxis])
 
     def _solve(self) -> FloatArray:
         return np.asarray(lapack.dtrtrs(self._root, self._right)[0][:, 0])

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 from armid_ros.errors import ArmidError
@@ -73,6 +73,10 @@ class ArmidNode(Node):
 
         """
 
+    def further_statuses(self) -> Sequence[DiagnosticStatus]:
+        """Return what else to say on /diagnostics."""
+        return ()
+
     def close(self) -> None:
         """Finish what must not be lost."""
 
@@ -128,7 +132,7 @@ class ArmidNode(Node):
         rejected = {f'rejected {kind}': n for kind, n in self.complaints.counts.items()}
         for key, value in {**values, **rejected}.items():
             status.values.append(KeyValue(key=key, value=_text(value)))
-        message = DiagnosticArray(status=[status])
+        message = DiagnosticArray(status=[status, *self.further_statuses()])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
         self.complaints.settle()

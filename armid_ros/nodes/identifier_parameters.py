@@ -9,6 +9,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
+from armid_ros.identification.change_watch import ChangeSettings
 from armid_ros.identification.online import OnlineIdentifier, OnlineSettings
 from armid_ros.nodes.parameters import NodeParameter
 from armid_ros.robots import load_robot, parse_gravity, robot_from_urdf
@@ -56,6 +57,14 @@ IDENTIFIER_PARAMETERS = (
     NodeParameter(
         'measured_velocity', False, 'Differentiate the measured velocity, not the position.'
     ),
+    NodeParameter(
+        'false_alarm_time',
+        360000.0,
+        'Mean time between false reports of a change; 0: changes are not looked for.',
+        's',
+        lower=0.0,
+        upper=1e9,
+    ),
 )
 
 
@@ -95,5 +104,6 @@ def make_identifier(value: Values, description: str | None = None) -> OnlineIden
         torque_noise=noise if any(noise) else None,
         max_gap=value('max_gap'),
         measured_velocity=value('measured_velocity'),
+        changes=ChangeSettings(value('false_alarm_time')) if value('false_alarm_time') else None,
     )
     return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))

@@ -12,15 +12,19 @@ from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.identification.change import Change
+from armid_ros.identification.learning_progress import LearningProgress, too_little_motion
 from armid_ros.identification.online import OnlineIdentifier, OnlineSample
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.estimates import estimate_message, save_identification
 from armid_ros.nodes.identifier_parameters import IDENTIFIER_PARAMETERS, make_identifier
 from armid_ros.nodes.joint_states import JointStateReader
+from armid_ros.nodes.learning_status import change_status, parameter_status
 from armid_ros.nodes.parameters import NodeParameter
 from armid_ros.nodes.process import run
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, STREAM
+from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.publisher import Publisher
@@ -78,6 +82,7 @@ class OnlineIdentifierNode(ArmidNode):
         else:
             self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
+        self._changes = self.create_publisher(ParameterEstimate, '~/change', LATCHED)
         self._predictions = self.create_publisher(JointState, '~/predicted_joint_states', STREAM)
         self._residuals = self.create_publisher(JointState, '~/residual', STREAM)
         self.joint_states = MatchedSubscription(
@@ -97,7 +102,9 @@ class OnlineIdentifierNode(ArmidNode):
     def reset(self) -> str:
         """Forget everything that was learned."""
         self._require().reset()
+        self._progress.reset()
         self._published = -1
+        self._told = 0
         self._begin_statistics()
         return 'the estimate begins anew'
 
@@ -142,7 +149,29 @@ class OnlineIdentifierNode(ArmidNode):
             self.complaints.say('time', f'joint states jump in time: {dict(identifier.restarts)}')
         self._restarts = restarts
         self._begin_statistics()
-        return ('' if self.received else 'no joint states so far'), values
+        return self._trouble(identifier), values
+
+    def further_statuses(self) -> Sequence[DiagnosticStatus]:
+        """Say what was learned, with intervals, and what has changed."""
+        identifier, prefix = self.identifier, self.get_fully_qualified_name()[1:]
+        if identifier is None:
+            return ()
+        statuses = (
+            parameter_status(
+                f'{prefix}: parameters', identifier.estimate() if identifier.samples else None
+            ),
+            change_status(f'{prefix}: changes', identifier.changes, self._last_sample),
+        )
+        for status in statuses:
+            status.hardware_id = self.hardware
+        return statuses
+
+    def _trouble(self, identifier: OnlineIdentifier) -> str:
+        if not self.received:
+            return 'no joint states so far'
+        if not identifier.samples:
+            return ''
+        return too_little_motion(self._progress.look(self._last_sample, identifier.estimate()))
 
     def _on_description(self, message: String) -> None:
         if message.data == self._description:
@@ -169,8 +198,21 @@ class OnlineIdentifierNode(ArmidNode):
         self.update_times.append(time.perf_counter() - begun)
         if learned is not None:
             self._publish_sample(learned)
+        for change in self.identifier.changes[self._told :]:
+            self._tell(change)
+
+    def _tell(self, change: Change) -> None:
+        """Publish a change."""
+        self._told += 1
+        self.get_logger().warning(str(change))
+        message = estimate_message(
+            change.size, self._require().samples, self._require().condition_number
+        )
+        message.header.stamp = self._reader.stamp(change.t).to_msg()
+        self._changes.publish(message)
 
     def _publish_sample(self, sample: OnlineSample) -> None:
+        self._last_sample = sample.t
         self._squares += sample.residual**2
         self._counted += 1
         self._last_sample_stamp = self._reader.stamp(sample.t).to_msg()
@@ -189,6 +231,11 @@ class OnlineIdentifierNode(ArmidNode):
         self._names = list(robot.joints)
         self._reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
         self._last_sample_stamp = self._reader.stamp(0.0).to_msg()
+        self._last_sample = 0.0
+        self._told = len(identifier.changes)
+        self._progress = LearningProgress(
+            identifier.arm, identifier.base, np.random.default_rng(0)
+        )
         self._begin_statistics()
         self.get_logger().info(
             f'{robot.name}: {len(identifier.base.parameters)} base parameters of '

@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.closed_loop import command, run, Targets, Trace
 from armid_ros.simulation.controller import ComputedTorque, Controller
@@ -120,6 +121,33 @@ class SimulatedArm:
         self._set_off()
         delay = self.sensors.torque_delay
         self._past = RecentPast.of(self.plant, self._state, self._torque, delay)
+
+    def become(self, arm: ArmModel) -> None:
+        """
+        Go on as another arm from where this one is: it picks up a load, its friction rises.
+
+        The controller stays what it was, and so knows nothing of it.
+
+        Parameters
+        ----------
+        arm : ArmModel
+            The same robot with other effects or other values of them.
+
+        Raises
+        ------
+        ModelError
+            If it is another robot.
+
+        """
+        if arm.robot.joints != self.joints:
+            raise ModelError(
+                f'{arm.robot.name}: an arm with the joints {", ".join(self.joints)} cannot become '
+                f'one with {", ".join(arm.robot.joints)}'
+            )
+        now = self._state
+        self.plant = replace(self.plant, arm=arm)
+        self._state = self.plant.state(now.q, now.dq, now.ddq, now.steps)
+        self._past = RecentPast.of(self.plant, self._state, self._torque, self.sensors.torque_delay)
 
     def set_trajectory(self, reference: Reference) -> None:
         """

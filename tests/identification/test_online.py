@@ -8,7 +8,8 @@ from armid_ros.errors import IdentificationError, RecordingError
 from armid_ros.identification import identify, Score
 from armid_ros.identification.causal import MOTION_FILTER_RATIO
 from armid_ros.identification.identify import Fit
-from armid_ros.identification.online import JointOrder, OnlineIdentifier, OnlineSettings
+from armid_ros.identification.joint_order import JointOrder
+from armid_ros.identification.online import OnlineIdentifier, OnlineSettings
 from armid_ros.identification.regression import regressions
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording
@@ -207,7 +208,7 @@ def test_forgetting_follows_friction_that_rises(arm, motion):
     tau = arm.torque(motion) + 0.08 * (rise - 1.0)[:, None] * motion.dq
     errors = {}
     for forgetting in (1.0, 1.0 - 1.0 / (4.0 * 200.0)):
-        online = identifier(arm, replace(SETTINGS, forgetting=forgetting))
+        online = identifier(arm, replace(SETTINGS, forgetting=forgetting, changes=None))
         feed(online, motion.t, motion.q, tau)
         estimate = online.estimate()
         found = [estimate.values[estimate.index('viscous_coefficient', j)] for j in robot.joints]

@@ -274,3 +274,70 @@ def test_without_a_robot_the_services_say_so(bench):
     for service in ('reset', 'save'):
         answer = bench.call(f'online_identifier/{service}')
         assert not answer.success and 'robot_description' in answer.message
+
+
+def moving(arm, seconds, still=None, change=None, at=0.0):
+    """Return joint states of a motion with a little noise: a joint still, friction rising."""
+    rng = np.random.default_rng(0)
+    t = np.arange(0.0, seconds, 1.0 / RATE)[:, np.newaxis]
+    w, phase = np.array([3.1, 4.3]), np.array([0.0, 1.0])
+    q = np.sin(w * t + phase) + 0.4 * np.sin(0.37 * w * t)
+    dq = w * np.cos(w * t + phase) + 0.4 * 0.37 * w * np.cos(0.37 * w * t)
+    ddq = -(w**2) * np.sin(w * t + phase) - 0.4 * (0.37 * w) ** 2 * np.sin(0.37 * w * t)
+    if still is not None:
+        q[:, still], dq[:, still], ddq[:, still] = 0.3, 0.0, 0.0
+    motion = Motion(arm.robot.joints, t[:, 0], q, dq, ddq)
+    tau = arm.torque(motion)
+    if change is not None:
+        other = arm.with_effect(*parse_effect(change, arm.robot))
+        tau = np.where(t >= at, other.torque(motion), tau)
+    tau = tau + 0.05 * rng.normal(size=tau.shape)
+    return messages(arm, (t[:, 0], q, dq, tau))
+
+
+def statuses(bench, node):
+    diagnostics = bench.diagnostics()
+    bench.diagnose(node, diagnostics)
+    return {s.name.partition(': ')[2]: s for s in diagnostics[-1].status}
+
+
+def test_parameters_come_with_their_intervals(bench, arm):
+    node = identifying(bench)
+    publish(bench, node, bench.matched_publisher(JointState, 'joint_states'), moving(arm, 20.0))
+    found = statuses(bench, node)['parameters']
+    values = {v.key: float(v.value) for v in found.values}
+    for joint in ('shoulder', 'elbow'):
+        name = f'{joint} viscous_coefficient [N m s/rad]'
+        assert values[f'{name} lower'] < values[name] < values[f'{name} upper']
+        assert values[f'{name} lower'] - 0.02 < 0.3 < values[f'{name} upper'] + 0.02
+    assert found.hardware_id == 'pendulum'
+
+
+def test_too_little_motion_is_said_with_the_joint(bench, arm):
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    batch = moving(arm, 14.0, still=1)
+    for first in range(0, len(batch), round(RATE)):  # diagnostics once a second of the arm's time
+        publish(bench, node, publisher, batch[first : first + round(RATE)])
+        node.condition()
+    state = statuses(bench, node)['state']
+    assert state.level == state.WARN
+    assert 'too little motion to learn from: elbow' in state.message
+
+
+def test_a_change_is_published_and_said(bench, arm):
+    sizes = bench.listen(ParameterEstimate, 'online_identifier/change', LATCHED)
+    node = identifying(bench)
+    assert statuses(bench, node)['changes'].message == 'no change seen'
+    change = 'viscous_friction@elbow:viscous_coefficient=0.2'
+    batch = moving(arm, 34.0, change=change, at=30.0)
+    publish(bench, node, bench.matched_publisher(JointState, 'joint_states'), batch)
+    bench.spin_until(lambda: sizes, 'the change')
+    (found,) = sizes
+    assert (found.name, found.joint) == (['viscous_coefficient'], ['elbow'])
+    assert abs(found.value[0] - 0.2) < 4.0 * found.std_dev[0] < 0.2
+    assert abs(found.header.stamp.sec - 1030) <= 1
+    status = statuses(bench, node)['changes']
+    assert status.level == status.WARN
+    assert status.message.startswith('viscous friction at elbow has changed: ')
+    assert 's ago' in status.message

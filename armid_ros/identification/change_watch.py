@@ -1,0 +1,268 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Watch for changes while learning: a load picked up, friction risen.
+
+Rows are summed up in blocks of a quarter of a second. After each block windows of half a second to
+two seconds that end with it are tested (``change_evidence``). When a test is positive, all begins
+of the change are compared, and it is named as soon as nothing else explains the torques as well,
+or when time is up. The estimator then returns to what it knew before, forgets what may have
+changed, and only that, and learns from the rows since then again.
+
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate
+from armid_ros.identification.change import Candidate, Change
+from armid_ros.identification.change_evidence import Block, Evidence, evidence, UsualSize
+from armid_ros.identification.loudness import Loudness
+from armid_ros.identification.recursive import Learned, RecursiveLeastSquares
+from armid_ros.identification.score_variance import ScoreVariance
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Length of a block [s].
+BLOCK = 0.25
+#: Lengths of the windows that are tested, in blocks.
+_LENGTHS = (2, 4, 8)
+#: Blocks that are kept: the longest window, and one before it.
+_KEPT = 9
+#: Blocks since the change before which it is not named, and after which it is in any case.
+_EARLIEST = 4
+_LATEST = 6
+#: Logarithm of the likelihood ratio by which the best explanation is clear.
+_CLEAR = 5.0
+#: For so long after a change its size is still being learned [s]; what is less likely than this
+#: share of it corrects the size.
+_LEARNING = 10.0
+_CORRECTION = 0.1
+
+
+@dataclass(frozen=True)
+class ChangeSettings:
+    """
+    How readily a change is believed.
+
+    Attributes
+    ----------
+    false_alarm_time : float
+        Mean time between two alarms of an arm that does not change [s].
+
+    """
+
+    false_alarm_time: float = 100.0 * 3600.0
+
+    def __post_init__(self) -> None:
+        """Refuse times that are none."""
+        if not self.false_alarm_time > 0.0:
+            raise IdentificationError(
+                f'time between false alarms {self.false_alarm_time} s: has to be above 0'
+            )
+
+
+class ChangeWatch:
+    """
+    Lets an estimator learn, and tells when what it learns has changed.
+
+    Parameters
+    ----------
+    estimator : RecursiveLeastSquares
+        Learns.
+    candidates : sequence of Candidate
+        What may change.
+    settings : ChangeSettings, optional
+        How readily a change is believed.
+
+    Attributes
+    ----------
+    changes : list of Change
+        What has changed since the last reset.
+
+    """
+
+    def __init__(
+        self,
+        estimator: RecursiveLeastSquares,
+        candidates: Sequence[Candidate],
+        settings: ChangeSettings | None = None,
+    ) -> None:
+        settings = settings or ChangeSettings()
+        self._estimator = estimator
+        self._candidates = tuple(candidates)
+        sizes = [len(c.parameters) for c in self._candidates]
+        ends = np.cumsum(sizes)
+        self._slices = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
+        self._sizes = np.array(sizes, dtype=float)
+        self._directions = np.hstack([c.directions for c in self._candidates])
+        size = len(estimator.values)
+        self._nothing = np.zeros((size, size)), np.zeros(size)
+        tests = len(sizes) * len(_LENGTHS)
+        self._chance = BLOCK / settings.false_alarm_time / tests
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what noise usually does, and all changes."""
+        self.changes: list[Change] = []
+        self._loudness = Loudness()
+        self._scores = ScoreVariance(len(self._estimator.values))
+        self._usual = {m: UsualSize(self._sizes.astype(int).tolist(), m) for m in _LENGTHS}
+        self._fresh = -np.inf, 0.0
+        self.interrupt()
+
+    def interrupt(self) -> None:
+        """Begin a new stretch of rows, which does not continue the one before."""
+        self._blocks: deque[Block] = deque(maxlen=_KEPT)
+        self._waiting: deque[dict[int, FloatArray]] = deque()
+        self._samples: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+        self._before: Learned | None = None
+        self._begin = 0.0
+        self._ended = 0
+        self._sums = self._nothing
+        self._last_score: tuple[FloatArray, FloatArray] | None = None
+
+    @property
+    def widening(self) -> FloatArray:
+        """Factor by which errors that last widen every standard deviation, shape (P,)."""
+        return self._scores.widening(self._estimator.covariance_factor)
+
+    def update(
+        self, t: float, rows: FloatArray, tau: FloatArray, weights: FloatArray
+    ) -> FloatArray:
+        """
+        Let the estimator take in one sample; see ``RecursiveLeastSquares.update``.
+
+        Parameters
+        ----------
+        t : float
+            Time of the sample [s].
+        rows, tau, weights : ndarray, shapes (m, P), (m,), (m,)
+            As for the estimator.
+
+        """
+        if self._before is not None and t - self._begin >= BLOCK:
+            self._end_block(t)
+        if self._before is None:
+            self._before, self._begin = self._estimator.learned(), t
+        self._samples.append((rows, tau, weights))
+        return self._estimator.update(rows, tau, weights)
+
+    def _end_block(self, t: float) -> None:
+        assert self._before is not None
+        rows, tau, weights = (np.stack(part) for part in zip(*self._samples, strict=True))
+        scale = np.array([self._estimator.scale(w) for w in weights])
+        w, y = scale[..., np.newaxis] * rows, scale * tau
+        information, right = _normal(w, y)
+        self._sums = self._sums[0] + information, self._sums[1] + right
+        loudness = self._loudness.value
+        self._loudness.learn(y - w @ self._before.values, weights)
+        sums = _normal(w / loudness[:, np.newaxis], y / loudness)
+        block = Block(self._begin, t, *sums, self._before, tuple(self._samples))
+        self._blocks.append(block)
+        self._samples, self._before = [], None
+        ratios = {
+            m: self._ratios(self._window(len(self._blocks) - m))
+            for m in _LENGTHS
+            if m <= len(self._blocks)
+        }
+        if any(np.any(self._usual[m].excess(r, self._chance) > 1.0) for m, r in ratios.items()):
+            self._judge()
+        if self._blocks:
+            self._sum_scores()
+            self._waiting.append(ratios)
+            if len(self._waiting) > _LENGTHS[-1]:  # by now a change in it would have been named
+                for m, values in self._waiting.popleft().items():
+                    self._usual[m].learn(values)
+
+    def _sum_scores(self) -> None:
+        """Keep the score of every longest window, once the next one is without a change."""
+        self._ended += 1
+        if self._ended % _LENGTHS[-1] == 0:
+            if self._last_score is not None:
+                self._scores.add(*self._last_score)
+            information, right = self._sums
+            self._last_score = information, right - information @ self._estimator.values
+            self._sums = self._nothing
+
+    def _window(self, first: int, before: int | None = None) -> Evidence:
+        """Weigh the blocks from one on against what was known before it, or another one."""
+        blocks = list(self._blocks)
+        known = blocks[first if before is None else before].before
+        return evidence(blocks[first:], known, self._directions)
+
+    def _ratios(self, window: Evidence) -> FloatArray:
+        return np.array([window.ratio(some) for some in self._slices])
+
+    def _judge(self) -> None:
+        """Find when the change was and what it is; name it if that is clear or time is up."""
+        count = len(self._blocks)
+        starts = range(count - 1)
+        likelihood = np.array([self._likelihood(self._ratios(self._window(k))) for k in starts])
+        first = int(np.argmax(likelihood.max(axis=1)))
+        seen, at = count - first, likelihood[first]
+        best = int(np.argmax(at))
+        near = np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))
+        if at[best] > self._least_likelihood() and seen >= _EARLIEST:
+            alike = [self._candidates[k] for k in near]
+            named = self._most_common(self._candidates[best], alike)
+            rivals = [c for c in alike if not (c.includes(named) or named.includes(c))]
+            if not rivals or seen >= _LATEST:
+                self._name(first, named, rivals, float(at[best]))
+
+    def _least_likelihood(self) -> float:
+        """Return what counts as a change: soon after one, no mere correction of its size."""
+        t, likelihood = self._fresh
+        soon = self._blocks[-1].end - t < _LEARNING
+        return max(_CLEAR, _CORRECTION * likelihood) if soon else _CLEAR
+
+    @staticmethod
+    def _most_common(best: Candidate, alike: Sequence[Candidate]) -> Candidate:
+        """Return the load where it explains the torques as well: arms pick things up all day."""
+        return next((c for c in alike if c.name == 'payload'), best)
+
+    def _likelihood(self, ratios: FloatArray) -> FloatArray:
+        """Return logarithms of likelihoods, each free parameter being charged for."""
+        factors = np.concatenate([u.factors for u in self._usual.values()])
+        usual = float(np.nanmedian(factors))
+        observations = sum(len(block.samples) for block in self._blocks)
+        return np.asarray(ratios / (2.0 * usual) - 0.5 * self._sizes * np.log(observations))
+
+    def _name(
+        self, first: int, best: Candidate, rivals: list[Candidate], likelihood: float
+    ) -> None:
+        """Report a change in a block, and learn anew what it concerns."""
+        blocks = list(self._blocks)
+        before = max(first - 1, 0)
+        after = min(first + 1, len(blocks) - 1)
+        some = self._slices[self._candidates.index(best)]
+        values, covariance = self._window(after, before).size(some)
+        usual = np.nanmax([u.factors[self._candidates.index(best)] for u in self._usual.values()])
+        size = Estimate(best.parameters, values, covariance * usual)
+        change = Change(best, tuple(rivals), blocks[first].begin, blocks[-1].end, size)
+        self.changes.append(change)
+        self._fresh = change.detected, likelihood
+        self._estimator.restore(blocks[before].before)
+        self._estimator.reopen(_joined([best, *rivals]))
+        for block in blocks[after:]:
+            for sample in block.samples:
+                self._estimator.update(*sample)
+        self.interrupt()
+
+
+def _normal(rows: FloatArray, tau: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the normal equations of rows of shape (k, m, P)."""
+    w = rows.reshape(-1, rows.shape[2])
+    return w.T @ w, w.T @ tau.reshape(-1)
+
+
+def _joined(candidates: Sequence[Candidate]) -> FloatArray:
+    """Return independent directions that span those of all candidates."""
+    columns = np.hstack([c.reopened for c in candidates])
+    columns = columns / np.linalg.norm(columns, axis=0)
+    left, size, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(left[:, size > 1e-6 * size[0]])

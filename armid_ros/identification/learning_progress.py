@@ -1,0 +1,137 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a motion does not teach: parameters that stay unknown, and how to move to learn them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.model import BaseParameters, inverse_dynamics, random_motion
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: States of the work space over which torques are predicted.
+_STATES = 100
+#: A parameter is known when it leaves the torque less uncertain than this share of the usual.
+_KNOWN = 0.1
+#: Time over which something has to be learned [s], and by how much deviations have to fall.
+_WAIT = 10.0
+_LEARNED = 0.9
+#: Joints that are named at most.
+_NAMED = 3
+_WORDS = {'kg m^2': 'inertia', 'kg m': 'balance', 'kg': 'mass'}
+#: How to move to show it.
+_ADVICE = {
+    'inertia': 'accelerate it harder',
+    'balance': 'move it through more of its range',
+    'mass': 'move it through more of its range',
+}
+_OTHER_ADVICE = 'move it both ways at several speeds'
+
+
+@dataclass(frozen=True)
+class Unlearned:
+    """
+    What is not learned about a joint.
+
+    Attributes
+    ----------
+    joint : str
+        The joint; empty for the whole arm.
+    parameters : tuple of ParameterName
+        What is unknown, the least known first.
+    uncertainty : float
+        How uncertain the worst one leaves a torque, as a share of what that joint usually takes.
+
+    """
+
+    joint: str
+    parameters: tuple[ParameterName, ...]
+    uncertainty: float
+
+    def __str__(self) -> str:
+        """Say what is unknown and how to move, in words of a person beside the robot."""
+        words = list(dict.fromkeys(_word(p) for p in self.parameters))
+        advice = list(dict.fromkeys(_ADVICE.get(word, _OTHER_ADVICE) for word in words))
+        return f'{self.joint or "the arm"} ({", ".join(words)}): {" and ".join(advice)}'
+
+
+class LearningProgress:
+    """
+    Looks at estimates now and then, and says what the motion between them did not teach.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        What is identified.
+    base : BaseParameters
+        Its base parameters.
+    rng : numpy.random.Generator
+        Draws states of the work space.
+
+    """
+
+    def __init__(self, arm: ArmModel, base: BaseParameters, rng: np.random.Generator) -> None:
+        motion = random_motion(arm.robot, _STATES, rng)
+        columns = arm.columns(motion)[:, :, base.independent]
+        usual = np.sqrt(np.mean(inverse_dynamics(arm.robot, motion) ** 2, axis=0))
+        size = (
+            np.sqrt(np.mean(columns**2, axis=0)) / np.maximum(usual, 1e-3 * usual.max())[:, None]
+        )
+        self._share = size.max(axis=0)
+        self._past: deque[tuple[float, FloatArray]] = deque()
+
+    def reset(self) -> None:
+        """Forget all estimates."""
+        self._past.clear()
+
+    def look(self, t: float, estimate: Estimate) -> tuple[Unlearned, ...]:
+        """
+        Return what is unknown and was not learned for ten seconds, joint by joint.
+
+        Parameters
+        ----------
+        t : float
+            Time of the last sample in the estimate [s].
+        estimate : Estimate
+            Of the base parameters.
+
+        """
+        if self._past and t < self._past[-1][0]:
+            self._past.clear()
+        self._past.append((t, estimate.std))
+        while len(self._past) > 1 and self._past[1][0] <= t - _WAIT:
+            self._past.popleft()
+        if self._past[0][0] > t - _WAIT:
+            return ()
+        unknown = self._share * estimate.std
+        stuck = (unknown > _KNOWN) & (estimate.std > _LEARNED * self._past[0][1])
+        by_joint: dict[str, list[int]] = {}
+        for k in sorted(np.flatnonzero(stuck).tolist(), key=lambda k: -float(unknown[k])):
+            by_joint.setdefault(estimate.parameters[k].joint, []).append(k)
+        return tuple(
+            Unlearned(joint, tuple(estimate.parameters[k] for k in some), float(unknown[some[0]]))
+            for joint, some in by_joint.items()
+        )
+
+
+def too_little_motion(unlearned: Sequence[Unlearned]) -> str:
+    """Say in a line what the motion does not teach; empty when nothing is missing."""
+    if not unlearned:
+        return ''
+    rest = len(unlearned) - _NAMED
+    more = f'; and {rest} more joint{"s" if rest > 1 else ""}' if rest > 0 else ''
+    return f'too little motion to learn from: {"; ".join(map(str, unlearned[:_NAMED]))}{more}'
+
+
+def _word(parameter: ParameterName) -> str:
+    words = {
+        'viscous_coefficient': 'viscous friction',
+        'coulomb_torque': 'Coulomb friction',
+    }
+    rigid = _WORDS.get(parameter.unit) if parameter.name[:1] in 'Im' else None
+    return rigid or words.get(parameter.name, parameter.name.replace('_', ' '))

@@ -1,0 +1,199 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Changes of an arm at work: how soon they are seen, what is said of them, and false alarms.
+
+The simulated humanoid arm under a controller, samples at 1 kHz, encoders of 17 bits, torque noise
+that is white and as much that is not (0.05 s). Beside the friction that is identified it has
+Stribeck friction and torque that goes with the load, which are not: so what the model lacks is in
+the residuals. First it moves for a minute and changes then, in mid-motion; the controller is not
+told. Then it works for half an hour, another motion every minute, slow and fast, with rests, and
+nothing changes.
+
+    python -m benchmarks.changes [--minutes 30] [--draws 4]
+
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+import time
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import parse_effect
+from armid_ros.identification.change import Change
+from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.motion import FloatArray
+from armid_ros.robots import load_robot
+from armid_ros.simulation import Reference, Sensors, simulate, SimulatedArm
+from armid_ros.simulation.plant import middle_position
+import numpy as np
+from scipy import signal
+
+
+def _ball(mass: float) -> str:
+    """Return the quantities of a ball of 3 cm, 5 cm from the wrist."""
+    own = 0.4 * mass * 0.03**2
+    inertia = own + mass * 0.05**2
+    return (
+        f'payload_m={mass},payload_mz={-0.05 * mass},'
+        f'payload_Ixx={inertia},payload_Iyy={inertia},payload_Izz={own}'
+    )
+
+
+RATE = 1000.0
+IDENTIFIED = ('viscous_friction:viscous_coefficient=0.08', 'coulomb_friction:coulomb_torque=0.05')
+LACKING = (
+    'stribeck_friction:stribeck_torque=0.02',
+    'load_dependent_friction:load_coefficient=0.01',
+)
+NOISE = 0.02
+#: Time constant of the part of the noise that is not white [s].
+COLOUR = 0.05
+#: What changes, and how soon it has to be seen [s].
+CHANGES = (
+    *(f'payload:{_ball(mass)}' for mass in (0.1, 0.3, 1.0)),
+    'viscous_friction@elbow_pitch:viscous_coefficient=0.08',
+    'coulomb_friction@elbow_pitch:coulomb_torque=0.05',
+    'coulomb_friction@shoulder_pitch:coulomb_torque=0.1',
+    'viscous_friction@shoulder_roll:viscous_coefficient=0.3',
+)
+WANTED = 2.0
+SENSORS = Sensors(torque_noise=NOISE, resolution=2.0 * np.pi / 2**17)
+#: Beginning and end of a motion, from and to rest [s].
+_RAMP = 3.0
+
+Sample = tuple[float, FloatArray, FloatArray]
+
+
+def arm_with(*effects: str) -> ArmModel:
+    """Return the humanoid arm with effects."""
+    arm = ArmModel(load_robot('humanoid_arm'))
+    for text in effects:
+        effect, values = parse_effect(text, arm.robot)
+        arm = arm.with_effect(effect, values)
+    return arm
+
+
+def working_motion(duration: float, speed: float, rng: np.random.Generator) -> Reference:
+    """Return a motion of three harmonics a joint, from rest to rest in the middle of the range."""
+    robot = load_robot('humanoid_arm')
+    t = np.arange(0.0, duration + 1e-9, 0.01)[:, np.newaxis]
+    w = 2.0 * np.pi * 0.1 * speed * np.array([1.0, 2.0, 5.0])
+    size = rng.uniform(0.3, 1.0, robot.n_joints) * 0.3
+    q, dq, ddq = np.zeros((3, len(t), robot.n_joints))
+    for rate, share in zip(w, (1.0, 0.6, 0.2), strict=True):
+        angle = rate * t + rng.uniform(0.0, 2.0 * np.pi, robot.n_joints)
+        q += share * size * np.sin(angle)
+        dq += share * size * rate * np.cos(angle)
+        ddq -= share * size * rate**2 * np.sin(angle)
+    x = np.clip(np.minimum(t, t[-1] - t) / _RAMP, 0.0, 1.0)
+    sign = np.where(t < t[-1] / 2.0, 1.0, -1.0) * (x < 1.0) / _RAMP
+    fade = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+    slope = 30.0 * x**2 * (1.0 - x) ** 2 * sign
+    bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) * sign**2
+    middle = middle_position(robot)
+    return Reference(
+        robot.joints,
+        t[:, 0],
+        middle + fade * q,
+        fade * dq + slope * q,
+        fade * ddq + 2.0 * slope * dq + bend * q,
+    )
+
+
+def coloured(count: int, joints: int, rng: np.random.Generator) -> FloatArray:
+    """Return noise that is not white, shape (count, joints) [N m]."""
+    keep = np.exp(-1.0 / (COLOUR * RATE))
+    white = np.sqrt(1.0 - keep**2) * rng.normal(size=(count, joints))
+    return np.asarray(NOISE * signal.lfilter([1.0], [1.0, -keep], white, axis=0))
+
+
+def changing(change: str, seed: int, before: float = 60.0, after: float = 4.0) -> Iterator[Sample]:
+    """Let the arm move and change at the time `before`."""
+    rng = np.random.default_rng(seed)
+    arm = arm_with(*IDENTIFIED, *LACKING)
+    motion = working_motion(before + after + _RAMP, 1.0, rng)
+    simulated = SimulatedArm(arm, rng=rng, sensors=SENSORS, start=motion.q[0])
+    simulated.set_trajectory(motion)
+    count, at = round((before + after) * RATE), round(before * RATE)
+    more = coloured(count, len(motion.joints), rng)
+    for k in range(count):
+        if k == at:
+            simulated.become(arm.with_effect(*parse_effect(change, arm.robot)))
+        sample = simulated.advance()
+        yield sample.t, sample.q, sample.tau + more[k]
+
+
+def unchanging(minutes: int, seed: int) -> Iterator[Sample]:
+    """Let the arm work: another motion every minute, every fifth of them a rest."""
+    rng = np.random.default_rng(seed)
+    arm = arm_with(*IDENTIFIED, *LACKING)
+    for minute in range(minutes):
+        speed = rng.uniform(0.5, 2.0)
+        motion = working_motion(60.0, speed, rng)
+        if minute % 5 == 4:
+            motion = Reference(motion.joints, motion.t[[0, -1]], motion.q[[0, -1]])
+        run = simulate(
+            arm, motion, rng=rng, sensors=SENSORS, rate=RATE, duration=60.0 - 1.0 / RATE
+        )
+        tau = run.tau + coloured(len(run.t), len(motion.joints), rng)
+        for t, q, torque in zip(run.t, run.q, tau, strict=True):
+            yield 60.0 * minute + t, q, torque
+
+
+def watch(
+    samples: Iterator[Sample], tell: Callable[[float, Change], None] | None = None
+) -> OnlineIdentifier:
+    """Identify online; what is not given is unknown."""
+    nothing = replace(arm_with(*IDENTIFIED, 'torque_offset'), values=())
+    online = OnlineIdentifier(nothing, rng=np.random.default_rng(0))
+    seen = 0
+    for t, q, tau in samples:
+        online.update(t, q, None, tau)
+        if len(online.changes) > seen:
+            seen = len(online.changes)
+            if tell is not None:
+                tell(t, online.changes[-1])
+    return online
+
+
+def print_changes(draws: int) -> None:
+    """Print how soon every change is seen, and what is said."""
+    print(f'changes after 60 s of motion; wanted: seen within {WANTED:g} s, named, nothing else')
+    for change in CHANGES:
+        print(change)
+        for seed in range(draws):
+            told: list[tuple[float, Change]] = []
+            watch(changing(change, seed), lambda t, c, told=told: told.append((t, c)))
+            for t, found in told:
+                print(f'  seen after {t - 60.0:.2f} s: {found}')
+            if not told:
+                print('  NOT seen')
+
+
+def print_false_alarms(minutes: int) -> None:
+    """Print what is said where nothing changes."""
+    begun = time.process_time()
+    online = watch(unchanging(minutes, 0), lambda t, c: print(f'  at {t:.1f} s: {c}', flush=True))
+    used = time.process_time() - begun
+    print(
+        f'{minutes} min at 1 kHz without a change: {len(online.changes)} alarms (wanted 0); '
+        f'{used:.0f} s of processor time, simulation included'
+    )
+
+
+def main() -> None:
+    """Print both."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('--minutes', type=int, default=30, help='without a change')
+    parser.add_argument('--draws', type=int, default=4, help='runs with every change')
+    asked = parser.parse_args()
+    print_changes(asked.draws)
+    print_false_alarms(asked.minutes)
+
+
+if __name__ == '__main__':
+    main()

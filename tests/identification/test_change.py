@@ -1,0 +1,144 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Changes of an arm at work: seen soon, named, and nothing else forgotten."""
+
+from __future__ import annotations
+
+from armid_ros.estimate import ParameterName
+from armid_ros.identification.change import change_candidates
+from armid_ros.identification.change_evidence import Block, evidence, UsualSize
+from armid_ros.identification.recursive import RecursiveLeastSquares
+import numpy as np
+import pytest
+from scipy import stats
+
+from benchmarks import changes
+
+NAMES = tuple(ParameterName(f'p{k}', '', '') for k in range(5))
+TRUTH = np.array([1.0, -2.0, 0.5, 3.0, 0.0])
+CHANGED = np.array([[0.0], [0.0], [1.0], [0.0], [0.5]])
+
+
+def learned_and_block(
+    rng, delta: float, seen: int = 4
+) -> tuple[RecursiveLeastSquares, Block, np.ndarray, np.ndarray]:
+    """Learn from 400 rows of `seen` parameters, then take in 60 rows after a change."""
+    estimator = RecursiveLeastSquares(NAMES, [1.0])
+    rows = rng.normal(size=(400, 5)) * (np.arange(5) < seen)
+    for row in rows:
+        estimator.update(row[np.newaxis], np.atleast_1d(row @ TRUTH + rng.normal()))
+    w = rng.normal(size=(60, 5))
+    tau = w @ (TRUTH + delta * CHANGED[:, 0]) + rng.normal(size=60)
+    block = Block(0.0, 1.0, w.T @ w, w.T @ tau, estimator.learned(), ())
+    return estimator, block, w, tau
+
+
+def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows():
+    """Before and after in one problem, with a column for the change: the same answer."""
+    rng = np.random.default_rng(0)
+    _, block, w, tau = learned_and_block(rng, 0.7, seen=5)
+    found, covariance = evidence([block], block.before, CHANGED).size(slice(0, 1))
+    top = np.hstack([block.before.root, np.zeros((5, 1))])
+    both = np.vstack([top, np.hstack([w, w @ CHANGED])])
+    aim = np.concatenate([block.before.root @ block.before.values, tau])
+    expected = np.linalg.lstsq(both, aim, rcond=None)[0][-1]
+    assert found[0] == pytest.approx(expected, rel=1e-6)
+    assert covariance[0, 0] == pytest.approx(np.linalg.inv(both.T @ both)[-1, -1], rel=1e-6)
+
+
+def test_without_a_change_the_ratio_is_chi_square():
+    rng = np.random.default_rng(1)
+    ratios = []
+    for _ in range(150):
+        _, block, _, _ = learned_and_block(rng, 0.0, seen=5)
+        ratios.append(evidence([block], block.before, CHANGED).ratio(slice(0, 1)))
+    assert stats.kstest(ratios, stats.chi2(1).cdf).pvalue > 1e-3
+
+
+def test_what_was_never_known_cannot_be_seen_to_change():
+    rng = np.random.default_rng(2)
+    _, block, _, _ = learned_and_block(rng, 5.0)
+    unknown = np.eye(5)[:, [4]]
+    assert evidence([block], block.before, unknown).ratio(slice(0, 1)) < 1e-3
+
+
+def test_reopening_forgets_one_direction_and_nothing_else():
+    rng = np.random.default_rng(3)
+    estimator, _, _, _ = learned_and_block(rng, 0.0, seen=5)
+    before, root = estimator.values, estimator.learned().root
+    information = root.T @ root
+    estimator.reopen(CHANGED)
+    np.testing.assert_allclose(estimator.values, before, rtol=1e-6)
+    after = estimator.learned().root.T @ estimator.learned().root
+    unit = CHANGED / np.linalg.norm(CHANGED)
+    assert (unit.T @ after @ unit).item() < 1e-6
+    lost = information @ unit
+    np.testing.assert_allclose(
+        after, information - lost @ lost.T / (unit.T @ lost), atol=1e-6 * information.max()
+    )
+
+
+def test_a_statistic_that_is_usually_large_is_not_surprising():
+    rng = np.random.default_rng(4)
+    usual = UsualSize([1, 3], 1)
+    for _ in range(400):
+        usual.learn(100.0 * np.array([rng.chisquare(1), rng.chisquare(3)]))
+    np.testing.assert_allclose(usual.factors, 100.0, rtol=0.3)
+    assert np.all(usual.excess(np.array([2000.0, 2500.0]), 1e-8) < 1.0)
+    assert np.all(usual.excess(np.array([8000.0, 9000.0]), 1e-8) > 1.0)
+
+
+def test_candidates_are_every_effect_the_friction_of_a_joint_and_a_load():
+    online = changes.watch(iter(()))
+    found = change_candidates(online.arm, online.base)
+    names = {(c.name, c.joint) for c in found}
+    assert ('payload', 'wrist_pitch') in names and ('friction', 'elbow_pitch') in names
+    assert ('torque_offset', 'shoulder_roll') in names
+    payload = next(c for c in found if c.name == 'payload')
+    assert payload.parameters[0].name == 'payload_m'
+    np.testing.assert_allclose(
+        payload.directions[:, 0],
+        online.base.values(
+            np.eye(len(online.arm.theta))[[p.name for p in online.arm.parameters].index('m6')]
+        ),
+    )
+
+
+BEFORE = 30.0
+
+
+@pytest.mark.parametrize(
+    ('change', 'name', 'truth'),
+    [
+        (changes.CHANGES[1], 'payload', 0.3),
+        (changes.CHANGES[5], 'coulomb_friction', 0.1),
+    ],
+)
+def test_a_change_in_mid_motion_is_seen_and_nothing_else_forgotten(change, name, truth):
+    seen_at, known = None, None
+    online = changes.watch(iter(()))
+    for t, q, tau in changes.changing(change, 0, BEFORE, 3.0):
+        online.update(t, q, None, tau)
+        if known is None and t >= BEFORE:
+            known = online.estimate()
+        if seen_at is None and online.changes:
+            seen_at = t
+    (found,) = online.changes
+    assert BEFORE < seen_at < BEFORE + changes.WANTED
+    assert abs(found.t - BEFORE) < 0.5
+    assert found.candidate.name == name
+    lower, upper = found.size.interval(0.999)[0]
+    assert 0.0 < lower < truth < upper
+    still = online.estimate()
+    others = [
+        k
+        for k, p in enumerate(known.parameters)
+        if p.name == 'viscous_coefficient' and p.joint != found.candidate.joint
+    ]
+    assert np.all(still.std[others] < 1.5 * known.std[others])
+    moved = np.abs(still.values[others] - known.values[others])
+    assert np.all(moved < 4.0 * known.std[others])
+
+
+def test_work_without_a_change_raises_no_alarm():
+    assert not changes.watch(changes.unchanging(2, 1)).changes

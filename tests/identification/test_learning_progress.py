@@ -1,0 +1,106 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a motion does not teach is said, with the joint and how to move it; and intervals hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.estimate import Estimate
+from armid_ros.identification.learning_progress import LearningProgress, too_little_motion
+from armid_ros.identification.online import OnlineIdentifier, OnlineSettings
+from armid_ros.identification.score_variance import ScoreVariance
+import numpy as np
+import pytest
+from scipy import signal
+
+from tests.identification.conftest import multisine
+
+
+@pytest.fixture(scope='module')
+def motion(arm):
+    return multisine(arm.robot.joints, 30.0, 250.0, seed=0)
+
+
+def learn(arm, motion, look_every=1.0):
+    """Identify online, look every second, and return what was said last."""
+    rng = np.random.default_rng(0)
+    tau = arm.torque(motion) + 0.02 * rng.normal(size=motion.q.shape)
+    online = OnlineIdentifier(replace(arm, values=()), rng=np.random.default_rng(0))
+    progress = LearningProgress(online.arm, online.base, np.random.default_rng(0))
+    said, due = (), look_every
+    for t, q, torque in zip(motion.t, motion.q, tau, strict=True):
+        online.update(t, q, None, torque)
+        if t > due and online.samples:
+            said, due = progress.look(t, online.estimate()), due + look_every
+    return said
+
+
+def test_a_joint_that_stands_still_is_named(arm, motion):
+    elbow = list(arm.robot.joints).index('elbow_pitch')
+    parts = [np.array(part) for part in (motion.q, motion.dq, motion.ddq)]
+    parts[0][:, elbow], parts[1][:, elbow], parts[2][:, elbow] = 0.4, 0.0, 0.0
+    still = replace(motion, q=parts[0], dq=parts[1], ddq=parts[2])
+    said = learn(arm, still)
+    assert said[0].joint == 'elbow_pitch' or 'elbow_pitch' in [part.joint for part in said]
+    text = too_little_motion([part for part in said if part.joint == 'elbow_pitch'])
+    assert text.startswith('too little motion to learn from: elbow_pitch (')
+    assert 'viscous friction' in text and 'move it both ways at several speeds' in text
+
+
+def test_a_rich_motion_leaves_the_strong_joints_with_nothing_to_ask_for(arm, motion):
+    named = {part.joint for part in learn(arm, motion)}
+    assert not named & {'shoulder_pitch', 'shoulder_roll', 'upper_arm_yaw', 'elbow_pitch'}
+
+
+def test_while_the_estimate_gets_better_nothing_is_asked_for(arm):
+    online = OnlineIdentifier(arm, rng=np.random.default_rng(0))
+    progress = LearningProgress(online.arm, online.base, np.random.default_rng(0))
+    start = online.estimate()
+    for second in range(30):
+        better = Estimate(start.parameters, start.values, start.covariance * 0.8**second)
+        assert not progress.look(float(second), better)
+    worse = [progress.look(30.0 + second, better) for second in range(30)]
+    assert worse[-1]
+
+
+def test_errors_that_last_widen_intervals_and_white_ones_do_not():
+    """A mean of 8 s windows of AR(1) noise: the theory's factor."""
+    rng = np.random.default_rng(1)
+    keep, length = 0.9, 400
+    expected = np.sqrt((1.0 + keep) / (1.0 - keep))
+    for coefficients, factor in (([1.0], 1.0), ([1.0, -keep], expected)):
+        noise = signal.lfilter([1.0], coefficients, rng.normal(size=300 * length))
+        noise = (noise / noise.std()).reshape(300, length)
+        scores = ScoreVariance(1)
+        for window in noise:
+            scores.add(np.array([[float(length)]]), np.array([window.sum()]))
+        assert scores.widening(1.0)[0] == pytest.approx(factor, rel=0.2)
+
+
+def test_online_intervals_hold_in_coloured_noise(arm, motion):
+    """Of a rigid arm, over 3 noises; none the fewer than without the widening."""
+    arm = ArmModel(arm.robot)
+    inside, narrow = [], []
+    keep = np.exp(-1.0 / (0.05 * 250.0))
+    exact = arm.torque(motion)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        white = np.sqrt(1.0 - keep**2) * rng.normal(size=exact.shape)
+        tau = exact + 0.05 * signal.lfilter([1.0], [1.0, -keep], white, axis=0)
+        results = []
+        for settings in (OnlineSettings(), OnlineSettings(changes=None)):
+            online = OnlineIdentifier(
+                replace(arm, values=()), settings, rng=np.random.default_rng(0)
+            )
+            for t, q, torque in zip(motion.t, motion.q, tau, strict=True):
+                online.update(t, q, None, torque)
+            estimate = online.estimate()
+            truth = online.base.values(arm.theta)
+            ends = estimate.interval()
+            results.append((ends[:, 0] < truth) & (truth < ends[:, 1]))
+        inside.append(results[0].mean())
+        narrow.append(results[1].mean())
+    assert np.mean(inside) > 0.88
+    assert np.mean(inside) >= np.mean(narrow)
