@@ -147,7 +147,9 @@ class SimulatedArm:
         now = self._state
         self.plant = replace(self.plant, arm=arm)
         self._state = self.plant.state(now.q, now.dq, now.ddq, now.steps)
-        self._past = RecentPast.of(self.plant, self._state, self._torque, self.sensors.torque_delay)
+        self._past = RecentPast.of(
+            self.plant, self._state, self._torque, self.sensors.torque_delay
+        )
 
     def set_trajectory(self, reference: Reference) -> None:
         """
