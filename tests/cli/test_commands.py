@@ -3,56 +3,20 @@
 """The command line: what it writes, prints and refuses."""
 
 import json
-from pathlib import Path
 
-from armid_ros.arm import ArmModel, load_model
-from armid_ros.cli import main
 from armid_ros.cli.commands import COMMANDS
-from armid_ros.effects import CATALOGUE, make_effect
+from armid_ros.effects import CATALOGUE
 from armid_ros.excitation import load_excitation
 from armid_ros.identification.two_inertia import Accelerometers, read_runs
-from armid_ros.motion import Motion
-from armid_ros.recording import read_joint_trajectory, read_recording, write_recording
+from armid_ros.recording import read_joint_trajectory, read_recording
 from armid_ros.robots import load_robot
-from click.testing import CliRunner
 import numpy as np
 import pytest
 
-ROBOT = 'humanoid_arm'
+from .conftest import armid, ROBOT
+
 PHYSICAL = ('identify', '{bag}', '--robot', ROBOT, '--out', 'o', '--physical')
 QUICK = ('--starts', 1, '--iterations', 5)
-
-
-def armid(*arguments, code=0):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
-
-
-def bag_of(path, arm, seed, duration=20.0):
-    """Write what sensors would record of a motion in closed form."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(round(200 * duration)) / 200.0
-    q, dq, ddq = np.zeros((3, len(t), 6))
-    for hz, size in ((0.15, 0.5), (0.4, 0.25), (0.9, 0.08)):
-        w = 2 * np.pi * hz
-        angle = w * t[:, None] + rng.uniform(0, 2 * np.pi, 6)
-        q += size * np.sin(angle)
-        dq += size * w * np.cos(angle)
-        ddq -= size * w * w * np.sin(angle)
-    motion = Motion(arm.robot.joints, t, q, dq, ddq)
-    noise = 0.01 * rng.normal(size=q.shape)
-    measured = motion.with_torque(arm.torque(motion) + noise)
-    write_recording(path, measured, robot_description=arm.robot.urdf)
-    return path
-
-
-@pytest.fixture(scope='module')
-def bags(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('bags')
-    arm = ArmModel(load_robot(ROBOT))
-    arm = arm.with_effect(make_effect('viscous_friction', arm.robot), np.full(6, 0.1))
-    return [bag_of(folder / name, arm, seed) for seed, name in enumerate(('train', 'held_out'))]
 
 
 @pytest.mark.parametrize('command', COMMANDS)
@@ -64,104 +28,6 @@ def test_robots_and_effects_are_listed_for_people_and_programs():
     assert ROBOT in armid('robots').output
     listed = json.loads(armid('effects', '--json').output)
     assert [row['name'] for row in listed] == list(CATALOGUE)
-
-
-def test_identify_writes_model_numbers_and_page(bags, tmp_path):
-    out = tmp_path / 'out'
-    result = armid('identify', bags[0], '--robot', '-', '--validate', bags[1], '--out', out)
-    assert 'held out' in result.output
-    document = json.loads((out / 'identification.json').read_text())
-    assert document['schema'] == 'armid/identification/1'
-    assert document['validation'][0]['relative_error_percent'] < 3.0
-    assert {'name', 'joint', 'value', 'std', 'unit'} == set(document['parameters'][0])
-    arm = load_model(out / 'model.yaml')  # its robot came with the bag and lies beside it
-    viscous = arm.values[arm.effects.index(make_effect('viscous_friction', arm.robot))]
-    np.testing.assert_allclose(viscous, 0.1, atol=0.01)
-    assert (out / 'report.html').stat().st_size > 10_000
-
-
-def test_identify_prints_json_and_nothing_else(bags, tmp_path):
-    result = armid('identify', bags[0], '--robot', ROBOT, '--out', tmp_path / 'o', '--json')
-    assert json.loads(result.stdout)['robot'] == ROBOT
-
-
-def test_the_sample_bag_is_the_demo(tmp_path):
-    """Recorded over topics; the friction of the shoulder is the demo's 0.1 N m s/rad."""
-    bag = Path(__file__).parents[2] / 'bags' / 'humanoid_arm_moon'
-    out = tmp_path / 'out'
-    armid('identify', bag, '--robot', '-', '--gravity', 'moon', '--out', out)
-    document = json.loads((out / 'identification.json').read_text())
-    rows = {(row['name'], row['joint']): row for row in document['parameters']}
-    viscous = rows['viscous_coefficient', 'shoulder_pitch']
-    assert abs(viscous['value'] - 0.1) < max(3 * viscous['std'], 0.002)
-    assert document['training']['relative_error_percent'] < 4.0
-
-
-def test_physical_identifications_are_bodies_and_can_be_compared(bags, tmp_path):
-    before, after = tmp_path / 'before', tmp_path / 'after'
-    for bag, out in zip(bags, (before, after), strict=True):
-        armid('identify', bag, '--robot', ROBOT, '--physical', '--out', out)
-    robot = load_robot(before / 'identified.urdf')
-    model = load_model(before / 'model.yaml')
-    np.testing.assert_allclose(robot.rigid_parameters, model.robot.rigid_parameters, atol=1e-9)
-    assert (before / 'identified.mjcf.xml').read_text().startswith('<')
-    armid('compare', before, after, '--out', tmp_path / 'compared')
-    assert (tmp_path / 'compared' / 'report.html').is_file()
-
-
-def test_physical_identification_prints_its_certificate_and_its_checks(bags, tmp_path):
-    out = tmp_path / 'out'
-    arguments = ('--robot', ROBOT, '--physical', '--total-mass', 2.8, '--validate', bags[1])
-    box = 'wrist_pitch=-0.1,-0.1,-0.1:0.1,0.1,0.1'
-    text = armid('identify', bags[0], *arguments, '--box', box, '--out', out).stdout
-    document = json.loads((out / 'identification.json').read_text())
-    links = document['physical']['links']
-    assert len(links) == 6
-    assert min(min(link['eigenvalues']) for link in links) > 0.0
-    assert sum(link['mass'] for link in links) == pytest.approx(2.8, rel=1e-6)
-    for expected in (
-        'eigenvalues of the pseudo-inertia',
-        f'{links[0]["eigenvalues"][0]:.3g}',
-        'the masses add up to 2.8 kg, as given',
-        'identified.urdf has no place for torque_offset',
-        'Durbin-Wu-Hausman test',
-        'simulated in closed loop',
-        'not told from 0',
-        'not identified: m1',
-    ):
-        assert expected in text
-    (forward,) = document['verification']['forward']
-    assert max(forward['after']['position_rms'].values()) < 0.01
-    assert document['verification']['encoder_noise']['p_value'] > 0.0
-    page = (out / 'report.html').read_text()
-    assert 'Physical consistency' in page
-    assert 'Forward validation' in page
-
-
-def test_checks_can_be_left_out(bags, tmp_path):
-    out = tmp_path / 'out'
-    text = armid('identify', bags[0], '--robot', ROBOT, '--no-verify', '--out', out).stdout
-    assert 'check:' not in text
-    assert 'verification' not in json.loads((out / 'identification.json').read_text())
-
-
-def test_a_load_between_two_days_is_said_in_words(tmp_path):
-    robot = load_robot(ROBOT)
-    arm = ArmModel(robot)
-    held = 0.2 * np.array([1.0, 0.0, 0.0, 0.05, 0.004, 0.0, 0.004, 0.0, 0.0, 0.001])
-    loaded = arm.with_effect(make_effect('payload', robot), held)
-    for name, day, seed in (('before', arm, 0), ('after', loaded, 1)):
-        bag = bag_of(tmp_path / f'{name}_bag', day, seed)
-        armid('identify', bag, '--robot', ROBOT, '--no-verify', '--out', tmp_path / name)
-    days = (tmp_path / 'before', tmp_path / 'after')
-    text = armid('compare', *days, '--out', tmp_path / 'compared').stdout
-    assert 'kg was added to the link of wrist_pitch' in text
-    document = json.loads((tmp_path / 'compared' / 'comparison.json').read_text())
-    assert abs(document['load']['mass'] - 0.2) < 3.0 * document['load']['mass_std']
-    assert (
-        'was added to the link of wrist_pitch'
-        in (tmp_path / 'compared' / 'report.html').read_text()
-    )
 
 
 def test_excite_simulate_identify_in_three_lines(tmp_path):

@@ -1,0 +1,52 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings to run commands on."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.cli import main
+from armid_ros.effects import make_effect
+from armid_ros.motion import Motion
+from armid_ros.recording import write_recording
+from armid_ros.robots import load_robot
+from click.testing import CliRunner
+import numpy as np
+import pytest
+
+ROBOT = 'humanoid_arm'
+
+
+def armid(*arguments, code=0):
+    """Run a command, which has to end with a code."""
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def bag_of(path, arm, seed, duration=20.0, moving=slice(None)):
+    """Write what sensors would record of a motion in closed form, of all joints or of some."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(200 * duration)) / 200.0
+    q, dq, ddq = np.zeros((3, len(t), 6))
+    for hz, size in ((0.15, 0.5), (0.4, 0.25), (0.9, 0.08)):
+        w = 2 * np.pi * hz
+        angle = w * t[:, None] + rng.uniform(0, 2 * np.pi, 6)
+        q += size * np.sin(angle)
+        dq += size * w * np.cos(angle)
+        ddq -= size * w * w * np.sin(angle)
+    still = np.ones(6, dtype=bool)
+    still[moving] = False
+    q[:, still], dq[:, still], ddq[:, still] = 0.2, 0.0, 0.0
+    motion = Motion(arm.robot.joints, t, q, dq, ddq)
+    noise = 0.01 * rng.normal(size=q.shape)
+    measured = motion.with_torque(arm.torque(motion) + noise)
+    write_recording(path, measured, robot_description=arm.robot.urdf)
+    return path
+
+
+@pytest.fixture(scope='session')
+def bags(tmp_path_factory):
+    """Return two recordings of the shipped arm with viscous friction."""
+    folder = tmp_path_factory.mktemp('bags')
+    arm = ArmModel(load_robot(ROBOT))
+    arm = arm.with_effect(make_effect('viscous_friction', arm.robot), np.full(6, 0.1))
+    return [bag_of(folder / name, arm, seed) for seed, name in enumerate(('train', 'held_out'))]
