@@ -31,7 +31,10 @@ def say(text: str) -> None:
 def progress(what: str) -> Iterator[Tick]:
     """Show a bar while work goes on; yields tick(share, what=None)."""
     columns = (TextColumn('{task.description}'), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
         task = bar.add_task(what, total=1.0)
 
         def tick(share: float, what: str | None = None) -> None:

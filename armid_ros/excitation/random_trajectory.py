@@ -84,8 +84,8 @@ def random_feasible(
     found = _shrunk(arm, limits, around, clearance, margin, 8 * _SHRINKS)
     if found is None:
         raise TrajectoryError(
-            f'nothing but standing still is possible about {np.array2string(centre, precision=3)}:'
-            f' {trajectory_faults(arm, limits, around.scaled(0.01), clearance, margin)}'
+            f'nothing but standing still is possible about {", ".join(f"{x:.2f}" for x in centre)}'
+            f': {trajectory_faults(arm, limits, around.scaled(0.01), clearance, margin)}'
         )
     return found
 

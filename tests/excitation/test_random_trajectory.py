@@ -4,8 +4,11 @@
 
 from dataclasses import replace
 
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import check_limits, Limits, Obstacle, random_feasible, with_obstacles
+from armid_ros.motion import Motion
 from armid_ros.robots import collision_model
 import numpy as np
 import pytest
@@ -38,6 +41,27 @@ def test_torque_limit_below_gravity_is_named(two_link_arm):
     )
     with pytest.raises(TrajectoryError, match=r'joint shoulder: torque limit 2 N m.*every pose'):
         random_feasible(two_link_arm, pinned, 6.0, 3, np.random.default_rng(0))
+
+
+def test_limits_that_no_pose_keeps_together_are_named(two_link_arm):
+    """The shoulder is held best upright, the elbow with the upper arm level."""
+    lower, upper = np.array([0.3, 0.3]), np.array([1.4, 1.4])
+    q = np.random.default_rng(1).uniform(lower, upper, (5000, 2))
+    rest = np.zeros_like(q)
+    motion = Motion(two_link_arm.robot.joints, np.arange(5000.0), q, rest, rest)
+    least = np.abs(two_link_arm.joint_torque(motion)).min(axis=0)
+    limits = replace(Limits.of(two_link_arm.robot), lower=lower, upper=upper, torque=1.2 * least)
+    with pytest.raises(TrajectoryError, match=r'joint \w+: torque limit .* all torque limits'):
+        random_feasible(two_link_arm, limits, 6.0, 3, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(
+    'name', ['coulomb_friction', 'presliding_hysteresis', 'stribeck_friction']
+)
+def test_friction_beyond_the_torque_limit_is_no_room_to_move(two_link, name):
+    arm = ArmModel(two_link).with_effect(make_effect(name, two_link), [100.0, 0.0])
+    with pytest.raises(TrajectoryError, match=r'standing still is possible.*shoulder: torque'):
+        random_feasible(arm, Limits.of(two_link), 6.0, 3, np.random.default_rng(0))
 
 
 def test_bodies_that_cannot_be_kept_apart_are_named(two_link_arm):
