@@ -129,14 +129,16 @@ def _sentence(change: Change) -> str:
         label = f'Inertial parameter {label} of {change.parameter.joint}'
     label = label[0].upper() + label[1:]
     share = ''
-    if abs(change.before) > HALF_WIDTH * change.before_std:
+    ends = [_end(change.before, change.before_std), _end(change.after, change.after_std)]
+    if told_from_zero(change.before, change.before_std):
         share = f' ({100.0 * change.difference / abs(change.before):+.0f} %)'
     sure = f'{abs(change.deviations):.0f} standard deviations' if change.std > 0.0 else 'exactly'
     by = ' ± '.join(measured(abs(change.difference), HALF_WIDTH * change.std))
-    return (
-        f'{label} {verb} from {change.before:.4g} to {change.after:.4g} {unit}{share}, '
-        f'by {by}: {sure}.'
-    )
+    return f'{label} {verb} from {ends[0]} to {ends[1]}{share}, by {by} {unit}: {sure}.'
+
+
+def _end(value: float, std: float) -> str:
+    return f'{value:.4g}' if told_from_zero(value, std) else 'what is not told from 0'
 
 
 def _least_visible(changes: Sequence[Change]) -> str:

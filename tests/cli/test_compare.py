@@ -43,7 +43,7 @@ def test_a_change_is_said_in_words_and_on_a_page(tmp_path):
     result = armid('compare', first, second, '--out', tmp_path / 'out')
     assert result.exit_code == 0, result.output
     assert '1 of 2 parameters changed beyond uncertainty, at elbow' in result.output
-    assert 'of elbow rose from 0.08 to 0.1 N m s/rad (+25 %)' in result.output
+    assert 'of elbow rose from 0.08 to 0.1 (+25 %), by 0.0200 ± 0.0055 N m s/rad' in result.output
     page = (tmp_path / 'out' / 'report.html').read_text()
     assert 'rose from 0.08 to 0.1' in page
     assert 'Izz1 + Iyy2' in page

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.identification.comparison import Change, Comparison
-from armid_ros.identification.identifiability import HALF_WIDTH
+from armid_ros.identification.identifiability import HALF_WIDTH, told_from_zero
 from armid_ros.report.families import parameter_families
-from armid_ros.report.notation import digits, pretty
+from armid_ros.report.notation import measured, pretty
 from armid_ros.report.page import Section
 
 
@@ -40,8 +40,8 @@ class ChangeRow:
         """Both values with their 95 % intervals, and the difference in standard deviations."""
         c = self.change
         return (
-            f'{c.before:.4g} ± {digits(HALF_WIDTH * c.before_std)}',
-            f'{c.after:.4g} ± {digits(HALF_WIDTH * c.after_std)}',
+            _value(c.before, c.before_std),
+            _value(c.after, c.after_std),
             f'{c.deviations:+.1f}',
         )
 
@@ -57,6 +57,12 @@ class ChangeRow:
         """Where the interval of the second begins and what is left behind it, 0 to 100."""
         c, reach = self.change, HALF_WIDTH * self.change.after_std
         return self.place(c.after - reach), round(100.0 - self.place(c.after + reach), 2)
+
+
+def _value(value: float, std: float) -> str:
+    """Return a value with its 95 % interval; one that is not told from zero is no number."""
+    number, reach = measured(value, HALF_WIDTH * std)
+    return f'{number} ± {reach}' if told_from_zero(value, std) else f'not told from 0, ± {reach}'
 
 
 @dataclass(frozen=True)
