@@ -12,6 +12,7 @@ gives away is at most log(samples) / sharpness.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from armid_ros.arm import TorqueSlope
@@ -20,6 +21,7 @@ from armid_ros.excitation.fourier import fourier_basis
 from armid_ros.excitation.problem import Problem
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
+import numpy.typing as npt
 
 #: Distance over which the clearance counts as one unit of a constraint [m].
 _CLEARANCE_UNIT = 0.1
@@ -35,6 +37,9 @@ _STRETCHES = 20
 #: Samples per sample of the settings at which position, velocity and acceleration are looked at,
 #: and those at which torque and clearance are.
 _DENSE, _STATES = 3, 2
+
+#: Values of some constraints, and what works out their gradients.
+Part = tuple[FloatArray, Callable[[], FloatArray]]
 
 
 @dataclass(frozen=True)
@@ -100,9 +105,9 @@ class Constraints:
             fourier_basis(times, period, harmonics),
         )
 
-    def value(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def value(self, x: FloatArray) -> Part:
         """
-        Return the constraints and their gradients.
+        Return the constraints, and what works out their gradients.
 
         Parameters
         ----------
@@ -113,8 +118,8 @@ class Constraints:
         -------
         values : ndarray, shape (m,)
             Not positive where the limit is kept.
-        gradients : ndarray, shape (m, n, 1 + 2 H)
-            Derivatives by the coefficients.
+        gradients : callable () -> ndarray, shape (m, n, 1 + 2 H)
+            Derivatives by the coefficients; a line search does without most of them.
 
         """
         limits = self.problem.limits
@@ -132,8 +137,10 @@ class Constraints:
             parts.append(self._torque(motion))
         if self.clearance is not None and len(self.clearance.pairs):
             parts.append(self._clear(motion))
-        values, gradients = zip(*parts, strict=True)
-        return np.concatenate(values), np.concatenate(gradients)
+        return (
+            np.concatenate([values for values, _ in parts]),
+            lambda: np.concatenate([gradients() for _, gradients in parts]),
+        )
 
     def _own_joint(
         self,
@@ -142,25 +149,30 @@ class Constraints:
         lower: FloatArray,
         upper: FloatArray,
         unit: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> Part:
         """Constrain quantities that depend on the coefficients of their own joint only."""
         values = basis @ x.T
         limited = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
-        gradients = np.zeros((len(limited), values.shape[1], basis.shape[1]))
+        signed = np.empty((len(limited), len(values)))
         totals = np.empty(len(limited))
         for row, j in enumerate(limited):
             over, under = values[:, j] - upper[j], lower[j] - values[:, j]
             excess = np.concatenate([over, under]) / unit[j] + self.reserve
             totals[row], weights = self._soft_maximum(excess)
-            signed = weights[: len(values)] - weights[len(values) :]
-            gradients[row, j] = signed @ basis / unit[j]
+            signed[row] = (weights[: len(values)] - weights[len(values) :]) / unit[j]
+
+        def gradients() -> FloatArray:
+            result = np.zeros((len(limited), values.shape[1], basis.shape[1]))
+            result[np.arange(len(limited)), limited] = signed @ basis
+            return result
+
         return totals, gradients
 
-    def _torque(self, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    def _torque(self, motion: Motion) -> Part:
         arm, limits = self.problem.arm, self.problem.limits
-        torque, slope = arm.joint_torque(motion), TorqueSlope.of(arm, motion)
+        torque = arm.joint_torque(motion)
         limited = np.flatnonzero(np.isfinite(limits.torque))
-        gradients = np.empty((len(limited), motion.n_joints, self.basis[0].shape[1]))
+        of_torque = np.zeros((len(limited), *torque.shape))
         totals = np.empty(len(limited))
         count = len(motion)
         for row, j in enumerate(limited):
@@ -168,28 +180,40 @@ class Constraints:
             totals[row], weights = self._soft_maximum(
                 np.concatenate([relative, -relative]) - 1.0 + self.reserve
             )
-            of_torque = np.zeros_like(torque)
-            of_torque[:, j] = (weights[:count] - weights[count:]) / limits.torque[j]
-            gradients[row] = sum(
-                by.T @ basis
-                for by, basis in zip(slope.pullback(of_torque), self.basis, strict=True)
-            )
+            of_torque[row, :, j] = (weights[:count] - weights[count:]) / limits.torque[j]
+
+        def gradients() -> FloatArray:
+            slope = TorqueSlope.of(arm, motion)
+            result = np.empty((len(limited), motion.n_joints, self.basis[0].shape[1]))
+            for row, weights in enumerate(of_torque):
+                result[row] = sum(
+                    by.T @ basis
+                    for by, basis in zip(slope.pullback(weights), self.basis, strict=True)
+                )
+            return result
+
         return totals, gradients
 
-    def _clear(self, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    def _clear(self, motion: Motion) -> Part:
         """Constrain the clearance, once in every stretch of the period."""
         assert self.clearance is not None
         near = self.clearance.near(motion.q, self.margin + _CLEARANCE_REACH * _CLEARANCE_UNIT)
         stretch = self.t[near.sample] * (_STRETCHES / self.problem.settings.period)
         totals = np.full(_STRETCHES, -_CLEARANCE_REACH)
-        gradients = np.zeros((_STRETCHES, motion.n_joints, self.basis[0].shape[1]))
+        weighted: list[tuple[int, npt.NDArray[np.intp], FloatArray]] = []
         for number in range(_STRETCHES):
             rows = np.flatnonzero(stretch.astype(int) == number)
             if len(rows):
                 lack = (self.margin - near.distance[rows]) / _CLEARANCE_UNIT
                 totals[number], weights = self._soft_maximum(lack)
-                by_q = -weights[:, np.newaxis] / _CLEARANCE_UNIT * near.by_q[rows]
-                gradients[number] = by_q.T @ self.basis[0][near.sample[rows]]
+                weighted.append((number, rows, -weights[:, np.newaxis] / _CLEARANCE_UNIT))
+
+        def gradients() -> FloatArray:
+            result = np.zeros((_STRETCHES, motion.n_joints, self.basis[0].shape[1]))
+            for number, rows, weights in weighted:
+                result[number] = (weights * near.by_q[rows]).T @ self.basis[0][near.sample[rows]]
+            return result
+
         return totals, gradients
 
     def _soft_maximum(self, excess: FloatArray) -> tuple[float, FloatArray]:

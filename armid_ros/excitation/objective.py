@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from armid_ros.effects import Effect
@@ -78,9 +79,9 @@ class Objective:
         """Return the samples of coefficients X."""
         return Motion(self.problem.limits.joints, self.t, *(basis @ x.T for basis in self.basis))
 
-    def value(self, x: FloatArray) -> tuple[float, FloatArray]:
+    def value(self, x: FloatArray) -> tuple[float, Callable[[], FloatArray]]:
         """
-        Return the smooth cost and its gradient.
+        Return the smooth cost, and what works out its gradient.
 
         Parameters
         ----------
@@ -91,8 +92,8 @@ class Objective:
         -------
         cost : float
             Inf where the parameters cannot be seen.
-        gradient : ndarray, shape (n, 1 + 2 H)
-            Derivative by the coefficients.
+        gradient : callable () -> ndarray, shape (n, 1 + 2 H)
+            Derivative by the coefficients; a line search does without most of them.
 
         """
         problem, motion = self.problem, self.motion(x)
@@ -112,10 +113,14 @@ class Objective:
         if self.prior is not None:
             matrix = matrix + self.prior
         cost, by_matrix = problem.criterion.smooth(matrix)
-        weights = np.zeros_like(columns)
-        by_w = (2.0 * weight * (w @ by_matrix)).reshape(*motion.q.shape, -1)
-        weights[:, :, problem.selected] = by_w * inverse_noise
-        return cost, self._gradient(weights, rigid, effects, still)
+
+        def gradient() -> FloatArray:
+            weights = np.zeros_like(columns)
+            by_w = (2.0 * weight * (w @ by_matrix)).reshape(*motion.q.shape, -1)
+            weights[:, :, problem.selected] = by_w * inverse_noise
+            return self._gradient(weights, rigid, effects, still)
+
+        return cost, gradient
 
     def _gradient(
         self,

@@ -18,13 +18,12 @@ from armid_ros.excitation.clearance import ClearanceModel
 from armid_ros.excitation.constraints import Constraints
 from armid_ros.excitation.feasibility import Faults, trajectory_faults
 from armid_ros.excitation.fourier import FourierTrajectory
-from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.objective import Objective
 from armid_ros.excitation.problem import Problem
 from armid_ros.excitation.random_trajectory import position_range, random_feasible
+from armid_ros.excitation.solver import coefficient_range, coefficient_scale, solve
 from armid_ros.motion import FloatArray
 import numpy as np
-import scipy.optimize
 
 #: Sharpness of the soft maximum, coarse for as long as that gains anything, then fine.
 _SHARPNESS = (60.0, 300.0)
@@ -47,9 +46,6 @@ _POSES, _WATCHED = 1000, 0.01
 
 #: Factor by which a trajectory that is not quite feasible is made smaller, and how often.
 _SHRINK, _SHRINKS = 0.99, 12
-
-#: Stands in for an infinite cost, which a line search cannot work with.
-_NO_COST = 1e3
 
 #: Report: share of the iterations done, cost of the best so far, and that trajectory.
 Report = Callable[[float, float, FourierTrajectory], None]
@@ -186,8 +182,8 @@ def _improve(
     """Run the solver in rounds, within a box about the last trajectory that was feasible."""
     problem = objective.problem
     settings = problem.settings
-    scale = _coefficient_scale(problem.limits, settings.period, settings.harmonics)
-    lower, upper = _coefficient_range(problem.limits, scale)
+    scale = coefficient_scale(problem.limits, settings.period, settings.harmonics)
+    lower, upper = coefficient_range(problem.limits, scale)
     watched = _watched(problem, clearance, rng)
     x = np.column_stack([start.q0, start.a, start.b]) / scale
     left, times, box, sharpness = settings.iterations, np.empty(0), _BOX, _SHARPNESS[0]
@@ -200,14 +196,18 @@ def _improve(
             sharpness=sharpness,
             more_times=times,
         )
-        z, used = _solve(
+
+        def step(count: int, before: float = best.done) -> None:
+            best.tell(before + count / settings.iterations)
+
+        z, used = solve(
             objective,
             constraints,
             scale,
             x,
             (np.maximum(lower, x - box), np.minimum(upper, x + box)),
             min(_ROUND, left),
-            best,
+            step,
         )
         left -= used
         trajectory = _trajectory(problem, z * scale)
@@ -236,77 +236,6 @@ def _watched(
     lower, upper = position_range(problem.limits)
     poses = rng.uniform(lower, upper, (_POSES, len(lower)))
     return clearance.watched(poses, problem.settings.clearance + _WATCHED)
-
-
-def _solve(
-    objective: Objective,
-    constraints: Constraints,
-    scale: FloatArray,
-    x: FloatArray,
-    bounds: tuple[FloatArray, FloatArray],
-    iterations: int,
-    best: _Best,
-) -> tuple[FloatArray, int]:
-    """Run SLSQP on scaled coefficients; return where it ended and the iterations it took."""
-    done, total = best.done, objective.problem.settings.iterations
-    count = 0
-    last: list[tuple[bytes, FloatArray, FloatArray]] = []
-
-    def cost(z: FloatArray) -> tuple[float, FloatArray]:
-        value, gradient = objective.value(z.reshape(scale.shape) * scale)
-        return (value if np.isfinite(value) else _NO_COST), (gradient * scale).ravel()
-
-    def limits(z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        if not last or last[0][0] != z.tobytes():
-            values, gradients = constraints.value(z.reshape(scale.shape) * scale)
-            last[:] = [
-                (z.tobytes(), -values, -(gradients * scale).reshape(len(values), scale.size))
-            ]
-        return last[0][1:]
-
-    def step(z: FloatArray) -> None:
-        nonlocal count
-        count += 1
-        best.tell(done + count / total)
-
-    result = scipy.optimize.minimize(
-        cost,
-        x.ravel(),
-        jac=True,
-        method='SLSQP',
-        bounds=scipy.optimize.Bounds(bounds[0].ravel(), bounds[1].ravel()),
-        constraints=[
-            {'type': 'ineq', 'fun': lambda z: limits(z)[0], 'jac': lambda z: limits(z)[1]}
-        ],
-        options={'maxiter': iterations, 'ftol': 1e-5},
-        callback=step,
-    )
-    return np.asarray(result.x).reshape(scale.shape), max(count, 1)
-
-
-def _coefficient_scale(limits: Limits, period: float, harmonics: int) -> FloatArray:
-    """Size of every coefficient that alone reaches a limit, shape (n, 1 + 2 H)."""
-    lower, upper = position_range(limits)
-    half = 0.5 * (upper - lower)[:, np.newaxis]
-    k = 2.0 * np.pi / period * np.arange(1, harmonics + 1)
-    largest = np.minimum(limits.velocity[:, np.newaxis], limits.acceleration[:, np.newaxis] / k)
-    amplitude = np.minimum(half * k, largest) / np.sqrt(harmonics)
-    return np.column_stack([half, amplitude, amplitude])
-
-
-def _coefficient_range(limits: Limits, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """
-    Bound the scaled coefficients by what no feasible trajectory can exceed.
-
-    The amplitude of a harmonic is at most 4 / pi times the largest value of the curve.
-
-    """
-    harmonics = (scale.shape[1] - 1) // 2
-    upper = np.full_like(scale, 4.0 / np.pi * np.sqrt(harmonics))
-    lower = -upper
-    low, high = position_range(limits)
-    lower[:, 0], upper[:, 0] = low / scale[:, 0], high / scale[:, 0]
-    return lower, upper
 
 
 def _trajectory(problem: Problem, x: FloatArray) -> FourierTrajectory:

@@ -124,7 +124,7 @@ def assert_gradient(objective, problem):
     for _ in range(3):
         direction = rng.normal(size=x.shape)
         numeric = central(lambda y: objective.value(y)[0], x, direction, 1e-5)
-        np.testing.assert_allclose(np.sum(gradient * direction), numeric, rtol=2e-5, atol=1e-7)
+        np.testing.assert_allclose(np.sum(gradient() * direction), numeric, rtol=2e-5, atol=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -154,7 +154,7 @@ def test_gradient_of_the_constraints(humanoid, humanoid_collision, with_effects,
     values, gradients = constraints.value(x)
     direction = rng.normal(size=x.shape)
     numeric = central(lambda y: constraints.value(y)[0], x, direction)
-    np.testing.assert_allclose(np.sum(gradients * direction, axis=(1, 2)), numeric, atol=1e-4)
+    np.testing.assert_allclose(np.sum(gradients() * direction, axis=(1, 2)), numeric, atol=1e-4)
     assert len(values) == 4 * humanoid.n_joints + 20
 
 
