@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.cli import options
+from armid_ros.cli.springs import identify_springs
 from armid_ros.cli.terminal import print_parameters, progress, say
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.identification.two_inertia import (
@@ -24,7 +25,7 @@ from armid_ros.motion import FloatArray
 from armid_ros.report.elastic_report import elastic_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import load_robot, Robot
-from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkSet
+from armid_ros.robots.two_link import planar_pair, ROBOT, two_link_set, TwoLinkSet
 from armid_ros.simulation.elastic_run import ElasticSensors, run_all
 from armid_ros.simulation.elastic_signals import (
     EXCITATION_RMS,
@@ -57,7 +58,7 @@ STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_ac
     '--experiments', default=48, show_default=True, help='Of 4 s each, that --demo simulates.'
 )
 @click.option(
-    '--robot', 'robot_source', default=ROBOT, show_default=True, metavar='R', help='Two links.'
+    '--robot', 'robot_source', default=ROBOT, show_default=True, metavar='R', help='The arm.'
 )
 @click.option(
     '--start',
@@ -68,6 +69,9 @@ STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_ac
 @click.option('--gear', metavar='N1,N2', help='Turns of the motors per turn of the joints.')
 @click.option('--kp', metavar='K1,K2', help='Of the velocity loop, at the joints [N m s/rad].')
 @click.option('--ki', metavar='K1,K2', help='Of the velocity loop, at the joints [N m/rad].')
+@click.option(
+    '--model', type=click.Path(path_type=Path), help='A model.yaml with inertias, of other arms.'
+)
 @options.folder
 @options.seed
 @options.as_json
@@ -82,17 +86,30 @@ def elastic(
     gear: str | None,
     kp: str | None,
     ki: str | None,
+    model: Path | None,
     out: Path,
     seed: int,
     as_json: bool,
 ) -> None:
-    """Identify a planar two-link arm with elastic joints, in three steps."""
+    """
+    Identify elastic joints.
+
+    A pair of links that move in a horizontal plane is identified in three steps, resonances and
+    all. Other arms need encoders on both sides of their joints, and known inertias: their springs
+    are found joint by joint.
+
+    """
     robot = load_robot(robot_source)
-    if robot.n_joints != 2:
-        raise RobotError(
-            f'{robot.name} has {robot.n_joints} driven joints; this identification is for two '
-            'links that move in a plane'
-        )
+    if not planar_pair(robot):
+        if demo or steps:
+            raise RobotError(
+                f'{robot.name} is no pair of links that move in a horizontal plane: --demo and '
+                '--steps are for such; without them its springs are found joint by joint'
+            )
+        identify_springs(bags, robot, robot_source, model, out, seed, as_json)
+        return
+    if model is not None:
+        raise RobotError('--model has no place in the three steps, which find the inertias')
     shipped = two_link_set('after')
     sensors = Accelerometers.on(
         robot, _pair(accelerometers, 'accelerometers', shipped.assumptions['accelerometer_radius'])

@@ -15,6 +15,7 @@ from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots.robot import Robot
 import numpy as np
+import pinocchio as pin
 import yaml
 
 ROBOT = 'two_link_elastic'
@@ -147,6 +148,19 @@ class TwoLinkSet:
 
     parameters: TwoLinkParameters
     assumptions: Mapping[str, Any]
+
+
+def planar_pair(robot: Robot) -> bool:
+    """Whether a robot is two links that turn about parallel axes, without weight on either."""
+    if robot.n_joints != 2 or np.any(robot.prismatic):
+        return False
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, np.zeros(2), np.array([1.0, 0.0]))
+    first = np.array(data.oMi[1].rotation @ data.v[1].angular)
+    pin.forwardKinematics(robot.model, data, np.zeros(2), np.array([0.0, 1.0]))
+    second = np.array(data.oMi[2].rotation @ data.v[2].angular)
+    crossed = np.abs([np.cross(first, second), np.cross(first, robot.gravity)])
+    return bool(crossed.max() < 1e-6)
 
 
 def two_link_set(name: str = 'after', path: Path | None = None) -> TwoLinkSet:

@@ -83,7 +83,9 @@ def test_a_simulated_arm_on_springs_is_recorded_on_both_sides(tmp_path) -> None:
     [
         ([], RecordingError, 'no bag is named'),
         (['missing'], RecordingError, 'there is no such bag'),
-        (['x', '--robot', 'humanoid_arm'], RobotError, 'two links'),
+        (['x', '--robot', 'humanoid_arm'], RecordingError, 'there is no such bag'),
+        (['--demo', '--robot', 'humanoid_arm'], RobotError, 'joint by joint'),
+        (['x', '--model', 'model.yaml'], RobotError, 'which find the inertias'),
         (['x', '--gear', '50'], RobotError, '--gear takes two positive numbers'),
     ],
 )

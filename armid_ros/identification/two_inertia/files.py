@@ -135,7 +135,7 @@ def read_runs(path: str | Path, robot: Robot, sensors: Accelerometers) -> list[E
         loops are never asked to move.
 
     """
-    motors = _OTHER_MOTOR if _OTHER_MOTOR in {topic.name for topic in topics(path)} else MOTOR
+    motors = _motor_topic(path)
     names = (motors, LINK, REFERENCE)
     recordings = [read_recording(path, joints=robot.joints, topic=topic) for topic in names]
     felt = [read_accelerations(path, imu_topic(name)) for name in robot.links]
@@ -178,6 +178,27 @@ def read_runs(path: str | Path, robot: Robot, sensors: Accelerometers) -> list[E
             'velocity loops are asked for'
         )
     return runs
+
+
+def read_sides(path: str | Path, robot: Robot) -> tuple[Recording, Recording]:
+    """
+    Read motors and links of any arm from a bag.
+
+    Raises
+    ------
+    RecordingError
+        A topic is missing.
+
+    """
+    motors = _motor_topic(path)
+    motor, link = (
+        read_recording(path, joints=robot.joints, topic=topic) for topic in (motors, LINK)
+    )
+    return motor, link
+
+
+def _motor_topic(path: str | Path) -> str:
+    return _OTHER_MOTOR if _OTHER_MOTOR in {topic.name for topic in topics(path)} else MOTOR
 
 
 def _experiments(

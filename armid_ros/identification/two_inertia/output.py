@@ -4,16 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from armid_ros.arm import parameter_table
 from armid_ros.identification.two_inertia.interaction import decibel_error, ideal_response
+from armid_ros.identification.two_inertia.joints import JointSpring
 from armid_ros.identification.two_inertia.names import parameter_names, unpack
 from armid_ros.identification.two_inertia.physical import BAND
 from armid_ros.identification.two_inertia.three_steps import TwoInertiaIdentification
 import numpy as np
 
 SCHEMA = 'armid/elastic/1'
+SPRINGS_SCHEMA = 'armid/springs/1'
 
 
 def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, Any]:
@@ -72,3 +75,38 @@ def total_damping(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def springs_document(found: Sequence[JointSpring], robot: str) -> dict[str, Any]:
+    """Return springs that were found joint by joint as the document that elastic.json holds."""
+
+    def number(value: float) -> float | None:
+        return float(value) if np.isfinite(value) else None
+
+    return {
+        'schema': SPRINGS_SCHEMA,
+        'robot': robot,
+        'joints': [
+            {
+                'joint': one.joint,
+                'told': one.told,
+                'stiffness': number(one.transmission.stiffness[0]),
+                'stiffness_interval': [number(x) for x in one.transmission.stiffness[1:]],
+                'stiffness_unit': 'N m/rad',
+                'backlash': number(one.transmission.backlash[0]),
+                'backlash_interval': [number(x) for x in one.transmission.backlash[1:]],
+                'backlash_unit': 'rad',
+                'backlash_seen': one.transmission.backlash_seen,
+                'correlation': number(one.transmission.correlation),
+                'explained': number(one.transmission.explained),
+                'encoder_delay_s': number(one.transmission.delay[0]),
+                'link_inertia': one.inertia,
+                'rotor_inertia': None if one.motor is None else float(one.motor[0]),
+                'viscous_coefficient': None if one.motor is None else float(one.motor[1]),
+                'coulomb_torque': None if one.motor is None else float(one.motor[2]),
+                'antiresonance_hz': number(one.antiresonance),
+                'resonance_hz': number(one.resonance),
+            }
+            for one in found
+        ],
+    }

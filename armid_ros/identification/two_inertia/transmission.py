@@ -48,7 +48,9 @@ class TwoEncoders:
     motor, link : ndarray, shape (N,)
         Positions on either side, both at the joint [rad].
     torque : ndarray, shape (N,)
-        Of the motor, at the joint [N m].
+        Of the motor, at the joint; or what the spring carries, where that is known [N m].
+    carried : bool
+        Whether the torque is what the spring carries. Nothing has to be told from it then.
 
     """
 
@@ -56,6 +58,7 @@ class TwoEncoders:
     motor: FloatArray
     link: FloatArray
     torque: FloatArray
+    carried: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +76,8 @@ class TransmissionFit:
         Whole free play [rad]; NaN within infinite bounds where the load changes flanks too
         rarely for it to be seen.
     direction : tuple of float
-        Twist that follows the direction of travel, to either side [rad].
+        Twist that follows the direction of travel, to either side [rad]; NaN where the torque is
+        what the spring carries.
     delay : tuple of float
         Twist per velocity: by how much the link's encoder is read later than the motor's [s].
     correlation : float
@@ -147,8 +151,8 @@ def fit_transmission(
         _inverse(found[0], spread[:, 0]),
         alone,
         backlash,
+        (np.nan, -np.inf, np.inf) if records[0].carried else _interval(found[3], spread[:, 3]),
         _interval(found[2], spread[:, 2]),
-        _interval(found[3], spread[:, 3]),
         correlation,
         reversals,
         explained,
@@ -163,15 +167,13 @@ def _columns(record: TwoEncoders, cutoff: float) -> tuple[FloatArray, FloatArray
         sosfiltfilt(sections, x) for x in (record.motor, record.link, record.torque)
     )
     velocity = np.gradient(motor, record.dt)
-    acceleration = np.gradient(velocity, record.dt)
     moving = np.abs(velocity) > _STANDING * np.abs(velocity).max()
     ends = round(0.3 / record.dt)
     moving[:ends] = moving[-ends:] = False
     moving &= np.arange(len(moving)) % max(round(0.25 / cutoff / record.dt), 1) == 0
     flank = np.tanh(torque / (_MESHING * np.median(np.abs(torque))))
-    own = np.column_stack(
-        [torque, flank, np.sign(velocity), velocity, acceleration, motor, np.ones(len(motor))]
-    )
+    beside = [] if record.carried else [np.sign(velocity), np.gradient(velocity, record.dt)]
+    own = np.column_stack([torque, flank, velocity, *beside, motor, np.ones(len(motor))])
     changes = int(np.count_nonzero(np.diff(np.sign(torque[moving]))))
     times = np.asarray(record.dt * np.flatnonzero(moving), dtype=np.float64)
     return own[moving], np.asarray((motor - link)[moving]), times, changes
@@ -182,7 +184,7 @@ def _joined(
 ) -> tuple[FloatArray, FloatArray, list[IntArray]]:
     """Put recordings below each other, with slopes and offsets of their own, and cut blocks."""
     rows = sum(len(twist) for _, twist, _, _ in pieces)
-    shared, count = 5, len(pieces)
+    shared, count = pieces[0][0].shape[1] - 2, len(pieces)
     table = np.zeros((rows, shared + 2 * count))
     blocks: list[IntArray] = []
     twist, at = np.empty(rows), 0

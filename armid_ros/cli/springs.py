@@ -1,0 +1,80 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Springs of any arm, joint by joint, for `armid elastic`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import json
+from pathlib import Path
+from typing import Any
+
+from armid_ros.arm import load_model
+from armid_ros.cli.terminal import progress, say
+from armid_ros.errors import RecordingError
+from armid_ros.identification.two_inertia.files import read_sides
+from armid_ros.identification.two_inertia.joints import fit_springs
+from armid_ros.identification.two_inertia.output import springs_document
+from armid_ros.recording.elastic_topics import LINK
+from armid_ros.report.provenance import hash_files, Provenance, versions
+from armid_ros.report.springs_report import springs_report
+from armid_ros.robots import Robot
+import click
+import numpy as np
+
+WITHOUT = (
+    'with encoders at the motors alone, `armid diagnose`, or `armid identify --effects '
+    '...,joint_elasticity`, looks for springs'
+)
+
+
+def identify_springs(
+    bags: Sequence[Path], robot: Robot, source: str, model: Path | None, out: Path, seed: int,
+    as_json: bool,
+) -> None:  # fmt: skip
+    """Fit springs to bags with both encoders of any arm, and write what was found."""
+    body = robot if model is None else load_model(model, robot).body
+    if not bags:
+        raise RecordingError('no bag is named; give one with encoders on both sides of the joints')
+    with progress('reading') as tick:
+        try:
+            sides = [read_sides(path, robot) for path in bags]
+        except RecordingError as error:
+            hint = f'; {WITHOUT}' if LINK in str(error) else ''
+            raise RecordingError(f'{error}{hint}') from None
+        tick(0.5, 'fitting')
+        found = fit_springs(body, sides, np.random.default_rng(seed))
+    document = springs_document(found, source)
+    out.mkdir(parents=True, exist_ok=True)
+    (out / 'elastic.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    provenance = Provenance(
+        files=hash_files(bags), versions=versions(), settings={'model': str(model or source)}
+    )
+    page = springs_report(found, robot.name, provenance=provenance)
+    (out / 'report.html').write_text(page, encoding='utf-8')
+    if as_json:
+        click.echo(json.dumps(document))
+        return
+    for joint in document['joints']:
+        say(_line(joint))
+    say(f'{out}: elastic.json, report.html')
+
+
+def _line(joint: dict[str, Any]) -> str:
+    """Return what was found of a joint in words."""
+    if not joint['told']:
+        return f'{joint["joint"]}: the twist does not follow the load; no stiffness is told'
+    low, high = joint['stiffness_interval']
+    parts = [f'{joint["stiffness"]:.4g} N m/rad ({low:.4g} to {high:.4g}, 95 %)']
+    if joint['backlash_seen']:
+        parts.append(f'backlash {joint["backlash"]:.2g} rad')
+    elif joint['correlation'] is None:
+        parts.append('too few reversals of load to see backlash')
+    else:
+        parts.append('no backlash seen')
+    if joint['rotor_inertia'] is not None:
+        parts.append(f'rotor {joint["rotor_inertia"]:.3g} kg m^2')
+    frequencies = f'antiresonance {joint["antiresonance_hz"]:.1f} Hz'
+    if joint['resonance_hz'] is not None:
+        frequencies += f', resonance {joint["resonance_hz"]:.1f} Hz'
+    return f'{joint["joint"]}: {"; ".join([*parts, frequencies])}'
