@@ -104,6 +104,10 @@ def _force(
     force[e:] -= pin.nonLinearEffects(rigid.robot.model, rigid.data, q, v[e:])
     if action.link_torque is not None:
         force[e:] -= action.link_torque(t, q, v[e:])
+    beyond = q - np.minimum(np.maximum(q, rigid.robot.lower), rigid.robot.upper)
+    if beyond.any():
+        stiffness, damping = plant.stops
+        force[e:] -= stiffness * beyond + np.where(beyond != 0.0, damping, 0.0) * v[e:]
     return force, memory
 
 

@@ -21,7 +21,7 @@ from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
 from armid_ros.simulation.box_complementarity import Modes
-from armid_ros.simulation.plant import limit_slack, Plant
+from armid_ros.simulation.plant import limit_slack, middle_position, Plant
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -60,10 +60,17 @@ class ElasticState:
     memory: FloatArray
 
 
+#: Natural frequency of a link against its stop, times the substep: soft enough to be integrated.
+_STOP = 0.1
+
+
 @dataclass(frozen=True, eq=False)
 class ElasticPlant:
     """
     An arm with elastic transmissions, ready to be integrated.
+
+    Links that pass the limits of the robot meet a damped spring there, of 32 Hz with the inertia
+    in the middle of the ranges at the usual step; they get some milliradians beyond.
 
     Attributes
     ----------
@@ -99,6 +106,7 @@ class ElasticPlant:
     sensing: Action = field(init=False, repr=False)
     pull: FloatArray = field(init=False, repr=False)
     loose: bool = field(init=False, repr=False)
+    stops: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Collect what the effects do on either side."""
@@ -140,6 +148,7 @@ class ElasticPlant:
             'rotors': to_motors.T @ rotors @ to_motors,
             'damping': to_motors.T @ rigid.damping @ to_motors + to_links.T @ link @ to_links,
             'sensing': _sensing(self.arm),
+            'stops': _stops(rigid),
             'friction': np.ascontiguousarray(rigid.contacts.directions @ to_motors),
         }
         for name, value in values.items():
@@ -207,7 +216,7 @@ class ElasticPlant:
         return torque if drive is None else drive(torque)
 
     def require_range(self, state: ElasticState) -> None:
-        """Raise TrajectoryError if a link is beyond a limit; there are no stops to hold it."""
+        """Raise TrajectoryError if a link is beyond a limit."""
         robot = self.rigid.robot
         slack = limit_slack(robot)
         beyond = (state.q < robot.lower - slack) | (state.q > robot.upper + slack)
@@ -217,6 +226,15 @@ class ElasticPlant:
                 f'{state.t:.3f} s, beyond its limits of {robot.lower[joint]:.4g} and '
                 f'{robot.upper[joint]:.4g}'
             )
+
+
+def _stops(rigid: Plant) -> tuple[FloatArray, FloatArray]:
+    """Return stiffness and damping of the stops, each of shape (n,) [N m/rad], [N m s/rad]."""
+    robot = rigid.robot
+    inertia = np.array(pin.crba(robot.model, rigid.data, middle_position(robot)))
+    free = 1.0 / np.diag(np.linalg.inv(inertia))
+    rate = _STOP / rigid.dt
+    return read_only(free * rate**2), read_only(1.4 * free * rate)
 
 
 def _sensing(arm: ArmModel) -> Action:

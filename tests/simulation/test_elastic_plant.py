@@ -198,3 +198,16 @@ def test_a_link_beyond_its_limit_is_reported_by_name() -> None:
     experiment = Experiment(np.array([12.4, 0.0]), np.tile([4.0, 0.0], (200, 1)))
     with pytest.raises(TrajectoryError, match="'joint1' reaches"):
         run_elastic(plant, loop, experiment)
+
+
+def test_a_link_that_is_pushed_against_its_limit_is_held_there() -> None:
+    plant = two_link_plant(SHIPPED.parameters)
+    limit = plant.robot.upper[0]
+    state = plant.state([limit - 0.2, 0.3])
+    farthest = 0.0
+    for _ in range(3000):
+        state = elastic_step(plant, state, np.array([50.0, 0.0]))
+        farthest = max(farthest, state.q[0])
+    assert limit < farthest < limit + 0.02
+    np.testing.assert_allclose(plant.link(state)[1], 0.0, atol=1e-3)
+    assert state.x[0] > 0.0  # the spring is wound up by what the motor still gives
