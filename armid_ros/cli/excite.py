@@ -69,6 +69,7 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
 )
 @click.option(
     '--share',
+    type=click.FloatRange(0.0, 1.0, min_open=True),
     default=0.1,
     show_default=True,
     help='Of the torque limits (multisine, rms) or of the velocity limits (steps).',
@@ -91,7 +92,13 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
     show_default=True,
     help=f'{", ".join(SPEED_CLASSES)}, or a share of the limits; several: a folder for each.',
 )
-@click.option('--criterion', type=click.Choice(list(CRITERIA)), default='D', show_default=True)
+@click.option(
+    '--criterion',
+    type=click.Choice(list(CRITERIA)),
+    default='D',
+    show_default=True,
+    help='; '.join(f'{name}: {what}' for name, what in CRITERIA.items()),
+)
 @click.option(
     '--target',
     type=click.Choice(list(TARGETS)),
@@ -183,9 +190,9 @@ def excite(
     as_json: bool,
 ) -> None:
     """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
+    refuse_other_options(click.get_current_context())
     robot = options.open_robot(robot_source, gravity, joints, after)
-    if kind != FOURIER:
-        refuse_other_options(click.get_current_context())
+    if kind in COURSES:
         write_course(kind, robot, duration, share, clearance, environment, seed, out)
         return
     arm = ArmModel(robot) if model is None else load_model(model, robot)

@@ -18,21 +18,22 @@ import numpy as np
 
 #: Each with what it is made of, and the options of armid excite that it takes.
 COURSES = {'multisine': multisine_course, 'steps': step_course}
-_TAKES = {
-    'robot_source', 'out', 'kind', 'share', 'duration', 'clearance', 'environment', 'gravity',
-    'joints', 'seed',
+#: Options that a course takes as well as a design, and that a course alone takes.
+_SHARED = {
+    'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'gravity', 'joints',
+    'seed',
 }  # fmt: skip
+_OWN = {'share'}
 
 
 def refuse_other_options(context: click.Context) -> None:
-    """Raise a UsageError where an option was given that only a designed trajectory takes."""
-    default = click.core.ParameterSource.DEFAULT
+    """Raise a UsageError where an option was given that does not go with the kind."""
+    kind, default = context.params['kind'], click.core.ParameterSource.DEFAULT
     for option in context.command.params:
         name = str(option.name)
-        if name not in _TAKES and context.get_parameter_source(name) is not default:
-            raise click.UsageError(
-                f'{option.opts[0]} does not go with --kind {context.params["kind"]}'
-            )
+        fits = name in _SHARED or (name in _OWN) == (kind in COURSES)
+        if not fits and context.get_parameter_source(name) is not default:
+            raise click.UsageError(f'{option.opts[0]} does not go with --kind {kind}')
 
 
 def write_course(

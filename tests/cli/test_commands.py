@@ -97,6 +97,8 @@ def test_what_shows_springs_is_followed_by_the_elastic_arm(tmp_path, kind, exper
 def test_options_of_a_design_do_not_go_with_steps(tmp_path):
     arguments = ('excite', '--robot', 'two_link_elastic', '--kind', 'steps', '--starts', 3)
     assert '--starts does not go' in armid(*arguments, '--out', tmp_path / 'o', code=2).stderr
+    arguments = ('excite', '--robot', ROBOT, '--share', 0.5, '--out', tmp_path / 'o')
+    assert '--share does not go with --kind fourier' in armid(*arguments, code=2).stderr
 
 
 @pytest.mark.parametrize(
