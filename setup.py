@@ -9,7 +9,15 @@ from setuptools import find_packages, setup
 
 HERE = Path(__file__).resolve().parent  # `colcon build --symlink-install` runs a link to this file
 NAME = 'armid_ros'
-NODES = ('bag_player', 'excitation_publisher', 'online_identifier', 'recorder', 'simulated_arm')
+NODES = (
+    'bag_player',
+    'excitation_publisher',
+    'interaction_identifier',
+    'online_identifier',
+    'recorder',
+    'simulated_arm',
+    'simulated_pair',
+)
 
 
 def requirements(group):

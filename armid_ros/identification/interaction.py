@@ -60,6 +60,8 @@ class Interaction:
         Standard deviation of the angles of both machines that was corrected for [rad].
     residual : ndarray, shape (N, n)
         Of the torques [N m].
+    misfit : float
+        Weighted squares of the residuals, one for each degree of freedom where all is right.
 
     """
 
@@ -69,6 +71,7 @@ class Interaction:
     torque_noise: FloatArray
     position_noise: FloatArray
     residual: FloatArray
+    misfit: float
 
     @property
     def stiffness(self) -> FloatArray:
@@ -132,7 +135,8 @@ def identify_interaction(
             f'{1e3 * problem.typical_way:.2g} mm; filter them, or move more'
         )
     freedom = max(1, problem.tau.size - len(theta))
-    excess = max(1.0, _loss(problem, theta, used) / freedom)
+    misfit = _loss(problem, theta, used)
+    excess = max(1.0, misfit / freedom)
     names = tuple(
         ParameterName('interaction_stiffness', joint, 'N/m') for joint in problem.spring_joints
     )
@@ -143,6 +147,7 @@ def identify_interaction(
         read_only(np.sqrt(used)),
         problem.position_noise,
         read_only(problem.residual(theta)),
+        misfit,
     )
 
 

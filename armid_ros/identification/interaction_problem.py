@@ -116,6 +116,7 @@ def interaction_problem(
     used: Conditioning | None = None,
     inertias: Inertias = 'known',
     separate: bool = False,
+    slack: float = 0.0,
 ) -> InteractionProblem:
     """
     Set up the regression on motions of both machines.
@@ -139,6 +140,8 @@ def interaction_problem(
         Whether the machine's inertias are those of its description or are estimated as well.
     separate : bool
         Whether every spring has a stiffness of its own, or all have one.
+    slack : float
+        Way that the springs give before they pull [m].
 
     Raises
     ------
@@ -155,8 +158,8 @@ def interaction_problem(
     kept = np.array(decimated_samples(len(motion), used) if used else range(len(motion)))
     slow, far = motion.select(kept), other_motion.select(kept)
     geometry = tie_geometry(robot, motion.q, other, other_motion.q, ties)
-    springs = geometry.columns
-    springs_by = _springs_by_motion(robot, slow, other, far, ties)
+    springs = geometry.pulled(slack)
+    springs_by = _springs_by_motion(robot, slow, other, far, ties, slack)
     if not separate:
         springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))
     count = springs_by.shape[3] // 3
@@ -225,10 +228,15 @@ def _told_apart(
 
 
 def _springs_by_motion(
-    robot: Robot, motion: Motion, other: Robot, other_motion: Motion, ties: Sequence[Tie]
+    robot: Robot,
+    motion: Motion,
+    other: Robot,
+    other_motion: Motion,
+    ties: Sequence[Tie],
+    slack: float,
 ) -> FloatArray:
     """Return the derivatives of the spring columns, shape (N, n, S, 3 J)."""
-    by_q, by_far = tie_columns_derivatives(robot, motion.q, other, other_motion.q, ties)
+    by_q, by_far = tie_columns_derivatives(robot, motion.q, other, other_motion.q, ties, slack)
     by_angles = np.concatenate([by_q, by_far], axis=3)
     return np.concatenate([by_angles, np.zeros_like(by_angles), np.zeros_like(by_angles)], axis=3)
 

@@ -44,6 +44,7 @@ def recorded_interaction_problem(
     settings: SignalSettings | None = None,
     inertias: Inertias = 'known',
     separate: bool = False,
+    slack: float = 0.0,
 ) -> InteractionProblem:
     """
     Set up the regression on recordings, the noise of their angles being measured in them.
@@ -66,6 +67,8 @@ def recorded_interaction_problem(
         Whether the machine's inertias are those of its description or are estimated as well.
     separate : bool
         Whether every spring has a stiffness of its own, or all have one.
+    slack : float
+        Way that the springs give before they pull [m].
 
     Raises
     ------
@@ -97,6 +100,7 @@ def recorded_interaction_problem(
             used=used,
             inertias=inertias,
             separate=separate,
+            slack=slack,
         )
         for stretch in segments(both, used)
     ]

@@ -17,13 +17,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from armid_ros.model.rigid_body import point_motion
+from armid_ros.model.rigid_body import points_motion
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
 #: Step of the central differences of spring columns [rad or m].
 _STEP = 1e-5
+#: A way so short that it has no direction [m].
+_SHORTEST = 1e-12
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,12 @@ class TieGeometry(NamedTuple):
         """Torque of the machine's actuators per stiffness, J^T D, shape (N, n, S) [m^2]."""
         return np.asarray(np.einsum('nsxj,nsx->njs', self.jacobian, self.way))
 
+    def pulled(self, slack: float) -> FloatArray:
+        """Return the columns of springs that give by a slack [m] before they pull, (N, n, S)."""
+        length = np.maximum(np.linalg.norm(self.way, axis=2), _SHORTEST)
+        share = np.maximum(1.0 - slack / length, 0.0)
+        return np.asarray(self.columns * share[:, np.newaxis])
+
     @property
     def other_columns(self) -> FloatArray:
         """Torque of the other machine's per stiffness, -J^T D, shape (N, m, S) [m^2]."""
@@ -124,38 +132,65 @@ def tie_geometry(
         If a tie names a joint that a machine does not have.
 
     """
-    near = [point_motion(robot, _known(robot, t.joint), t.point, q) for t in ties]
-    far = [point_motion(other, _known(other, t.other_joint), t.other_point, other_q) for t in ties]
-    position = np.stack([p for p, _ in near], axis=1)
-    other_position = np.stack([p for p, _ in far], axis=1)
+    position, jacobian = points_motion(
+        robot,
+        [_known(robot, tie.joint) for tie in ties],
+        np.array([tie.point for tie in ties]).reshape(-1, 3),
+        q,
+    )
+    other_position, other_jacobian = points_motion(
+        other,
+        [_known(other, tie.other_joint) for tie in ties],
+        np.array([tie.other_point for tie in ties]).reshape(-1, 3),
+        other_q,
+    )
     return TieGeometry(
-        position - other_position,
-        position,
-        other_position,
-        np.stack([j for _, j in near], axis=1),
-        np.stack([j for _, j in far], axis=1),
+        position - other_position, position, other_position, jacobian, other_jacobian
     )
 
 
 def tie_columns_derivatives(
-    robot: Robot, q: FloatArray, other: Robot, other_q: FloatArray, ties: Sequence[Tie]
+    robot: Robot,
+    q: FloatArray,
+    other: Robot,
+    other_q: FloatArray,
+    ties: Sequence[Tie],
+    slack: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Differentiate ``TieGeometry.columns`` by the positions of both machines.
+    Differentiate ``TieGeometry.pulled`` by the positions of both machines.
+
+    Parameters
+    ----------
+    robot, other : Robot
+        The machines.
+    q, other_q : ndarray, shape (N, n) and (N, m)
+        Their positions.
+    ties : sequence of Tie
+        Where the springs are.
+    slack : float
+        Way that they give before they pull [m].
 
     Returns
     -------
     by_q : ndarray, shape (N, n, S, n)
         By the machine's own positions, from central differences of 1e-5 rad.
     by_other_q : ndarray, shape (N, n, S, m)
-        By the other machine's; exact, -J^T J of the two ends.
+        By the other machine's; exact without slack, -J^T J of the two ends.
 
     """
     by_q = np.empty((len(q), robot.n_joints, len(ties), robot.n_joints))
     for j, step in enumerate(_STEP * np.eye(robot.n_joints)):
-        after = tie_geometry(robot, q + step, other, other_q, ties).columns
-        before = tie_geometry(robot, q - step, other, other_q, ties).columns
+        after = tie_geometry(robot, q + step, other, other_q, ties).pulled(slack)
+        before = tie_geometry(robot, q - step, other, other_q, ties).pulled(slack)
         by_q[..., j] = (after - before) / (2.0 * _STEP)
+    if slack > 0.0:
+        by_other = np.empty((*by_q.shape[:3], other.n_joints))
+        for j, step in enumerate(_STEP * np.eye(other.n_joints)):
+            after = tie_geometry(robot, q, other, other_q + step, ties).pulled(slack)
+            before = tie_geometry(robot, q, other, other_q - step, ties).pulled(slack)
+            by_other[..., j] = (after - before) / (2.0 * _STEP)
+        return by_q, by_other
     here = tie_geometry(robot, q, other, other_q, ties)
     return by_q, -np.einsum('nsxi,nsxj->nisj', here.jacobian, here.other_jacobian)
 

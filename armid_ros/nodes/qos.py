@@ -86,12 +86,14 @@ class MatchedSubscription:
         callback: Callable[[Any], None],
         *,
         raw: bool = False,
+        depth: int = DEPTH,
     ) -> None:
         """Subscribe at once if the topic has publishers; otherwise `match` does when it has."""
         self._node = node
         self._message_type = message_type
         self._callback = callback
         self._raw = raw
+        self._depth = depth
         self._profile: QoSProfile | None = None
         self.topic = node.resolve_topic_name(topic)
         self.subscription: Subscription | None = None
@@ -107,7 +109,7 @@ class MatchedSubscription:
         publishers = self._node.get_publishers_info_by_topic(self.topic)
         if not publishers:
             return
-        profile = matching(publishers)
+        profile = matching(publishers, self._depth)
         if profile == self._profile:
             return
         self.close()

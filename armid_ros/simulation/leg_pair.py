@@ -88,6 +88,10 @@ class TiedPair:
         """Return the pair with other springs, one number or one for each [N/m]."""
         return replace(self, stiffness=np.asarray(stiffness, dtype=float))
 
+    def with_slack(self, slack: npt.ArrayLike) -> TiedPair:
+        """Return the pair with looser ties, one number or one for each [m]."""
+        return replace(self, slack=np.asarray(slack, dtype=float))
+
     def geometry(self, motion: Motion, other_motion: Motion) -> TieGeometry:
         """Return the ties along the motions of both."""
         return tie_geometry(self.robot, motion.q, self.other, other_motion.q, self.ties)

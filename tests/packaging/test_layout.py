@@ -14,7 +14,15 @@ from ament_index_python import get_package_prefix, get_package_share_directory, 
 import armid_ros
 import pytest
 
-NODES = {'bag_player', 'excitation_publisher', 'online_identifier', 'recorder', 'simulated_arm'}
+NODES = {
+    'bag_player',
+    'excitation_publisher',
+    'interaction_identifier',
+    'online_identifier',
+    'recorder',
+    'simulated_arm',
+    'simulated_pair',
+}
 
 
 @pytest.fixture(autouse=True)

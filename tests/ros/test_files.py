@@ -14,9 +14,11 @@ from xml.etree import ElementTree
 from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import EXECUTOR
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
+from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
+from armid_ros.nodes.simulated_pair import SimulatedPairNode
 from armid_ros.robots import load_robot
 import pytest
 import yaml
@@ -25,9 +27,11 @@ ROOT = Path(__file__).parents[2]
 NODES = {
     'bag_player': BagPlayerNode,
     'excitation_publisher': ExcitationPublisherNode,
+    'interaction_identifier': InteractionIdentifierNode,
     'online_identifier': OnlineIdentifierNode,
     'recorder': RecorderNode,
     'simulated_arm': SimulatedArmNode,
+    'simulated_pair': SimulatedPairNode,
 }
 TABLES = {
     name: {parameter.name: parameter for parameter in (*node.table, EXECUTOR)}

@@ -1,0 +1,186 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The interaction identifier node: joint states of two machines in, what ties them out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from armid_msgs.msg import ParameterEstimate
+from armid_ros.errors import ArmidError
+from armid_ros.identification.interaction import Interaction
+from armid_ros.identification.interaction_online import InteractionSettings, OnlineInteraction
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.joint_states import JointOrder
+from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.process import run
+from armid_ros.nodes.qos import LATCHED, MatchedSubscription
+from armid_ros.simulation.leg_pair import leg_pair
+import numpy as np
+from rclpy.clock import Clock, ClockType
+from sensor_msgs.msg import JointState
+
+#: How often publishers of joint states are looked for [s].
+_LOOK_PERIOD = 0.1
+#: Messages held while an estimate is made: several seconds at 1 kHz.
+_DEPTH = 10_000
+
+
+class InteractionIdentifierNode(ArmidNode):
+    """
+    Finds what ties the exoskeleton to its wearer, from its torques and the angles of both.
+
+    Attributes
+    ----------
+    identifier : OnlineInteraction
+        Does it.
+    received : int
+        Joint states received of both.
+
+    """
+
+    table = (
+        NodeParameter('memory', 10.0, 'How much of the past counts.', 's', lower=3.0, upper=600.0),
+        NodeParameter('period', 2.0, 'Between estimates.', 's', lower=0.1, upper=600.0),
+        NodeParameter(
+            'slack_period',
+            30.0,
+            'Between looks for slack, where springs without do not explain the torques.',
+            's',
+            lower=1.0,
+            upper=3600.0,
+        ),
+        NodeParameter(
+            'inertias',
+            'known',
+            "Whether the machine's inertias are those of its description or estimated as well.",
+            choices=('known', 'free'),
+        ),
+    )
+
+    def __init__(self, identifier: OnlineInteraction | None = None, **kwargs: Any) -> None:
+        """Take the identifier; by default that of the shipped leg pair."""
+        super().__init__('interaction_identifier', **kwargs)
+        self.identifier = identifier or self._make_identifier()
+        self.received = 0
+        self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
+        core = self.identifier
+        self._orders = JointOrder(core.robot.joints), JointOrder(core.other.joints)
+        self._epoch: int | None = None
+        self.topics = tuple(
+            MatchedSubscription(self, JointState, topic, take, depth=_DEPTH)
+            for topic, take in (
+                ('exo/joint_states', self._on_machine),
+                ('human/joint_states', self._on_wearer),
+            )
+        )
+        self.offer('~/reset', self.reset)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_LOOK_PERIOD, self.match, clock=steady)
+
+    @property
+    def hardware(self) -> str:
+        """Name of the machine."""
+        return str(self.identifier.robot.name)
+
+    def match(self) -> None:
+        """Look at who publishes joint states."""
+        for topic in self.topics:
+            topic.match()
+
+    def reset(self) -> str:
+        """Forget everything."""
+        self.identifier.reset()
+        return 'the estimate begins anew'
+
+    def condition(self) -> tuple[str, Mapping[str, object]]:
+        """Say what ties the machines."""
+        core = self.identifier
+        values: dict[str, object] = {'received': self.received}
+        for part in (core.together, core.separate):
+            values |= _named(part)
+        if core.slack is not None:
+            values |= {'slack_mm': 1e3 * core.slack.value, 'slack_std_mm': 1e3 * core.slack.std}
+            values |= _named(core.slack.interaction, ' with slack')
+            if core.slack.seen:
+                return (
+                    f'interface_slack: straps give {1e3 * core.slack.value:.1f} mm before they '
+                    'pull; tighten them, or read the stiffness with slack'
+                ), values
+        if not self.received:
+            return 'no joint states so far', values
+        return '', values
+
+    def _on_wearer(self, message: JointState) -> None:
+        self.received += 1
+        try:
+            order = self._orders[1].map(message.name)
+        except ArmidError as error:
+            self.complaints.say('human/joint_states', str(error))
+            return
+        self.identifier.take_other(self._time(message), np.array(message.position)[order])
+
+    def _on_machine(self, message: JointState) -> None:
+        self.received += 1
+        try:
+            order = self._orders[0].map(message.name)
+            q, tau = np.array(message.position)[order], np.array(message.effort)[order]
+            if self.identifier.take(self._time(message), q, tau):
+                self._publish(message)
+        except (ArmidError, IndexError) as error:
+            self.complaints.say('exo/joint_states', str(error))
+
+    def _publish(self, message: JointState) -> None:
+        core = self.identifier
+        assert core.separate is not None
+        estimate = core.separate.estimate
+        self._estimates.publish(
+            ParameterEstimate(
+                header=message.header,
+                name=[f'{p.name}' for p in estimate.parameters],
+                joint=[p.joint for p in estimate.parameters],
+                unit=[p.unit for p in estimate.parameters],
+                value=estimate.values.tolist(),
+                std_dev=estimate.std.tolist(),
+                samples=len(core.separate.residual),
+            )
+        )
+
+    def _time(self, message: JointState) -> float:
+        stamp = message.header.stamp
+        if self._epoch is None:
+            self._epoch = stamp.sec
+        return float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec
+
+    def _make_identifier(self) -> OnlineInteraction:
+        pair = leg_pair()
+        settings = InteractionSettings(
+            self.value('memory'),
+            self.value('period'),
+            self.value('slack_period'),
+            self.value('inertias'),
+        )
+        return OnlineInteraction(pair.robot, pair.other, pair.ties, settings)
+
+
+def _named(found: Interaction | None, suffix: str = '') -> dict[str, object]:
+    """Return stiffnesses with their intervals, for diagnostics."""
+    if found is None:
+        return {}
+    values: dict[str, object] = {}
+    for segment, k, (lower, upper) in zip(
+        found.segments, found.stiffness, found.interval(), strict=True
+    ):
+        key = f'stiffness {segment} [N/m]{suffix}'
+        values |= {key: float(k), f'{key} lower': float(lower), f'{key} upper': float(upper)}
+    return values
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    run(InteractionIdentifierNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,176 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The simulated leg pair node: an exoskeleton and its wearer, each with its joint states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import math
+from pathlib import Path
+import time
+from typing import Any
+
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.parameters import names, NodeParameter
+from armid_ros.nodes.process import run
+from armid_ros.nodes.qos import STREAM
+from armid_ros.simulation.gait import read_gait
+from armid_ros.simulation.leg_pair import leg_pair, SEGMENTS
+from armid_ros.simulation.simulated_pair import PairSensors, SimulatedPair
+import numpy as np
+from rclpy.clock import Clock, ClockType
+from rclpy.publisher import Publisher
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+
+#: Longest stretch of work before services are answered, and backlog that is given up [s].
+_BURST = 0.005
+_BACKLOG = 0.2
+ALL = 'all'
+
+
+class SimulatedPairNode(ArmidNode):
+    """
+    The shipped leg pair, stepping to and fro, on exo/joint_states and human/joint_states.
+
+    A pair that has fallen, as all joints driven by torque in open loop do, says so and publishes
+    nothing more until ~/reset.
+
+    """
+
+    table = (
+        NodeParameter('gait', '', 'CSV of one leg over a cycle; empty: level walking.'),
+        NodeParameter('stiffness', 1e4, 'Of all springs.', 'N/m', lower=0.0, upper=1e6),
+        NodeParameter('segments', list(SEGMENTS), 'Where springs are; without names: none.'),
+        NodeParameter('slack', 0.0, 'Way before springs pull.', 'm', lower=0.0, upper=0.1),
+        NodeParameter(
+            'driven',
+            [''],
+            "Joints of the exoskeleton that follow torques, or 'all'; without names: none, all "
+            'move as the gait says.',
+        ),
+        NodeParameter('torque_rate', 100.0, 'Torque samples.', 'Hz', lower=10.0, upper=1000.0),
+        NodeParameter('angle_noise', 0.05, 'Standard deviation.', 'deg', lower=0.0, upper=10.0),
+        NodeParameter('torque_noise', 0.5, 'Standard deviation.', 'N m', lower=0.0, upper=100.0),
+        NodeParameter('seed', 0, 'Of the noise.', lower=0, upper=2**62),
+        NodeParameter('rate', 1000.0, 'Of both joint states.', 'Hz', lower=50.0, upper=5000.0),
+        NodeParameter(
+            'real_time_factor',
+            1.0,
+            'Simulated time per real time, if the computer can. 0: moves only when told.',
+            lower=0.0,
+            upper=1000.0,
+        ),
+    )
+
+    def __init__(
+        self, pair: SimulatedPair | None = None, start_ns: int | None = None, **kwargs: Any
+    ) -> None:
+        """
+        Make the node.
+
+        Parameters
+        ----------
+        pair : SimulatedPair, optional
+            By default the one the parameters describe.
+        start_ns : int, optional
+            Stamp of the beginning [ns]; by default that of the node's clock.
+        **kwargs
+            For rclpy's Node.
+
+        """
+        super().__init__('simulated_pair', **kwargs)
+        self.pair = pair or self._make_pair()
+        self._origin_ns = self.get_clock().now().nanoseconds if start_ns is None else start_ns
+        self._exo = self.create_publisher(JointState, 'exo/joint_states', STREAM)
+        self._human = self.create_publisher(JointState, 'human/joint_states', STREAM)
+        self._anchor = (time.monotonic(), 0.0)
+        self.offer('~/reset', self.reset)
+        factor = self.value('real_time_factor')
+        if factor:
+            period = max(1.0 / (self.value('rate') * factor), 0.0005)
+            self.create_timer(period, self.catch_up, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    @property
+    def hardware(self) -> str:
+        """Name of the machine."""
+        return str(self.pair.pair.robot.name)
+
+    @property
+    def stamp_ns(self) -> int:
+        """Stamp of the present state [ns]."""
+        return self._origin_ns + round(self.pair.t * 1e9)
+
+    def step(self) -> int:
+        """Move on to the next sample, publish it on both topics, and return its stamp [ns]."""
+        if self.pair.fallen:
+            return self.stamp_ns
+        sample = self.pair.advance()
+        robot, other = self.pair.pair.robot, self.pair.pair.other
+        for publisher, joints, parts in (
+            (self._human, other.joints, (sample.other_q, sample.other_dq)),
+            (self._exo, robot.joints, (sample.q, sample.dq, sample.tau)),
+        ):
+            self._publish(publisher, joints, parts)
+        return self.stamp_ns
+
+    def catch_up(self) -> None:
+        """Move as far as real time has, times the factor; what cannot be made up is given up."""
+        factor, now = self.value('real_time_factor'), time.monotonic()
+        due = self._anchor[1] + (now - self._anchor[0]) * factor
+        while self.pair.t < due and not self.pair.fallen and time.monotonic() - now < _BURST:
+            self.step()
+        if (due - self.pair.t) / factor > _BACKLOG:
+            self._anchor = (time.monotonic(), self.pair.t)
+
+    def reset(self) -> str:
+        """Put both back to where they began; time goes on."""
+        self._origin_ns = self.stamp_ns
+        self.pair.reset()
+        self._anchor = (time.monotonic(), 0.0)
+        return 'both are where they began'
+
+    def condition(self) -> tuple[str, Mapping[str, object]]:
+        """Say whether the pair still stands."""
+        values = {
+            'simulated_time': self.pair.t,
+            'off_the_gait_deg': math.degrees(self.pair.deviation),
+        }
+        if self.pair.fallen:
+            return f'fell after {self.pair.t:.2f} s, as an open loop does: call ~/reset', values
+        return '', values
+
+    def _publish(
+        self, publisher: Publisher, joints: tuple[str, ...], parts: Sequence[np.ndarray]
+    ) -> None:
+        message = JointState(name=list(joints))
+        message.header.stamp = Time(nanoseconds=self.stamp_ns).to_msg()
+        for field, values in zip(('position', 'velocity', 'effort'), parts, strict=False):
+            setattr(message, field, values.tolist())
+        publisher.publish(message)
+
+    def _make_pair(self) -> SimulatedPair:
+        pair = leg_pair(self.value('stiffness'), names(self, 'segments'))
+        pair = pair.with_slack(self.value('slack'))
+        driven = names(self, 'driven')
+        gait = self.value('gait')
+        return SimulatedPair(
+            pair,
+            read_gait(Path(gait) if gait else None),
+            driven=pair.robot.joints if driven == (ALL,) else driven,
+            torque_rate=self.value('torque_rate'),
+            rate=self.value('rate'),
+            sensors=PairSensors(
+                math.radians(self.value('angle_noise')), self.value('torque_noise')
+            ),
+            rng=np.random.default_rng(self.value('seed')),
+        )
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    run(SimulatedPairNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,72 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The leg pair on two topics, and what ties it, found from them."""
+
+from __future__ import annotations
+
+from armid_msgs.msg import ParameterEstimate
+from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
+from armid_ros.nodes.qos import LATCHED
+from armid_ros.nodes.simulated_pair import SimulatedPairNode
+import pytest
+from sensor_msgs.msg import JointState
+
+START_NS = 1_000 * 10**9
+
+
+def pair_node(bench, **parameters):
+    options = {'real_time_factor': 0.0, 'rate': 250.0, 'seed': 1, **parameters}
+    return bench.add(lambda **kw: SimulatedPairNode(start_ns=START_NS, **kw), **options)
+
+
+def test_both_machines_have_joint_states_with_one_stamp(bench):
+    exo = bench.listen(JointState, 'exo/joint_states')
+    human = bench.listen(JointState, 'human/joint_states')
+    node = pair_node(bench)
+    bench.spin_until(lambda: node._exo.get_subscription_count())
+    bench.spin_until(lambda: node._human.get_subscription_count())
+    for count in range(1, 6):
+        node.step()
+        bench.spin_until(lambda count=count: len(exo) == len(human) == count, 'joint states')
+    assert exo[-1].header.stamp == human[-1].header.stamp
+    assert exo[-1].header.stamp.sec == 1000
+    assert exo[-1].header.stamp.nanosec == 20_000_000
+    assert len(exo[-1].effort) == 6 and not human[-1].effort
+    assert all(name.startswith('exo_') for name in exo[-1].name)
+    assert all(name.startswith('human_') for name in human[-1].name)
+
+
+def test_springs_are_found_from_the_topics(bench):
+    estimates = bench.listen(ParameterEstimate, 'interaction_identifier/estimate', LATCHED)
+    learner = bench.add(InteractionIdentifierNode, memory=4.0)
+    node = pair_node(bench)
+    learner.match()
+    bench.spin_until(lambda: all(topic.publishers for topic in learner.topics), 'discovery')
+    while not estimates and node.pair.t < 6.0:
+        received = learner.received + 2
+        node.step()
+        bench.spin_until(lambda received=received: learner.received >= received, 'joint states')
+        bench.executor.spin_once(timeout_sec=0.0)
+    bench.spin_until(lambda: estimates, 'the estimate')
+    found = estimates[-1]
+    assert list(found.name) == ['interaction_stiffness'] * 4
+    assert found.joint[0] == 'exo_swing_knee'
+    for value, std in zip(found.value, found.std_dev, strict=True):
+        assert abs(value - 1e4) < 5.0 * std < 5e3
+    state = bench.diagnose(learner, bench.diagnostics())
+    values = {v.key: v.value for v in state.values}
+    assert float(values['stiffness all [N/m]']) == pytest.approx(1e4, rel=0.02)
+    assert state.level == state.OK
+
+
+def test_a_pair_that_fell_says_so_until_it_is_reset(bench):
+    node = pair_node(bench, driven=['all'], torque_rate=30.0)
+    diagnostics = bench.diagnostics()
+    while not node.pair.fallen and node.pair.t < 5.0:
+        node.step()
+    state = bench.diagnose(node, diagnostics)
+    assert state.level == state.WARN and 'open loop' in state.message
+    stamp = node.stamp_ns
+    assert node.step() == stamp
+    assert bench.call('simulated_pair/reset').success
+    assert not node.pair.fallen and node.step() > stamp
