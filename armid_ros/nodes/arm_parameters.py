@@ -54,7 +54,12 @@ ARM_PARAMETERS = (
     NodeParameter('velocity_from_encoder', False, 'Differentiate positions for the velocity.'),
     NodeParameter('torque_delay', 0, 'Steps by which torque is read late.', lower=0, upper=100000),
     NodeParameter(
-        'acceleration_noise', 0.0, 'Standard deviation; of links on springs.', 'm/s^2', lower=0.0
+        'acceleration_noise',
+        0.0,
+        'Standard deviation; of links on springs.',
+        'm/s^2',
+        lower=0.0,
+        upper=1000.0,
     ),
     NodeParameter(
         'loop_gain',
