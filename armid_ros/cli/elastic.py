@@ -25,7 +25,13 @@ from armid_ros.motion import FloatArray
 from armid_ros.report.elastic_report import elastic_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import load_robot, Robot
-from armid_ros.robots.two_link import planar_pair, ROBOT, two_link_set, TwoLinkSet
+from armid_ros.robots.two_link import (
+    planar_pair,
+    ROBOT,
+    two_link_set,
+    TwoLinkParameters,
+    TwoLinkSet,
+)
 from armid_ros.simulation.elastic_run import ElasticSensors, run_all
 from armid_ros.simulation.elastic_signals import (
     EXCITATION_RMS,
@@ -138,12 +144,13 @@ def elastic(
             progress=tick,
         )
         tick(1.0, 'drawing')
-        files = _draw(result, shipped, out)
+        known, table = _known(robot, shipped, start)
+        files = _draw(result, known, out)
         page = elastic_report(
             result,
             robot.name,
-            known=shipped.parameters,
-            source='Table 1 of the source, after tuning',
+            known=known,
+            source=table,
             provenance=Provenance(
                 files=hash_files([*bags, *steps]),
                 versions=versions(),
@@ -202,14 +209,26 @@ def _simulate(
     return (out / 'resonances',), (out / 'steps',)
 
 
-def _draw(result: TwoInertiaIdentification, shipped: TwoLinkSet, out: Path) -> list[str]:
+def _known(
+    robot: Robot, shipped: TwoLinkSet, start: str | None
+) -> tuple[TwoLinkParameters | None, str]:
+    """Return what the parameters are compared with, and where it comes from."""
+    if robot.name == ROBOT:
+        return shipped.parameters, 'Table 1 of the source, after tuning'
+    if start is not None:
+        return two_link_set(start).parameters, f"the set '{start}', which the tuning began with"
+    return None, ''
+
+
+def _draw(
+    result: TwoInertiaIdentification, known: TwoLinkParameters | None, out: Path
+) -> list[str]:
     from armid_ros.report.figures.elastic import bode_figure, comparison_figure, step_figure
     from armid_ros.report.figures.style import save_figure
 
-    figures = {
-        'bode.png': bode_figure(result),
-        'parameters.png': comparison_figure(result, shipped.parameters),
-    }
+    figures = {'bode.png': bode_figure(result)}
+    if known is not None:
+        figures['parameters.png'] = comparison_figure(result, known)
     if result.tuning is not None:
         figures['steps.png'] = step_figure(result.tuning)
     for name, figure in figures.items():

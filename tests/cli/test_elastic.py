@@ -78,6 +78,19 @@ def test_a_simulated_arm_on_springs_is_recorded_on_both_sides(tmp_path) -> None:
     np.testing.assert_allclose(spring[still], load[still], atol=0.02 * np.abs(load).max())
 
 
+def test_an_arm_that_is_not_the_shipped_one_is_not_compared_with_its_table(
+    folder, tmp_path
+) -> None:
+    urdf = tmp_path / 'mine.urdf'
+    text = load_robot('two_link_elastic').urdf
+    urdf.write_text(text.replace('name="two_link_elastic"', 'name="mine"'), encoding='utf-8')
+    arguments = [str(folder / 'resonances'), '--robot', str(urdf), '--out', str(tmp_path / 'out')]
+    result = CliRunner().invoke(elastic, arguments, catch_exceptions=False)
+    assert result.exit_code == 0
+    assert 'Table 1' not in (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
+    assert not (tmp_path / 'out' / 'parameters.png').exists()
+
+
 @pytest.mark.parametrize(
     'arguments, error, message',
     [
