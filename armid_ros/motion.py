@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from armid_ros.errors import RecordingError
 import numpy as np
@@ -43,6 +43,9 @@ class Motion:
     tau : ndarray, shape (N, n), or None
         Actuator torque [N m] or force [N], positive along the URDF joint axis; None when the
         motion is a reference that nobody measured.
+    band_hz : float
+        What positions that were measured have above this frequency is noise, as far as second
+        derivatives of torques go; infinite for a reference.
 
     """
 
@@ -52,6 +55,7 @@ class Motion:
     dq: FloatArray
     ddq: FloatArray
     tau: FloatArray | None = None
+    band_hz: float = field(default=np.inf, kw_only=True)
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check that their shapes agree."""

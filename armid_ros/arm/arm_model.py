@@ -142,6 +142,10 @@ class ArmModel:
         """Return what the rigid body takes along a motion of the links, shape (N, n) [N m]."""
         return inverse_dynamics(self.body, self.felt(motion))
 
+    def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
+        return inverse_dynamics_derivatives(self.body, self.felt(motion))
+
     def joint_torque(self, motion: Motion) -> FloatArray:
         """
         Return the true torques of a recorded motion: what sensors of no error would read.
@@ -237,7 +241,7 @@ class ArmModel:
 
         """
         link = self.link_motion(motion)
-        by_q, by_dq, by_ddq = inverse_dynamics_derivatives(self.body, self.felt(link))
+        by_q, by_dq, by_ddq = self.load_derivatives(link)
         columns = by_q @ change.q
         if not self.quasi_static:
             columns += by_dq @ change.dq + by_ddq @ change.ddq

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, pairwise, permutations, product
+from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
@@ -176,22 +177,27 @@ class _Remembering(ArmModel):
     """An arm that computes the torques of a motion once, for all effects that ask."""
 
     @cached_property
-    def _known(self) -> dict[tuple[str, int], tuple[Motion, FloatArray]]:
+    def _known(self) -> dict[tuple[str, int], tuple[Motion, Any]]:
         return {}
+
+    def _once(self, what: str, motion: Motion, compute: Callable[[Motion], Any]) -> Any:
+        key = what, id(motion)
+        if key not in self._known:
+            self._known[key] = motion, compute(motion)
+        return self._known[key][1]
 
     def load(self, motion: Motion) -> FloatArray:
         """Return what the rigid body takes, shape (N, n) [N m]."""
-        key = 'load', id(motion)
-        if key not in self._known:
-            self._known[key] = motion, super().load(motion)
-        return self._known[key][1].copy()
+        return np.array(self._once('load', motion, super().load))
+
+    def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
+        by_q, by_dq, by_ddq = self._once('derivatives', motion, super().load_derivatives)
+        return by_q, by_dq, by_ddq
 
     def joint_torque(self, motion: Motion) -> FloatArray:
         """Return the true torques of a recorded motion, shape (N, n) [N m]."""
-        key = 'torque', id(motion)
-        if key not in self._known:
-            self._known[key] = motion, super().joint_torque(motion)
-        return self._known[key][1].copy()
+        return np.array(self._once('torque', motion, super().joint_torque))
 
 
 def remembering(arm: ArmModel) -> ArmModel:

@@ -19,7 +19,7 @@ from armid_ros.diagnosis.fit import excited, fit
 from armid_ros.diagnosis.floor import Floor, noise_floor
 from armid_ros.diagnosis.gap import Gap, measure_gap
 from armid_ros.diagnosis.gate import check_data, Gate
-from armid_ros.diagnosis.model_search import as_described, explain, Explanation
+from armid_ros.diagnosis.model_search import as_described, explain, Explanation, no_worse
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict import decide, Finding, Verdict
 from armid_ros.diagnosis.where import locate, Where
@@ -36,7 +36,7 @@ Progress = Callable[[float, str], None]
 #: beyond is mostly noise, which a gap has to stand out of.
 _BANDS = 6.0
 #: Causes that a model as described may lack before a fit of everything is the better explanation.
-_FIXED_STEPS = 1
+_FIXED_STEPS = 3
 
 
 @dataclass(frozen=True)
@@ -168,6 +168,8 @@ def diagnose(
         tell(0.5, 'model fitted anew')
         chosen = explain(arm, data, sigma, base, settings, settings.most_steps)
         chosen = as_described(chosen, arm, data, sigma, settings)
+        if fixed.steps and no_worse(fixed.losses, chosen.losses, settings):
+            chosen = fixed
     tell(0.85, 'held-out gap')
     floors = [noise_floor(part, chosen.fitted.arm) for part in data]
     gap = measure_gap(chosen, data, floors, validate, used, settings.consistent_loss)

@@ -25,6 +25,9 @@ import numpy as np
 
 Progress = Callable[[float, str], None]
 
+#: A fit of all parameters that takes less than this of a joint's loss tells that they were right.
+_ALIKE = 1.05
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -135,8 +138,7 @@ def as_described(
         return explanation
     fitted = fit(arm, explanation.fitted.named, data, sigma, None)
     losses = joint_losses_of(fitted, data, sigma)
-    near = losses < np.maximum(settings.consistent_loss, 1.05 * explanation.losses)
-    if not np.all(near):
+    if not no_worse(losses, explanation.losses, settings):
         return explanation
     reference = fit(arm, (), data, sigma, None)
     before = joint_losses_of(reference, data, sigma)
@@ -148,6 +150,11 @@ def as_described(
         losses=losses,
         reference_losses=before,
     )
+
+
+def no_worse(described: FloatArray, fitted: FloatArray, settings: DiagnosisSettings) -> bool:
+    """Return whether a model as described leaves each joint no more than a fit of it does."""
+    return bool(np.all(described < np.maximum(settings.consistent_loss, _ALIKE * fitted)))
 
 
 def _start(named: Sequence[Named], steps: Sequence[Step], arm: ArmModel) -> list[FloatArray]:

@@ -23,6 +23,11 @@ import numpy.typing as npt
 #: A gain in rows too few for blocks to repeat, such as at the peaks where a drive saturates, is
 #: sure when it is this large in each half of a trajectory; noise alone gives some ten.
 _SPARSE_GAIN = 50.0
+#: Columns of which one part of the data has more than this share do nothing in the others, and
+#: nothing can be learned of them there: halves of that part are held out instead.
+_IN_ONE_PART = 0.999
+#: Values beyond a bound by this share of it are at the bound.
+_AT_BOUND = 0.1
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,9 @@ class Trial:
         How sure the gain of each part is.
     fold_values : ndarray, shape (F, p)
         Values without each part.
+    only : int or None
+        The one part of the data in which the columns do something, if there is but one; then its
+        halves are the parts that values are not taken from.
 
     """
 
@@ -80,6 +88,7 @@ class Trial:
     gains: FloatArray
     z: FloatArray
     fold_values: FloatArray
+    only: int | None
 
     @property
     def gain(self) -> float:
@@ -108,12 +117,21 @@ def screen(
         if visible < least_visible:
             continue
         values, std = solve_products(own, aim)
-        gain = 0.0
-        for a, b in zip(parts, target, strict=True):
-            v, _ = solve_products(own - a, aim - b)
-            gain += float(2.0 * v @ b - v @ a @ v)
+        gain = float(values @ aim)
+        raw = np.trace(problem.products[:, span, span], axis1=1, axis2=2)
+        if _only_part(raw) is None:
+            gain = 0.0
+            for a, b in zip(parts, target, strict=True):
+                v, _ = solve_products(own - a, aim - b)
+                gain += float(2.0 * v @ b - v @ a @ v)
         result.append(Score(group, values, std, gain, visible))
     return sorted(result, key=lambda score: -score.gain)
+
+
+def _only_part(sizes: FloatArray) -> int | None:
+    """Return the one part of the data that has columns with squares of these sums, if one has."""
+    largest = int(np.argmax(sizes))
+    return largest if sizes[largest] > _IN_ONE_PART * sizes.sum() else None
 
 
 def solve_products(own: FloatArray, aim: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -137,23 +155,31 @@ def try_group(
     """Look at a group row by row; columns are weighted, (R, n, p), free ones not taken out."""
     left = projection.rest(problem.y)
     own_columns = projection.rest(columns)
-    flat = own_columns.reshape(-1, columns.shape[2])
-    owner = np.repeat(problem.fold, problem.y.shape[1])
-    parts = np.array([flat[owner == k].T @ flat[owner == k] for k in range(problem.folds)])
-    aims = np.array([flat[owner == k].T @ left.ravel()[owner == k] for k in range(problem.folds)])
+    sizes = np.bincount(problem.fold, np.sum(columns**2, axis=(1, 2)))
+    only = _only_part(np.asarray(sizes, dtype=np.float64))
+    piece = problem.fold if only is None else _halves(problem.fold == only)
+    held = [(own_columns[piece == k], left[piece == k]) for k in range(int(piece.max()) + 1)]
+    parts = np.array([np.einsum('rnp,rnq->pq', c, c) for c, _ in held])
+    aims = np.array([np.einsum('rnp,rn->p', c, y) for c, y in held])
     own, aim = parts.sum(axis=0), aims.sum(axis=0)
     values, std = solve_products(own, aim)
     fold_values = np.array(
         [solve_products(own - a, aim - b)[0] for a, b in zip(parts, aims, strict=True)]
     )
-    held_out = np.einsum('rnp,rp->rn', own_columns, fold_values[problem.fold])
+    held_out = np.einsum('rnp,rp->rn', own_columns, fold_values[piece])
     gain = left**2 - (left - held_out) ** 2
     gains = np.array([gain[problem.fold == k].sum(axis=0) for k in range(problem.folds)])
     scored = Score(score.group, values, std, float(gains.sum()), score.visible)
     z = block_z(problem.fold, gain.sum(axis=1), settings.blocks)
     sparse = _in_both_halves(problem.fold, gain.sum(axis=1))
     z = np.where(sparse, np.maximum(z, 1.5 * settings.least_z), z)
-    return Trial(scored, own_columns @ values, held_out, gains, z, fold_values)
+    return Trial(scored, own_columns @ values, held_out, gains, z, fold_values, only)
+
+
+def _halves(where: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
+    """Return 1 and 2 for the rows of both halves of a part of the data, 0 for others."""
+    rows = np.cumsum(where)
+    return np.where(where, 1 + (2 * rows > rows[-1]), 0)
 
 
 def block_z(fold: npt.NDArray[np.intp], gain: FloatArray, blocks: int) -> FloatArray:
@@ -192,7 +218,7 @@ def within_bounds(score: Score) -> bool:
     """Return whether the values are physically possible, or differ from that by noise."""
     kept = list(score.group.kept)
     lower, upper = (bound[kept] for bound in score.group.effect.bounds())
-    slack = 3.0 * score.std
+    slack = 3.0 * score.std + _AT_BOUND * np.where(np.isfinite(upper), upper, 0.0)
     return bool(np.all(score.values > lower - slack) and np.all(score.values < upper + slack))
 
 
@@ -201,9 +227,12 @@ def replicated(trial: Trial, settings: DiagnosisSettings) -> bool:
     Return whether a gain is there in more than one part of the data.
 
     In two parts clearly; or in one beyond all doubt, the fast one as a rule, with another that
-    agrees and none that disagrees. The values never come from the part that is judged.
+    agrees and none that disagrees; or beyond all doubt in the only one that can show it. The
+    values never come from the part that is judged.
 
     """
+    if trial.only is not None:
+        return bool(trial.z[trial.only] >= 1.5 * settings.least_z)
     order = np.sort(trial.z)[::-1]
     if len(order) < 2:
         return bool(order[0] >= settings.least_z)

@@ -180,7 +180,7 @@ class ActuatorSaturation(TorqueReading):
         """Return shares of the highest torque that was measured."""
         tau = arm.joint_torque(motion) if motion.tau is None else motion.tau
         highest = np.maximum(np.max(np.abs(tau[:, self.indices(motion.joints)]), axis=0), 1e-3)
-        return (np.outer(highest, [0.5, 0.6, 0.7, 0.8, 0.9, 0.95]),)
+        return (np.outer(highest, [0.3, 0.4, *np.linspace(0.5, 0.95, 10)]),)
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return what the drives give of what they are asked for, and the reading."""

@@ -14,7 +14,7 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 #: Time constants after which a low-pass has forgotten what went in.
 _FORGOTTEN = 20.0
@@ -133,6 +133,20 @@ def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
             'motion of two samples or more'
         )
     return np.asarray(np.gradient(x, t, axis=0))
+
+
+def within_band(motion: Motion, x: FloatArray) -> FloatArray:
+    """
+    Take from torques that follow a motion what is beyond the band of the motion.
+
+    The second derivative of a torque is the fourth of positions, of which noise is the larger
+    part at high frequency. The filter goes forth and back, without a shift in time.
+
+    """
+    rate = (len(motion) - 1) / float(motion.t[-1] - motion.t[0])
+    if motion.band_hz >= 0.5 * rate:
+        return x
+    return np.asarray(sosfiltfilt(butter(3, motion.band_hz, fs=rate, output='sos'), x, axis=0))
 
 
 def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:

@@ -19,9 +19,10 @@ from armid_ros.effects.action import Action, Displacement, Transmission
 from armid_ros.effects.base import Quantity, Shape
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.readings import Displacing
-from armid_ros.effects.timing import low_pass, rate_of_change
+from armid_ros.effects.timing import low_pass, rate_of_change, within_band
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 if TYPE_CHECKING:
     from armid_ros.arm import ArmModel
@@ -50,7 +51,7 @@ class JointElasticity(Displacing):
 
     def displacements(self, motion: Motion, arm: ArmModel) -> Displacement:
         """Return minus the torque that twists the transmission, and its derivatives."""
-        load = arm.load(motion)
+        load = within_band(motion, arm.load(motion))
         (retardation,) = self.shape_over_joints(arm.robot)
         for joint in np.flatnonzero(retardation):
             load[:, joint] = low_pass(motion.t, load[:, joint], float(retardation[joint]))
@@ -76,23 +77,33 @@ class Backlash(Displacing):
     """
     Free play of a gear, q_link = q_motor - b / 2 on the flank that carries the load.
 
-    The load changes flanks as tanh(tau / tau_m), within a meshing torque tau_m that stands for
-    friction and film between the teeth. Confounded with presliding_hysteresis and with a spring
-    that hardens; reversals with and without load, or an encoder at the link, tell.
+    Where the load changes its sign the link leaves its flank and flies to the other one, with
+    the acceleration load / M_jj relative to the motor, and lands without a bounce. How wide the
+    gap is shows twice: in the size of the torque, which is linear in the play, and in the time
+    that a crossing takes, which is the shape; a gap has them equal. Confounded with
+    presliding_hysteresis and with a spring that hardens; reversals with and without load, or an
+    encoder at the link, tell.
+    Source: Nordin and Gutman 2002.
 
     """
 
     name = 'backlash'
     summary = 'free play of a gear'
     quantities = (Quantity('backlash', 'rad', lower=0.0, typical=(1e-4, 0.02)),)
-    shapes = (Shape('meshing_torque', 'N m', 1e-6, 1e4, 0.1, (0.01, 0.03, 0.1, 0.3, 1.0)),)
+    shapes = (Shape('crossing_width', 'rad', 1e-6, 1.0, 1e-3, tuple(1e-4 * 1.6 ** np.arange(12))),)
     linear = False
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: ArmModel) -> Displacement:
-        """Return minus half the side of the gap that the load lies on, and its derivatives."""
-        (meshing,) = self.shape_over_joints(arm.robot)
-        return _twist(self, motion, 0.5 * np.tanh(arm.load(motion) / meshing))
+        """Return minus the place of the motor in the gap, and its derivatives, over the gap."""
+        (width,) = self.shape_over_joints(arm.robot)
+        load = arm.load(motion)
+        inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
+        place = np.zeros(motion.q.shape)
+        for joint in self.indices(motion.joints):
+            pull = load[:, joint] / inertia[:, joint]
+            place[:, joint] = place_in_gap(motion.t, pull, float(width[joint]))
+        return _twist(self, motion, place / width)
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the gaps, and what encoders at the motors make of them."""
@@ -102,6 +113,29 @@ class Backlash(Displacing):
         rigid = np.full_like(gap, np.inf)
         gaps = Transmission(rigid, np.zeros_like(gap), gap / 2)
         return replace(super().action(values, arm), transmission=gaps)
+
+
+def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
+    """Return where between two stops something is that an acceleration pulls, shape (N,)."""
+    speed = cumulative_trapezoid(pull, t, initial=0.0)
+    way = cumulative_trapezoid(speed, t, initial=0.0)
+    side = 1.0 if pull[0] >= 0.0 else -1.0
+    place, start = np.empty(len(t)), 0
+    while start < len(t):
+        free = np.flatnonzero(pull[start:] * side < 0.0)
+        leave = start + int(free[0]) if len(free) else len(t)
+        place[start:leave] = 0.5 * side * width
+        if leave == len(t):
+            break
+        flown = way[leave:] - way[leave] - speed[leave] * (t[leave:] - t[leave])
+        flight = 0.5 * side * width + flown
+        landed = np.flatnonzero(np.abs(flight) > 0.5 * width)
+        length = max(int(landed[0]), 1) if len(landed) else len(flight)
+        place[leave : leave + length] = flight[:length]
+        start = leave + length
+        if start < len(t):
+            side = float(np.sign(flight[length]))
+    return place
 
 
 def _twist(effect: Displacing, motion: Motion, twist: FloatArray) -> Displacement:

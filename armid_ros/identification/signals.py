@@ -36,6 +36,9 @@ EDGE_PERIODS = 4.0
 SMOOTH_SAMPLES = 5.0
 #: Half length of the decimation filter in output samples; its edges are cut off.
 _HALF_TAPS = 4
+#: Second derivatives of torques, fourth of positions, are taken below this many bands of the
+#: motion: between two and five, elasticity is found all the same; at ten there is but noise.
+_CURVATURE_BANDS = 2.0
 #: Output samples that one matrix product makes; larger ones multiply more zeros of the band.
 _BLOCK = 8
 
@@ -120,7 +123,10 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
         crossing = max(_noise_crossing(recording) for recording in recordings)
-        band = MODEL_BANDS * max(_motion_band(recording, crossing) for recording in recordings)
+        band = MODEL_BANDS * max(
+            _motion_band(recording.q, sampling_rate(recording), crossing)
+            for recording in recordings
+        )
         decimation = decimation or max(1, int(rate / (2.5 * band)))
         cutoff = cutoff or min(max(crossing, band), 0.2 * rate)
     if cutoff >= 0.5 * rate:
@@ -221,7 +227,9 @@ def _differentiated(
     ddq = _central_difference(dq, t[1] - t[0])
     edge = int(np.ceil(EDGE_PERIODS * used.rate_hz / used.cutoff_hz))
     inner = slice(edge, len(t) - edge)
-    return Motion(joints, t[inner], smooth[inner], dq[inner], ddq[inner], tau[inner])
+    band = _CURVATURE_BANDS * _motion_band(smooth, used.rate_hz, used.cutoff_hz)
+    parts = (part[inner] for part in (smooth, dq, ddq, tau))
+    return Motion(joints, t[inner], *parts, band_hz=band)
 
 
 def _central_difference(x: FloatArray, step: float) -> FloatArray:
@@ -231,16 +239,15 @@ def _central_difference(x: FloatArray, step: float) -> FloatArray:
     return np.asarray(difference / (12.0 * step))
 
 
-def _motion_band(recording: Recording, noise_hz: float) -> float:
+def _motion_band(q: FloatArray, rate: float, noise_hz: float) -> float:
     """
     Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint.
 
     What is above a given frequency is noise and does not count.
 
     """
-    rate = sampling_rate(recording)
-    band = 1.0 / recording.duration
-    for position in recording.q.T:
+    band = rate / len(q)
+    for position in q.T:
         if np.ptp(position) > 0.0:
             frequency, power = signal.periodogram(np.diff(position), fs=rate)
             share = np.cumsum(power[frequency <= noise_hz])

@@ -21,7 +21,7 @@ import pytest
     ],
 )
 def test_a_gain_has_to_be_there_in_more_than_one_trajectory(z, counts):
-    trial = SimpleNamespace(z=np.array(z))
+    trial = SimpleNamespace(z=np.array(z), only=None)
     assert replicated(trial, DiagnosisSettings()) is counts
 
 

@@ -128,4 +128,4 @@ def test_the_search_for_a_level_begins_at_the_torques_that_were_measured(robot, 
     effect = make_effect('actuator_saturation', robot)
     (levels,) = effect.shape_grids(motion.with_torque(torque), ArmModel(robot))
     assert np.all(levels.max(axis=1) < np.arange(1.0, 7.0))
-    assert np.all(levels.min(axis=1) > 0.4 * np.arange(1.0, 7.0))
+    assert np.all(levels.min(axis=1) > 0.25 * np.arange(1.0, 7.0))

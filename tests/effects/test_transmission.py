@@ -4,6 +4,7 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
+from armid_ros.effects.transmission import place_in_gap
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
@@ -104,12 +105,20 @@ def test_rotors_turn_with_the_motors_and_links_with_the_links():
 
 
 def test_backlash_moves_the_link_to_the_flank_that_carries_the_load(robot, sines, with_values):
-    """In slow motion, where the weight decides: half the play to either side."""
+    """Where the weight decides and the gap is crossed at once: half the play to either side."""
     fine = sines(1.0, 500.0).at_rest()
-    arm = with_values('backlash', 0.01, [1e-3])
+    arm = with_values('backlash', 0.01, [1e-6])
     load = inverse_dynamics(robot, fine)
     link = arm.link_motion(fine)
-    loaded = np.abs(load) > 0.01
+    loaded = np.abs(load) > 0.1
     np.testing.assert_allclose(
         (fine.q - link.q)[loaded], (0.005 * np.sign(load))[loaded], atol=1e-9
     )
+
+
+def test_a_gap_is_crossed_in_the_time_that_the_load_takes():
+    """A load that turns round at a steady rate j flies x = j t^3 / 6 to the other flank."""
+    t, rate, width = np.linspace(-0.5, 0.5, 4001), 40.0, 1e-3
+    place = place_in_gap(t, rate * t, width)
+    flown = np.where(t > 0.0, rate * t**3 / 6.0, 0.0)
+    np.testing.assert_allclose(place, np.minimum(flown - 0.5 * width, 0.5 * width), atol=1e-6)

@@ -181,7 +181,10 @@ class Backlash(HiddenEffect):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('backlash', self.joint, self.width, 'rad'),)
+        return (
+            Parameter('backlash', self.joint, self.width, 'rad'),
+            Parameter('crossing_width', self.joint, self.width, 'rad'),
+        )
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         twist = add_twist(spec, self.joint)

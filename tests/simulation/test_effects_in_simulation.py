@@ -41,7 +41,7 @@ CASES = {
     'gravity_magnitude': (-1.0, None),
     'base_tilt': (0.05, None),
     'joint_elasticity': (3e-3, None),
-    'backlash': (0.005, [2.0]),
+    'backlash': (0.005, None),
     'torque_ripple': (0.1, [12.0]),
     'joint_spring': ([2.0, 0.3], None),
     'joint_coupling': (0.3, None),
@@ -68,7 +68,6 @@ COARSE = {
     'stribeck_friction': 2e-3,
     'load_dependent_friction': 3e-3,
     'joint_elasticity': 0.03,
-    'backlash': 0.02,
 }
 
 
@@ -112,7 +111,9 @@ def rms(x: FloatArray) -> float:
     return float(np.sqrt(np.mean(x**2)))
 
 
-@pytest.mark.parametrize('name', CATALOGUE)
+#: Links that land on a flank do so between samples of the reference: tests of hidden effects have
+#: them at the rate of a recording.
+@pytest.mark.parametrize('name', [name for name in CATALOGUE if name != 'backlash'])
 def test_what_is_recorded_is_what_the_model_predicts(humanoid, reference, name) -> None:
     arm = arm_with(humanoid, name)
     run = simulate(arm, reference, rng=np.random.default_rng(0))
