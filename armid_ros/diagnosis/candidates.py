@@ -19,6 +19,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
+from armid_ros.diagnosis.shapes import shape_starts
 from armid_ros.effects import Effect
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
@@ -35,9 +36,6 @@ _ALSO_JOINTS = ('time_delay',)
 #: Effects whose quantities stand for causes of their own. Together, the two of a saturation are
 #: the measured torque minus the model's: they would explain anything.
 _ALONE = {'actuator_saturation': ((0,), (1,)), 'soft_limit': ((0,), (1,))}
-#: Effects whose shape is a peak of the spectrum over the angle; peaks that are tried, and between
-#: which orders [1/rad]: below, it is gravity and springs; above, filters take it away.
-_PEAKS, _MOST_PEAKS, _ORDERS = ('torque_ripple',), 6, (3.0, 80.0)
 #: Effects that cost much and depend on position and velocity smoothly: their columns are computed
 #: at the rows.
 _SMOOTH = ('human_interaction', 'interface_slack')
@@ -95,8 +93,6 @@ def group_effects(
                     effect = kind.on(robot, pair)
                     yield effect, [effect]
             continue
-        if name in _SMOOTH and robot.n_joints == 1:
-            continue  # the same as a joint_spring
         try:
             whole = kind.on(robot)
         except ModelError:
@@ -113,13 +109,17 @@ def group_effects(
 
 
 def shaped(
-    effect: Effect, members: list[Effect], arm: ArmModel, data: Sequence[Trajectory]
+    effect: Effect,
+    members: list[Effect],
+    arm: ArmModel,
+    data: Sequence[Trajectory],
+    free: Sequence[FloatArray],
 ) -> Iterator[tuple[Effect, list[Effect]]]:
     """Yield an effect and its groups with every shape that a search starts from."""
     if not effect.shapes:
         yield effect, members
         return
-    grids = _grids(effect, arm, data)
+    grids = shape_starts(effect, arm, data, free)
     counts = [grid.shape[1] for grid in grids]
     together = len(set(counts)) == 1 and int(np.prod(counts)) > _MOST_SHAPES
     chosen = (
@@ -135,41 +135,6 @@ def shaped(
         rows = values if len(members) > 1 else [values.ravel()]
         whole = effect.with_shape(values)
         yield whole, [m.with_shape(row) for m, row in zip(members, rows, strict=True)]
-
-
-def _grids(effect: Effect, arm: ArmModel, data: Sequence[Trajectory]) -> tuple[FloatArray, ...]:
-    """Return where to start: extremes of all trajectories together, peaks of their spectrum."""
-    if effect.name in _PEAKS:
-        return (_orders(effect, arm, data),)
-    parts = [part.motion for part in data]
-    whole = Motion(
-        parts[0].joints,
-        np.concatenate([part.t for part in parts]),
-        *(np.concatenate([getattr(part, k) for part in parts]) for k in ('q', 'dq', 'ddq', 'tau')),
-    )
-    return effect.shape_grids(whole, arm)
-
-
-def _orders(effect: Effect, arm: ArmModel, data: Sequence[Trajectory]) -> FloatArray:
-    """
-    Return the orders at which the residual of all trajectories has its peaks, (owners, K).
-
-    The rows of all trajectories count together, as a ripple has one order and phase in all.
-
-    """
-    left = np.concatenate([part.residual(arm) * part.told for part in data])
-    q = np.concatenate([part.motion.q[part.rows] for part in data])
-    rows = []
-    for joint in effect.indices(arm.robot.joints):
-        step = 0.5 * np.pi / max(float(np.ptp(q[:, joint])), 0.1)
-        orders = np.arange(_ORDERS[0], _ORDERS[1], step)
-        wave = np.exp(-1j * np.outer(orders, q[:, joint]))
-        power = np.abs(wave @ (left[:, joint] - left[:, joint].mean())) ** 2
-        padded = np.concatenate([[0.0], power, [0.0]])
-        peaks = np.flatnonzero((power >= padded[:-2]) & (power > padded[2:]))
-        best = peaks[np.argsort(-power[peaks])[:_MOST_PEAKS]]
-        rows.append(np.resize(orders[best] if len(best) else orders[:1], _MOST_PEAKS))
-    return np.array(rows)
 
 
 @dataclass(frozen=True)
@@ -224,15 +189,18 @@ class Candidates:
 
 
 def candidates(
-    arm: ArmModel, data: Sequence[Trajectory], kinds: Sequence[type[Effect]]
+    arm: ArmModel,
+    data: Sequence[Trajectory],
+    kinds: Sequence[type[Effect]],
+    free: Sequence[FloatArray],
 ) -> Candidates:
-    """Compute the columns of every effect that the arm does not have."""
+    """Compute the columns of what the arm does not have, beside free ones (M, n, f)."""
     arm = remembering(arm)
     groups: list[Group] = []
     blocks: list[list[FloatArray]] = [[] for _ in data]
     start = 0
     for effect, members in group_effects(arm, kinds):
-        for whole, singles in shaped(effect, members, arm, data):
+        for whole, singles in shaped(effect, members, arm, data, free):
             for block, part in zip(blocks, data, strict=True):
                 block.append(effect_rows(arm, whole, part))
             for single in singles:

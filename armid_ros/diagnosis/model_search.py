@@ -85,7 +85,7 @@ def explain(
         if not gap and (survey is not None or base is None):
             break
         if found is None:
-            found = candidates(current.arm, data, settings.kinds)
+            found = candidates(current.arm, data, settings.kinds, current.columns)
             columns = [
                 np.concatenate(pair, axis=2)
                 for pair in zip(found.columns, current.columns, strict=True)

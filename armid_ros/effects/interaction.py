@@ -232,10 +232,39 @@ class InterfaceSlack(_Attached):
         for owner, shape in enumerate(self.shape_values):
             anchor, _ = self._from(t, reference[owner])
             way = positions[:, owner] - anchor - shape[3:6]
-            length = np.linalg.norm(way, axis=1, keepdims=True)
-            pull = way * np.maximum(1.0 - shape[6] / np.maximum(length, _SHORTEST), 0.0)
-            columns[:, :, owner] = np.einsum('nxj,nx->nj', jacobians[:, owner], pull)
+            columns[:, :, owner] = _pulled(way, jacobians[:, owner], shape[6])
         return columns
+
+    def columns_of_straps(
+        self, robot: Robot, q: FloatArray, anchors: FloatArray, slacks: FloatArray
+    ) -> FloatArray:
+        """
+        Return the torque per stiffness of many straps from the first attachment, (N, n, A).
+
+        Parameters
+        ----------
+        robot : Robot
+            The arm.
+        q : ndarray, shape (N, n)
+            Positions of the joints.
+        anchors : ndarray, shape (A, 3)
+            Fixed points of the base frame [m].
+        slacks : ndarray, shape (A,)
+            Their slacks [m].
+
+        """
+        positions, jacobians = self._points(robot, q)
+        straps = zip(anchors, slacks, strict=True)
+        return np.stack(
+            [_pulled(positions[:, 0] - a, jacobians[:, 0], slack) for a, slack in straps], axis=2
+        )
+
+
+def _pulled(way: FloatArray, jacobian: FloatArray, slack: float) -> FloatArray:
+    """Return the torque, over stiffness, of a strap as long as the way (N, 3), shape (N, n)."""
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    pull = way * np.maximum(1.0 - slack / np.maximum(length, _SHORTEST), 0.0)
+    return np.asarray(np.einsum('nxj,nx->nj', jacobian, pull))
 
 
 def _middle(robot: Robot) -> FloatArray:

@@ -9,13 +9,12 @@ from armid_ros.model.base_parameters import (
     regroup,
     rigid_base_parameters,
 )
+from armid_ros.model.kinematics import point_motion, points_motion
 from armid_ros.model.rigid_body import (
     gravity_sensitivity,
     inverse_dynamics,
     inverse_dynamics_derivatives,
     LINK_PARAMETERS,
-    point_motion,
-    points_motion,
     random_motion,
     regressor,
     rigid_parameter_names,

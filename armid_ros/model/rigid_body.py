@@ -10,13 +10,10 @@ Everything here is linear in the gravity vector and in the inertial parameters o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
 #: Inertial parameters of one link in Pinocchio's order: mass, first moments, inertia about the
@@ -132,78 +129,6 @@ def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
         for k, position in enumerate(q):
             columns[k, :, axis] = pin.computeGeneralizedGravity(model, data, position)
     return columns
-
-
-def point_motion(
-    robot: Robot, joint: str, offset: npt.ArrayLike, q: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """
-    Follow a point of a link.
-
-    Parameters
-    ----------
-    robot : Robot
-        The arm.
-    joint : str
-        The joint that moves the link.
-    offset : array_like, shape (3,)
-        The point in the frame of that joint [m].
-    q : ndarray, shape (N, n)
-        Joint positions.
-
-    Returns
-    -------
-    position : ndarray, shape (N, 3)
-        In the base frame [m].
-    jacobian : ndarray, shape (N, 3, n)
-        Derivative by the joint positions.
-
-    """
-    point = np.asarray(offset, dtype=np.float64)[np.newaxis]
-    positions, jacobians = points_motion(robot, [joint], point, q)
-    return positions[:, 0], jacobians[:, 0]
-
-
-def points_motion(
-    robot: Robot, joints: Sequence[str], offsets: FloatArray, q: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """
-    Follow points of links.
-
-    Parameters
-    ----------
-    robot : Robot
-        The arm.
-    joints : sequence of str
-        The joints that move the links, one of each of k points.
-    offsets : ndarray, shape (k, 3)
-        The points in the frames of those joints [m].
-    q : ndarray, shape (N, n)
-        Joint positions.
-
-    Returns
-    -------
-    positions : ndarray, shape (N, k, 3)
-        In the base frame [m].
-    jacobians : ndarray, shape (N, k, 3, n)
-        Derivatives by the joint positions.
-
-    """
-    model = robot.model
-    data = model.createData()
-    links = [model.getJointId(joint) for joint in joints]
-    points = list(zip(links, offsets, strict=True))
-    positions = np.empty((len(q), len(points), 3))
-    jacobians = np.empty((len(q), len(points), 3, robot.n_joints))
-    for k, configuration in enumerate(q):
-        pin.computeJointJacobians(model, data, configuration)
-        for i, (link, offset) in enumerate(points):
-            placement = data.oMi[link]
-            aligned = pin.getJointJacobian(model, data, link, pin.LOCAL_WORLD_ALIGNED)
-            lever = placement.rotation @ offset
-            positions[k, i] = placement.translation + lever
-            jacobians[k, i] = aligned[:3] - pin.skew(lever) @ aligned[3:]
-    return positions, jacobians
 
 
 def random_motion(robot: Robot, n_samples: int, rng: np.random.Generator) -> Motion:

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from armid_ros.model.rigid_body import points_motion
+from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
