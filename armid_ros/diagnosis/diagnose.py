@@ -23,6 +23,7 @@ from armid_ros.diagnosis.model_search import as_described, explain, Explanation,
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict import decide, Finding, Verdict
 from armid_ros.diagnosis.where import locate, Where
+from armid_ros.diagnosis.wrong_body import wrong_body
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.checks import check_motion
 from armid_ros.identification.signals import Conditioning, conditioning, MODEL_BANDS
@@ -170,6 +171,8 @@ def diagnose(
         chosen = as_described(chosen, arm, data, sigma, settings)
         if fixed.steps and no_worse(fixed.losses, chosen.losses, settings):
             chosen = fixed
+        elif not chosen.steps and np.all(chosen.losses < settings.consistent_loss):
+            chosen = wrong_body(chosen, arm, data, sigma, settings)
     tell(0.85, 'held-out gap')
     floors = [noise_floor(part, chosen.fitted.arm) for part in data]
     gap = measure_gap(chosen, data, floors, validate, used, settings.consistent_loss)

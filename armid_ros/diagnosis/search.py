@@ -18,6 +18,7 @@ from armid_ros.diagnosis.selection import (
     joint_losses,
     Score,
     screen,
+    SPARSE_GAIN,
     Trial,
     try_group,
 )
@@ -42,11 +43,16 @@ _AT_PEAKS, _PEAK_SHARE = ('actuator_saturation',), 0.2
 _OUTSIDE = 4
 #: Gains within this share of each other are alike; a lead of less than this share is none.
 _EQUAL, _LEAD = 0.98, 0.02
+#: A lead of this share that no part of the data denies is one, however few parts show it.
+_FAR = 0.25
+#: What contains a simpler cause is no rival of it, unless it gains this much more.
+_MORE = 1.1
 #: Shapes that the data give a good start of, and how far from it a search goes: of a peak of a
 #: spectrum [1/rev], of a level near the highest torque (far below it, it would be the torque).
 _NEAR = {'ripple_order': 1.0, 'saturation_torque': 0.08}
-#: How far from a peak of the spectrum its side lobes are looked at [1/rad].
-_LOBES = 3.0
+#: How far from a peak of the spectrum its side lobes are looked at [1/rad], and what is too slow
+#: for a ripple: gravity and springs are.
+_LOBES, _LOWEST_ORDER = 3.0, 3.0
 #: Rounds and evaluations per shape of a refinement.
 _GOLDEN, _ROUNDS = 7, 2
 
@@ -175,12 +181,12 @@ def next_step(
     if not passing:
         return None, survey, problem
     tied = [passing[0], *not_beaten(passing, problem, left, settings)]
-    winner = _likelier_body(simplest(tied), tied, work.arm)
+    winner = likelier_body(simplest(tied), tied, work.arm)
     rivals = tuple(
         t
         for t in tied
         if t is not winner
-        and not _contains(t, winner, problem, projection)
+        and not (t.gain < _MORE * winner.gain and _contains(t, winner, problem, projection))
         and not imitates(t, winner)
     )
     before = joint_losses(problem, left)
@@ -204,7 +210,7 @@ def simplest(tied: Sequence[Trial]) -> Trial:
     return min(close, key=lambda trial: order.get(trial.score.group.effect.name, len(order)))
 
 
-def _likelier_body(winner: Trial, tied: Sequence[Trial], arm: ArmModel) -> Trial:
+def likelier_body(winner: Trial, tied: Sequence[Trial], arm: ArmModel) -> Trial:
     """Return the link instead of a payload on it where descriptions are off by as much."""
     group = winner.score.group
     if group.effect.name != 'payload':
@@ -248,6 +254,8 @@ def not_beaten(
         z = block_z(problem.fold, lead.sum(axis=1), settings.blocks)
         worse = lead.sum() > _LEAD * best.gain
         beaten = worse and np.sum(z >= settings.rival_z) >= min(2, problem.folds)
+        far = lead.sum() > max(_FAR * best.gain, SPARSE_GAIN)
+        beaten |= far and bool(np.all(z > -settings.rival_z))
         alike = _cosine(best.torque, other.torque) > settings.same_cosine and not worse
         if not beaten or alike:
             result.append(other)
@@ -339,7 +347,7 @@ def _line_search(
 
     if kind.unit == '1/rev':  # side lobes beside the peak are almost as high
         scan = value + np.linspace(-_LOBES, _LOBES, 25)
-        value = max(scan[scan > kind.lower].tolist(), key=lambda x: gain(at(x)))
+        value = max(scan[scan > min(value, _LOWEST_ORDER)].tolist(), key=lambda x: gain(at(x)))
         low, high = value - 0.2, value + 0.2
     golden = (np.sqrt(5.0) - 1.0) / 2.0
     a, b = high - golden * (high - low), low + golden * (high - low)

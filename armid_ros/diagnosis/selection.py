@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 #: A gain in rows too few for blocks to repeat, such as at the peaks where a drive saturates, is
 #: sure when it is this large in each half of a trajectory; noise alone gives some ten.
-_SPARSE_GAIN = 50.0
+SPARSE_GAIN = 50.0
 #: Columns of which one part of the data has more than this share do nothing in the others, and
 #: nothing can be learned of them there: halves of that part are held out instead.
 _IN_ONE_PART = 0.999
@@ -200,7 +200,7 @@ def block_z(fold: npt.NDArray[np.intp], gain: FloatArray, blocks: int) -> FloatA
 def _in_both_halves(fold: npt.NDArray[np.intp], gain: FloatArray) -> npt.NDArray[np.bool_]:
     """Return for which folds a gain that comes in few rows comes in both halves, shape (F,)."""
     halves = [np.array_split(gain[fold == k], 2) for k in range(int(fold.max()) + 1)]
-    return np.array([min(part.sum() for part in pair) > _SPARSE_GAIN for pair in halves])
+    return np.array([min(part.sum() for part in pair) > SPARSE_GAIN for pair in halves])
 
 
 def excess(problem: Problem, left: FloatArray) -> FloatArray:
@@ -271,4 +271,6 @@ def acceptable(
     gains = trial.gains.sum(axis=0)
     whole = trial.gain >= settings.least_share * beyond[gap].sum() and gains[gap].sum() > 0.0
     one = bool(np.any(gap & (gains >= 0.3 * beyond)))
-    return bool(gap.any()) and (whole or one)
+    everywhere = len(trial.z) >= 3 and bool(np.all(trial.z >= settings.sure_z))
+    pooled = everywhere and trial.gain >= 0.3 * beyond.sum()
+    return (bool(gap.any()) and (whole or one)) or pooled

@@ -37,6 +37,9 @@ class DiagnosisSettings:
         of a gap is not what was missing.
     least_z : float
         Block z that a gain has to reach on a held-out trajectory to count as replicated.
+    sure_z : float
+        Block z of a gain in every part of the data that counts although no joint has a gap of its
+        own: a little of all joints.
     tautology : float
         A group that leaves a joint less than this share of its noise explains the noise itself:
         its columns are made of the measured torque.
@@ -62,6 +65,7 @@ class DiagnosisSettings:
     least_share: float = 0.10
     least_of_all: float = 0.0015
     least_z: float = 3.0
+    sure_z: float = 4.0
     tautology: float = 0.8
     rival_z: float = 2.0
     same_cosine: float = 0.95

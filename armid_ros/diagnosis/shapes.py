@@ -104,7 +104,7 @@ def _straps(
         anchors, slacks = _proposals(places)
         columns = rest(single.columns_of_straps(arm.robot, q[rows], anchors, slacks))
         own, aim = np.sum(columns**2, axis=0), columns.T @ target
-        gain = np.where(aim > 0.0, aim, 0.0) ** 2 / np.maximum(own, 1e-12 * own.max())
+        gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
         best = np.argsort(-gain)[:_STRAPS]
         starts.append([(*shape[:3], *anchors[k], slacks[k]) for k in best])
     return tuple(np.array(starts).transpose(2, 0, 1))

@@ -10,6 +10,10 @@ from armid_ros.motion import FloatArray
 import numpy as np
 
 
+#: A joint slower than this share of the top speed of its motion rests.
+_REST = 0.02
+
+
 @dataclass(frozen=True)
 class Hysteresis:
     """
@@ -60,7 +64,8 @@ class Hysteresis:
         """
         way = q @ self.directions.T
         states = np.empty_like(way)
-        states[0] = self.start(dq[0])
+        moves = np.abs(dq[0]) > _REST * np.abs(dq).max(axis=0)  # the rest is noise of a sensor
+        states[0] = self.start(np.where(moves, dq[0], 0.0))
         for element, distance in enumerate(self.distance):
             _slip(way[:, element], states[:, element], float(distance))
         return states
