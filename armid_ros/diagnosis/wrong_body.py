@@ -21,13 +21,23 @@ from armid_ros.diagnosis.fit import fit, Named
 from armid_ros.diagnosis.model_search import Explanation, joint_losses_of, no_worse
 from armid_ros.diagnosis.problem import make_problem, project
 from armid_ros.diagnosis.search import likelier_body, Step
-from armid_ros.diagnosis.selection import joint_losses, screen, Trial, try_group, within_bounds
+from armid_ros.diagnosis.selection import (
+    excess,
+    joint_losses,
+    replicated,
+    screen,
+    Trial,
+    try_group,
+    within_bounds,
+)
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
 
 #: Not a change of the body, but of what is said about its posture.
 _POSTURE = ('encoder_offset',)
+#: Share of what is beyond the noise that the one cause has to take, held out.
+_MOST = 0.5
 
 
 def wrong_body(
@@ -59,12 +69,14 @@ def wrong_body(
     found = candidates(arm, data, kinds, reference.columns)
     problem = make_problem(data, sigma, reference.residual, list(found.columns))
     projection, left = project(problem, ()), problem.y
+    total = float(excess(problem, left).sum())
     able: list[Trial] = []
     for score in screen(problem, projection, found.groups, settings.least_visible):
         columns = problem.x[:, :, score.group.columns]
         trial = try_group(problem, projection, score, columns, settings)
         after = joint_losses(problem, left - trial.torque)
-        if within_bounds(trial.score) and no_worse(after, fitted.losses, settings):
+        real = trial.gain > _MOST * total and replicated(trial, settings)
+        if real and within_bounds(trial.score) and no_worse(after, fitted.losses, settings):
             able.append(trial)
     if not able:
         return fitted

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from armid_ros.motion import FloatArray
 import numpy as np
 
-
 #: A joint slower than this share of the top speed of its motion rests.
 _REST = 0.02
 

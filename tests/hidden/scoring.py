@@ -59,7 +59,7 @@ class Outcome:
     findings : tuple of Finding
         What was named, most important first.
     closed : float
-        Share of the gap that is closed on held-out data; nan if not said.
+        Share of the explainable gap that is closed on motions never used; nan if they have none.
     before, after, floor : float
         Root mean square of the torque error over all joints, on held-out data [N m].
     seconds : float
@@ -258,8 +258,8 @@ def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
     removed = [j for j in judged if j.truth.kind == 'removed' and j.truth.visible]
     placed = [j for j in single if j.found and not j.whole_arm]
     sets = [len(j.found.names) for j in single if j.found]
-    closed = [j.outcome.closed for j in (*single, *pairs)]
-    closed = np.nan_to_num(np.array(closed, dtype=float), nan=0.0)
+    closed = [0.0 if j.outcome.error else j.outcome.closed for j in (*single, *pairs)]
+    closed = [share for share in closed if not np.isnan(share)]  # some never show it again
     errors = [error for j in single for error in j.parameter_errors()]
     sizes = np.array([size for size, _ in errors])
     seconds = np.array([j.outcome.seconds for j in judged])
