@@ -13,16 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import combinations, pairwise, permutations, product
-from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
+from armid_ros.diagnosis.remembering import remembering
 from armid_ros.diagnosis.shapes import shape_starts
 from armid_ros.effects import Effect
 from armid_ros.errors import ModelError
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 import numpy as np
 
 #: Effects whose joints are pairs, and which pairs are likely enough to be looked at.
@@ -135,39 +134,6 @@ def shaped(
         rows = values if len(members) > 1 else [values.ravel()]
         whole = effect.with_shape(values)
         yield whole, [m.with_shape(row) for m, row in zip(members, rows, strict=True)]
-
-
-@dataclass(frozen=True)
-class _Remembering(ArmModel):
-    """An arm that computes the torques of a motion once, for all effects that ask."""
-
-    @cached_property
-    def _known(self) -> dict[tuple[str, int], tuple[Motion, Any]]:
-        return {}
-
-    def _once(self, what: str, motion: Motion, compute: Callable[[Motion], Any]) -> Any:
-        key = what, id(motion)
-        if key not in self._known:
-            self._known[key] = motion, compute(motion)
-        return self._known[key][1]
-
-    def load(self, motion: Motion) -> FloatArray:
-        """Return what the rigid body takes, shape (N, n) [N m]."""
-        return np.array(self._once('load', motion, super().load))
-
-    def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
-        by_q, by_dq, by_ddq = self._once('derivatives', motion, super().load_derivatives)
-        return by_q, by_dq, by_ddq
-
-    def joint_torque(self, motion: Motion) -> FloatArray:
-        """Return the true torques of a recorded motion, shape (N, n) [N m]."""
-        return np.array(self._once('torque', motion, super().joint_torque))
-
-
-def remembering(arm: ArmModel) -> ArmModel:
-    """Return the arm, made to compute the torques of each motion once."""
-    return _Remembering(arm.robot, arm.effects, arm.values, arm.quasi_static)
 
 
 @dataclass(frozen=True)

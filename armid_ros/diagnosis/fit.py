@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
+from armid_ros.diagnosis.remembering import remembering
 from armid_ros.effects import Effect
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
@@ -225,7 +226,7 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _columns(state: _State, part: Trajectory, base: BaseParameters | None) -> FloatArray:
-    model, motion = state.model, part.motion
+    model, motion = remembering(state.model), part.motion
     blocks = [np.empty((len(motion), motion.n_joints, 0))]
     if base is not None:
         known = len(state.arm.parameters)
