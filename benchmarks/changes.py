@@ -55,10 +55,11 @@ COLOUR = 0.05
 #: What changes, and how soon it has to be seen [s].
 CHANGES = (
     *(f'payload:{_ball(mass)}' for mass in (0.1, 0.3, 1.0)),
-    'viscous_friction@elbow_pitch:viscous_coefficient=0.08',
-    'coulomb_friction@elbow_pitch:coulomb_torque=0.05',
+    'viscous_friction@elbow_pitch:viscous_coefficient=0.3',
+    'coulomb_friction@elbow_pitch:coulomb_torque=0.15',
     'coulomb_friction@shoulder_pitch:coulomb_torque=0.1',
     'viscous_friction@shoulder_roll:viscous_coefficient=0.3',
+    'coulomb_friction@elbow_pitch:coulomb_torque=0.05',  # no more than the model lacks
 )
 WANTED = 2.0
 SENSORS = Sensors(torque_noise=NOISE, resolution=2.0 * np.pi / 2**17)

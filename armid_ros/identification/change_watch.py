@@ -41,7 +41,7 @@ _CLEAR = 5.0
 #: For so long after a change its size is still being learned [s]; what is less likely than this
 #: share of it corrects the size.
 _LEARNING = 10.0
-_CORRECTION = 0.1
+_CORRECTION = 0.3
 
 
 @dataclass(frozen=True)

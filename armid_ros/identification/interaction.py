@@ -33,6 +33,8 @@ _FREE = 5
 _SETTLED = 25
 #: Steps below this share of a standard deviation end the iteration.
 _CONVERGED = 1e-3
+#: Samples over which errors may last after filtering.
+_LAGS = 6
 #: A step that overshoots is halved so many times.
 _HALVINGS = 10
 #: Of the residuals' mean square at least this share is the torques' own noise.
@@ -124,7 +126,7 @@ def identify_interaction(
         if given is None and iteration < _SETTLED:  # or the two chase each other
             share = 1.0 / max(1, iteration - _FREE)
             used = (1.0 - share) * used + share * _torque_variance(problem, theta)
-        step, information = _gauss_newton(problem, theta, used)
+        step, information, _ = _gauss_newton(problem, theta, used)
         step = _shortened(problem, theta, step, used)
         theta = theta + step
         if step @ information @ step < _CONVERGED**2 * len(step):
@@ -141,7 +143,7 @@ def identify_interaction(
         ParameterName('interaction_stiffness', joint, 'N/m') for joint in problem.spring_joints
     )
     return Interaction(
-        Estimate(names + problem.rigid, theta, excess * _inverse(information)),
+        Estimate(names + problem.rigid, theta, _covariance(problem, theta, used, excess)),
         read_only(uncorrected),
         problem.segments,
         read_only(np.sqrt(used)),
@@ -234,8 +236,8 @@ def _torque_variance(problem: InteractionProblem, theta: FloatArray) -> FloatArr
 
 def _gauss_newton(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the step of the parameters and their information matrix."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the step of the parameters, their information and every sample's score (N, P)."""
     by_motion = problem.sensitivity(theta)
     weighted = by_motion @ problem.motion_noise
     covariance = np.diag(variance) + weighted @ by_motion.transpose(0, 2, 1)
@@ -244,10 +246,33 @@ def _gauss_newton(
     columns = problem.columns + np.einsum('nipj,nj->nip', problem.columns_by_motion, correction)
     scaled = np.linalg.solve(covariance, columns)
     information = np.einsum('nip,niq->pq', columns, scaled)
-    gradient = np.einsum('nip,ni->p', columns, pull)
+    scores = np.einsum('nip,ni->np', columns, pull)
+    gradient = scores.sum(axis=0)
     size = np.sqrt(np.diag(information))
     step = np.linalg.solve(information / np.outer(size, size), gradient / size) / size
-    return np.asarray(step), np.asarray(information)
+    return np.asarray(step), np.asarray(information), np.asarray(scores)
+
+
+def _covariance(
+    problem: InteractionProblem, theta: FloatArray, variance: FloatArray, excess: float
+) -> FloatArray:
+    """
+    Return the covariance of the parameters at the solution.
+
+    Filtered samples are not independent of each other; where their scores add up to more than
+    independent ones would, deviations are widened (Newey and West 1987).
+
+    """
+    _, information, scores = _gauss_newton(problem, theta, variance)
+    independent = excess * _inverse(information)
+    squares = scores.T @ scores
+    for lag in range(1, _LAGS + 1):
+        product = (1.0 - lag / (_LAGS + 1.0)) * scores[lag:].T @ scores[:-lag]
+        squares = squares + product + product.T
+    inverse = _inverse(information)
+    lasting = np.diag(inverse @ squares @ inverse) / np.diag(independent)
+    factor = np.sqrt(np.maximum(lasting, 1.0))
+    return np.asarray(independent * np.outer(factor, factor))
 
 
 def _inverse(information: FloatArray) -> FloatArray:
