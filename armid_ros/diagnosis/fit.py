@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
-from armid_ros.diagnosis.remembering import remembering
-from armid_ros.effects import Effect
+from armid_ros.diagnosis.patch import Named, Patch, patch_columns
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.least_squares import solve
@@ -30,28 +29,6 @@ _EXCITED = 1e-4
 _MOST_ROUNDS = 4
 #: How far from its joint a link's mass may be without a word in the description [m].
 _REACH = 0.1
-#: Largest relative step of a shape in a round: the search has refined it already.
-_SHAPE_STEP = 0.1
-#: Relative step of the differences by a shape.
-_STEP = 1e-3
-
-
-@dataclass(frozen=True)
-class Named:
-    """
-    An effect that was named, as it is fitted.
-
-    Attributes
-    ----------
-    effect : Effect
-        Joints and shape.
-    kept : tuple of int
-        Its parameters that are free; the others are zero.
-
-    """
-
-    effect: Effect
-    kept: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -128,13 +105,13 @@ def fit(
 
     """
     values = list(start) or [np.zeros(len(n.effect.parameters(arm.robot))) for n in named]
-    state = _State(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
+    state = Patch(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
     pull = np.zeros((0, 0)) if base is None else _described(base, arm)
     residual = _residuals(state.model, data)
     loss = _loss(residual, data, sigma)
     rounds = _MOST_ROUNDS if named else int(base is not None)
     for _ in range(rounds):
-        columns = [_columns(state, part, base) for part in data]
+        columns = [patch_columns(state, part, base) for part in data]
         step = _step(columns, residual, data, sigma, pull, state.change)
         moved, after = state, residual
         for share in (1.0, 0.5, 0.2):
@@ -148,7 +125,7 @@ def fit(
         state, residual, loss = moved, after, new
         if settled:
             break
-    columns = [_columns(state, part, base) for part in data]
+    columns = [patch_columns(state, part, base) for part in data]
     size = 0 if base is None else base.rank
     names, numbers = state.parameters()
     covariance = np.zeros((size, size))
@@ -161,103 +138,6 @@ def fit(
         tuple(residual),
         tuple(columns),
     )
-
-
-@dataclass(frozen=True)
-class _State:
-    arm: ArmModel
-    named: tuple[Named, ...]
-    values: tuple[FloatArray, ...]
-    change: FloatArray
-
-    @property
-    def model(self) -> ArmModel:
-        model = self.arm
-        for own, values in zip(self.named, self.values, strict=True):
-            model = model.with_effect(own.effect, values)
-        return model
-
-    def moved(self, change: FloatArray, base: BaseParameters | None) -> _State:
-        """Return the state after a step of all that is free, within bounds."""
-        arm, start = self.arm, 0
-        if base is not None:
-            theta = arm.theta
-            lifted = base.lift(base.values(theta) + change[: base.rank], theta)
-            arm, start = arm.with_theta(lifted), base.rank
-        named, values = [], []
-        for own, old in zip(self.named, self.values, strict=True):
-            effect, kept = own.effect, list(own.kept)
-            lower, upper = effect.bounds()
-            new = old.copy()
-            new[kept] += change[start : start + len(kept)]
-            values.append(np.clip(new, lower, upper))
-            start += len(kept)
-            count = len(effect.shape)
-            if count:
-                low, high, step = _shape_bounds(effect)
-                shape = np.array(effect.shape)
-                limit = np.maximum(_SHAPE_STEP * np.abs(shape), 30.0 * step)
-                shape = shape + np.clip(change[start : start + count], -limit, limit)
-                effect = effect.with_shape(np.clip(shape, low, high))
-                start += count
-            named.append(Named(effect, own.kept))
-        return _State(arm, tuple(named), tuple(values), self.change + change[: len(self.change)])
-
-    def parameters(self) -> tuple[tuple[ParameterName, ...], FloatArray]:
-        """Name the free parameters of the named effects, shapes behind quantities."""
-        names: list[ParameterName] = []
-        numbers: list[float] = []
-        for own, values in zip(self.named, self.values, strict=True):
-            all_names = own.effect.parameters(self.arm.robot)
-            names += [all_names[k] for k in own.kept]
-            numbers += [float(values[k]) for k in own.kept]
-            names += own.effect.shape_parameters(self.arm.robot)
-            numbers += list(own.effect.shape)
-        return tuple(names), np.array(numbers)
-
-
-def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return bounds of a shape and steps for differences, per value."""
-    owners = len(effect.owners)
-    low = np.tile([s.lower for s in effect.shapes], owners)
-    high = np.tile([s.upper for s in effect.shapes], owners)
-    size = np.tile([max(abs(s.default), 1e-3) for s in effect.shapes], owners)
-    return low, high, _STEP * np.maximum(np.abs(np.array(effect.shape)), 0.1 * size)
-
-
-def _columns(state: _State, part: Trajectory, base: BaseParameters | None) -> FloatArray:
-    model, motion = remembering(state.model), part.motion
-    blocks = [np.empty((len(motion), motion.n_joints, 0))]
-    if base is not None:
-        known = len(state.arm.parameters)
-        own = [model.rigid_columns(motion)]
-        own += [model.columns_of(effect, motion) for effect in state.arm.effects]
-        blocks.append(np.concatenate(own, axis=2)[:, :, :known][:, :, base.independent])
-    first = len(state.arm.effects)
-    for position, named in enumerate(state.named):
-        effect = named.effect
-        blocks.append(model.columns_of(effect, motion)[:, :, list(named.kept)])
-        if effect.shape:
-            low, high, step = _shape_bounds(effect)
-            shape = np.array(effect.shape)
-            ends = []
-            for sign in (1.0, -1.0):
-                for index in range(len(shape)):
-                    moved = shape.copy()
-                    moved[index] = np.clip(
-                        shape[index] + sign * step[index], low[index], high[index]
-                    )
-                    effects = list(model.effects)
-                    effects[first + position] = effect.with_shape(moved)
-                    shifted = replace(model, effects=tuple(effects))
-                    ends.append((moved[index], shifted.torque(motion)))
-            count = len(shape)
-            slopes = [
-                (ends[k][1] - ends[count + k][1]) / max(ends[k][0] - ends[count + k][0], 1e-12)
-                for k in range(count)
-            ]
-            blocks.append(np.stack(slopes, axis=2))
-    return part.reduce(np.concatenate(blocks, axis=2))
 
 
 def _residuals(model: ArmModel, data: Sequence[Trajectory]) -> list[FloatArray]:

@@ -10,10 +10,12 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.candidates import Candidates, candidates, effect_rows
 from armid_ros.diagnosis.evidence import Trajectory
-from armid_ros.diagnosis.fit import fit, Fitted, Named
+from armid_ros.diagnosis.fit import fit, Fitted
+from armid_ros.diagnosis.patch import Named
 from armid_ros.diagnosis.problem import make_problem, Problem, project, Projection
+from armid_ros.diagnosis.refine import Workspace
 from armid_ros.diagnosis.remembering import remembering
-from armid_ros.diagnosis.search import imitates, next_step, not_beaten, Step, Survey, Workspace
+from armid_ros.diagnosis.search import imitates, next_step, not_beaten, Step, Survey
 from armid_ros.diagnosis.selection import (
     acceptable,
     joint_losses,

@@ -17,8 +17,9 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.candidates import candidates
 from armid_ros.diagnosis.evidence import Trajectory
-from armid_ros.diagnosis.fit import fit, Named
+from armid_ros.diagnosis.fit import fit
 from armid_ros.diagnosis.model_search import Explanation, joint_losses_of, no_worse
+from armid_ros.diagnosis.patch import Named
 from armid_ros.diagnosis.problem import make_problem, project
 from armid_ros.diagnosis.search import likelier_body, Step
 from armid_ros.diagnosis.selection import (
