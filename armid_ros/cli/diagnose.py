@@ -15,6 +15,8 @@ from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings, next_run
 from armid_ros.excitation import save_excitation
 from armid_ros.identification import SignalSettings
+from armid_ros.identification.signals import conditioning
+from armid_ros.identification.verification import ForwardValidation, simulate_held_out
 from armid_ros.report.diagnosis_report import diagnosis_report
 import click
 import numpy as np
@@ -80,7 +82,15 @@ def diagnose(
             rng=np.random.default_rng(seed),
             progress=tick,
         )
+        forward: tuple[ForwardValidation, ...] = ()
+        left_out: tuple[str, ...] = ()
+        if held_out and result.gap is not None:
+            used = conditioning(recordings, settings.signals)
+            forward, left_out = simulate_held_out(
+                arm, result.arm, used, held_out, progress=lambda _, what: tick(1.0, what)
+            )
     document = diagnosis_document(result)
+    document['forward'] = [pair.document() for pair in forward]
     out.mkdir(parents=True, exist_ok=True)
     save_model(out / 'model.yaml', result.arm, options.kept_source(robot_source, robot, out))
     page = diagnosis_report(
@@ -88,6 +98,7 @@ def diagnose(
         robot=robot_source,
         recordings=recordings,
         validation=held_out,
+        forward=forward,
         patch=(out / 'model.yaml').read_text(encoding='utf-8'),
         provenance=provenance([*bags, *validate], seed=seed),
     )
@@ -100,6 +111,10 @@ def diagnose(
         click.echo(json.dumps(document))
         return
     _show(result, out)
+    for pair in forward:
+        say(pair.sentence())
+    for note in left_out:
+        say(f'note: {note}')
 
 
 def _show(result: Diagnosis, out: Path) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.bodies import as_bodies
 from armid_ros.diagnosis.evidence import trajectories, Trajectory
 from armid_ros.diagnosis.fit import excited, fit
 from armid_ros.diagnosis.floor import Floor, noise_floor
@@ -175,6 +176,8 @@ def diagnose(
             chosen = fixed
         elif not chosen.steps and np.all(chosen.losses < settings.consistent_loss):
             chosen = wrong_body(chosen, arm, data, sigma, settings)
+    chosen, remarks = as_bodies(chosen, arm, data, sigma, settings)
+    notes += remarks
     tell(0.85, 'held-out gap')
     floors = [noise_floor(part, chosen.fitted.arm) for part in data]
     gap = measure_gap(chosen, data, floors, validate, used, settings.consistent_loss)

@@ -19,6 +19,7 @@ from armid_ros.errors import ArmidError
 from armid_ros.identification.consistency import check_noise, NoiseCheck
 from armid_ros.identification.forward import forward_validation, ForwardScore
 from armid_ros.identification.identify import Identification
+from armid_ros.identification.signals import Conditioning
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -45,6 +46,14 @@ class ForwardValidation:
 
     before: ForwardScore | None
     after: ForwardScore
+
+    def sentence(self) -> str:
+        """Say how far the simulations are off."""
+        before = '' if self.before is None else f'{self.before.worst} before, '
+        return (
+            f'simulated in closed loop along {np.ptp(self.after.motion.t):.0f} s of '
+            f'{self.after.source}: position error at most {before}{self.after.worst} after'
+        )
 
     def document(self) -> dict[str, Any]:
         """Return the errors for programs to read."""
@@ -79,14 +88,7 @@ class Verification:
     def sentences(self) -> tuple[str, ...]:
         """Say in words what was found."""
         said = [] if self.noise is None else [*self.noise.sentences()]
-        for pair in self.forward:
-            after = pair.after
-            before = '' if pair.before is None else f'{pair.before.worst} before, '
-            said.append(
-                f'simulated in closed loop along {np.ptp(after.motion.t):.0f} s of '
-                f'{after.source}: position error at most {before}{after.worst} after'
-            )
-        return (*said, *self.left_out)
+        return (*said, *(pair.sentence() for pair in self.forward), *self.left_out)
 
 
 def verify(
@@ -131,33 +133,63 @@ def verify(
         )
     except (ArmidError, np.linalg.LinAlgError) as error:
         left_out.append(f'not tested for encoder noise: {error}')
-    forward = []
+    forward, missing = simulate_held_out(
+        description, result.arm, result.used, held_out, progress=progress
+    )
+    return Verification(noise, forward, (*left_out, *missing))
+
+
+def simulate_held_out(
+    before: ArmModel,
+    after: ArmModel,
+    used: Conditioning,
+    held_out: Sequence[Recording],
+    *,
+    progress: Callable[[float, str], None] = lambda share, what: None,
+) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
+    """
+    Simulate two models in closed loop along held-out recordings.
+
+    Parameters
+    ----------
+    before, after : ArmModel
+        What was believed, and what was found; the second one gives the feedback of both.
+    used : Conditioning
+        Filters.
+    held_out : sequence of Recording
+        Data that neither was fitted to.
+    progress : callable, optional
+        Told the share that is done, 0 to 1, and what is being done.
+
+    Returns
+    -------
+    pairs : tuple of ForwardValidation
+        One a recording that could be simulated.
+    left_out : tuple of str
+        What was not done, and why.
+
+    """
     if not held_out:
-        left_out.append('not simulated: no recording was held out')
-    elif result.arm.quasi_static:
-        left_out.append('not simulated: a quasi-static model has no inertia')
-        held_out = ()
-    duration = min(LONGEST, SIMULATED / max(1, len(held_out)))
+        return (), ('not simulated: no recording was held out',)
+    if after.quasi_static:
+        return (), ('not simulated: a quasi-static model has no inertia',)
+    pairs: list[ForwardValidation] = []
+    left_out: list[str] = []
+    duration = min(LONGEST, SIMULATED / len(held_out))
     for index, recording in enumerate(held_out):
         progress(index / len(held_out), 'simulating held-out recordings')
         try:
-            after = _simulated(result.arm, result, recording, duration)
+            patched = forward_validation(after, recording, used, nominal=after, duration=duration)
         except ArmidError as error:
             left_out.append(f'{recording.source}: not simulated: {error}')
             continue
+        plain = None
         try:
-            before = _simulated(description, result, recording, duration)
+            plain = forward_validation(before, recording, used, nominal=after, duration=duration)
         except ArmidError as error:
             left_out.append(f'{recording.source}: the description is not simulated: {error}')
-            before = None
-        forward.append(ForwardValidation(before, after))
-    return Verification(noise, tuple(forward), tuple(left_out))
-
-
-def _simulated(
-    arm: ArmModel, result: Identification, recording: Recording, duration: float
-) -> ForwardScore:
-    return forward_validation(arm, recording, result.used, nominal=result.arm, duration=duration)
+        pairs.append(ForwardValidation(plain, patched))
+    return tuple(pairs), tuple(left_out)
 
 
 def _errors(score: ForwardScore) -> dict[str, dict[str, float]]:

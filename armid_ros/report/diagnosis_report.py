@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.diagnosis import Diagnosis
+from armid_ros.identification.verification import ForwardValidation
 from armid_ros.recording import Recording
 from armid_ros.report.notation import counted
 from armid_ros.report.page import Page, Section
@@ -14,6 +15,7 @@ from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.candidates import CandidateTable
 from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
 from armid_ros.report.sections.evidence import Evidence
+from armid_ros.report.sections.forward import Forward
 from armid_ros.report.sections.gap import GapBars, GapOverlay
 from armid_ros.report.sections.named import NamedParameters
 from armid_ros.report.sections.next_steps import NextSteps
@@ -31,6 +33,7 @@ def diagnosis_report(
     robot: str,
     recordings: Sequence[Recording],
     validation: Sequence[Recording] = (),
+    forward: Sequence[ForwardValidation] = (),
     patch: str = '',
     provenance: Provenance | None = None,
 ) -> str:
@@ -47,6 +50,8 @@ def diagnosis_report(
         Data that were looked at.
     validation : sequence of Recording
         Data that were only predicted.
+    forward : sequence of ForwardValidation
+        Those data simulated, with the model as it was and as it is patched.
     patch : str
         model.yaml of the patched model.
     provenance : Provenance, optional
@@ -76,6 +81,8 @@ def diagnosis_report(
     sections.append(NextSteps(_next_steps(diagnosis)))
     if diagnosis.findings:
         sections.append(NamedParameters(diagnosis.findings))
+    if forward:
+        sections.append(Forward(diagnosis.arm.robot, forward, ('as it was', 'patched')))
     sections.append(
         DataQuality(
             [

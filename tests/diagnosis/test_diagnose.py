@@ -7,6 +7,8 @@ import json
 
 from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
 from armid_ros.effects import Action, CATALOGUE, Effect, Quantity
+from armid_ros.model import inverse_dynamics
+from armid_ros.model.pseudo_inertia import pseudo_inertia
 import numpy as np
 import pytest
 
@@ -33,6 +35,30 @@ def test_values_that_are_off_are_no_effect(bench):
     arm = bench.arm.with_theta(np.concatenate([off, [0.32, 0.19], [0.47, 0.32]]))
     found = look(bench, bench.recordings(), arm)
     assert found.verdict == 'consistent'
+
+
+def test_links_of_a_patched_arm_are_bodies(bench):
+    robot = bench.robot
+    off = robot.rigid_parameters * np.tile([1.06, 1.04] + [0.95] * 8, robot.n_joints)
+    arm = bench.arm.with_theta(np.concatenate([off, [0.32, 0.19], [0.47, 0.32]]))
+    drag = bench.recordings(lambda m, tau: on_elbow(0.08 * m.dq[:, 1] * np.abs(m.dq[:, 1])))
+    found = look(bench, drag, arm)
+    assert found.refitted
+    links = found.arm.robot.rigid_parameters.reshape(-1, 10)
+    assert all(np.linalg.eigvalsh(pseudo_inertia(link))[0] > 0.0 for link in links)
+
+
+def test_a_link_that_is_too_heavy_is_named_instead_of_all_values(bench):
+    robot = bench.robot
+    heavy = robot.rigid_parameters.reshape(-1, 10).copy()
+    heavy[1, 0] += 0.5
+    heavy[1, 3] += 0.06
+    true = robot.with_inertias(heavy.ravel())
+    weight = bench.recordings(lambda m, _: inverse_dynamics(true, m) - inverse_dynamics(robot, m))
+    found = look(bench, weight)
+    names = {n for f in found.findings for n in (f.name, *f.ambiguous_with)}
+    assert not found.refitted
+    assert names & {'payload', 'link_inertia'}
 
 
 def test_drag_is_named_with_its_coefficient_and_joint(bench):

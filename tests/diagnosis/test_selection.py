@@ -25,6 +25,12 @@ def test_a_gain_has_to_be_there_in_more_than_one_trajectory(z, counts):
     assert replicated(trial, DiagnosisSettings()) is counts
 
 
+@pytest.mark.parametrize(('z', 'counts'), [(4.6, True), (3.2, False)])
+def test_what_one_trajectory_alone_can_show_has_to_be_beyond_doubt_there(z, counts):
+    trial = SimpleNamespace(z=np.array([0.0, 0.0, z]), only=2)
+    assert replicated(trial, DiagnosisSettings()) is counts
+
+
 def test_blocks_are_not_fooled_by_coloured_noise():
     rng = np.random.default_rng(0)
     slow = np.repeat(rng.normal(size=(200, 20)), 25, axis=1)  # 25 alike in a row

@@ -28,6 +28,8 @@ class Forward(Section):
         Gives joints and units.
     pairs : sequence of ForwardValidation
         One a held-out recording.
+    labels : tuple of str
+        What both models are called.
 
     """
 
@@ -36,6 +38,7 @@ class Forward(Section):
 
     robot: Robot
     pairs: Sequence[ForwardValidation]
+    labels: tuple[str, str] = ('description', 'identified')
 
     @property
     def drawn(self) -> list[tuple[ForwardValidation, BarChart, Chart]]:
@@ -43,9 +46,9 @@ class Forward(Section):
         return [(pair, self._bars(pair), self._chart(pair)) for pair in self.pairs]
 
     def _bars(self, pair: ForwardValidation) -> BarChart:
-        roles: list[tuple[Role, str, ForwardScore]] = [('after', 'identified', pair.after)]
+        roles: list[tuple[Role, str, ForwardScore]] = [('after', self.labels[1], pair.after)]
         if pair.before is not None:
-            roles.insert(0, ('before', 'description', pair.before))
+            roles.insert(0, ('before', self.labels[0], pair.before))
         rows = []
         for joint, name in enumerate(self.robot.joints):
             unit = torque_unit(self.robot, joint)
@@ -64,9 +67,9 @@ class Forward(Section):
     def _chart(self, pair: ForwardValidation) -> Chart:
         joint = int(pair.after.position_error.argmax())
         motion = pair.after.motion
-        errors: list[tuple[str, Role, ForwardScore]] = [('identified', 'after', pair.after)]
+        errors: list[tuple[str, Role, ForwardScore]] = [(self.labels[1], 'after', pair.after)]
         if pair.before is not None:
-            errors.insert(0, ('description', 'before', pair.before))
+            errors.insert(0, (self.labels[0], 'before', pair.before))
         curves = [1e3 * (s.simulated[:, joint] - motion.q[:, joint]) for _, _, s in errors]
         kept = thinned(*curves)
         return Chart(

@@ -1,0 +1,102 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Links of a fitted arm made bodies, so that it can be simulated.
+
+A fit of base parameters leaves standard ones that no body may have. What the data tell stays: of
+all links that are bodies and fit as well, those nearest to the description are taken.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.evidence import Trajectory
+from armid_ros.diagnosis.model_search import Explanation, joint_losses_of, no_worse
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.physical import bodily_prior
+from armid_ros.identification.physical_program import PhysicalProgram
+from armid_ros.motion import FloatArray
+import numpy as np
+import scipy.linalg
+
+#: Weights of the description that are tried, the heaviest that costs nothing is taken.
+_WEIGHTS = (1e-3, 1e-5, 1e-7)
+
+
+def as_bodies(
+    explanation: Explanation,
+    arm: ArmModel,
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+    settings: DiagnosisSettings,
+) -> tuple[Explanation, tuple[str, ...]]:
+    """
+    Return an explanation whose links are bodies, if some explain the data as well, and a note.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        What was found.
+    arm : ArmModel
+        The arm as described.
+    data : sequence of Trajectory
+        The data.
+    sigma : sequence of ndarray, shape (n,)
+        Noise of each trajectory [N m].
+    settings : DiagnosisSettings
+        Thresholds.
+
+    """
+    base, fitted = explanation.base, explanation.fitted
+    if base is None:
+        return explanation, ()
+    known = len(arm.parameters)
+    values = base.values(fitted.arm.theta[:known])
+    triangle, count = _triangle(explanation, values, data, sigma)
+    prior, _ = bodily_prior(arm)
+    bounds = [effect.bounds() for effect in arm.effects]
+    lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in bounds)]) for k in (0, 1))
+    first = known - len(lower)
+    prior[first:] = np.clip(prior[first:], lower, upper)
+    program = PhysicalProgram(base, prior, lower, upper, None, {})
+    for weight in _WEIGHTS:
+        try:
+            theta = program.solve(triangle, count, weight)
+        except IdentificationError:
+            continue
+        changed = fitted.arm.with_theta(np.concatenate([theta, fitted.arm.theta[known:]]))
+        residual = tuple(part.residual(changed) for part in data)
+        bodily = replace(fitted, arm=changed, residual=residual)
+        losses = joint_losses_of(bodily, data, sigma)
+        if no_worse(losses, explanation.losses, settings):
+            return replace(explanation, fitted=bodily, losses=losses), ()
+    return explanation, (
+        'no links that are bodies explain the data as well: what was named, or not found, is in '
+        'the inertias; the patched model may not be simulable',
+    )
+
+
+def _triangle(
+    explanation: Explanation,
+    values: FloatArray,
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+) -> tuple[FloatArray, float]:
+    """Return the triangular factor of base columns and what they are to make, and its rows."""
+    fitted, rank, count = explanation.fitted, len(values), 0
+    factors = []
+    for columns, left, part, s in zip(fitted.columns, fitted.residual, data, sigma, strict=True):
+        weight = part.told / s
+        own = columns[:, :, :rank]
+        target = left + own @ values
+        stacked = np.concatenate([own, target[:, :, np.newaxis]], axis=2)
+        rows = (stacked * weight[:, :, np.newaxis]).reshape(-1, rank + 1)
+        factors.append(scipy.linalg.qr(rows, mode='r')[0][: rank + 1])
+        count += int(part.told.sum())
+    whole = scipy.linalg.qr(np.concatenate(factors), mode='r')[0][: rank + 1]
+    return np.asarray(whole), float(count)
