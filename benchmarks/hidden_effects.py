@@ -82,7 +82,10 @@ def run_diagnosis(case: Case) -> Outcome:
         rng=np.random.default_rng(0),
     )
     seconds = time.process_time() - begin
-    closed = np.nan if diagnosis.gap is None else share_closed(case, diagnosis.gap.overlays)
+    known = all(effect.name in CATALOGUE for effect in case.effects)
+    closed = np.nan
+    if known and diagnosis.gap is not None:
+        closed = share_closed(case, diagnosis.gap.overlays)
     return outcome_of(diagnosis_document(diagnosis), closed, seconds)
 
 

@@ -161,9 +161,9 @@ def diagnose(
     tell(0.25, 'model as described')
     fixed = explain(arm, data, sigma, None, settings, _FIXED_STEPS)
     explained = bool(np.all(fixed.losses < settings.consistent_loss))
-    if explained and fixed.steps:
+    if explained and len(fixed.steps) == 1:
         chosen = fixed
-    elif explained:
+    elif explained and not fixed.steps:
         refitted = explain(arm, data, sigma, base, settings, 1)
         chosen = replace(fixed, survey=refitted.survey)
     else:
