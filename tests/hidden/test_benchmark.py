@@ -4,7 +4,12 @@
 
 import json
 
+from armid_ros.diagnosis.evidence import trajectories
+from armid_ros.diagnosis.floor import noise_floor
+from armid_ros.diagnosis.gap import Overlay
 from armid_ros.effects import CATALOGUE
+from armid_ros.identification import SignalSettings
+from armid_ros.identification.signals import conditioning
 import numpy as np
 import pytest
 
@@ -45,7 +50,7 @@ DOCUMENT = {
 @pytest.fixture(scope='module')
 def judged():
     """Return a payload that was called an offset."""
-    outcome = hidden_effects.outcome_of(DOCUMENT, 2.5)
+    outcome = hidden_effects.outcome_of(DOCUMENT, 1.0, 2.5)
     return Judged(Truth.of(make_case(find_case('development/payload/3-0'))), outcome)
 
 
@@ -63,9 +68,25 @@ def test_outcome_is_what_the_document_says(judged):
 
 
 def test_silence_is_an_outcome():
-    outcome = hidden_effects.outcome_of({'verdict': 'consistent', 'effects': []}, 1.0)
+    outcome = hidden_effects.outcome_of({'verdict': 'consistent', 'effects': []}, np.nan, 1.0)
     assert not outcome.findings
     assert np.isnan(outcome.closed)
+
+
+@pytest.mark.parametrize(('found', 'share'), [(0.0, 0.0), (1.0, 1.0)])
+def test_the_true_arm_closes_the_gap_and_the_old_one_nothing(found, share):
+    case = make_case(find_case('development/quadratic_friction/20-0'))
+    before, after = hidden_effects.nominal_arm(case), hidden_effects.true_arm(case)
+    recordings = [bag.recording for bag in case.validation]
+    used = conditioning(recordings, SignalSettings())
+    overlays = []
+    for part in trajectories(recordings, used):
+        sigma = noise_floor(part, after).sigma
+        measured = part.reduce(part.motion.tau)
+        ends = [measured - part.residual(arm) for arm in (before, after)]
+        patched = (1.0 - found) * ends[0] + found * ends[1]
+        overlays.append(Overlay(part.source, part, measured, ends[0], patched, sigma))
+    assert hidden_effects.share_closed(case, overlays) == pytest.approx(share)
 
 
 def test_slice_has_all_kinds_and_is_short():

@@ -56,7 +56,7 @@ def test_names_are_right_ambiguous_or_wrong():
     assert metric(judged, 'mean number of names').value == 1.5
     assert metric(judged, 'wrong names').value == 0.25
     assert metric(judged, 'nothing found').value == 0.25
-    assert metric(judged, 'gap closed, median').value == pytest.approx(0.6)
+    assert metric(judged, 'gap closed, median').value == pytest.approx(1.0)
     assert metric(judged, 'parameter error, median').value == pytest.approx(0.05)
     assert metric(judged, '95 % intervals with the truth').value == 1.0
 
