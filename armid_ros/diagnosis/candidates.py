@@ -12,11 +12,12 @@ once and shared out.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise, permutations, product
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
+from armid_ros.diagnosis.fit import Fitted
 from armid_ros.diagnosis.remembering import remembering
 from armid_ros.diagnosis.shapes import shape_starts
 from armid_ros.effects import Effect
@@ -110,15 +111,14 @@ def group_effects(
 def shaped(
     effect: Effect,
     members: list[Effect],
-    arm: ArmModel,
+    fitted: Fitted,
     data: Sequence[Trajectory],
-    free: Sequence[FloatArray],
 ) -> Iterator[tuple[Effect, list[Effect]]]:
     """Yield an effect and its groups with every shape that a search starts from."""
     if not effect.shapes:
         yield effect, members
         return
-    grids = shape_starts(effect, arm, data, free)
+    grids = shape_starts(effect, fitted, data)
     counts = [grid.shape[1] for grid in grids]
     together = len(set(counts)) == 1 and int(np.prod(counts)) > _MOST_SHAPES
     chosen = (
@@ -155,18 +155,16 @@ class Candidates:
 
 
 def candidates(
-    arm: ArmModel,
-    data: Sequence[Trajectory],
-    kinds: Sequence[type[Effect]],
-    free: Sequence[FloatArray],
+    fitted: Fitted, data: Sequence[Trajectory], kinds: Sequence[type[Effect]]
 ) -> Candidates:
-    """Compute the columns of what the arm does not have, beside free ones (M, n, f)."""
-    arm = remembering(arm)
+    """Compute the columns of every effect that a fitted arm does not have."""
+    fitted = replace(fitted, arm=remembering(fitted.arm))
+    arm = fitted.arm
     groups: list[Group] = []
     blocks: list[list[FloatArray]] = [[] for _ in data]
     start = 0
     for effect, members in group_effects(arm, kinds):
-        for whole, singles in shaped(effect, members, arm, data, free):
+        for whole, singles in shaped(effect, members, fitted, data):
             for block, part in zip(blocks, data, strict=True):
                 block.append(effect_rows(arm, whole, part))
             for single in singles:

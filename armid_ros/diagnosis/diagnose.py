@@ -169,13 +169,13 @@ def diagnose(
     else:
         tell(0.5, 'model fitted anew')
         chosen = explain(arm, data, sigma, base, settings, settings.most_steps)
-        chosen = as_described(chosen, arm, data, sigma, settings)
+        chosen = as_described(chosen, fixed, arm, data, sigma, settings)
         names = len(fixed.steps)
         fewer = 0 < names <= max(1, len(chosen.steps))
         if fewer and no_worse(fixed.losses, chosen.losses, settings):
             chosen = fixed
         elif not chosen.steps and np.all(chosen.losses < settings.consistent_loss):
-            chosen = wrong_body(chosen, arm, data, sigma, settings)
+            chosen = wrong_body(chosen, fixed, arm, data, sigma, settings)
     chosen, remarks = as_bodies(chosen, arm, data, sigma, settings)
     notes += remarks
     tell(0.85, 'held-out gap')

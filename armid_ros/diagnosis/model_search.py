@@ -88,7 +88,7 @@ def explain(
         if not gap and (survey is not None or base is None):
             break
         if found is None:
-            found = candidates(current.arm, data, settings.kinds, current.columns)
+            found = candidates(current, data, settings.kinds)
             columns = [
                 np.concatenate(pair, axis=2)
                 for pair in zip(found.columns, current.columns, strict=True)
@@ -131,6 +131,7 @@ def explain(
 
 def as_described(
     explanation: Explanation,
+    described: Explanation,
     arm: ArmModel,
     data: Sequence[Trajectory],
     sigma: Sequence[FloatArray],
@@ -143,15 +144,8 @@ def as_described(
     losses = joint_losses_of(fitted, data, sigma)
     if not no_worse(losses, explanation.losses, settings):
         return explanation
-    reference = fit(arm, (), data, sigma, None)
-    before = joint_losses_of(reference, data, sigma)
     return replace(
-        explanation,
-        base=None,
-        fitted=fitted,
-        reference=reference,
-        losses=losses,
-        reference_losses=before,
+        described, fitted=fitted, steps=explanation.steps, survey=explanation.survey, losses=losses
     )
 
 

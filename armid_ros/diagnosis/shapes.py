@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import product
 
-from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
+from armid_ros.diagnosis.fit import Fitted
 from armid_ros.effects import Effect
 from armid_ros.effects.interaction import InterfaceSlack
 from armid_ros.model import points_motion
@@ -26,7 +26,7 @@ _STRAPS, _ROWS = 2, 400
 
 
 def shape_starts(
-    effect: Effect, arm: ArmModel, data: Sequence[Trajectory], free: Sequence[FloatArray]
+    effect: Effect, fitted: Fitted, data: Sequence[Trajectory]
 ) -> tuple[FloatArray, ...]:
     """
     Return values of every shape to start from, each of shape (number of owners, G).
@@ -35,36 +35,34 @@ def shape_starts(
     ----------
     effect : Effect
         The effect on all its joints.
-    arm : ArmModel
-        The arm without it.
+    fitted : Fitted
+        The arm without it, what that leaves, and the columns of what is fitted anew beside it.
     data : sequence of Trajectory
         The data.
-    free : sequence of ndarray, each (M, n, f)
-        Columns, per trajectory, of what is fitted anew beside it.
 
     """
     if effect.name == 'torque_ripple':
-        return (_orders(effect, arm, data),)
+        return (_orders(effect, fitted, data),)
     if isinstance(effect, InterfaceSlack) and effect.anchor is None:
-        return _straps(effect, arm, data, free)
+        return _straps(effect, fitted, data)
     parts = [part.motion for part in data]
     names = ('q', 'dq', 'ddq', 'tau')
     arrays = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
     whole = Motion(parts[0].joints, np.concatenate([part.t for part in parts]), *arrays)
-    return effect.shape_grids(whole, arm)
+    return effect.shape_grids(whole, fitted.arm)
 
 
-def _orders(effect: Effect, arm: ArmModel, data: Sequence[Trajectory]) -> FloatArray:
+def _orders(effect: Effect, fitted: Fitted, data: Sequence[Trajectory]) -> FloatArray:
     """
     Return the orders at which the residual of all trajectories has its peaks, (owners, K).
 
     The rows of all trajectories count together, as a ripple has one order and phase in all.
 
     """
-    left = np.concatenate([part.residual(arm) * part.told for part in data])
+    left = _left(fitted, data)
     q = np.concatenate([part.motion.q[part.rows] for part in data])
     rows = []
-    for joint in effect.indices(arm.robot.joints):
+    for joint in effect.indices(fitted.arm.robot.joints):
         step = 0.5 * np.pi / max(float(np.ptp(q[:, joint])), 0.1)
         orders = np.arange(_ORDERS[0], _ORDERS[1], step)
         wave = np.exp(-1j * np.outer(orders, q[:, joint]))
@@ -76,17 +74,23 @@ def _orders(effect: Effect, arm: ArmModel, data: Sequence[Trajectory]) -> FloatA
     return np.array(rows)
 
 
+def _left(fitted: Fitted, data: Sequence[Trajectory]) -> FloatArray:
+    """Return what is left in all rows that tell something, shape (R, n) [N m]."""
+    parts = zip(fitted.residual, data, strict=True)
+    return np.concatenate([left * part.told for left, part in parts])
+
+
 def _straps(
-    effect: InterfaceSlack, arm: ArmModel, data: Sequence[Trajectory], free: Sequence[FloatArray]
+    effect: InterfaceSlack, fitted: Fitted, data: Sequence[Trajectory]
 ) -> tuple[FloatArray, ...]:
     """Return the anchors and slacks that take most of what is left, beside what is free."""
+    robot, left = fitted.arm.robot, _left(fitted, data)
     q = np.concatenate([part.motion.q[part.rows] for part in data])
-    left = np.concatenate([part.residual(arm) * part.told for part in data])
     told = np.concatenate([part.told for part in data])
     size = np.maximum(np.sqrt(np.mean(left**2, axis=0)), 1e-12)
     rows = np.unique(np.linspace(0, len(q) - 1, _ROWS).astype(int))
     weight = told[rows] / np.maximum(size, 1e-3 * size.max())
-    beside = np.concatenate(free)[rows] * weight[:, :, np.newaxis]
+    beside = np.concatenate(fitted.columns)[rows] * weight[:, :, np.newaxis]
     basis, _ = np.linalg.qr(beside.reshape(weight.size, -1))
 
     def rest(values: FloatArray) -> FloatArray:
@@ -100,9 +104,9 @@ def _straps(
     for owner, joint in enumerate(effect.joints):
         shape = effect.shape_values[owner]
         single = InterfaceSlack((joint,), tuple(shape.tolist()))
-        places = points_motion(arm.robot, (joint,), shape[np.newaxis, :3], q[rows])[0][:, 0]
+        places = points_motion(robot, (joint,), shape[np.newaxis, :3], q[rows])[0][:, 0]
         anchors, slacks = _proposals(places)
-        columns = rest(single.columns_of_straps(arm.robot, q[rows], anchors, slacks))
+        columns = rest(single.columns_of_straps(robot, q[rows], anchors, slacks))
         own, aim = np.sum(columns**2, axis=0), columns.T @ target
         gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
         best = np.argsort(-gain)[:_STRAPS]

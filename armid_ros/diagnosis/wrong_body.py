@@ -43,6 +43,7 @@ _MOST = 0.5
 
 def wrong_body(
     fitted: Explanation,
+    described: Explanation,
     arm: ArmModel,
     data: Sequence[Trajectory],
     sigma: Sequence[FloatArray],
@@ -55,6 +56,8 @@ def wrong_body(
     ----------
     fitted : Explanation
         The fit of all values, with nothing named.
+    described : Explanation
+        The arm as described, with nothing fitted.
     arm : ArmModel
         The arm as described.
     data : sequence of Trajectory
@@ -65,9 +68,9 @@ def wrong_body(
         Library and thresholds.
 
     """
-    reference = fit(arm, (), data, sigma, None)
+    reference = described.reference
     kinds = [kind for kind in settings.kinds if kind.changes_body or kind.name in _POSTURE]
-    found = candidates(arm, data, kinds, reference.columns)
+    found = candidates(reference, data, kinds)
     problem = make_problem(data, sigma, reference.residual, list(found.columns))
     projection, left = project(problem, ()), problem.y
     total = float(excess(problem, left).sum())
@@ -90,14 +93,6 @@ def wrong_body(
     losses = joint_losses_of(patched, data, sigma)
     if not no_worse(losses, fitted.losses, settings):
         return fitted
-    before = joint_losses_of(reference, data, sigma)
     rivals = tuple(trial for trial in able if trial is not first)
-    return replace(
-        fitted,
-        base=None,
-        fitted=patched,
-        reference=reference,
-        steps=(Step(first, rivals, tuple(able), before, losses),),
-        losses=losses,
-        reference_losses=before,
-    )
+    step = Step(first, rivals, tuple(able), described.reference_losses, losses)
+    return replace(described, fitted=patched, steps=(step,), survey=fitted.survey, losses=losses)
