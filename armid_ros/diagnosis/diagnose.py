@@ -20,6 +20,7 @@ from armid_ros.diagnosis.fit import excited, fit
 from armid_ros.diagnosis.floor import Floor, noise_floor
 from armid_ros.diagnosis.gap import Gap, measure_gap
 from armid_ros.diagnosis.gate import check_data, Gate
+from armid_ros.diagnosis.league import League, make_league
 from armid_ros.diagnosis.model_search import as_described, explain, Explanation, no_worse
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict import decide, Finding, Verdict
@@ -62,6 +63,8 @@ class Diagnosis:
         Errors before and after beside the noise; None where the data are bad.
     explanation : Explanation or None
         How it was found.
+    league : League
+        How sure each candidate is.
     arm : ArmModel
         The patched model.
     gate : Gate or None
@@ -86,6 +89,7 @@ class Diagnosis:
     left: tuple[Where, ...]
     gap: Gap | None
     explanation: Explanation | None
+    league: League
     arm: ArmModel
     gate: Gate | None
     data: tuple[Trajectory, ...]
@@ -118,7 +122,7 @@ def diagnose(
     settings : DiagnosisSettings, optional
         Thresholds and library.
     rng : numpy.random.Generator
-        Draws the states over which base parameters are found.
+        Draws the states over which base parameters are found, and resamplings of the data.
     progress : callable, optional
         Told the share that is done and what is being done.
 
@@ -201,6 +205,7 @@ def diagnose(
         left=left,
         gap=gap,
         explanation=chosen,
+        league=make_league(chosen, arm, settings, rng),
         arm=chosen.fitted.arm,
         gate=gate,
         data=tuple(data),
@@ -236,6 +241,7 @@ def _bad(
         left=(),
         gap=None,
         explanation=None,
+        league=League(),
         arm=arm,
         gate=gate,
         data=tuple(data),

@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 from typing import Any
 
 from armid_ros.diagnosis.diagnose import Diagnosis
-from armid_ros.diagnosis.selection import Trial
+from armid_ros.diagnosis.league import Standing
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -53,6 +54,7 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
                 ],
                 'ambiguous_with': list(finding.ambiguous_with),
                 'experiment': finding.experiment,
+                **_sureness(diagnosis.league.of(finding.name)),
             }
             for finding in diagnosis.findings
         ],
@@ -61,7 +63,7 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
             for w in diagnosis.where
         ],
         'gap': _gap(diagnosis),
-        'candidates': [_candidate(trial) for trial in _league(diagnosis)],
+        'candidates': [_candidate(s) for s in diagnosis.league.first[:_MOST_CANDIDATES]],
         'not_visible': list(diagnosis.not_visible),
         'model': model,
     }
@@ -95,15 +97,8 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _league(diagnosis: Diagnosis) -> tuple[Trial, ...]:
-    explanation = diagnosis.explanation
-    if explanation is None or explanation.survey is None:
-        return ()
-    return explanation.survey.league[:_MOST_CANDIDATES]
-
-
-def _candidate(trial: Trial) -> dict[str, Any]:
-    score = trial.score
+def _candidate(standing: Standing) -> dict[str, Any]:
+    trial, score = standing.trial, standing.trial.score
     return {
         'name': score.group.effect.name,
         'joints': list(score.group.effect.joints),
@@ -111,6 +106,15 @@ def _candidate(trial: Trial) -> dict[str, Any]:
         'replicated_in': int(np.sum(trial.z >= 3.0)),
         'visible_fraction': score.visible,
         'min_detectable': _finite(_DETECTABLE * float(score.std[0])),
+        **_sureness([standing]),
+    }
+
+
+def _sureness(standings: Sequence[Standing]) -> dict[str, float]:
+    """Return how sure the least sure of some candidates is."""
+    return {
+        'adjusted_p': max((s.adjusted_p for s in standings), default=1.0),
+        'inclusion': min((s.inclusion for s in standings), default=0.0),
     }
 
 

@@ -62,6 +62,8 @@ class Step:
         The best groups of the round, one per name and joints, best first.
     before, after : ndarray, shape (n,)
         Loss of each joint.
+    passing : tuple of Trial
+        All groups of the round that could have been named.
 
     """
 
@@ -70,6 +72,7 @@ class Step:
     league: tuple[Trial, ...]
     before: FloatArray
     after: FloatArray
+    passing: tuple[Trial, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -85,12 +88,15 @@ class Survey:
         Names of which the free parameters leave nothing to be seen.
     scores : tuple of Score
         All visible groups, best shape of each.
+    tried : int
+        How many visible groups there are, every shape for itself.
 
     """
 
     league: tuple[Trial, ...]
     hidden: frozenset[str]
     scores: tuple[Score, ...]
+    tried: int
 
 
 def next_step(
@@ -129,7 +135,8 @@ def next_step(
     settings = work.settings
     projection = project(problem, free)
     left = projection.rest(problem.y)
-    scores = _best_per_key(screen(problem, projection, groups, settings.least_visible))
+    screened = screen(problem, projection, groups, settings.least_visible)
+    scores = _best_per_key(screened)
     visible = {score.group.effect.name for score in scores}
     hidden = frozenset(group.effect.name for group in groups) - visible
     trials: list[Trial] = []
@@ -153,7 +160,7 @@ def next_step(
     trials.sort(key=lambda trial: -trial.gain)
     passing = [t for t in trials if acceptable(t, problem, left, settings, total)]
     league = tuple(trials)
-    survey = Survey(league, hidden, tuple(scores))
+    survey = Survey(league, hidden, tuple(scores), len(screened))
     if not passing:
         return None, survey, problem
     tied = [passing[0], *not_beaten(passing, problem, left, settings)]
@@ -167,7 +174,7 @@ def next_step(
     )
     before = joint_losses(problem, left)
     after = joint_losses(problem, left - winner.torque)
-    return Step(winner, rivals, league, before, after), survey, problem
+    return Step(winner, rivals, league, before, after, tuple(passing)), survey, problem
 
 
 def simplest(tied: Sequence[Trial]) -> Trial:

@@ -74,6 +74,8 @@ class Trial:
         Sum of squares that each part and joint loses, held out.
     z : ndarray, shape (F,)
         How sure the gain of each part is.
+    blocks : ndarray, shape (F, B)
+        Sum of squares that each block of each part loses, held out.
     fold_values : ndarray, shape (F, p)
         Values without each part.
     only : int or None
@@ -87,6 +89,7 @@ class Trial:
     held_out: FloatArray
     gains: FloatArray
     z: FloatArray
+    blocks: FloatArray
     fold_values: FloatArray
     only: int | None
 
@@ -173,13 +176,20 @@ def try_group(
     z = block_z(problem.fold, gain.sum(axis=1), settings.blocks)
     sparse = _in_both_halves(problem.fold, gain.sum(axis=1))
     z = np.where(sparse, np.maximum(z, 1.5 * settings.least_z), z)
-    return Trial(scored, own_columns @ values, held_out, gains, z, fold_values, only)
+    blocks = block_sums(problem.fold, gain.sum(axis=1), settings.blocks)
+    return Trial(scored, own_columns @ values, held_out, gains, z, blocks, fold_values, only)
 
 
 def _halves(where: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
     """Return 1 and 2 for the rows of both halves of a part of the data, 0 for others."""
     rows = np.cumsum(where)
     return np.where(where, 1 + (2 * rows > rows[-1]), 0)
+
+
+def block_sums(fold: npt.NDArray[np.intp], gain: FloatArray, blocks: int) -> FloatArray:
+    """Return the sums of a gain per row in the blocks of each fold, shape (F, blocks)."""
+    parts = [np.array_split(gain[fold == k], blocks) for k in range(int(fold.max()) + 1)]
+    return np.array([[block.sum() for block in part] for part in parts])
 
 
 def block_z(fold: npt.NDArray[np.intp], gain: FloatArray, blocks: int) -> FloatArray:

@@ -26,6 +26,8 @@ class Row:
     value: str
     visible: str
     detectable: str
+    adjusted_p: str
+    inclusion: str
     named: bool
 
 
@@ -49,13 +51,11 @@ class CandidateTable(Section):
     @property
     def rows(self) -> Sequence[Row]:
         """The best candidates."""
-        explanation = self.diagnosis.explanation
-        if explanation is None or explanation.survey is None:
-            return ()
         names = {finding.name for finding in self.diagnosis.findings}
         rows = []
-        for trial in explanation.survey.league[:_MOST]:
-            score, effect = trial.score, trial.score.group.effect
+        for standing in self.diagnosis.league.first[:_MOST]:
+            trial, score = standing.trial, standing.trial.score
+            effect = score.group.effect
             quantity = effect.quantities[score.group.kept[0] % len(effect.quantities)]
             value = f'{digits(float(score.values[0]))} {quantity.unit}'
             rows.append(
@@ -67,7 +67,16 @@ class CandidateTable(Section):
                     value.strip(),
                     f'{100.0 * score.visible:.0f} %',
                     f'{digits(5.0 * float(score.std[0]))} {quantity.unit}'.strip(),
+                    _probability(standing.adjusted_p),
+                    f'{100.0 * standing.inclusion:.0f} %',
                     effect.name in names,
                 )
             )
         return rows
+
+
+def _probability(p: float) -> str:
+    """Return a p value to the digit that matters."""
+    if p < 1e-4:
+        return '< 0.0001'
+    return f'{p:.1g}' if p < 0.1 else f'{p:.2f}'
