@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import json
 from pathlib import Path
 
@@ -12,7 +13,15 @@ from armid_ros.cli import options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
 from armid_ros.diagnosis import diagnose as run
-from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings, next_run
+from armid_ros.diagnosis import (
+    Diagnosis,
+    diagnosis_document,
+    DiagnosisSettings,
+    EXPERIMENT_FILE,
+    next_run,
+    NextRun,
+)
+from armid_ros.errors import ArmidError
 from armid_ros.excitation import save_excitation
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.signals import conditioning
@@ -89,8 +98,10 @@ def diagnose(
             forward, left_out = simulate_held_out(
                 arm, result.arm, used, held_out, progress=lambda _, what: tick(1.0, what)
             )
+        run_next, refused = _next_run(result, seed, tick)
     document = diagnosis_document(result)
     document['forward'] = [pair.document() for pair in forward]
+    document['next_run'] = None if run_next is None else run_next.document()
     out.mkdir(parents=True, exist_ok=True)
     save_model(out / 'model.yaml', result.arm, options.kept_source(robot_source, robot, out))
     page = diagnosis_report(
@@ -99,25 +110,41 @@ def diagnose(
         recordings=recordings,
         validation=held_out,
         forward=forward,
+        next_run=run_next,
         patch=(out / 'model.yaml').read_text(encoding='utf-8'),
         provenance=provenance([*bags, *validate], seed=seed),
     )
-    run_next = next_run(result, np.random.default_rng(seed))
     if run_next is not None:
-        save_excitation(run_next.excitation, out / 'experiment.yaml')
+        save_excitation(run_next.excitation, out / EXPERIMENT_FILE)
     (out / 'report.html').write_text(page, encoding='utf-8')
     (out / 'diagnosis.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
     if as_json:
         click.echo(json.dumps(document))
         return
-    _show(result, out)
+    _show(result)
     for pair in forward:
         say(pair.sentence())
-    for note in left_out:
+    for note in (*left_out, *refused):
         say(f'note: {note}')
+    files = ['diagnosis.json', 'model.yaml', 'report.html']
+    if run_next is not None:
+        say(run_next.sentence)
+        files.append(EXPERIMENT_FILE)
+    say(f'{out}: {", ".join(files)}')
 
 
-def _show(result: Diagnosis, out: Path) -> None:
+def _next_run(
+    result: Diagnosis, seed: int, tick: Callable[[float, str], None]
+) -> tuple[NextRun | None, tuple[str, ...]]:
+    """Return a motion that separates names in doubt, or why there is none."""
+    tick(1.0, 'next run')
+    try:
+        return next_run(result, np.random.default_rng(seed)), ()
+    except ArmidError as error:
+        return None, (str(error),)
+
+
+def _show(result: Diagnosis) -> None:
     say(f'{result.verdict.replace("_", " ").upper()}: {result.summary}')
     explanation = result.explanation
     if explanation is not None and explanation.steps:
@@ -141,7 +168,3 @@ def _show(result: Diagnosis, out: Path) -> None:
         )
     for note in result.notes:
         say(f'note: {note}')
-    files = ['diagnosis.json', 'model.yaml', 'report.html']
-    if (out / 'experiment.yaml').exists():
-        files.append('experiment.yaml, a motion that separates the names')
-    say(f'{out}: {", ".join(files)}')

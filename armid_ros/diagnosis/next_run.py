@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The next run: of several motions within the limits, the one that separates two names best.
+The next run: of many motions that the arm can make, the one that separates names best.
 
 T-optimality (Atkinson and Fedorov 1975): with the named effect in the arm, a motion is worth what
 the rival, with everything that is free fitted to it, cannot explain of its torque, over noise.
@@ -10,19 +10,37 @@ the rival, with everything that is free fitted to it, cannot explain of its torq
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 from armid_ros.diagnosis.diagnose import Diagnosis
-from armid_ros.effects import Effect
+from armid_ros.diagnosis.separation import Doubt, Load, Separation
+from armid_ros.diagnosis.templates import CLEARANCE, Template, templates
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import Excitation, Limits, random_feasible
-from armid_ros.motion import Motion
+from armid_ros.excitation import (
+    ClearanceModel,
+    design,
+    DesignSettings,
+    Excitation,
+    FourierTrajectory,
+    Problem,
+)
+from armid_ros.excitation.placing import placed
+from armid_ros.robots import collision_model, CollisionModel
 import numpy as np
 
-#: Share of the speed limits, period [s] and harmonics of the motions that are tried.
-_MOTIONS = ((0.1, 12.0, 3), (0.3, 10.0, 5), (0.6, 8.0, 6), (0.9, 8.0, 8))
-_DRAWS = 2
-_RATE = 50.0
+#: The file that a run is written to.
+EXPERIMENT_FILE = 'experiment.yaml'
+#: Names are told apart beyond doubt at this many standard deviations: a payload is not asked for
+#: where a motion alone does it.
+_SURE = 5.0
+#: ... and not at all below this many.
+_NOTHING = 1.0
+#: Rivals of a provisional name that has none: the next best of its league.
+_RUNNERS_UP = 3
+#: A search for a better motion than the templates: few steps, as each costs as much as a template.
+_STARTS, _CANDIDATES, _ITERATIONS = 1, 4, 25
 
 
 @dataclass(frozen=True)
@@ -33,55 +51,210 @@ class NextRun:
     Attributes
     ----------
     excitation : Excitation
-        Within the limits of the robot; two equal periods.
-    name, rival : str
-        What it separates.
-    worth : float
-        Sum of squares over noise that the rival would leave, in one period.
+        From rest to rest within all limits, clear of the arm itself; two equal periods.
+    template : str
+        What kind of motion it is, in words.
+    load : Load or None
+        What is to be fixed to the last link in a second run of the same motion; None: one run.
+    separations : tuple of Separation
+        How far it tells each pair of names apart.
 
     """
 
     excitation: Excitation
-    name: str
-    rival: str
-    worth: float
+    template: str
+    load: Load | None
+    separations: tuple[Separation, ...]
+
+    @property
+    def expected_z(self) -> float:
+        """Standard deviations between the two names that are nearest to each other."""
+        return min(pair.z for pair in self.separations)
+
+    @property
+    def sentence(self) -> str:
+        """What to do and what it would show, for a person."""
+        told = [one for one in self.separations if one.z >= _NOTHING]
+        alike = [one for one in self.separations if one.z < _NOTHING]
+        parts = [
+            f'it should tell {one.name} from {one.rival} by {one.z:.0f} standard deviations'
+            for one in told
+        ]
+        parts += [f'no motion tells {one.name} from {one.rival}' for one in alike]
+        again = ''
+        if self.load is not None:
+            again = f', then again with {self.load.mass:g} kg fixed to {self.load.frame}'
+        return (
+            f'Run {EXPERIMENT_FILE} ({self.template}, {self.excitation.duration:.0f} s){again}, '
+            f'and diagnose all recordings together: {"; ".join(parts).replace("_", " ")}.'
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return the run as diagnosis.json holds it."""
+        return {
+            'file': EXPERIMENT_FILE,
+            'motion': self.template,
+            'duration': self.excitation.duration,
+            'payload': 0.0 if self.load is None else self.load.mass,
+            'separates': [
+                {'name': one.name, 'rival': one.rival, 'expected_z': one.z}
+                for one in self.separations
+            ],
+            'expected_z': self.expected_z,
+        }
 
 
-def next_run(diagnosis: Diagnosis, rng: np.random.Generator) -> NextRun | None:
-    """Choose a motion for the first name that has rivals; None if there is none."""
+def next_run(
+    diagnosis: Diagnosis,
+    rng: np.random.Generator,
+    *,
+    collision: CollisionModel | None = None,
+) -> NextRun | None:
+    """
+    Choose a motion that tells a doubtful name from its rivals.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What was found.
+    rng : numpy.random.Generator
+        Draws the motions.
+    collision : CollisionModel, optional
+        Bodies to keep apart; those of the description by default.
+
+    Returns
+    -------
+    NextRun or None
+        None if no name is in doubt.
+
+    Raises
+    ------
+    TrajectoryError
+        If the arm cannot make any of the motions; says what stands in the way.
+
+    """
+    doubts = _doubts(diagnosis)
+    if not doubts:
+        return None
+    arm = diagnosis.arm
+    clearance = ClearanceModel.of(collision or collision_model(arm.robot))
+    joints = dict.fromkeys(joint for doubt in doubts for joint in doubt.joints)
+    whole_arm = any(not doubt.joints for doubt in doubts)
+    runs: list[_Run] = []
+    refused: list[str] = []
+    for template in templates(() if whole_arm else tuple(joints)):
+        try:
+            trajectory = template.draw(arm, clearance, rng)
+        except TrajectoryError as error:
+            refused.append(str(error))
+            continue
+        runs.append(_run(diagnosis, doubts, template, trajectory))
+    plain = [run for run in runs if not run.template.loaded]
+    if plain:
+        best = max(plain, key=lambda run: run.worth)
+        runs += _designed(diagnosis, doubts, best, collision, rng)
+    for run in _in_order(runs):
+        settings = _settings(run.template)
+        problem = Problem.of(arm, settings, rng)
+        try:
+            excitation = placed(problem, run.trajectory, clearance)
+        except TrajectoryError as error:
+            refused.append(str(error))
+            continue
+        return NextRun(excitation, run.template.name, run.load, run.separations)
+    raise TrajectoryError(f'no motion for the next run: {refused[-1]}')
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A motion and what it would show."""
+
+    template: Template
+    trajectory: FourierTrajectory
+    load: Load | None
+    separations: tuple[Separation, ...]
+
+    @property
+    def worth(self) -> float:
+        """All pairs count, and one that no motion separates does not decide."""
+        return float(sum(np.log1p(pair.power) for pair in self.separations))
+
+
+def _in_order(runs: Sequence[_Run]) -> list[_Run]:
+    """Return runs, best first; with a payload only where that tells apart what no motion does."""
+    most = np.max([[pair.z for pair in run.separations] for run in runs], axis=0, initial=0.0)
+    wanted = np.where(most < _NOTHING, 0.0, np.minimum(most, _SURE))
+    plain = [run for run in runs if not run.template.loaded]
+    enough = any(all(p.z >= z for p, z in zip(r.separations, wanted, strict=True)) for r in plain)
+    return sorted(runs, key=lambda run: (enough and run.template.loaded, -run.worth))
+
+
+def _run(
+    diagnosis: Diagnosis,
+    doubts: Sequence[Doubt],
+    template: Template,
+    trajectory: FourierTrajectory,
+) -> _Run:
+    load = Load.along(diagnosis.arm, trajectory) if template.loaded else None
+    pairs = tuple(Separation.of(diagnosis, doubt, trajectory, load) for doubt in doubts)
+    return _Run(template, trajectory, load, pairs)
+
+
+def _doubts(diagnosis: Diagnosis) -> tuple[Doubt, ...]:
+    """Return the names that may be others: with rivals, or provisional."""
     explanation = diagnosis.explanation
     if explanation is None:
-        return None
-    doubtful = [k for k, step in enumerate(explanation.steps) if step.rivals]
-    if not doubtful:
-        return None
-    named = explanation.fitted.named[doubtful[0]].effect
-    rival = explanation.steps[doubtful[0]].rivals[0].score.group.effect
-    best: NextRun | None = None
-    for speed, period, harmonics in _MOTIONS * _DRAWS:
-        limits = Limits.of(diagnosis.arm.robot, speed=speed)
-        try:
-            trajectory = random_feasible(diagnosis.arm, limits, period, harmonics, rng)
-        except TrajectoryError:
-            continue
-        motion = trajectory.one_period(int(period * _RATE))
-        worth = _worth(diagnosis, motion, named, rival)
-        if best is None or worth > best.worth:
-            best = NextRun(Excitation(trajectory), named.name, rival.name, worth)
-    return best
+        return ()
+    pairs = zip(explanation.fitted.named, explanation.steps, strict=True)
+    found = {own.effect.name for own in explanation.fitted.named}
+    doubts: dict[tuple[str, str], Doubt] = {}
+    for named, step in pairs:
+        others = [t.score.group.effect for t in step.rivals]
+        if not others and diagnosis.verdict == 'partial':
+            others = [t.score.group.effect for t in step.league if t.gain > 0.0]
+            others = [effect for effect in others if effect.name not in found][:_RUNNERS_UP]
+        for other in others:
+            if other.name in found:
+                continue
+            doubt = Doubt(named, other)
+            doubts.setdefault((doubt.named.effect.name, doubt.rival.name), doubt)
+    return tuple(doubts.values())
 
 
-def _worth(diagnosis: Diagnosis, motion: Motion, named: Effect, rival: Effect) -> float:
-    arm = diagnosis.arm
-    noise = np.mean([floor.sigma for floor in diagnosis.floors], axis=0)[:, np.newaxis]
-    target = arm.columns_of(named, motion) @ arm.values_of(named)
-    free = [arm.columns_of(rival, motion)]
-    if diagnosis.refitted:
-        free.append(arm.rigid_columns(motion))
-        free += [arm.columns_of(e, motion) for e in arm.effects if e != named]
-    columns = np.concatenate(free, axis=2) / noise
-    flat = columns.reshape(-1, columns.shape[2])
-    scale = np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
-    wanted = (target / noise[:, 0]).ravel()
-    left = wanted - flat / scale @ np.linalg.lstsq(flat / scale, wanted, rcond=1e-8)[0]
-    return float(left @ left)
+def _designed(
+    diagnosis: Diagnosis,
+    doubts: Sequence[Doubt],
+    best: _Run,
+    collision: CollisionModel | None,
+    rng: np.random.Generator,
+) -> list[_Run]:
+    """Return a motion like the best template, made for the nearest of the pairs that it tells."""
+    told = [k for k, pair in enumerate(best.separations) if pair.z >= _NOTHING]
+    if not told:
+        return []
+    nearest = min(told, key=lambda k: best.separations[k].power)
+    arm, rival = doubts[nearest].models(diagnosis)
+    settings = _settings(best.template, 'T', 'all' if diagnosis.refitted else 'effects')
+    bodies = collision or collision_model(arm.robot)
+    try:
+        found = design(arm, settings, rng, collision=bodies, rival=rival)
+    except TrajectoryError:
+        return []
+    made = replace(best.template, name='designed motion of all joints')
+    return [_run(diagnosis, doubts, made, found.excitation.trajectory)]
+
+
+def _settings(template: Template, criterion: str = 'D', target: str = 'all') -> DesignSettings:
+    return DesignSettings(
+        period=template.period,
+        harmonics=template.harmonics,
+        speed=template.speed,
+        clearance=CLEARANCE,
+        criterion=criterion,
+        target=target,
+        samples=max(100, 10 * template.harmonics),
+        starts=_STARTS,
+        candidates=_CANDIDATES,
+        iterations=_ITERATIONS,
+        processes=1,
+    )

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armid_ros.diagnosis import Diagnosis
+from armid_ros.diagnosis import Diagnosis, NextRun
 from armid_ros.identification.verification import ForwardValidation
 from armid_ros.recording import Recording
 from armid_ros.report.notation import counted
@@ -34,6 +34,7 @@ def diagnosis_report(
     recordings: Sequence[Recording],
     validation: Sequence[Recording] = (),
     forward: Sequence[ForwardValidation] = (),
+    next_run: NextRun | None = None,
     patch: str = '',
     provenance: Provenance | None = None,
 ) -> str:
@@ -52,6 +53,8 @@ def diagnosis_report(
         Data that were only predicted.
     forward : sequence of ForwardValidation
         Those data simulated, with the model as it was and as it is patched.
+    next_run : NextRun, optional
+        The motion that was written to separate names.
     patch : str
         model.yaml of the patched model.
     provenance : Provenance, optional
@@ -78,7 +81,7 @@ def diagnosis_report(
         if diagnosis.where:
             sections.append(Evidence(diagnosis.where))
         sections += [CandidateTable(diagnosis), Staircase(diagnosis)]
-    sections.append(NextSteps(_next_steps(diagnosis)))
+    sections.append(NextSteps(_next_steps(diagnosis, next_run)))
     if diagnosis.findings:
         sections.append(NamedParameters(diagnosis.findings))
     if forward:
@@ -101,8 +104,9 @@ def diagnosis_report(
     return Page(f'Diagnosis of {diagnosis.arm.robot.name}', subtitle, sections).html()
 
 
-def _next_steps(diagnosis: Diagnosis) -> list[str]:
-    steps = [finding.experiment for finding in diagnosis.findings if finding.experiment]
+def _next_steps(diagnosis: Diagnosis, next_run: NextRun | None) -> list[str]:
+    steps = [] if next_run is None else [next_run.sentence]
+    steps += [finding.experiment for finding in diagnosis.findings if finding.experiment]
     if diagnosis.verdict == 'bad_data':
         steps.append('Correct the data, or the description, and diagnose again.')
     if diagnosis.verdict in ('unknown', 'partial'):

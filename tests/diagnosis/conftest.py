@@ -13,7 +13,13 @@ import pytest
 
 LINK = """
   <link name="{name}"><inertial><origin xyz="0 0 {com}"/><mass value="{mass}"/>
-    <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.002"/></inertial></link>
+    <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.002"/></inertial>
+    <collision><origin xyz="0 0 0.15"/><geometry><box size="0.04 0.04 0.28"/></geometry>
+    </collision></link>
+"""
+PEDESTAL = """
+  <link name="base"><collision><origin xyz="0 0 0.1"/><geometry><box size="0.5 0.3 0.2"/>
+    </geometry></collision></link>
 """
 JOINT = """
   <joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>
@@ -21,7 +27,8 @@ JOINT = """
     <limit lower="-3" upper="3" effort="50" velocity="6"/></joint>
 """
 URDF = (
-    '<robot name="two_links"><link name="base"/>'
+    '<robot name="two_links">'
+    + PEDESTAL
     + LINK.format(name='upper', mass=3.0, com=0.15)
     + LINK.format(name='lower', mass=1.5, com=0.12)
     + JOINT.format(name='shoulder', parent='base', child='upper', height=0.5)

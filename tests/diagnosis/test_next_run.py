@@ -1,27 +1,204 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A motion that separates two names, ready to run."""
+"""A motion that separates two names: one the arm can make, worth what is said."""
 
+from dataclasses import replace
+import json
+from types import SimpleNamespace
+
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, next_run
-from armid_ros.excitation import check_limits, Limits
+from armid_ros.diagnosis.fit import fit
+from armid_ros.diagnosis.floor import noise_floor
+from armid_ros.diagnosis.model_search import joint_losses_of
+from armid_ros.diagnosis.patch import Named
+from armid_ros.diagnosis.separation import Doubt, Load, Separation
+from armid_ros.diagnosis.templates import CLEARANCE, templates
+from armid_ros.effects import CATALOGUE
+from armid_ros.excitation import (
+    ClearanceModel,
+    excitation_faults,
+    FourierTrajectory,
+    Limits,
+    random_feasible,
+    trajectory_faults,
+)
+from armid_ros.recording import Recording
+from armid_ros.robots import collision_model, robot_from_urdf
 import numpy as np
+import pytest
+
+from tests.diagnosis.conftest import LINK, POSITION_NOISE, TORQUE_NOISE
+from tests.diagnosis.test_floor import cut
+
+OFFSET = 0.05
 
 
-def test_the_next_run_is_within_the_limits_and_worth_something(bench):
-    recordings = bench.recordings()
-    robot = bench.robot
-    heavier = robot.rigid_parameters.copy()
-    heavier[10:14] += np.array([0.5, 0.0, 0.0, 0.1])  # 0.5 kg at 0.2 m of the lower link
-    heavier[14:] += [0.02, 0.0, 0.02, 0.0, 0.0, 0.0]
-    lighter = bench.arm.with_theta(
-        np.concatenate([2 * robot.rigid_parameters - heavier, [0.3, 0.2], [0.5, 0.3]])
+def offset(motion, tau):
+    """Return a constant torque of the elbow."""
+    return np.tile([0.0, OFFSET], (len(motion), 1))
+
+
+@pytest.fixture(scope='module')
+def named(bench):
+    """Return the diagnosis of an offset of the elbow."""
+    found = diagnose(bench.arm, bench.recordings(offset), rng=np.random.default_rng(0))
+    assert [f.name for f in found.findings] == ['torque_offset']
+    return found
+
+
+@pytest.fixture(scope='module')
+def doubtful(named):
+    """Return the same with two other names left possible, as poorer data would."""
+    (step,) = named.explanation.steps
+    rivals = [
+        next(t for t in step.league if t.score.group.key[:2] == (name, ('elbow',)))
+        for name in ('encoder_offset', 'torque_drift')
+    ]
+    steps = (replace(step, rivals=tuple(rivals)),)
+    return replace(named, verdict='ambiguous', explanation=replace(named.explanation, steps=steps))
+
+
+@pytest.fixture(scope='module')
+def chosen(doubtful):
+    """Return what to run next."""
+    return next_run(doubtful, np.random.default_rng(1))
+
+
+def test_nothing_is_to_be_run_where_no_name_is_in_doubt(named):
+    (step,) = named.explanation.steps
+    sure = replace(named.explanation, steps=(replace(step, rivals=()),))
+    found = replace(named, verdict='named', explanation=sure)
+    assert next_run(found, np.random.default_rng(1)) is None
+
+
+def test_a_provisional_name_is_held_against_the_next_best(named):
+    (step,) = named.explanation.steps
+    alone = replace(named.explanation, steps=(replace(step, rivals=()),))
+    found = replace(named, verdict='partial', explanation=alone)
+    run = next_run(found, np.random.default_rng(1))
+    assert {pair.name for pair in run.separations} == {'torque_offset'}
+    league = [t.score.group.effect.name for t in step.league]
+    assert {pair.rival for pair in run.separations} <= set(league) - {'torque_offset'}
+
+
+def test_the_arm_can_make_the_run_without_hitting_its_own_pedestal(bench, chosen):
+    bodies = collision_model(bench.robot)
+    clearance = ClearanceModel.of(bodies)
+    limits = Limits.of(bench.robot, speed=0.9)
+    run = chosen.excitation
+    assert not trajectory_faults(bench.arm, limits, run.trajectory, clearance, CLEARANCE)
+    assert not excitation_faults(bench.arm, limits, run, clearance, CLEARANCE)
+    assert bodies.path_clearance(run.motion(100.0).q).min() >= CLEARANCE
+    assert run.n_periods == 2
+
+
+def test_every_motion_to_choose_from_keeps_clear_where_careless_ones_do_not(bench):
+    rng = np.random.default_rng(2)
+    bodies = collision_model(bench.robot)
+    careless = [
+        random_feasible(bench.arm, Limits.of(bench.robot, speed=0.4), 10.0, 5, rng)
+        for _ in range(12)
+    ]
+    assert min(bodies.path_clearance(t.one_period(200).q).min() for t in careless) < 0.0
+    for template in templates(('elbow',)):
+        motion = template.draw(bench.arm, ClearanceModel.of(bodies), rng).one_period(400)
+        assert bodies.path_clearance(motion.q).min() >= CLEARANCE
+        still = np.ptp(motion.q, axis=0) == 0.0
+        assert list(still) == ([True, False] if template.joints else [False, False])
+
+
+def test_the_worth_of_a_motion_is_what_the_rival_leaves(bench, doubtful):
+    trajectory = FourierTrajectory(
+        bench.robot.joints, 10.0, np.array([0.2, 0.7]), np.full((2, 1), 0.5), np.full((2, 1), 0.3)
     )
-    found = diagnose(lighter, recordings, rng=np.random.default_rng(0))
-    chosen = next_run(found, np.random.default_rng(1))
-    if found.verdict == 'named':
-        assert chosen is None
-        return
-    assert found.verdict == 'ambiguous'
-    assert chosen.worth >= 0.0
-    motion = chosen.excitation.motion(100.0)
-    assert not check_limits(Limits.of(robot, speed=1.0), motion)
+    (own,) = doubtful.explanation.fitted.named
+    zero = CATALOGUE['encoder_offset'].on(bench.robot, ('elbow',))
+    assert not doubtful.refitted
+    power = Separation.of(doubtful, Doubt(own, zero), trajectory).power
+    motion = trajectory.motion(np.arange(1000) / 50.0)
+    speed = np.abs(motion.dq)
+    used, floors = doubtful.data[0].used, doubtful.floors
+    sigma = np.sqrt(np.mean([floor.sigma**2 for floor in floors], axis=0))
+    rows = used.rate_hz / used.decimation / 50.0
+    weight = np.where(speed > 0.02 * speed.max(axis=0), np.sqrt(rows) / sigma, 0.0)
+    (value,) = doubtful.arm.values_of(own.effect)
+    target = (weight * [0.0, value]).ravel()
+    slope = (weight * doubtful.arm.columns_of(zero, motion)[:, :, 0]).ravel()
+    left = target @ target - (target @ slope) ** 2 / (slope @ slope)
+    assert left > 10.0
+    assert power == pytest.approx(left, rel=1e-6)
+
+
+def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen):
+    motion = chosen.excitation.motion(200.0)
+    rng = np.random.default_rng(3)
+    tau = bench.torque(motion) + offset(motion, None)
+    recording = Recording(
+        joints=motion.joints,
+        t=motion.t,
+        q=motion.q + POSITION_NOISE * rng.normal(size=motion.q.shape),
+        tau=tau + TORQUE_NOISE * rng.normal(size=motion.q.shape),
+        source='next run',
+    )
+    data = cut([recording])
+    sigma = [noise_floor(data[0], bench.arm).sigma]
+    rows = data[0].told.sum(axis=0)
+
+    def squares(name):
+        effect = CATALOGUE[name].on(bench.robot, ('elbow',))
+        kept = tuple(range(len(effect.parameters(bench.robot))))
+        fitted = fit(bench.arm, [Named(effect, kept)], data, sigma, None)
+        return float(np.sum(joint_losses_of(fitted, data, sigma) * rows))
+
+    own = squares('torque_offset')
+    for pair in chosen.separations:
+        measured = np.sqrt(max(squares(pair.rival) - own, 0.0))
+        assert measured == pytest.approx(pair.z, rel=0.5)
+    assert chosen.expected_z > 5.0
+
+
+def test_what_was_chosen_is_about_the_best_that_there_is(bench, doubtful, chosen):
+    clearance = ClearanceModel.of(collision_model(bench.robot))
+    rng = np.random.default_rng(4)
+    (own,) = doubtful.explanation.fitted.named
+    rivals = [t.score.group.effect for t in doubtful.explanation.steps[0].rivals]
+    worths = []
+    for template in templates(('elbow',)):
+        trajectory = template.draw(bench.arm, clearance, rng)
+        pairs = [Separation.of(doubtful, Doubt(own, rival), trajectory) for rival in rivals]
+        worths.append(sum(np.log1p(pair.power) for pair in pairs))
+    best = sum(np.log1p(pair.power) for pair in chosen.separations)
+    assert best > np.median(worths)
+    assert best > 0.8 * max(worths)
+
+
+def test_only_a_known_payload_tells_a_gain_from_the_mass():
+    joint = """<joint name="hinge" type="revolute"><parent link="base"/><child link="bob"/>
+        <axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="50" velocity="6"/></joint>"""
+    bob = LINK.format(name='bob', mass=3.0, com=0.15)
+    robot = robot_from_urdf(f'<robot name="pendulum"><link name="base"/>{bob}{joint}</robot>')
+    gain = CATALOGUE['torque_gain'].on(robot)
+    arm = ArmModel(robot).with_effect(gain, [0.05])
+    used = SimpleNamespace(rate_hz=100.0, decimation=4)
+    found = SimpleNamespace(
+        arm=arm,
+        refitted=True,
+        floors=[SimpleNamespace(sigma=np.array([0.02]))],
+        data=[SimpleNamespace(used=used)],
+        explanation=SimpleNamespace(fitted=SimpleNamespace(named=[Named(gain, (0,))])),
+    )
+    trajectory = FourierTrajectory(
+        robot.joints, 8.0, np.zeros(1), np.array([[0.8, 1.0]]), np.array([[0.5, 0.4]])
+    )
+    doubt = Doubt(Named(gain, (0,)), CATALOGUE['link_inertia'].on(robot))
+    assert Separation.of(found, doubt, trajectory).z < 1e-3
+    assert Separation.of(found, doubt, trajectory, load=Load(1.0, 'bob')).z > 10.0
+
+
+def test_the_document_states_what_is_expected(chosen):
+    document = json.loads(json.dumps(chosen.document()))
+    assert document['expected_z'] == min(pair['expected_z'] for pair in document['separates'])
+    assert {pair['rival'] for pair in document['separates']} == {'encoder_offset', 'torque_drift'}
+    for pair in document['separates']:
+        assert f'{pair["expected_z"]:.0f} standard deviations' in chosen.sentence
