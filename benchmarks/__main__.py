@@ -6,7 +6,14 @@ from pathlib import Path
 import subprocess
 import sys
 
-LIBRARY = {'__init__', '__main__', 'browser', 'leg_pair_in_mujoco', 'real_recordings'}
+LIBRARY = {
+    '__init__',
+    '__main__',
+    'bic_selection',
+    'browser',
+    'leg_pair_in_mujoco',
+    'real_recordings',
+}
 
 
 def main() -> int:

@@ -6,14 +6,15 @@ Whether the diagnosis names effects that are hidden in recordings of MuJoCo arms
 The cases are those of tests/hidden, whose data come from code that has nothing in common with the
 diagnosis; rates have 95 % intervals (Wilson). Reach and what counts: tests/hidden/README.md.
 
-    python -m benchmarks.hidden_effects [development|locked] [--slice] [--only TEXT] [--out DIR]
+    python -m benchmarks.hidden_effects [development|locked] [--slice] [--only TEXT] [--baseline]
+        [--out DIR]
 
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 import json
@@ -25,17 +26,23 @@ import traceback
 from typing import Any
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis import DiagnosisSettings
 from armid_ros.diagnosis.gap import Overlay
 from armid_ros.effects import CATALOGUE
 from armid_ros.motion import FloatArray
 import numpy as np
 
+from benchmarks.bic_selection import bic_selection
 from tests.hidden.cases import Case, make_case, VISIBLE
+from tests.hidden.catalogue import HIDDEN
 from tests.hidden.scoring import confusion, Finding, Judged, Outcome, score, Truth
 from tests.hidden.specification import case_list, CaseSpec
 
 #: Every so many cases of a kind are in the slice.
 SLICE = {'single': 9, 'free': 20, 'pair': 8, 'outside': 5, 'removed': 10}
+
+#: What a baseline that only names effects can be compared in.
+BASELINE_METRICS = ('false alarms', 'wrong names', 'top-1 name right', 'pairs exact')
 
 
 def nominal_arm(case: Case) -> ArmModel:
@@ -70,7 +77,7 @@ def true_arm(case: Case) -> ArmModel:
 
 def run_diagnosis(case: Case) -> Outcome:
     """Diagnose a case. This is the one place that knows how."""
-    from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
+    from armid_ros.diagnosis import diagnose, diagnosis_document
 
     library = tuple(name for name in CATALOGUE if name not in case.removed)
     begin = time.process_time()
@@ -145,7 +152,31 @@ def judge(spec: CaseSpec) -> Judged:
     return Judged(Truth.of(case), outcome)
 
 
-def run(specs: Sequence[CaseSpec], processes: int = 2) -> list[Judged]:
+def judge_baseline(spec: CaseSpec) -> Judged:
+    """Make a case and let textbook model selection name what is hidden."""
+    case = make_case(spec)
+    library = tuple(name for name in CATALOGUE if name not in case.removed)
+    begin = time.process_time()
+    groups = bic_selection(
+        nominal_arm(case),
+        [bag.recording for bag in case.bags],
+        DiagnosisSettings(library=library),
+        np.random.default_rng(0),
+    )
+    joints: dict[str, list[str]] = {}
+    for group in groups:
+        joints.setdefault(group.effect.name, []).extend(group.effect.joints)
+    outcome = Outcome(
+        verdict='named' if groups else 'consistent',
+        findings=tuple(Finding(name, tuple(dict.fromkeys(own))) for name, own in joints.items()),
+        seconds=time.process_time() - begin,
+    )
+    return Judged(Truth.of(case), outcome)
+
+
+def run(
+    specs: Sequence[CaseSpec], processes: int = 2, judge: Callable[[CaseSpec], Judged] = judge
+) -> list[Judged]:
     """Judge cases in several processes, with a line of progress each."""
     judged = []
     context = multiprocessing.get_context('spawn')
@@ -189,6 +220,32 @@ def report(judged: Sequence[Judged]) -> None:
         )
 
 
+def compare(judged: Sequence[Judged], baseline: Sequence[Judged]) -> None:
+    """
+    Print the rates that both have, beside each other.
+
+    The baseline fits the rigid body anew: what only the model as described shows is left out.
+
+    """
+    seen = [j.truth.key for j in judged if not any(HIDDEN[name].rigid for name in j.truth.names)]
+    tables = [
+        {m.name: m for m in score([j for j in one if j.truth.key in seen])}
+        for one in (judged, baseline)
+    ]
+    print(
+        f'\n{"without wrong values of the rigid body":40s} {"diagnosis":>20s} {"pooled BIC":>20s}'
+    )
+    for name in BASELINE_METRICS:
+        pair = [table[name] for table in tables]
+        shown = [f'{m.value:.3f} ({m.low:.2f} - {m.high:.2f})' for m in pair]
+        print(f'{name:30s} {pair[0].count:9d} {shown[0]:>20s} {shown[1]:>20s}')
+    counts = [
+        [len(j.findings) for j in one if j.truth.kind == 'free'] for one in (judged, baseline)
+    ]
+    means = ' '.join(f'{np.mean(c) if c else np.nan:20.2f}' for c in counts)
+    print(f'{"names where nothing is hidden":30s} {len(counts[0]):9d} {means}')
+
+
 def write(judged: Sequence[Judged], folder: Path) -> None:
     """Write all outcomes as JSON, and the confusion matrix as a figure."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -228,14 +285,18 @@ def main() -> None:
     parser.add_argument('set', nargs='?', choices=['development', 'locked'])
     parser.add_argument('--slice', action='store_true', help='a few cases of every kind')
     parser.add_argument('--only', nargs='+', default=[], metavar='TEXT', help='keys that have it')
+    parser.add_argument('--baseline', action='store_true', help='pooled BIC on the same cases')
     parser.add_argument('--out', type=Path, help='folder for outcomes.json and confusion.svg')
     parser.add_argument('--processes', type=int, default=2)
     options = parser.parse_args()
     for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
         os.environ.setdefault(variable, '1')  # the processes share the cores as it is
     part = options.slice or options.set is None
-    judged = run(select(options.set or 'development', options.only, part), options.processes)
+    specs = select(options.set or 'development', options.only, part)
+    judged = run(specs, options.processes)
     report(judged)
+    if options.baseline:
+        compare(judged, run(specs, options.processes, judge_baseline))
     if options.out:
         write(judged, options.out)
 

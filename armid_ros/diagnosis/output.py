@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import math
 from typing import Any
 
+from armid_ros.diagnosis.detectable import detectable, smallest_size
 from armid_ros.diagnosis.diagnose import Diagnosis
 from armid_ros.diagnosis.league import Standing
 from armid_ros.motion import FloatArray
@@ -15,8 +16,6 @@ import numpy as np
 
 SCHEMA = 'armid/diagnosis/1'
 
-#: A group is detectable at this many standard deviations of its values.
-_DETECTABLE = 5.0
 _MOST_CANDIDATES = 20
 
 
@@ -65,6 +64,7 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
         'gap': _gap(diagnosis),
         'candidates': [_candidate(s) for s in diagnosis.league.first[:_MOST_CANDIDATES]],
         'not_visible': list(diagnosis.not_visible),
+        'detectable': _detectable(diagnosis),
         'model': model,
     }
 
@@ -105,9 +105,24 @@ def _candidate(standing: Standing) -> dict[str, Any]:
         'held_out_gain': trial.gain,
         'replicated_in': int(np.sum(trial.z >= 3.0)),
         'visible_fraction': score.visible,
-        'min_detectable': _finite(_DETECTABLE * float(score.std[0])),
+        'min_detectable': _finite(smallest_size(score)[1]),
         **_sureness([standing]),
     }
+
+
+def _detectable(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return from which size on the data would show each effect; null where at no size."""
+    return [
+        {
+            'name': row.name,
+            'joints': list(row.joints),
+            'parameter': '' if row.parameter is None else row.parameter.name,
+            'min_detectable': _finite(row.size),
+            'unit': '' if row.parameter is None else row.parameter.unit,
+            'visible_fraction': row.visible,
+        }
+        for row in detectable(diagnosis.explanation, diagnosis.arm.robot)
+    ]
 
 
 def _sureness(standings: Sequence[Standing]) -> dict[str, float]:

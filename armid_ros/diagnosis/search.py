@@ -90,6 +90,8 @@ class Survey:
         All visible groups, best shape of each.
     tried : int
         How many visible groups there are, every shape for itself.
+    unseen : tuple of (str, tuple of str)
+        Names and joints of the groups that are not visible.
 
     """
 
@@ -97,6 +99,7 @@ class Survey:
     hidden: frozenset[str]
     scores: tuple[Score, ...]
     tried: int
+    unseen: tuple[tuple[str, tuple[str, ...]], ...]
 
 
 def next_step(
@@ -139,6 +142,8 @@ def next_step(
     scores = _best_per_key(screened)
     visible = {score.group.effect.name for score in scores}
     hidden = frozenset(group.effect.name for group in groups) - visible
+    seen = {score.group.key[:2] for score in scores}
+    unseen = tuple(dict.fromkeys(g.key[:2] for g in groups if g.key[:2] not in seen))
     trials: list[Trial] = []
     refined = 0
     for score in scores[:_LOOKED_AT]:
@@ -160,7 +165,7 @@ def next_step(
     trials.sort(key=lambda trial: -trial.gain)
     passing = [t for t in trials if acceptable(t, problem, left, settings, total)]
     league = tuple(trials)
-    survey = Survey(league, hidden, tuple(scores), len(screened))
+    survey = Survey(league, hidden, tuple(scores), len(screened), unseen)
     if not passing:
         return None, survey, problem
     tied = [passing[0], *not_beaten(passing, problem, left, settings)]

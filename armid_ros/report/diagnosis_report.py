@@ -7,12 +7,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.diagnosis import Diagnosis, NextRun
+from armid_ros.diagnosis.detectable import detectable
 from armid_ros.identification.verification import ForwardValidation
 from armid_ros.recording import Recording
 from armid_ros.report.notation import counted
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.candidates import CandidateTable
+from armid_ros.report.sections.could_be_seen import CouldBeSeen
 from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
 from armid_ros.report.sections.evidence import Evidence
 from armid_ros.report.sections.forward import Forward
@@ -81,6 +83,7 @@ def diagnosis_report(
         if diagnosis.where:
             sections.append(Evidence(diagnosis.where))
         sections += [CandidateTable(diagnosis), Staircase(diagnosis)]
+        sections.append(CouldBeSeen(detectable(diagnosis.explanation, diagnosis.arm.robot)))
     sections.append(NextSteps(_next_steps(diagnosis, next_run)))
     if diagnosis.findings:
         sections.append(NamedParameters(diagnosis.findings))

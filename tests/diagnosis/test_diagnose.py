@@ -138,6 +138,7 @@ def test_the_document_has_what_the_schema_says(bench):
         'gap',
         'candidates',
         'not_visible',
+        'detectable',
         'model',
     }
 

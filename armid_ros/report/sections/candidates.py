@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis
+from armid_ros.diagnosis.detectable import smallest_size
+from armid_ros.diagnosis.league import Standing
 from armid_ros.report.notation import digits
 from armid_ros.report.page import Section
 
@@ -66,13 +68,20 @@ class CandidateTable(Section):
                     f'{int((trial.z >= 3.0).sum())} of {len(trial.z)}',
                     value.strip(),
                     f'{100.0 * score.visible:.0f} %',
-                    f'{digits(5.0 * float(score.std[0]))} {quantity.unit}'.strip(),
+                    _size(standing),
                     _probability(standing.adjusted_p),
                     f'{100.0 * standing.inclusion:.0f} %',
                     effect.name in names,
                 )
             )
         return rows
+
+
+def _size(standing: Standing) -> str:
+    """Return from which size on a candidate shows, with its unit."""
+    effect = standing.trial.score.group.effect
+    index, size = smallest_size(standing.trial.score)
+    return f'{digits(size)} {effect.quantities[index % len(effect.quantities)].unit}'.strip()
 
 
 def _probability(p: float) -> str:

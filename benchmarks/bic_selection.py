@@ -1,0 +1,97 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What textbook model selection names: the baseline that a diagnosis has to beat.
+
+Forward selection by the Bayesian information criterion on all rows pooled, as if their errors were
+independent and alike: no noise floor, nothing held out, no replication. Library, filters, columns
+and what is free of the rigid body are those of the diagnosis.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.candidates import candidates, Group
+from armid_ros.diagnosis.diagnose import _narrower
+from armid_ros.diagnosis.evidence import trajectories
+from armid_ros.diagnosis.fit import excited, fit
+from armid_ros.diagnosis.problem import make_problem, project
+from armid_ros.diagnosis.selection import solve_products
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.identification.signals import conditioning
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+import numpy as np
+
+#: Columns of which what is free leaves less than this share add nothing.
+_LEAST_VISIBLE = 0.02
+
+
+def bic_selection(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    settings: DiagnosisSettings,
+    rng: np.random.Generator,
+) -> list[Group]:
+    """
+    Return the groups that lower the criterion, in the order in which they do.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The arm as described; its rigid body and known effects are free.
+    recordings : sequence of Recording
+        Data with torques.
+    settings : DiagnosisSettings
+        Library.
+    rng : numpy.random.Generator
+        Draws the states over which base parameters are found.
+
+    """
+    used = _narrower(conditioning(list(recordings), settings.signals), settings)
+    data = trajectories(recordings, used)
+    base, _ = excited(arm, arm.base_parameters(rng), data)
+    one = [np.ones(arm.robot.n_joints)] * len(data)
+    reference = fit(arm, (), data, one, base)
+    told = np.concatenate([part.told for part in data])
+    left = np.concatenate(reference.residual)
+    alike = [np.sqrt(np.sum(left**2, axis=0, where=told) / told.sum(axis=0))] * len(data)
+    found = candidates(reference, data, settings.kinds)
+    columns = [
+        np.concatenate(c, axis=2) for c in zip(found.columns, reference.columns, strict=True)
+    ]
+    problem = make_problem(data, alike, reference.residual, columns)
+    size = problem.x.shape[2]
+    free = list(range(size - reference.columns[0].shape[2], size))
+    rows = int(problem.used.sum())
+    chosen: list[Group] = []
+    while True:
+        rest = project(problem, free).sweep(problem.products).sum(axis=0)
+        whole = np.diagonal(problem.products.sum(axis=0))
+        best, group = _best(rest, whole, found.groups, rows)
+        if group is None or best >= 0.0:
+            return chosen
+        chosen.append(group)
+        free += range(group.columns.start, group.columns.stop)
+
+
+def _best(
+    rest: FloatArray, whole: FloatArray, groups: Sequence[Group], rows: int
+) -> tuple[float, Group | None]:
+    """Return the largest change of the criterion, and the group that makes it."""
+    best, chosen = 0.0, None
+    squares = float(rest[-1, -1])
+    for group in groups:
+        span = group.columns
+        own, aim = rest[span, span], rest[span, -1]
+        if np.trace(own) < _LEAST_VISIBLE**2 * whole[span].sum() or np.trace(own) <= 0.0:
+            continue
+        values, _ = solve_products(own, aim)
+        after = max(squares - float(values @ aim), 1e-300)
+        change = rows * np.log(after / squares) + group.size * np.log(rows)
+        if change < best:
+            best, chosen = change, group
+    return best, chosen

@@ -1,0 +1,204 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Ways in which a search for effects fools itself, each reproduced beside what the diagnosis does.
+
+The data and the library are the same for both; what differs is the one step that is wrong.
+
+"""
+
+from dataclasses import dataclass, replace
+
+from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis.candidates import candidates
+from armid_ros.diagnosis.fit import excited, fit
+from armid_ros.diagnosis.floor import noise_floor
+from armid_ros.diagnosis.model_search import explain
+from armid_ros.diagnosis.problem import make_problem, project
+from armid_ros.diagnosis.selection import replicated, Score, solve_products, try_group
+from armid_ros.effects import Action, CATALOGUE, Effect, Quantity
+from armid_ros.model import inverse_dynamics
+import numpy as np
+import pytest
+from scipy import stats
+
+from benchmarks.bic_selection import bic_selection
+from tests.diagnosis.conftest import TORQUE_NOISE
+from tests.diagnosis.test_floor import cut
+
+SETTINGS = DiagnosisSettings()
+
+
+def look(bench, recordings, **options):
+    return diagnose(bench.arm, recordings, rng=np.random.default_rng(0), **options)
+
+
+def on_elbow(torque):
+    """Return a torque of the elbow alone."""
+    return np.column_stack([np.zeros(len(torque)), torque])
+
+
+def shaken(recordings, size, seed):
+    """Return recordings with noisier encoders."""
+    rng = np.random.default_rng(seed)
+    return [replace(r, q=r.q + size * rng.normal(size=r.q.shape)) for r in recordings]
+
+
+def significant(arm, data, sigma, names):
+    """Return the most significant of some effects by chi squared, if it is at 5 % of them all."""
+    base, _ = excited(arm, arm.base_parameters(np.random.default_rng(0)), data)
+    reference = fit(arm, (), data, sigma, base)
+    found = candidates(reference, data, [CATALOGUE[name] for name in names])
+    pairs = zip(found.columns, reference.columns, strict=True)
+    columns = [np.concatenate(pair, axis=2) for pair in pairs]
+    problem = make_problem(data, sigma, reference.residual, columns)
+    size = problem.x.shape[2]
+    free = range(size - reference.columns[0].shape[2], size)
+    rest = project(problem, free).sweep(problem.products).sum(axis=0)
+    p = {}
+    for group in found.groups:
+        own, aim = rest[group.columns, group.columns], rest[group.columns, -1]
+        gain = float(solve_products(own, aim)[0] @ aim)
+        name = group.effect.name
+        p[name] = min(p.get(name, 1.0), float(stats.chi2.sf(gain, group.size)))
+    best = min(p, key=p.get)
+    return best if p[best] < 0.05 / len(found.groups) else None
+
+
+FRICTION = (
+    'stribeck_friction',
+    'asymmetric_friction',
+    'quadratic_friction',
+    'load_dependent_friction',
+    'torque_offset',
+    'rotor_inertia',
+    'torque_gain',
+)
+
+
+def test_noise_of_the_torque_sensor_alone_makes_a_false_stribeck_friction(bench):
+    by_sensor, by_floor = [], []
+    for seed in range(1, 7):
+        data = cut(shaken(bench.recordings(seed=seed), 3e-4, seed))
+        everywhere = [replace(part, told=np.ones_like(part.told)) for part in data]
+        sensor = [np.full(2, TORQUE_NOISE * np.linalg.norm(part.used.taps())) for part in data]
+        floor = [noise_floor(part, bench.arm).sigma for part in data]
+        assert all(np.all(a > b) for a, b in zip(floor, sensor, strict=True))
+        by_sensor.append(significant(bench.arm, everywhere, sensor, FRICTION))
+        by_floor.append(significant(bench.arm, data, floor, FRICTION))
+    assert by_sensor.count('stribeck_friction') >= 5
+    assert by_floor.count(None) >= 5
+
+
+def test_information_criteria_over_pooled_rows_invent_effects(bench):
+    invented, named = [], []
+    for seed in range(1, 5):
+        recordings = shaken(bench.recordings(seed=seed), 2e-4, seed)
+        rng = np.random.default_rng(0)
+        invented.append(len(bic_selection(bench.arm, recordings, SETTINGS, rng)))
+        named.append(len(look(bench, recordings).findings))
+    assert np.mean(np.array(invented) > 0) >= 0.5
+    assert named == [0] * len(invented)
+
+
+@pytest.mark.parametrize(
+    ('name', 'hide', 'refitted'),
+    [
+        ('rotor_inertia', lambda bench, m: on_elbow(0.004 * m.ddq[:, 1]), True),
+        (
+            'gravity_magnitude',
+            lambda bench, m: 0.006 * inverse_dynamics(bench.robot, m.at_rest()),
+            False,
+        ),
+    ],
+)
+def test_one_floor_for_all_speeds_hides_what_the_quiet_ones_show(bench, name, hide, refitted):
+    quiet = bench.recordings(lambda m, tau: hide(bench, m), noise=0.3)
+    loud = np.random.default_rng(1).normal(size=quiet[2].tau.shape)
+    data = cut([*quiet[:2], replace(quiet[2], tau=quiet[2].tau + loud)])
+    own = [noise_floor(part, bench.arm).sigma for part in data]
+    pooled = [np.sqrt(np.mean(np.square(own), axis=0))] * len(own)
+    base, _ = excited(bench.arm, bench.arm.base_parameters(np.random.default_rng(0)), data)
+    names = []
+    for sigma in (own, pooled):
+        found = explain(bench.arm, data, sigma, base if refitted else None, SETTINGS, 3)
+        names.append([step.trial.score.group.effect.name for step in found.steps])
+    assert names == [[name], []]
+
+
+def test_what_most_recordings_cannot_show_is_found_in_the_two_that_can(bench):
+    def little(motion, tau):
+        return 0.01 * drag(motion, tau)
+
+    slow = [bench.recordings(little, seed=seed)[0] for seed in range(4)]
+    fast = [bench.recordings(little, seed=seed)[2] for seed in range(2)]
+    found = look(bench, [*slow, *fast])
+    (finding,) = found.findings
+    assert (finding.name, finding.joints) == ('quadratic_friction', ('elbow',))
+    (step,) = found.explanation.steps
+    assert np.all(step.trial.z[:4] < 3.0)
+    assert np.all(step.trial.z[4:] > 3.0)
+
+
+def test_parts_drawn_from_all_recordings_repeat_what_is_in_one_of_them_only(bench):
+    recordings = bench.recordings()
+    recordings[1] = replace(recordings[1], tau=np.add(recordings[1].tau, [0.0, 0.3]))
+    data = cut(recordings)
+    sigma = [noise_floor(part, bench.arm).sigma for part in data]
+    reference = fit(bench.arm, (), data, sigma, None)
+    found = candidates(reference, data, [CATALOGUE['torque_offset']])
+    problem = make_problem(data, sigma, reference.residual, list(found.columns))
+    (group,) = (g for g in found.groups if g.effect.joints == ('elbow',))
+    mixed = np.random.default_rng(0).integers(3, size=len(problem.fold))
+    trials = []
+    for fold in (mixed, problem.fold):
+        parts = replace(problem, fold=fold)
+        start = Score(group, np.zeros(1), np.zeros(1), 0.0, 1.0)
+        columns = parts.x[:, :, group.columns]
+        trials.append(try_group(parts, project(parts, ()), start, columns, SETTINGS))
+    drawn, whole = trials
+    assert np.all(drawn.gains.sum(axis=1) > 0.0)
+    assert replicated(drawn, SETTINGS)
+    assert np.all(whole.gains.sum(axis=1)[[0, 2]] < 0.0)
+    assert not replicated(whole, SETTINGS)
+    assert 'torque_offset' not in {f.name for f in look(bench, recordings).findings}
+
+
+def drag(motion, tau):
+    """Return a torque of the elbow that grows with the square of its speed."""
+    return on_elbow(0.1 * motion.dq[:, 1] * np.abs(motion.dq[:, 1]))
+
+
+def test_a_surrogate_for_a_name_that_is_not_in_the_library_is_provisional(bench):
+    library = tuple(name for name in CATALOGUE if name != 'quadratic_friction')
+    found = look(bench, bench.recordings(drag), settings=DiagnosisSettings(library=library))
+    assert found.verdict in ('unknown', 'partial')
+    whole = look(bench, bench.recordings(drag))
+    assert (whole.verdict, whole.findings[0].name) == ('named', 'quadratic_friction')
+
+
+@dataclass(frozen=True)
+class MeasuredTorque(Effect):
+    """A share of the measured torque: with the rigid body it makes any residual."""
+
+    name = 'measured_torque'
+    summary = 'a share of what is to be explained'
+    quantities = (Quantity('share', ''),)
+
+    def columns(self, motion, arm):
+        """Return the measured torque minus that of the arm: the residual itself."""
+        columns = np.zeros((len(motion), motion.n_joints, len(self.joints)))
+        left = motion.tau - arm.torque(motion)
+        for position, joint in enumerate(self.indices(motion.joints)):
+            columns[:, joint, position] = left[:, joint]
+        return columns
+
+    def action(self, values, arm):
+        """Act in no way: there is nothing physical in it."""
+        return Action()
+
+
+@pytest.mark.parametrize('hide', [None, drag])
+def test_columns_made_of_the_measured_torque_explain_nothing(bench, hide):
+    found = look(bench, bench.recordings(hide), settings=DiagnosisSettings(own=(MeasuredTorque,)))
+    assert 'measured_torque' not in {f.name for f in found.findings}
