@@ -56,12 +56,15 @@ class Group:
         Its columns among those of all groups.
     kept : tuple of int
         Parameters of the effect that the columns belong to; the others are zero.
+    precision : ndarray, shape (p,)
+        How strongly their values are held to what may be expected of them.
 
     """
 
     effect: Effect
     columns: slice
     kept: tuple[int, ...]
+    precision: FloatArray
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
@@ -113,12 +116,13 @@ def shaped(
     members: list[Effect],
     fitted: Fitted,
     data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
 ) -> Iterator[tuple[Effect, list[Effect]]]:
     """Yield an effect and its groups with every shape that a search starts from."""
     if not effect.shapes:
         yield effect, members
         return
-    grids = shape_starts(effect, fitted, data)
+    grids = shape_starts(effect, fitted, data, sigma)
     counts = [grid.shape[1] for grid in grids]
     together = len(set(counts)) == 1 and int(np.prod(counts)) > _MOST_SHAPES
     chosen = (
@@ -155,7 +159,10 @@ class Candidates:
 
 
 def candidates(
-    fitted: Fitted, data: Sequence[Trajectory], kinds: Sequence[type[Effect]]
+    fitted: Fitted,
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+    kinds: Sequence[type[Effect]],
 ) -> Candidates:
     """Compute the columns of every effect that a fitted arm does not have."""
     fitted = replace(fitted, arm=remembering(fitted.arm))
@@ -164,14 +171,15 @@ def candidates(
     blocks: list[list[FloatArray]] = [[] for _ in data]
     start = 0
     for effect, members in group_effects(arm, kinds):
-        for whole, singles in shaped(effect, members, fitted, data):
+        for whole, singles in shaped(effect, members, fitted, data, sigma):
             for block, part in zip(blocks, data, strict=True):
                 block.append(effect_rows(arm, whole, part))
             for single in singles:
-                size = len(single.parameters(arm.robot))
+                precision = single.spread(arm.robot) ** -2.0
+                size = len(precision)
                 for kept in _ALONE.get(single.name, (tuple(range(size)),)):
                     span = slice(start + kept[0], start + kept[-1] + 1)
-                    groups.append(Group(single, span, kept))
+                    groups.append(Group(single, span, kept, precision[list(kept)]))
                 start += size
     return Candidates(tuple(groups), tuple(np.concatenate(block, axis=2) for block in blocks))
 

@@ -12,8 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from armid_ros.arm import ArmModel
+from armid_ros.effects.timing import smoothed
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.signals import (
     Conditioning,
@@ -31,9 +33,9 @@ _OVERSAMPLING = 8
 #: A joint slower than this share of its top speed for this long [s] is at rest.
 _REST_SPEED, _REST_TIME = 0.02, 0.2
 #: Below this share of the top speed the sign of a velocity is uncertain, and so is dry friction in
-#: as many rows around as the filter smears it over: beyond two rows the residuals of six-joint
-#: arms are at their noise again, within them they are at 3 to 15 times its power.
-_REVERSAL_SPEED, _REVERSAL_ROWS = 0.004, 2
+#: as many rows around as the filter rings over: beyond three rows the residuals of six-joint
+#: arms are at their noise again, in the third they can be at four times its power.
+_REVERSAL_SPEED, _REVERSAL_ROWS = 0.004, 3
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,11 @@ class Trajectory:
     def reduce(self, values: FloatArray) -> FloatArray:
         """Filter and decimate samples (N, ...) to rows (M, ...)."""
         return decimate(values, self.used)
+
+    @cached_property
+    def smooth(self) -> Trajectory:
+        """The same with positions that have nothing beyond the band of the motion."""
+        return replace(self, motion=smoothed(self.motion))
 
     def residual(self, arm: ArmModel) -> FloatArray:
         """Return measured torque minus that of a model, in rows, shape (M, n) [N m]."""

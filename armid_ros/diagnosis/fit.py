@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.patch import Named, Patch, patch_columns
+from armid_ros.effects.load import described_spread
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.least_squares import solve
@@ -27,8 +28,6 @@ import numpy as np
 #: Free columns of which the others leave less than this share of their length are grouped.
 _EXCITED = 1e-4
 _MOST_ROUNDS = 4
-#: How far from its joint a link's mass may be without a word in the description [m].
-_REACH = 0.1
 
 
 @dataclass(frozen=True)
@@ -160,11 +159,8 @@ def _described(base: BaseParameters, arm: ArmModel) -> FloatArray:
 
     """
     size = len(arm.robot.rigid_parameters)
-    body = arm.robot.rigid_parameters.reshape(-1, 10)
-    mass = np.abs(body[:, :1]) + 0.1 * np.mean(np.abs(body[:, :1]))
-    reach = mass * np.array([[1.0] + 3 * [_REACH] + 6 * [_REACH**2]])
     spread = np.full(len(base.standard), np.inf)
-    spread[:size] = (np.abs(body) + reach).ravel()
+    spread[:size] = described_spread(arm.robot).ravel()
     known = np.abs(arm.theta[size:])
     spread[size:] = np.where(known > 0.0, known, np.inf)
     told = ~np.any((base.grouping != 0.0) & np.isinf(spread), axis=1)

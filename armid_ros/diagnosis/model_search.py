@@ -88,7 +88,7 @@ def explain(
         if not gap and (survey is not None or base is None):
             break
         if found is None:
-            found = candidates(current, data, settings.kinds)
+            found = candidates(current, data, sigma, settings.kinds)
             columns = [
                 np.concatenate(pair, axis=2)
                 for pair in zip(found.columns, current.columns, strict=True)

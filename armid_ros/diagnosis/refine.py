@@ -42,6 +42,20 @@ class Workspace:
         blocks = [effect_rows(self.arm, effect, part) for part in self.data]
         return np.asarray(np.concatenate(blocks)[:, :, list(kept)])
 
+    def smooth_columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
+        """Return what they would be without the noise that positions have beyond the motion."""
+        smooth = tuple(part.smooth for part in self.data)
+        return replace(self, data=smooth).columns(effect, kept)
+
+    def reads_torque(self, effect: Effect, kept: Sequence[int]) -> bool:
+        """Return whether the columns of an effect are made of the measured torque."""
+        silent = tuple(
+            replace(part, motion=part.motion.with_torque(np.zeros_like(part.motion.q)))
+            for part in self.data
+        )
+        without = replace(self, data=silent).columns(effect, kept)
+        return not np.array_equal(without, self.columns(effect, kept))
+
 
 def refine(
     problem: Problem,

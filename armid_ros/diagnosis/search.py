@@ -20,6 +20,7 @@ from armid_ros.diagnosis.selection import (
     SPARSE_GAIN,
     Trial,
     try_group,
+    within_bounds,
 )
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
@@ -38,7 +39,11 @@ _OFF = 0.12
 _AT_PEAKS, _PEAK_SHARE = ('actuator_saturation',), 0.2
 #: What holds the arm from outside is another machine or a person: a cause as rich as this many
 #: quantities, which the arm alone has to fail to explain.
-_OUTSIDE = 4
+_STRAPS, _OUTSIDE = ('human_interaction', 'interface_slack'), 4
+#: Columns that take less than this share of their gain without the noise of positions beyond the
+#: band of the motion are made of that noise: backlash that encoders make takes nothing, of real
+#: backlash as wide as three counts a fifth is left.
+_NOT_NOISE = 0.1
 #: Gains within this share of each other are alike; a lead of less than this share is none.
 _EQUAL, _LEAD = 0.98, 0.02
 #: A lead of this share that no part of the data denies is one, however few parts show it.
@@ -146,13 +151,14 @@ def next_step(
     unseen = tuple(dict.fromkeys(g.key[:2] for g in groups if g.key[:2] not in seen))
     trials: list[Trial] = []
     refined = 0
+    best = max((s.gain for s in scores if s.group.effect.name not in _STRAPS), default=0.0)
     for score in scores[:_LOOKED_AT]:
         columns = problem.x[:, :, score.group.columns]
         if score.gain <= 0.0:
             break
         if score.group.effect.name in _AT_PEAKS and _share(problem, columns) > _PEAK_SHARE:
             continue
-        promising = refined < _REFINED and score.gain > 0.4 * scores[0].gain
+        promising = refined < _REFINED and score.gain > 0.4 * best
         if score.group.effect.shapes and promising:
             refined += 1
             score, columns = refine(problem, projection, score, left, work)
@@ -163,13 +169,21 @@ def next_step(
             columns = problem.x[:, :, span]
         trials.append(try_group(problem, projection, score, columns, settings))
     trials.sort(key=lambda trial: -trial.gain)
-    passing = [t for t in trials if acceptable(t, problem, left, settings, total)]
+    passing = [
+        trial
+        for trial in trials
+        if acceptable(trial, problem, left, settings, total)
+        and not made_of_noise(trial, problem, projection, left, work)
+    ]
     league = tuple(trials)
     survey = Survey(league, hidden, tuple(scores), len(screened), unseen)
     if not passing:
         return None, survey, problem
     tied = [passing[0], *not_beaten(passing, problem, left, settings)]
     winner = likelier_body(simplest(tied), tied, work.arm)
+    if winner.score.group.effect.name in _STRAPS:
+        links = likelier_links(winner, scores, problem, projection, settings)
+        winner, tied = (links[0], [*links, winner]) if links else (winner, tied)
     rivals = tuple(
         t
         for t in tied
@@ -180,6 +194,27 @@ def next_step(
     before = joint_losses(problem, left)
     after = joint_losses(problem, left - winner.torque)
     return Step(winner, rivals, league, before, after, tuple(passing)), survey, problem
+
+
+def made_of_noise(
+    trial: Trial, problem: Problem, projection: Projection, left: FloatArray, work: Workspace
+) -> bool:
+    """
+    Return whether a group explains noise with that noise.
+
+    What positions have beyond the motion is in the accelerations that the model takes, and so in
+    what is left, and in columns that are derived from them. And columns that are made of the
+    measured torque can leave less than its noise.
+
+    """
+    effect, kept, settings = trial.score.group.effect, trial.score.group.kept, work.settings
+    columns = work.smooth_columns(effect, kept) * problem.weight[:, :, np.newaxis]
+    smooth = try_group(problem, projection, trial.score, columns, settings)
+    if smooth.gain < _NOT_NOISE * trial.gain:
+        return True
+    before = np.minimum(joint_losses(problem, left), 1.0)
+    after = joint_losses(problem, left - trial.torque)
+    return bool(np.any(after < settings.tautology * before)) and work.reads_torque(effect, kept)
 
 
 def simplest(tied: Sequence[Trial]) -> Trial:
@@ -211,6 +246,35 @@ def likelier_body(winner: Trial, tied: Sequence[Trial], arm: ArmModel) -> Trial:
     return twins[0] if twins else winner
 
 
+def likelier_links(
+    winner: Trial,
+    scores: Sequence[Score],
+    problem: Problem,
+    projection: Projection,
+    settings: DiagnosisSettings,
+) -> list[Trial]:
+    """
+    Return bodies that take as much as what holds the arm from outside does, best first.
+
+    A far anchor pulls as gravity does. A body has ten values, which slow motions alone do not
+    tell, so that it is behind where recordings are held out; it counts if all data together are
+    explained as well.
+
+    """
+
+    def taken(trial: Trial) -> float:
+        left = projection.rest(problem.y)
+        return float(np.sum(left**2) - np.sum((left - trial.torque) ** 2))
+
+    bodies = [
+        try_group(problem, projection, score, problem.x[:, :, score.group.columns], settings)
+        for score in scores
+        if score.group.effect.changes_body
+    ]
+    able = [t for t in bodies if within_bounds(t.score) and taken(t) >= taken(winner)]
+    return sorted(able, key=lambda t: -taken(t))
+
+
 def _share(problem: Problem, columns: FloatArray) -> float:
     """Return in what share of the rows of the busiest joint a group does something."""
     size = np.abs(columns).max(axis=2)
@@ -219,7 +283,7 @@ def _share(problem: Problem, columns: FloatArray) -> float:
 
 
 def _complexity(group: Group) -> int:
-    outside = _OUTSIDE if group.effect.name in ('human_interaction', 'interface_slack') else 0
+    outside = _OUTSIDE if group.effect.name in _STRAPS else 0
     shapes = 1 if group.effect.name == 'soft_limit' else len(group.effect.shapes)
     return len(group.kept) + shapes + outside
 

@@ -15,9 +15,9 @@ from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Peaks of a spectrum over the angle that are tried, and between which orders [1/rad]: below, it
-#: is gravity and springs; above, filters take it away.
-_MOST_PEAKS, _ORDERS = 6, (3.0, 80.0)
+#: Orders of a ripple that go on to be compared, of how many likely ones that are looked at finely,
+#: and between which orders [1/rad]: below, it is gravity and springs; above, filters take it away.
+_MOST_PEAKS, _LIKELY, _FINER, _ORDERS = 3, 12, 8, (3.0, 80.0)
 #: Anchors of straps that are tried: how far from the middle of where the attachment comes to, over
 #: the spread of that, in all directions of a cube. Slacks are quantiles of the length.
 _DISTANCES, _SLACKS = (0.0, 0.7, 1.5, 3.0), (0.0, 0.2, 0.4, 0.6, 0.8)
@@ -26,7 +26,10 @@ _STRAPS, _ROWS = 2, 400
 
 
 def shape_starts(
-    effect: Effect, fitted: Fitted, data: Sequence[Trajectory]
+    effect: Effect,
+    fitted: Fitted,
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
 ) -> tuple[FloatArray, ...]:
     """
     Return values of every shape to start from, each of shape (number of owners, G).
@@ -39,12 +42,14 @@ def shape_starts(
         The arm without it, what that leaves, and the columns of what is fitted anew beside it.
     data : sequence of Trajectory
         The data.
+    sigma : sequence of ndarray, shape (n,)
+        Noise of each trajectory [N m].
 
     """
     if effect.name == 'torque_ripple':
-        return (_orders(effect, fitted, data),)
+        return (_orders(effect, fitted, data, sigma),)
     if isinstance(effect, InterfaceSlack) and effect.anchor is None:
-        return _straps(effect, fitted, data)
+        return _straps(effect, fitted, data, sigma)
     parts = [part.motion for part in data]
     names = ('q', 'dq', 'ddq', 'tau')
     arrays = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
@@ -52,44 +57,70 @@ def shape_starts(
     return effect.shape_grids(whole, fitted.arm)
 
 
-def _orders(effect: Effect, fitted: Fitted, data: Sequence[Trajectory]) -> FloatArray:
+def _orders(
+    effect: Effect, fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
+) -> FloatArray:
     """
-    Return the orders at which the residual of all trajectories has its peaks, (owners, K).
+    Return the orders at which waves over the angle take most of what is left, (owners, K).
 
     The rows of all trajectories count together, as a ripple has one order and phase in all.
 
     """
-    left = _left(fitted, data)
+    weight = _weight(data, sigma)
+    left = np.concatenate(fitted.residual) * weight
     q = np.concatenate([part.motion.q[part.rows] for part in data])
-    rows = []
+    starts = []
     for joint in effect.indices(fitted.arm.robot.joints):
-        step = 0.5 * np.pi / max(float(np.ptp(q[:, joint])), 0.1)
+        rows = weight[:, joint] > 0.0
+        angle, rest, scale = q[rows, joint], left[rows, joint], weight[rows, joint]
+        step = 0.5 * np.pi / max(float(np.ptp(angle)), 0.1)
         orders = np.arange(_ORDERS[0], _ORDERS[1], step)
-        wave = np.exp(-1j * np.outer(orders, q[:, joint]))
-        power = np.abs(wave @ (left[:, joint] - left[:, joint].mean())) ** 2
-        padded = np.concatenate([[0.0], power, [0.0]])
-        peaks = np.flatnonzero((power >= padded[:-2]) & (power > padded[2:]))
-        best = peaks[np.argsort(-power[peaks])[:_MOST_PEAKS]]
-        rows.append(np.resize(orders[best] if len(best) else orders[:1], _MOST_PEAKS))
-    return np.array(rows)
+        gain = wave_gains(angle, rest, scale, orders)
+        padded = np.concatenate([[0.0], gain, [0.0]])
+        peaks = np.flatnonzero((gain >= padded[:-2]) & (gain > padded[2:]))
+        likely = orders[peaks[np.argsort(-gain[peaks])[:_LIKELY]]]
+        likely = likely if len(likely) else orders[:1]
+        fine = likely[:, np.newaxis] + step * np.linspace(-1.0, 1.0, 2 * _FINER + 1)
+        gain = wave_gains(angle, rest, scale, fine.ravel()).reshape(fine.shape)
+        best = np.argsort(-gain.max(axis=1))[:_MOST_PEAKS]
+        starts.append(np.resize(fine[best, np.argmax(gain[best], axis=1)], _MOST_PEAKS))
+    return np.array(starts)
 
 
-def _left(fitted: Fitted, data: Sequence[Trajectory]) -> FloatArray:
-    """Return what is left in all rows that tell something, shape (R, n) [N m]."""
-    parts = zip(fitted.residual, data, strict=True)
-    return np.concatenate([left * part.told for left, part in parts])
+def wave_gains(
+    angle: FloatArray, rest: FloatArray, weight: FloatArray, orders: FloatArray
+) -> FloatArray:
+    """
+    Return what a sine and cosine of each order take of the squares of a weighted rest, (K,).
+
+    Few cycles of a wave leak into each other; least squares tell them apart where the height of
+    a spectrum does not.
+
+    """
+    wave = np.exp(1j * np.outer(orders, angle))
+    aim, twice, count = wave @ (weight * rest), wave**2 @ weight**2, np.sum(weight**2)
+    cosines, sines, mixed = count + twice.real, count - twice.real, twice.imag
+    determinant = np.maximum(cosines * sines - mixed**2, 1e-6 * count**2)
+    squares = sines * aim.real**2 - 2.0 * mixed * aim.real * aim.imag + cosines * aim.imag**2
+    return np.asarray(2.0 * squares / determinant)
+
+
+def _weight(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
+    """Return one over the noise of all rows, zero where they tell nothing [1/(N m)]."""
+    return np.concatenate([part.told / s for part, s in zip(data, sigma, strict=True)])
 
 
 def _straps(
-    effect: InterfaceSlack, fitted: Fitted, data: Sequence[Trajectory]
+    effect: InterfaceSlack,
+    fitted: Fitted,
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
 ) -> tuple[FloatArray, ...]:
     """Return the anchors and slacks that take most of what is left, beside what is free."""
-    robot, left = fitted.arm.robot, _left(fitted, data)
+    robot, left = fitted.arm.robot, np.concatenate(fitted.residual)
     q = np.concatenate([part.motion.q[part.rows] for part in data])
-    told = np.concatenate([part.told for part in data])
-    size = np.maximum(np.sqrt(np.mean(left**2, axis=0)), 1e-12)
     rows = np.unique(np.linspace(0, len(q) - 1, _ROWS).astype(int))
-    weight = told[rows] / np.maximum(size, 1e-3 * size.max())
+    weight = _weight(data, sigma)[rows]
     beside = np.concatenate(fitted.columns)[rows] * weight[:, :, np.newaxis]
     basis, _ = np.linalg.qr(beside.reshape(weight.size, -1))
 

@@ -70,7 +70,7 @@ def wrong_body(
     """
     reference = described.reference
     kinds = [kind for kind in settings.kinds if kind.changes_body or kind.name in _POSTURE]
-    found = candidates(reference, data, kinds)
+    found = candidates(reference, data, sigma, kinds)
     problem = make_problem(data, sigma, reference.residual, list(found.columns))
     projection, left = project(problem, ()), problem.y
     total = float(excess(problem, left).sum())

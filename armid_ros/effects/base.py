@@ -212,6 +212,10 @@ class Effect(ABC):
             ) from None
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
+    def spread(self, robot: Robot) -> FloatArray:
+        """Return how large values may be expected to be, infinite if at all, shape (P,)."""
+        return np.full(len(self.parameters(robot)), np.inf)
+
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
         """Name the shape parameters, owner by owner."""
         return tuple(

@@ -213,7 +213,7 @@ class InterfaceSlack(_Attached):
             Shape(f'anchor_{axis}', 'm', -100.0, 100.0, 0.0, (-0.3, -0.1, 0.0, 0.1, 0.3))
             for axis in _AXES
         ),
-        Shape('slack', 'm', 0.0, 1.0, 0.01, (0.0, 0.003, 0.01, 0.03, 0.1)),
+        Shape('slack', 'm', 0.0, 5.0, 0.01, (0.0, 0.003, 0.01, 0.03, 0.1)),
     )
 
     def _default_shape(self, robot: Robot) -> FloatArray:

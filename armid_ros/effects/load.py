@@ -17,6 +17,8 @@ import numpy as np
 if TYPE_CHECKING:
     from armid_ros.arm import ArmModel
 
+#: How far from its joint a link's mass may be without a word in the description [m].
+_REACH = 0.1
 _UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 
@@ -37,9 +39,25 @@ class _LinkBody(Effect):
         parameters[self._rows(arm.robot)] += values
         return Action(robot=arm.robot.with_inertias(parameters))
 
+    def spread(self, robot: Robot) -> FloatArray:
+        """Return what descriptions of the links are off by at the most, shape (P,)."""
+        return described_spread(robot).ravel()[self._rows(robot)]
+
     def _rows(self, robot: Robot) -> list[int]:
         size = len(LINK_PARAMETERS)
         return [size * joint + i for joint in self.indices(robot.joints) for i in range(size)]
+
+
+def described_spread(robot: Robot) -> FloatArray:
+    """
+    Return how far rigid parameters may be from their description, shape (n, 10).
+
+    It is believed to a factor or so, and where it gives nothing, a tenth of a mean link is there.
+
+    """
+    body = np.abs(robot.rigid_parameters.reshape(-1, len(LINK_PARAMETERS)))
+    mass = body[:, :1] + 0.1 * np.mean(body[:, :1])
+    return np.asarray(body + mass * np.array([[1.0] + 3 * [_REACH] + 6 * [_REACH**2]]))
 
 
 @dataclass(frozen=True)

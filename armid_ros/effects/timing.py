@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from armid_ros.effects.base import Quantity
 from armid_ros.effects.layout import joint_columns
@@ -16,6 +17,9 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.signal import butter, lfilter, sosfiltfilt
 
+if TYPE_CHECKING:
+    from armid_ros.arm import ArmModel
+
 #: Time constants after which a low-pass has forgotten what went in.
 _FORGOTTEN = 20.0
 #: Factor between two lags whose difference is the derivative.
@@ -23,7 +27,22 @@ _MORE = 1.0001
 
 
 @dataclass(frozen=True)
-class TimeDelay(TorqueReading):
+class Late(TorqueReading):
+    """A reading that comes late, which shows in how fast the torque changes."""
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """
+        Return the derivative of the reading, shape (N, n, P).
+
+        It is taken along the motion without the noise of positions: the rate of a torque is a
+        third derivative of them, and noise in columns makes the values too small.
+
+        """
+        return super().columns(smoothed(motion), arm)
+
+
+@dataclass(frozen=True)
+class TimeDelay(Late):
     """
     Torque readings older than the positions they are recorded with, reading(t) = tau(t - delay).
 
@@ -77,7 +96,7 @@ class TimeDelay(TorqueReading):
 
 
 @dataclass(frozen=True)
-class TorqueLag(TorqueReading):
+class TorqueLag(Late):
     """
     Torque readings through a low-pass of the first order, T dreading/dt + reading = tau.
 
@@ -137,16 +156,24 @@ def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
 
 def within_band(motion: Motion, x: FloatArray) -> FloatArray:
     """
-    Take from torques that follow a motion what is beyond the band of the motion.
+    Take from what follows a motion what is beyond the band of the motion.
 
     The second derivative of a torque is the fourth of positions, of which noise is the larger
     part at high frequency. The filter goes forth and back, without a shift in time.
 
     """
+    if np.isinf(motion.band_hz):
+        return x
     rate = (len(motion) - 1) / float(motion.t[-1] - motion.t[0])
     if motion.band_hz >= 0.5 * rate:
         return x
     return np.asarray(sosfiltfilt(butter(3, motion.band_hz, fs=rate, output='sos'), x, axis=0))
+
+
+def smoothed(motion: Motion) -> Motion:
+    """Take from positions, velocities and accelerations what is beyond the band of the motion."""
+    q, dq, ddq = (within_band(motion, x) for x in (motion.q, motion.dq, motion.ddq))
+    return replace(motion, q=q, dq=dq, ddq=ddq)
 
 
 def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:

@@ -264,8 +264,9 @@ def noise_products(
             transformed = np.fft.rfft(columns, 2 * count, axis=0)
             fitted = active < rank
             taken = transformed[:, fitted] @ inverse[active[fitted]]
-            leverage = np.sum(np.abs(taken) ** 2, axis=1) / count
-            spectrum = _noise_spectrum(residual[start:stop, joint], leverage)
+            told = weights[start:stop, joint] > 0.0
+            leverage = np.sum(np.abs(taken) ** 2, axis=1) / max(np.count_nonzero(told), 1)
+            spectrum = _noise_spectrum(residual[start:stop, joint], told, leverage)
             spectrum[1:-1] *= 2.0  # the constant and the Nyquist bin have no mirror image
             transformed *= np.sqrt(spectrum / (2 * count))[:, np.newaxis]
             power = transformed.real.T @ transformed.real + transformed.imag.T @ transformed.imag
@@ -274,18 +275,23 @@ def noise_products(
     return products
 
 
-def _noise_spectrum(residual: FloatArray, leverage: FloatArray) -> FloatArray:
+def _noise_spectrum(
+    residual: FloatArray, told: npt.NDArray[np.bool_], leverage: FloatArray
+) -> FloatArray:
     """
     Estimate the power spectrum of the noise that left a residual.
 
-    The residual is whitened by an autoregression, its spectrum smoothed by a Parzen window over
-    lags, and coloured again, which keeps peaks from being smoothed away (Andrews and Monahan
-    1992). What the fit took is made up for in the same band.
+    Its autocovariance is that of the samples that tell something, lag by lag over as many pairs
+    as there are (Parzen 1963). The residual is whitened by an autoregression, its spectrum
+    smoothed by a Parzen window over lags, and coloured again, which keeps peaks from being
+    smoothed away (Andrews and Monahan 1992). What the fit took is made up for in the same band.
 
     Parameters
     ----------
     residual : ndarray, shape (M,)
-        Residual.
+        Residual; zero where it tells nothing.
+    told : ndarray of bool, shape (M,)
+        Where it tells something.
     leverage : ndarray, shape (M + 1,)
         Share of the noise that the fit takes, on the bins of an rfft of 2 M samples.
 
@@ -297,12 +303,23 @@ def _noise_spectrum(residual: FloatArray, leverage: FloatArray) -> FloatArray:
     """
     count = len(residual)
     size = 2 * count
-    power = np.abs(np.fft.rfft(residual, size)) ** 2 / count
-    whitening = _whitening(np.fft.irfft(power, size)[:count], size)
+    lags = _autocovariance(residual, told)
+    power = np.fft.rfft(np.concatenate([lags, [0.0], lags[:0:-1]])).real
+    whitening = _whitening(lags, size)
     lags = np.fft.irfft(power * whitening, size)[: count // 2]
     reach = _correlation_reach(lags, count)
     left = _smoothed(1.0 - leverage, reach).clip(LEAST_LEFT)
     return np.asarray(_smoothed(power * whitening, reach).clip(0.0) / left / whitening)
+
+
+def _autocovariance(residual: FloatArray, told: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return the autocovariance of a signal with gaps, biased as if it had none, shape (M,)."""
+    count = len(residual)
+    sums, pairs = (
+        np.fft.irfft(np.abs(np.fft.rfft(signal, 2 * count)) ** 2)[:count]
+        for signal in (residual, told.astype(float))
+    )
+    return np.asarray(sums / np.maximum(pairs, 1.0) * np.arange(count, 0, -1) / count)
 
 
 def _whitening(lags: FloatArray, size: int) -> FloatArray:
