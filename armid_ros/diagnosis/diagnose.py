@@ -153,17 +153,18 @@ def diagnose(
         return _bad(arm, gate, data, tuple(faults))
     tell(0.1, 'noise floor')
     base, _ = excited(arm, arm.base_parameters(rng), data)
-    sigma = [noise_floor(part, arm).sigma for part in data]
-    refit = fit(arm, (), data, sigma, base)
+    told = [noise_floor(part, arm) for part in data]
+    refit = fit(arm, (), data, [floor.sigma for floor in told], base)
     floors = [noise_floor(part, refit.arm) for part in data]
     sigma = [floor.sigma for floor in floors]
+    as_told = [(a if a.period else b).sigma for a, b in zip(told, floors, strict=True)]
     if any(floor.period is None for floor in floors):
         notes.append(
             'nothing repeats in some recordings: their noise floor is assumed from the upper part '
             'of the spectrum; two equal periods would measure it'
         )
     tell(0.25, 'model as described')
-    fixed = explain(arm, data, sigma, None, settings, _FIXED_STEPS)
+    fixed = explain(arm, data, as_told, None, settings, _FIXED_STEPS)
     explained = bool(np.all(fixed.losses < settings.consistent_loss))
     if explained and len(fixed.steps) == 1:
         chosen = fixed
@@ -173,13 +174,13 @@ def diagnose(
     else:
         tell(0.5, 'model fitted anew')
         chosen = explain(arm, data, sigma, base, settings, settings.most_steps)
-        chosen = as_described(chosen, fixed, arm, data, sigma, settings)
+        chosen = as_described(chosen, fixed, arm, data, as_told, settings)
         names = len(fixed.steps)
         fewer = 0 < names <= max(1, len(chosen.steps))
         if fewer and no_worse(fixed.losses, chosen.losses, settings):
             chosen = fixed
         elif not chosen.steps and np.all(chosen.losses < settings.consistent_loss):
-            chosen = wrong_body(chosen, fixed, arm, data, sigma, settings)
+            chosen = wrong_body(chosen, fixed, arm, data, as_told, settings)
     chosen, remarks = as_bodies(chosen, arm, data, sigma, settings)
     notes += remarks
     tell(0.85, 'held-out gap')

@@ -9,6 +9,7 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.signals import conditioning, SignalSettings
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from tests.diagnosis.conftest import PERIODS
 
@@ -60,3 +61,27 @@ def test_each_trajectory_has_a_floor_of_its_own(bench):
     )
     floors = [noise_floor(part, bench.arm).sigma for part in cut([slow, middle, fast])]
     assert np.all(floors[2] > 3.0 * floors[0])
+
+
+def test_coloured_noise_repeats_and_a_machine_nearby_does_not(bench):
+    """Noise of torques that is strong below 10 Hz is noise; a slow sweep in one bag is not."""
+    rng = np.random.default_rng(3)
+
+    def shaken(recording, sweep):
+        white = rng.normal(size=(len(recording.t) + 200, 2))
+        coloured = lfilter([0.6], [1.0, -0.8], white, axis=0)[200:]
+        hum = np.sin(2.0 * np.pi * (0.5 + 0.1 * recording.t) * recording.t)
+        tau = recording.tau + 0.1 * coloured + sweep * hum[:, np.newaxis] * [0.0, 1.0]
+        return type(recording)(joints=recording.joints, t=recording.t, q=recording.q, tau=tau)
+
+    quiet, swept = (
+        [
+            noise_floor(part, bench.arm)
+            for part in cut([shaken(r, size) for r in bench.recordings()])
+        ]
+        for size in (0.0, 0.8)
+    )
+    assert all(floor.repeats.all() for floor in quiet)
+    assert max(floor.structure.max() for floor in quiet) < 4.0
+    assert not any(floor.repeats[1] for floor in swept)
+    assert all(floor.repeats[0] for floor in swept)

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What sensors make of torque and position: gain, crosstalk, drift, delay, offset, clipping."""
 
+from dataclasses import replace
+
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError
@@ -129,3 +131,19 @@ def test_the_search_for_a_level_begins_at_the_torques_that_were_measured(robot, 
     (levels,) = effect.shape_grids(motion.with_torque(torque), ArmModel(robot))
     assert np.all(levels.max(axis=1) < np.arange(1.0, 7.0))
     assert np.all(levels.min(axis=1) > 0.25 * np.arange(1.0, 7.0))
+
+
+def test_noise_of_positions_does_not_make_a_delay_too_small(robot, sines):
+    """The rate of a torque has the third derivative of positions, most of which is noise."""
+    rng = np.random.default_rng(0)
+    motion = sines(4.0)
+    noise = 0.05 * np.abs(motion.ddq).max() * rng.normal(size=motion.ddq.shape)
+    shaken = replace(motion, ddq=motion.ddq + noise, band_hz=8.0)
+    delay, arm = make_effect('time_delay', robot), ArmModel(robot)
+    inner = slice(100, -100)
+    true, found, raw = (
+        delay.columns(m, arm)[inner, :, 0]
+        for m in (motion, shaken, replace(shaken, band_hz=np.inf))
+    )
+    assert np.sum(true * raw) / np.sum(raw**2) < 0.7
+    assert np.sum(true * found) / np.sum(found**2) == pytest.approx(1.0, abs=0.05)

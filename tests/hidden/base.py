@@ -126,6 +126,8 @@ class HiddenEffect(ABC):
     name: ClassVar[str]
     #: Whether the parameters of the rigid body explain it, once they are free.
     rigid: ClassVar[bool] = False
+    #: Names in the catalogue of what it is a limit of: they make the same torque.
+    limit_of: ClassVar[tuple[str, ...]] = ()
     #: Whether it acts at every step; those that do not cost no time.
     acts: ClassVar[bool] = False
     #: Whether it repeats from period to period.

@@ -141,7 +141,10 @@ class Case:
     @property
     def removed(self) -> tuple[str, ...]:
         """Names to be taken out of the library for this case."""
-        return self.spec.effects if self.spec.kind == 'removed' else ()
+        if self.spec.kind != 'removed':
+            return ()
+        limits = [name for effect in self.effects for name in effect.limit_of]
+        return (*self.spec.effects, *limits)
 
 
 @dataclass(frozen=True)

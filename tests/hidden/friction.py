@@ -36,6 +36,7 @@ class ViscousFriction(_JointFriction):
 
     name = 'viscous_friction'
     replaces = ('viscous_friction',)
+    limit_of = ('thermal_friction',)
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
@@ -56,6 +57,7 @@ class CoulombFriction(_JointFriction):
 
     name = 'coulomb_friction'
     replaces = ('coulomb_friction',)
+    limit_of = ('stribeck_friction', 'presliding_hysteresis')
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:

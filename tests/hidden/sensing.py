@@ -44,6 +44,7 @@ class TorqueOffset(_Reading):
     """The reading is too high by a constant."""
 
     name = 'torque_offset'
+    limit_of = ('torque_drift', 'joint_spring', 'asymmetric_friction')
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:

@@ -234,6 +234,7 @@ class HumanInteraction(_Strap):
     """A spring and a damper."""
 
     name = 'human_interaction'
+    limit_of = ('interface_slack',)
     damping_time: float = 0.02
     middle: tuple[float, float, float] = (0.0, 0.0, 0.0)
 

@@ -1,5 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
 from armid_ros.identification.least_squares import solve
 from armid_ros.identification.regression import Regression
 from armid_ros.motion import Motion
@@ -54,6 +56,18 @@ def test_stated_deviations_are_the_scatter_over_repeats(colour):
     scatter = np.std([s.values for s in solutions], axis=0, ddof=1)
     stated = np.sqrt(np.mean([np.diag(s.covariance) for s in solutions], axis=0))
     np.testing.assert_allclose(stated, scatter, rtol=0.25)
+
+
+def test_stated_deviations_know_of_gaps():
+    """A third of the rows tells nothing; taken as silence, the noise would be a third less."""
+    told = np.tile(np.arange(60) >= 20, 25)[:, np.newaxis] & np.ones(2, dtype=bool)
+    solutions = []
+    for seed in range(150):
+        whole = problem(np.random.default_rng(seed), 1500, colour=0.8)
+        solutions.append(solve([replace(whole, informative=told)]))
+    scatter = np.std([s.values for s in solutions], axis=0, ddof=1)
+    stated = np.sqrt(np.mean([np.diag(s.covariance) for s in solutions], axis=0))
+    np.testing.assert_allclose(stated, scatter, rtol=0.2)
 
 
 def test_outliers_do_not_pull():
