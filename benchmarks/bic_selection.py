@@ -59,7 +59,7 @@ def bic_selection(
     told = np.concatenate([part.told for part in data])
     left = np.concatenate(reference.residual)
     alike = [np.sqrt(np.sum(left**2, axis=0, where=told) / told.sum(axis=0))] * len(data)
-    found = candidates(reference, data, settings.kinds)
+    found = candidates(reference, data, alike, settings.kinds)
     columns = [
         np.concatenate(c, axis=2) for c in zip(found.columns, reference.columns, strict=True)
     ]

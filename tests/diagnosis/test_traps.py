@@ -48,7 +48,7 @@ def significant(arm, data, sigma, names):
     """Return the most significant of some effects by chi squared, if it is at 5 % of them all."""
     base, _ = excited(arm, arm.base_parameters(np.random.default_rng(0)), data)
     reference = fit(arm, (), data, sigma, base)
-    found = candidates(reference, data, [CATALOGUE[name] for name in names])
+    found = candidates(reference, data, sigma, [CATALOGUE[name] for name in names])
     pairs = zip(found.columns, reference.columns, strict=True)
     columns = [np.concatenate(pair, axis=2) for pair in pairs]
     problem = make_problem(data, sigma, reference.residual, columns)
@@ -146,7 +146,7 @@ def test_parts_drawn_from_all_recordings_repeat_what_is_in_one_of_them_only(benc
     data = cut(recordings)
     sigma = [noise_floor(part, bench.arm).sigma for part in data]
     reference = fit(bench.arm, (), data, sigma, None)
-    found = candidates(reference, data, [CATALOGUE['torque_offset']])
+    found = candidates(reference, data, sigma, [CATALOGUE['torque_offset']])
     problem = make_problem(data, sigma, reference.residual, list(found.columns))
     (group,) = (g for g in found.groups if g.effect.joints == ('elbow',))
     mixed = np.random.default_rng(0).integers(3, size=len(problem.fold))
