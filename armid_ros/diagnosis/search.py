@@ -185,11 +185,16 @@ def next_step(
         links = likelier_links(winner, scores, problem, projection, settings)
         winner, tied = (links[0], [*links, winner]) if links else (winner, tied)
     rivals = tuple(
-        t
-        for t in tied
-        if t is not winner
-        and not (t.gain < _MORE * winner.gain and _contains(t, winner, problem, projection))
-        and not imitates(t, winner)
+        trial
+        for trial in tied
+        if trial is not winner
+        and (
+            _finishes(trial, winner, problem, left, settings)
+            or (not imitates(trial, winner)
+            and not (
+                trial.gain < _MORE * winner.gain and _contains(trial, winner, problem, projection)
+            ))
+        )
     )
     before = joint_losses(problem, left)
     after = joint_losses(problem, left - winner.torque)
@@ -328,6 +333,15 @@ def _contains(big: Trial, small: Trial, problem: Problem, projection: Projection
     target = small.torque.ravel()
     fit = np.linalg.lstsq(columns, target, rcond=1e-6)[0]
     return bool(np.sum((target - columns @ fit) ** 2) < 0.02 * np.sum(target**2))
+
+
+def _finishes(
+    big: Trial, small: Trial, problem: Problem, left: FloatArray, settings: DiagnosisSettings
+) -> bool:
+    """Return whether a larger group brings a joint to its noise that a smaller one does not."""
+    after, before = (joint_losses(problem, left - trial.torque) for trial in (big, small))
+    limit = settings.consistent_loss
+    return bool(np.any((before > limit) & (after < limit)))
 
 
 def imitates(other: Trial, winner: Trial) -> bool:

@@ -83,7 +83,7 @@ def test_noise_of_the_torque_sensor_alone_makes_a_false_stribeck_friction(bench)
         everywhere = [replace(part, told=np.ones_like(part.told)) for part in data]
         sensor = [np.full(2, TORQUE_NOISE * np.linalg.norm(part.used.taps())) for part in data]
         floor = [noise_floor(part, bench.arm).sigma for part in data]
-        assert all(np.all(a > b) for a, b in zip(floor, sensor, strict=True))
+        assert np.all(np.mean(floor, axis=0) > np.mean(sensor, axis=0))
         by_sensor.append(significant(bench.arm, everywhere, sensor, FRICTION))
         by_floor.append(significant(bench.arm, data, floor, FRICTION))
     assert by_sensor.count('stribeck_friction') >= 5
