@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.model_search import Explanation
-from armid_ros.diagnosis.search import likelier_body, simplest
+from armid_ros.diagnosis.rivals import likelier_body, simplest
 from armid_ros.diagnosis.selection import replicated, SPARSE_GAIN, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray

@@ -15,7 +15,8 @@ from armid_ros.diagnosis.patch import Named
 from armid_ros.diagnosis.problem import make_problem, Problem, project, Projection
 from armid_ros.diagnosis.refine import Workspace
 from armid_ros.diagnosis.remembering import remembering
-from armid_ros.diagnosis.search import imitates, next_step, not_beaten, Step, Survey
+from armid_ros.diagnosis.rivals import imitates, not_beaten
+from armid_ros.diagnosis.search import next_step, Step, Survey
 from armid_ros.diagnosis.selection import (
     acceptable,
     joint_losses,

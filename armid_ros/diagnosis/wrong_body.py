@@ -21,7 +21,8 @@ from armid_ros.diagnosis.fit import fit
 from armid_ros.diagnosis.model_search import Explanation, joint_losses_of, no_worse
 from armid_ros.diagnosis.patch import Named
 from armid_ros.diagnosis.problem import make_problem, project
-from armid_ros.diagnosis.search import likelier_body, Step
+from armid_ros.diagnosis.rivals import likelier_body
+from armid_ros.diagnosis.search import Step
 from armid_ros.diagnosis.selection import (
     excess,
     joint_losses,
