@@ -18,8 +18,7 @@ from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.model_search import Explanation, joint_losses_of, no_worse
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.physical import bodily_prior
-from armid_ros.identification.physical_program import PhysicalProgram
+from armid_ros.identification.physical import physical_program, PhysicalSettings
 from armid_ros.motion import FloatArray
 import numpy as np
 import scipy.linalg
@@ -58,12 +57,7 @@ def as_bodies(
     known = len(arm.parameters)
     values = base.values(fitted.arm.theta[:known])
     triangle, count = _triangle(explanation, values, data, sigma)
-    prior, _ = bodily_prior(arm)
-    bounds = [effect.bounds() for effect in arm.effects]
-    lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in bounds)]) for k in (0, 1))
-    first = known - len(lower)
-    prior[first:] = np.clip(prior[first:], lower, upper)
-    program = PhysicalProgram(base, prior, lower, upper, None, {})
+    program, _ = physical_program(arm, base, PhysicalSettings())
     for weight in _WEIGHTS:
         try:
             theta = program.solve(triangle, count, weight)

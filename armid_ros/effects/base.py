@@ -224,9 +224,7 @@ class Effect(ABC):
             for s in self.shapes
         )
 
-    def shape_grids(
-        self, motion: Motion, arm: ArmModel, residual: FloatArray | None = None
-    ) -> tuple[FloatArray, ...]:
+    def shape_grids(self, motion: Motion, arm: ArmModel) -> tuple[FloatArray, ...]:
         """
         Return where a search for the shape should start.
 
@@ -236,8 +234,6 @@ class Effect(ABC):
             The data that the shape is to explain.
         arm : ArmModel
             The arm without the effect.
-        residual : ndarray, shape (N, n), optional
-            What the arm does not explain of the measured torque [N m].
 
         Returns
         -------

@@ -18,12 +18,6 @@ if TYPE_CHECKING:
     from armid_ros.arm import ArmModel
     from armid_ros.robots import Robot
 
-#: Orders between which ripple is looked for [1/rev], and how many peaks a search starts from.
-_ORDERS = (2.0, 400.0)
-_PEAKS = 5
-#: Samples of an order spectrum; orders per resolution of the range of motion.
-_SPECTRUM_SAMPLES = 8000
-_OVERSAMPLING = 4.0
 #: A drive that gives nothing beyond its level cannot be asked for more than it gives: without a
 #: report of what it was asked for, this share of the excess is the most that it can lose.
 _MOST_LOST = 0.99
@@ -93,55 +87,6 @@ class TorqueRipple(Effect):
 
         return Action(torque=torque)
 
-    def shape_grids(
-        self, motion: Motion, arm: ArmModel, residual: FloatArray | None = None
-    ) -> tuple[FloatArray, ...]:
-        """Return the orders at which the residual's spectrum over the angle has its peaks."""
-        if residual is None:
-            return super().shape_grids(motion, arm)
-        rows = [_peaks(motion.q[:, j], residual[:, j]) for j in self.indices(motion.joints)]
-        return (np.array(rows),)
-
-
-def order_spectrum(q: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """
-    Transform the torque of a joint over its angle instead of time.
-
-    Parameters
-    ----------
-    q, residual : ndarray, shape (N,)
-        Position [rad] and torque [N m] of one joint.
-
-    Returns
-    -------
-    orders : ndarray, shape (K,)
-        Cycles per turn, as fine as the range of motion resolves.
-    amplitude : ndarray, shape (K,)
-        Amplitude of the ripple that each would be alone [N m].
-
-    """
-    stride = max(1, len(q) // _SPECTRUM_SAMPLES)
-    q, torque = q[::stride], residual[::stride]
-    step = 2.0 * np.pi / max(float(np.ptp(q)), 1e-3) / _OVERSAMPLING
-    orders = np.arange(_ORDERS[0], max(_ORDERS[1], _ORDERS[0] + 8.0 * step), step)
-    torque = torque - np.polyval(np.polyfit(q, torque, 1), q)
-    rotation = np.exp(-1j * step * q)
-    phasor = np.exp(-1j * orders[0] * q) * torque
-    amplitude = np.empty(len(orders))
-    for index in range(len(orders)):
-        amplitude[index] = 2.0 * abs(phasor.mean())
-        phasor *= rotation
-    return orders, amplitude
-
-
-def _peaks(q: FloatArray, residual: FloatArray) -> FloatArray:
-    """Return the orders of the highest peaks of the spectrum, highest first, shape (_PEAKS,)."""
-    orders, amplitude = order_spectrum(q, residual)
-    padded = np.concatenate([[0.0], amplitude, [0.0]])
-    peaks = np.flatnonzero((amplitude >= padded[:-2]) & (amplitude > padded[2:]))
-    highest = peaks[np.argsort(amplitude[peaks])[::-1][:_PEAKS]]
-    return np.resize(orders[highest] if len(highest) else orders[:1], _PEAKS)
-
 
 @dataclass(frozen=True)
 class ActuatorSaturation(TorqueReading):
@@ -174,9 +119,7 @@ class ActuatorSaturation(TorqueReading):
         known = np.isfinite(limits) & (limits > 0.0)
         return np.where(known, 0.8 * limits, self.shape_values)
 
-    def shape_grids(
-        self, motion: Motion, arm: ArmModel, residual: FloatArray | None = None
-    ) -> tuple[FloatArray, ...]:
+    def shape_grids(self, motion: Motion, arm: ArmModel) -> tuple[FloatArray, ...]:
         """Return shares of the highest torque that was measured."""
         tau = arm.joint_torque(motion) if motion.tau is None else motion.tau
         highest = np.maximum(np.max(np.abs(tau[:, self.indices(motion.joints)]), axis=0), 1e-3)

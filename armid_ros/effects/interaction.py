@@ -82,9 +82,7 @@ class _Attached(Effect):
             row[:3] = robot.model.inertias[robot.model.getJointId(joint)].lever
         return values
 
-    def shape_grids(
-        self, motion: Motion, arm: ArmModel, residual: FloatArray | None = None
-    ) -> tuple[FloatArray, ...]:
+    def shape_grids(self, motion: Motion, arm: ArmModel) -> tuple[FloatArray, ...]:
         """Return the geometry as it is; other shapes have their grids."""
         return tuple(
             self.shape_values[:, [index]]

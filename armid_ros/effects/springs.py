@@ -85,9 +85,7 @@ class SoftLimit(Effect):
         edges = np.stack([lower + margin, upper - margin], axis=1)
         return np.where(known[:, np.newaxis], edges, self.shape_values)
 
-    def shape_grids(
-        self, motion: Motion, arm: ArmModel, residual: FloatArray | None = None
-    ) -> tuple[FloatArray, ...]:
+    def shape_grids(self, motion: Motion, arm: ArmModel) -> tuple[FloatArray, ...]:
         """Return positions near the ends of what was moved through."""
         q = arm.link_motion(motion).q[:, self.indices(motion.joints)]
         lowest, highest = q.min(axis=0)[:, np.newaxis], q.max(axis=0)[:, np.newaxis]

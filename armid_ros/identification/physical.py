@@ -115,16 +115,8 @@ def fit_bodies(
         Why to believe it.
 
     """
-    prior, notes = bodily_prior(arm)
-    bounds = [effect.bounds() for effect in arm.effects]
-    lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in bounds)]) for k in (0, 1))
-    boxes: dict[int, Box] = {
-        arm.robot.index(joint): (np.array(low, dtype=float), np.array(high, dtype=float))
-        for joint, (low, high) in settings.boxes.items()
-    }
-    start = prior[len(prior) - len(lower) :]
-    prior[len(prior) - len(lower) :] = np.clip(start, lower, upper)
-    program = PhysicalProgram(base, prior, lower, upper, settings.total_mass, boxes)
+    program, notes = physical_program(arm, base, settings)
+    prior, lower, upper, boxes = program.prior, program.lower, program.upper, program.boxes
     blocks = compress(problem, weights, settings.blocks)
     whole = np.concatenate(blocks)
     least = float(np.linalg.norm(_residual(whole, unconstrained.values)))
@@ -167,6 +159,22 @@ def fit_bodies(
         misfit_ratio=max(misfit / least, 1.0),
         notes=notes,
     )
+
+
+def physical_program(
+    arm: ArmModel, base: BaseParameters, settings: PhysicalSettings
+) -> tuple[PhysicalProgram, tuple[str, ...]]:
+    """Return what physics allows for the parameters of an arm, and what was assumed for it."""
+    prior, notes = bodily_prior(arm)
+    bounds = [effect.bounds() for effect in arm.effects]
+    lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in bounds)]) for k in (0, 1))
+    boxes: dict[int, Box] = {
+        arm.robot.index(joint): (np.array(low, dtype=float), np.array(high, dtype=float))
+        for joint, (low, high) in settings.boxes.items()
+    }
+    rigid = len(prior) - len(lower)
+    prior[rigid:] = np.clip(prior[rigid:], lower, upper)
+    return PhysicalProgram(base, prior, lower, upper, settings.total_mass, boxes), notes
 
 
 def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -73,20 +74,28 @@ def points_motion(
     jacobians = np.zeros((len(q), len(joints), 3, robot.n_joints))
     for k, (joint, offset) in enumerate(zip(joints, offsets, strict=True)):
         link = robot.joints.index(joint)
-        rotation, origin = frames[link]
-        positions[:, k] = origin + rotation @ offset
+        frame = frames[link]
+        positions[:, k] = frame.origin + frame.rotation @ offset
         for moved_by in _ancestors(robot, link):
-            rotation, origin = frames[moved_by]
-            slide, turn = (rotation @ part for part in _axis(robot, moved_by))
-            jacobians[:, k, :, moved_by] = slide + np.cross(turn, positions[:, k] - origin)
+            mover = frames[moved_by]
+            arm = positions[:, k] - mover.origin
+            jacobians[:, k, :, moved_by] = mover.slide + np.cross(mover.turn, arm)
     return positions, jacobians
 
 
-def _frames(
-    robot: Robot, q: FloatArray, links: set[int]
-) -> dict[int, tuple[FloatArray, FloatArray]]:
-    """Return rotations (N, 3, 3) and origins (N, 3) of links and of all that carry them."""
-    frames: dict[int, tuple[FloatArray, FloatArray]] = {}
+@dataclass(frozen=True)
+class _Frame:
+    """Where a joint is: rotation (N, 3, 3), origin, and what it does per unit, (N, 3)."""
+
+    rotation: FloatArray
+    origin: FloatArray
+    slide: FloatArray
+    turn: FloatArray
+
+
+def _frames(robot: Robot, q: FloatArray, links: set[int]) -> dict[int, _Frame]:
+    """Return the frames of links and of all that carry them."""
+    frames: dict[int, _Frame] = {}
     for link in sorted({above for end in links for above in _ancestors(robot, end)}):
         placement = robot.model.jointPlacements[link + 1]
         slide, turn = _axis(robot, link)
@@ -94,10 +103,10 @@ def _frames(
         rotation = placement.rotation @ _rotations(turn, q[:, link])
         parent = int(robot.model.parents[link + 1]) - 1
         if parent >= 0:
-            base, origin = frames[parent]
-            way = origin + np.einsum('nxy,ny->nx', base, way)
-            rotation = base @ rotation
-        frames[link] = rotation, way
+            base = frames[parent]
+            way = base.origin + np.einsum('nxy,ny->nx', base.rotation, way)
+            rotation = base.rotation @ rotation
+        frames[link] = _Frame(rotation, way, rotation @ slide, rotation @ turn)
     return frames
 
 

@@ -163,7 +163,7 @@ def test_every_effect_says_what_it_is(robot, name):
 @pytest.mark.parametrize('name', [name for name, effect in CATALOGUE.items() if effect.shapes])
 def test_shapes_start_and_search_within_what_is_possible(robot, motion, name):
     effect = make_effect(name, robot)
-    grids = effect.shape_grids(motion, ArmModel(robot), 0.1 * np.cos(20.0 * motion.q))
+    grids = effect.shape_grids(motion, ArmModel(robot))
     assert effect.shape_values.shape == (len(effect.owners), len(effect.shapes))
     for column, (shape, grid) in enumerate(zip(effect.shapes, grids, strict=True)):
         assert len(grid) == len(effect.owners)

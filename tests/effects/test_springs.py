@@ -94,17 +94,6 @@ def test_ripple_repeats_at_its_order(robot, motion, added):
     assert np.abs(once).max() == pytest.approx(amplitude, rel=0.02)
 
 
-@pytest.mark.parametrize('order', [7.0, 31.0, 100.0])
-def test_the_order_of_a_ripple_is_found_at_any_speed(robot, sines, order):
-    motion = sines(8.0, 1000.0)
-    rng = np.random.default_rng(0)
-    residual = 0.05 * np.sin(order * motion.q + 0.4) + rng.normal(scale=0.05, size=motion.q.shape)
-    effect = make_effect('torque_ripple', robot)
-    (peaks,) = effect.shape_grids(motion, ArmModel(robot), residual)
-    resolution = 2.0 * np.pi / np.ptp(motion.q, axis=0)
-    assert np.all(np.abs(peaks[:, 0] - order) < 0.3 * resolution)
-
-
 def pull(robot, joint, offset, motion, anchor, stiffness):
     """Return the torque against a spring, from its energy by differences."""
     torque = np.empty_like(motion.q)
