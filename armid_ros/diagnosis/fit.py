@@ -223,6 +223,8 @@ def _covariance(
         for part, block, left, s in zip(data, weighted, residual, sigma, strict=True)
     ]
     covariance = np.diag(np.full(size, np.inf))
+    if not len(kept):
+        return covariance
     try:
         covariance[np.ix_(kept, kept)] = solve(problem, 'ols').covariance
     except (np.linalg.LinAlgError, ValueError) as error:
