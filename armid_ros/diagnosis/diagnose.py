@@ -22,6 +22,7 @@ from armid_ros.diagnosis.gap import Gap, measure_gap
 from armid_ros.diagnosis.gate import check_data, Gate
 from armid_ros.diagnosis.league import League, make_league
 from armid_ros.diagnosis.model_search import as_described, explain, Explanation, no_worse
+from armid_ros.diagnosis.pattern import find_pattern, Pattern
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict import decide, Finding, Verdict
 from armid_ros.diagnosis.where import locate, Where
@@ -77,6 +78,8 @@ class Diagnosis:
         Names of the catalogue that these data cannot show.
     refitted : bool
         Whether the rigid body and known effects were fitted anew.
+    pattern : Pattern or None
+        What all values that are off have in common, where nothing was named.
     notes : tuple of str
         What a reader should know.
 
@@ -96,6 +99,7 @@ class Diagnosis:
     floors: tuple[Floor, ...]
     not_visible: tuple[str, ...]
     refitted: bool
+    pattern: Pattern | None
     notes: tuple[str, ...]
 
 
@@ -183,6 +187,9 @@ def diagnose(
             chosen = wrong_body(chosen, fixed, arm, data, as_told, settings)
     chosen, remarks = as_bodies(chosen, arm, data, sigma, settings)
     notes += remarks
+    pattern = None if chosen.steps else find_pattern(chosen, arm, data, sigma)
+    if pattern is not None:
+        notes.append(pattern.sentence)
     tell(0.85, 'held-out gap')
     floors = [noise_floor(part, chosen.fitted.arm) for part in data]
     gap = measure_gap(chosen, data, floors, validate, used, settings.consistent_loss)
@@ -213,6 +220,7 @@ def diagnose(
         floors=tuple(floors),
         not_visible=_not_visible(chosen, settings),
         refitted=chosen.base is not None,
+        pattern=pattern,
         notes=tuple(notes),
     )
 
@@ -249,6 +257,7 @@ def _bad(
         floors=(),
         not_visible=(),
         refitted=False,
+        pattern=None,
         notes=gate.notes,
     )
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 import math
 from typing import Any
 
@@ -65,6 +66,7 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
         'candidates': [_candidate(s) for s in diagnosis.league.first[:_MOST_CANDIDATES]],
         'not_visible': list(diagnosis.not_visible),
         'detectable': _detectable(diagnosis),
+        'pattern': None if diagnosis.pattern is None else asdict(diagnosis.pattern),
         'model': model,
     }
 

@@ -139,6 +139,7 @@ def test_the_document_has_what_the_schema_says(bench):
         'candidates',
         'not_visible',
         'detectable',
+        'pattern',
         'model',
     }
 

@@ -1,0 +1,233 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the diagnosis names on recordings of real machines.
+
+Three questions with known answers: what is named from the rigid body alone; whether a term is
+named again that was taken out of the model; whether an effect is named that was added to the
+measured torque, which leaves the noise, the friction and the faults of a real machine in.
+Recordings are those of the folder that the environment variable ARMID_DATA names.
+
+    python -m benchmarks.real_diagnosis [TEXT ...]    # only the rows that have one of the texts
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+import os
+from pathlib import Path
+import sys
+import tempfile
+import time
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis import diagnose, Diagnosis
+from armid_ros.effects import CATALOGUE
+from armid_ros.motion import FloatArray
+from armid_ros.recording import read_recording, Recording
+from armid_ros.robots import load_robot
+import numpy as np
+from scipy import signal
+
+from benchmarks import real_recordings
+
+#: What the model of each machine is known to need (effects, joints; none: all).
+KNOWN: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
+    'emps': (
+        ('viscous_friction', ()),
+        ('coulomb_friction', ()),
+        ('torque_offset', ()),
+        ('asymmetric_friction', ()),
+    ),
+    'tx40': (
+        ('viscous_friction', ()),
+        ('coulomb_friction', ()),
+        ('torque_offset', ()),
+        ('rotor_inertia', ()),
+        ('coupled_joint_friction', ('joint_5', 'joint_6')),
+    ),
+    'ur10': (('viscous_friction', ()), ('coulomb_friction', ()), ('torque_offset', ())),
+}
+#: Band in which a motion is differentiated to make an effect of it [Hz].
+_BAND = {'emps': 40.0, 'tx40': 20.0, 'ur10': 6.0}
+
+#: A torque from position, velocity, acceleration and measured torque of the joint, all (N,).
+Law = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
+
+LAWS: dict[str, Law] = {
+    'quadratic_friction': lambda q, dq, ddq, tau: dq * np.abs(dq),
+    'torque_ripple': lambda q, dq, ddq, tau: np.sin(12.0 * q),
+    'joint_spring': lambda q, dq, ddq, tau: q - q.mean(),
+    'torque_offset': lambda q, dq, ddq, tau: np.ones_like(q),
+    'rotor_inertia': lambda q, dq, ddq, tau: ddq,
+    'load_dependent_friction': lambda q, dq, ddq, tau: np.abs(tau) * np.sign(dq),
+}
+
+
+@dataclass(frozen=True)
+class Question:
+    """
+    A diagnosis whose answer is known.
+
+    Attributes
+    ----------
+    machine : str
+        emps, tx40 or ur10.
+    what : str
+        'from rigid', 'without NAME' or 'with NAME'.
+    name : str
+        What has to be named; empty for 'from rigid'.
+    joint : str
+        Where; empty for all joints that have it.
+    size : float
+        Root mean square of what is added, over what the known model leaves there, or the noise.
+
+    """
+
+    machine: str
+    what: str
+    name: str = ''
+    joint: str = ''
+    size: float = 0.0
+
+    @property
+    def label(self) -> str:
+        """Say it in a few words."""
+        where = f' in {self.joint}' if self.joint else ''
+        return f'{self.machine} {self.what} {self.name}{where}'.strip()
+
+
+def questions() -> Iterator[Question]:
+    """Yield all questions."""
+    for machine in KNOWN:
+        yield Question(machine, 'from rigid')
+    for machine, terms in KNOWN.items():
+        for name, _ in terms:
+            if name != 'torque_offset' or machine != 'emps':  # part of the asymmetry there
+                yield Question(machine, 'without', name)
+    for machine, joints in (
+        ('ur10', ('shoulder_lift_joint', 'elbow_joint', 'wrist_2_joint')),
+        ('tx40', ('joint_1', 'joint_3', 'joint_5')),
+    ):
+        for position, name in enumerate(LAWS):
+            held = name in {known for known, _ in KNOWN[machine]}
+            if not held:
+                yield Question(machine, 'with', name, joints[position % len(joints)], 3.0)
+
+
+class Machines:
+    """Recordings and models, read once."""
+
+    def __init__(self, data: Path, out: Path) -> None:
+        self._data, self._out = data, out
+        self._read: dict[str, tuple[ArmModel, Recording]] = {}
+        self._left: dict[str, FloatArray] = {}
+
+    def bare(self, machine: str) -> tuple[ArmModel, Recording]:
+        """Return a rigid arm and its recording."""
+        if machine not in self._read:
+            maker = getattr(real_recordings, machine)
+            bags = maker(self._data) if machine == 'ur10' else maker(self._data, self._out)
+            robot = load_robot(str(bags.robot))
+            recording = read_recording(bags.bags[0], joints=robot.joints)
+            self._read[machine] = ArmModel(robot), recording
+        return self._read[machine]
+
+    def ask(self, question: Question) -> Diagnosis:
+        """Diagnose."""
+        bare, recording = self.bare(question.machine)
+        without = question.name if question.what == 'without' else None
+        arm = bare if question.what == 'from rigid' else known_arm(bare, question.machine, without)
+        if question.what == 'with':
+            recording = self.with_effect(question)
+        return diagnose(arm, [recording], rng=np.random.default_rng(0))
+
+    def with_effect(self, question: Question) -> Recording:
+        """Return the recording with a torque added to what was measured in one joint."""
+        arm, recording = self.bare(question.machine)
+        joint = arm.robot.joints.index(question.joint)
+        rate = 1.0 / float(np.median(np.diff(recording.t)))
+        low = signal.butter(4, _BAND[question.machine], fs=rate)
+        q, tau = (signal.filtfilt(*low, x[:, joint]) for x in (recording.q, recording.tau))
+        dq = np.gradient(q, recording.t)
+        shape = LAWS[question.name](q, dq, np.gradient(dq, recording.t), tau)
+        size = question.size * self.left(question.machine)[joint] / np.sqrt(np.mean(shape**2))
+        torque = recording.tau.copy()
+        torque[:, joint] += size * shape
+        return replace(recording, tau=torque)
+
+    def left(self, machine: str) -> FloatArray:
+        """Return what the known model leaves of each joint, or its noise if more [N m]."""
+        if machine not in self._left:
+            bare, recording = self.bare(machine)
+            found = diagnose(
+                known_arm(bare, machine, None), [recording], rng=np.random.default_rng(0)
+            )
+            assert found.gap is not None
+            self._left[machine] = np.maximum(found.gap.after, found.gap.floor)
+        return self._left[machine]
+
+
+def known_arm(bare: ArmModel, machine: str, without: str | None) -> ArmModel:
+    """Return the arm with the effects that its machine is known to have, but one."""
+    arm = bare
+    for name, joints in KNOWN[machine]:
+        if name != without:
+            arm = arm.with_effect(CATALOGUE[name].on(arm.robot, joints or None))
+    return arm
+
+
+def answered(question: Question, found: Diagnosis) -> str:
+    """Say whether the right name was given in the right joint: first, also, as one of several."""
+    if not question.name:
+        return ''
+    wanted = {question.joint} if question.joint else set()
+    places = [k for k, f in enumerate(found.findings) if wanted <= set(f.joints) or not f.joints]
+    if any(found.findings[k].name == question.name for k in places):
+        return 'first' if found.findings[0].name == question.name else 'named'
+    if any(question.name in found.findings[k].ambiguous_with for k in places):
+        return 'among'
+    return 'NOT'
+
+
+def error_percent(found: Diagnosis) -> float:
+    """Return the relative error of the torque with what was named, rows at reversals left out."""
+    assert found.gap is not None
+    squares = np.zeros(2)
+    for one in found.gap.overlays:
+        told = one.trajectory.told
+        squares += [np.sum(x**2, where=told) for x in (one.measured - one.after, one.measured)]
+    return float(100.0 * np.sqrt(squares[0] / squares[1]))
+
+
+def main() -> int:
+    """Print the table."""
+    folder = os.environ.get('ARMID_DATA')
+    if not folder:
+        print('real_diagnosis: ARMID_DATA names no folder with recordings', file=sys.stderr)
+        return 0
+    texts = sys.argv[1:]
+    with tempfile.TemporaryDirectory() as out:
+        machines = Machines(Path(folder), Path(out))
+        for question in questions():
+            if texts and not any(text in question.label for text in texts):
+                continue
+            begin = time.process_time()
+            found = machines.ask(question)
+            named = '; '.join(
+                '|'.join((f.name, *f.ambiguous_with))
+                + (f'@{",".join(f.joints)}' if len(f.joints) < 4 else f' in {len(f.joints)}')
+                for f in found.findings
+            )
+            print(
+                f'{question.label:52s} {answered(question, found):6s} {found.verdict:10s} '
+                f'{error_percent(found):5.2f} % {time.process_time() - begin:5.1f} s  {named}',
+                flush=True,
+            )
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

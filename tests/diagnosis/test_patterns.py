@@ -1,0 +1,111 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which described value is wrong, by the pattern of what has changed."""
+
+from armid_ros.diagnosis import diagnose, diagnosis_document
+from armid_ros.model import inverse_dynamics
+import numpy as np
+import pytest
+
+ANGLE = 0.02
+
+
+def names(found):
+    """Return all names that what was found may be."""
+    return {name for f in found.findings for name in (f.name, *f.ambiguous_with)}
+
+
+@pytest.fixture
+def other(bench):
+    """Return a function that diagnoses recordings of an arm that is not as described."""
+
+    def diagnosed(true):
+        def change(motion, tau):
+            return inverse_dynamics(true, motion) - inverse_dynamics(bench.robot, motion)
+
+        return diagnose(bench.arm, bench.recordings(change), rng=np.random.default_rng(0))
+
+    return diagnosed
+
+
+def links(robot, *factors):
+    """Return a robot whose links have all their inertial parameters times a factor each."""
+    parameters = robot.rigid_parameters.reshape(-1, 10) * np.array(factors)[:, np.newaxis]
+    return robot.with_inertias(parameters.ravel())
+
+
+def test_a_factor_on_all_masses_is_a_scale_of_the_masses(bench, other):
+    found = other(links(bench.robot, 1.05, 1.05))
+    assert not found.findings
+    assert found.pattern.name == 'mass_scale'
+    assert found.pattern.factor == pytest.approx(1.05, abs=0.002)
+    assert any('masses' in note for note in found.notes)
+    assert diagnosis_document(found)['pattern']['share'] > 0.95
+
+
+def test_a_factor_on_all_torques_and_friction_is_a_gain_of_the_drives(bench):
+    hidden = bench.recordings(lambda m, tau: 0.05 * tau)
+    found = diagnose(bench.arm, hidden, rng=np.random.default_rng(0))
+    assert not found.findings
+    assert found.pattern.name == 'torque_gain'
+    assert found.pattern.factor == pytest.approx(1.05, abs=0.002)
+
+
+@pytest.mark.parametrize('factors', [(1.06, 0.96), (0.93, 1.08)])
+def test_links_that_are_off_each_by_its_own_factor_have_no_pattern(bench, other, factors):
+    found = other(links(bench.robot, *factors))
+    assert not found.findings
+    assert found.pattern is None
+
+
+def test_a_factor_in_one_joint_is_a_gain_of_its_drive(bench):
+    hidden = bench.recordings(lambda m, tau: 0.05 * tau * [0.0, 1.0])
+    found = diagnose(bench.arm, hidden, rng=np.random.default_rng(0))
+    (finding,) = found.findings
+    assert (finding.name, finding.joints) == ('torque_gain', ('elbow',))
+    assert finding.values[0] == pytest.approx(0.05, abs=0.002)
+
+
+@pytest.mark.parametrize('share', [0.97, 1.62 / 9.81])
+def test_what_gravity_alone_enters_is_gravity(bench, other, share):
+    found = other(bench.robot.with_gravity(share * bench.robot.gravity))
+    (finding,) = found.findings
+    assert finding.name == 'gravity_magnitude'
+    assert finding.values[0] == pytest.approx(9.81 * (share - 1.0), rel=0.02)
+    assert not names(found) & {'payload', 'link_inertia', 'torque_gain'}
+
+
+@pytest.mark.parametrize('joint', ['shoulder', 'elbow'])
+def test_one_direction_of_ten_parameters_is_a_link(bench, other, joint):
+    factors = [1.1 if name == joint else 1.0 for name in bench.robot.joints]
+    found = other(links(bench.robot, *factors))
+    (finding,) = found.findings
+    assert 'link_inertia' in names(found)
+    assert finding.joints == (joint,)
+    assert not names(found) & {'gravity_magnitude', 'torque_gain', 'base_tilt'}
+
+
+def test_what_hangs_on_the_last_link_is_a_payload_or_that_link(bench, other):
+    parameters = bench.robot.rigid_parameters.copy()
+    parameters[10:] += [0.5, 0.0, 0.0, 0.15, 0.045, 0.0, 0.045, 0.0, 0.0, 0.0]
+    found = other(bench.robot.with_inertias(parameters))
+    assert names(found) == {'payload', 'link_inertia'}
+    assert found.findings[0].values[0] == pytest.approx(0.5, abs=0.02)
+
+
+def tilted(bench):
+    """Return the gravity of a base that leans about the axis of the joints."""
+    return 9.81 * np.array([np.sin(ANGLE), 0.0, -np.cos(ANGLE)])
+
+
+def test_turned_gravity_is_the_zero_of_the_first_encoder_or_a_tilt(bench, other):
+    found = other(bench.robot.with_gravity(tilted(bench)))
+    assert names(found) <= {'encoder_offset', 'base_tilt'}
+    (finding,) = found.findings
+    assert max(np.abs(finding.values)) == pytest.approx(ANGLE, abs=0.001)
+
+
+@pytest.mark.xfail(strict=True, reason='directions that no data show make the tilt a richer cause')
+def test_a_planar_arm_cannot_tell_a_tilt_from_the_zero_of_its_first_encoder(bench, other):
+    found = other(bench.robot.with_gravity(tilted(bench)))
+    assert names(found) == {'encoder_offset', 'base_tilt'}
