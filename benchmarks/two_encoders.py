@@ -14,7 +14,11 @@ import os
 from pathlib import Path
 import sys
 
-from armid_ros.identification.two_inertia.transmission import fit_transmission, TwoEncoders
+from armid_ros.identification.two_inertia.transmission import (
+    fit_transmission,
+    TransmissionFit,
+    TwoEncoders,
+)
 import numpy as np
 from scipy.io import loadmat
 
@@ -39,6 +43,24 @@ def kr300(data: Path, axis: int) -> list[TwoEncoders]:
     return records
 
 
+def named(fit: TransmissionFit) -> tuple[str, ...]:
+    """
+    Name what twists a joint: what its 95 % intervals tell from nothing.
+
+    Returns
+    -------
+    tuple of str
+        joint_elasticity, backlash, both, or none; one name with both in it where the intervals
+        cannot tell them from each other.
+
+    """
+    soft = bool(np.isfinite(fit.stiffness_alone[2]))
+    if soft and abs(fit.correlation) >= 0.95:
+        return ('joint_elasticity or backlash',)
+    names = (('joint_elasticity', soft), ('backlash', fit.backlash_seen))
+    return tuple(name for name, there in names if there)
+
+
 def main() -> int:
     """Print the table."""
     folder = os.environ.get('ARMID_DATA')
@@ -53,7 +75,8 @@ def main() -> int:
         print(
             f'axis {axis + 1}: K {value:.1f} [{low:.1f}, {high:.1f}] 1e6 N m/rad, backlash '
             f'[{play}] deg, correlation {fit.correlation:.2f}, {fit.reversals} reversals of load, '
-            f'encoders apart by [{delay}] ms, R2 {fit.explained:.3f}'
+            f'encoders apart by [{delay}] ms, R2 {fit.explained:.3f}; '
+            f'named: {", ".join(named(fit)) or "nothing"}'
         )
     return 0
 

@@ -3,14 +3,23 @@
 """What is named on recordings of real machines, and what is not invented."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import diagnose
-from armid_ros.effects import make_effect
+from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis.diagnose import _narrower
+from armid_ros.diagnosis.evidence import trajectories
+from armid_ros.diagnosis.fit import excited, fit
+from armid_ros.diagnosis.floor import noise_floor
+from armid_ros.diagnosis.patch import Named
+from armid_ros.effects import CATALOGUE, make_effect
+from armid_ros.identification.signals import conditioning
+from armid_ros.identification.two_inertia.transmission import fit_transmission
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 
+from benchmarks.real_diagnosis import answered, known_arm, Machines, Question
 from benchmarks.real_recordings import emps, tx40, ur10
+from benchmarks.two_encoders import kr300, named
 
 pytestmark = pytest.mark.real_data
 
@@ -51,6 +60,54 @@ def test_the_coupled_wrist_of_a_tx40(real_data, tmp_path):
     found = look(tx40(real_data, tmp_path), known)
     wrist = next(f for f in found.findings if f.name == 'coupled_joint_friction')
     assert {'joint_5', 'joint_6'} <= set(wrist.joints)
+
+
+@pytest.mark.parametrize('name', ['viscous_friction', 'coulomb_friction', 'asymmetric_friction'])
+def test_a_term_taken_out_of_the_model_of_a_positioning_system_is_named(real_data, tmp_path, name):
+    machines = Machines(real_data, tmp_path)
+    question = Question('emps', 'without', name)
+    assert answered(question, machines.ask(question)) == 'first'
+
+
+@pytest.mark.xfail(
+    strict=True, reason='an assumed floor that is too high makes friction a tautology'
+)
+def test_viscous_friction_taken_out_of_the_model_of_a_ur10_is_named(real_data, tmp_path):
+    machines = Machines(real_data, tmp_path)
+    question = Question('ur10', 'without', 'viscous_friction')
+    assert answered(question, machines.ask(question)) == 'first'
+
+
+def test_friction_of_a_tx40_bends_with_speed_in_both_halves_of_its_recording(real_data, tmp_path):
+    """What is named beside the wrist is there: the second half agrees with the first."""
+    bare, recording = Machines(real_data, tmp_path).bare('tx40')
+    arm = known_arm(bare, 'tx40', None)
+    settings = DiagnosisSettings()
+    used = _narrower(conditioning([recording], settings.signals), settings)
+    bend = CATALOGUE['quadratic_friction'].on(arm.robot, ('joint_2',))
+    middle = len(recording.t) // 2
+    values, std = [], []
+    for half in (slice(0, middle), slice(middle, None)):
+        data = trajectories([recording.select(half)], used)
+        base, _ = excited(arm, arm.base_parameters(np.random.default_rng(0)), data)
+        sigma = [noise_floor(part, arm).sigma for part in data]
+        fitted = fit(arm, [Named(bend, (0,))], data, sigma, base)
+        values.append(fitted.estimate.values[0])
+        std.append(fitted.estimate.std[0])
+    assert np.all(np.array(values) < -3.0 * np.array(std))
+    assert abs(values[0] - values[1]) < 3.0 * np.hypot(*std)
+
+
+@pytest.mark.parametrize(
+    ('axis', 'names'),
+    [
+        (0, ('joint_elasticity', 'backlash')),
+        (1, ('joint_elasticity', 'backlash')),
+        (2, ('joint_elasticity',)),  # its load never changes flanks
+    ],
+)
+def test_the_twist_of_a_kr300_is_named(real_data, axis, names):
+    assert named(fit_transmission(kr300(real_data, axis), np.random.default_rng(0))) == names
 
 
 def test_friction_of_a_ur10(real_data):
