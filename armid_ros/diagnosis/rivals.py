@@ -35,6 +35,8 @@ STRAPS, _OUTSIDE = ('human_interaction', 'interface_slack'), 4
 _EQUAL, _LEAD = 0.98, 0.02
 #: A lead of this share that no part of the data denies is one, however few parts show it.
 _FAR = 0.25
+#: Columns below this share of the largest are not seen.
+_UNSEEN = 1e-6
 #: What contains a simpler cause is no rival of it, unless it gains this much more.
 _MORE = 1.1
 
@@ -156,9 +158,10 @@ def _cosine(a: FloatArray, b: FloatArray) -> float:
 def _contains(big: Trial, small: Trial, problem: Problem, projection: Projection) -> bool:
     """Return whether a larger group can make what a smaller one makes."""
     span = big.score.group.columns
-    if span.stop - span.start <= len(small.score.values):
-        return False
     columns = projection.rest(problem.x[:, :, span]).reshape(-1, span.stop - span.start)
+    size = np.linalg.norm(columns, axis=0)
+    if np.count_nonzero(size > _UNSEEN * size.max()) <= len(small.score.values):
+        return False
     target = small.torque.ravel()
     fit = np.linalg.lstsq(columns, target, rcond=1e-6)[0]
     return bool(np.sum((target - columns @ fit) ** 2) < 0.02 * np.sum(target**2))

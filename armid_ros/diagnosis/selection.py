@@ -229,8 +229,13 @@ def within_bounds(score: Score) -> bool:
     """Return whether the values are physically possible, or differ from that by noise."""
     kept = list(score.group.kept)
     lower, upper = (bound[kept] for bound in score.group.effect.bounds())
-    slack = 3.0 * score.std + _AT_BOUND * np.where(np.isfinite(upper), upper, 0.0)
-    return bool(np.all(score.values > lower - slack) and np.all(score.values < upper + slack))
+    slack = [
+        3.0 * score.std + _AT_BOUND * np.where(np.isfinite(bound), np.abs(bound), 0.0)
+        for bound in (lower, upper)
+    ]
+    return bool(
+        np.all(score.values > lower - slack[0]) and np.all(score.values < upper + slack[1])
+    )
 
 
 def replicated(trial: Trial, settings: DiagnosisSettings) -> bool:

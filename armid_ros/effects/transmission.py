@@ -27,6 +27,9 @@ from scipy.integrate import cumulative_trapezoid
 if TYPE_CHECKING:
     from armid_ros.arm import ArmModel
 
+#: Inertia about a joint that is taken as some, of a link whose description gives none [kg m^2].
+_LIGHTEST = 1e-9
+
 
 @dataclass(frozen=True)
 class JointElasticity(Displacing):
@@ -101,7 +104,7 @@ class Backlash(Displacing):
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
         place = np.zeros(motion.q.shape)
         for joint in self.indices(motion.joints):
-            pull = load[:, joint] / inertia[:, joint]
+            pull = load[:, joint] / np.maximum(inertia[:, joint], _LIGHTEST)
             place[:, joint] = place_in_gap(motion.t, pull, float(width[joint]))
         return _twist(self, motion, place / width)
 

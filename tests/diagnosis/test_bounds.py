@@ -17,14 +17,12 @@ def lead(bench):
     return diagnose(bench.arm, bench.recordings(early), rng=np.random.default_rng(0))
 
 
-@pytest.mark.xfail(strict=True, reason='within_bounds lets a lag through that is below its bound')
 def test_an_effect_is_not_named_with_a_value_of_zero(lead):
     assert lead.findings
     for finding in lead.findings:
         assert any(abs(v) > 3.0 * s for v, s in zip(finding.values, finding.std, strict=True))
 
 
-@pytest.mark.xfail(strict=True, reason='the share that is closed does not know of bounds')
 def test_nothing_is_closed_while_a_joint_is_far_above_its_noise(lead):
     elbow = float(lead.explanation.losses[1])
     before = float(lead.explanation.reference_losses[1])
