@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from armid_ros.identification.least_squares import LEAST_LEFT
+from armid_ros.identification.recursive import PRIOR_STD
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import linalg, stats
@@ -116,8 +117,8 @@ class ScoreVariance:
             self._settled = _sum(self._settled, self._latest)
             kept = max(self._kept, 1.0 - _brought(window, self._settled))
             self._settled = _Bands(self._settled.products * kept, self._settled.counts * kept)
+            self._shape = _shape(self._settled + window, values)
         self._latest = window
-        self._shape = _shape(_sum(self._settled, window), values)
 
     def reopen(self, directions: FloatArray, values: FloatArray) -> None:
         """
@@ -152,7 +153,7 @@ class ScoreVariance:
 
     def covariance(self, root: FloatArray) -> FloatArray | None:
         """
-        Return the covariance of an estimate, shape (P, P); None before the first window.
+        Return the covariance of an estimate, shape (P, P); None before the second window.
 
         Few windows tell the noise only roughly: its deviations are those of normal distributions
         with intervals as wide as Student's.
@@ -179,7 +180,7 @@ def _sum(some: _Bands | None, more: _Bands) -> _Bands:
 def _brought(window: _Bands, before: _Bands) -> float:
     """Return the share of what is known with a window that it brings, mean of all directions."""
     both = before.information + window.information
-    size = np.sqrt(np.diag(both).clip(_SMALLEST))
+    size = np.sqrt(np.diag(both).clip(PRIOR_STD**-2))
     scale = np.outer(size, size)
     share = np.linalg.solve(both / scale + _RIDGE * np.eye(len(size)), window.information / scale)
     return float(np.trace(share)) / len(size)
@@ -212,7 +213,7 @@ def _shape(bands: _Bands, values: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     """
     information, scores = bands.information, bands.products[..., :-1, :-1]
-    size = np.sqrt(np.diag(information).clip(_SMALLEST))
+    size = np.sqrt(np.diag(information).clip(PRIOR_STD**-2))
     ridge = _RIDGE * np.eye(len(size))
     inverse = linalg.solve_triangular(
         _triangle(information / np.outer(size, size) + ridge), np.eye(len(size))
@@ -221,13 +222,13 @@ def _shape(bands: _Bands, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     covariance = root @ root.T
 
     counts = bands.counts.clip(_SMALLEST)
-    leverage = np.einsum('pq,jbpq->jb', covariance, scores) / counts
-    freedom = counts * (1.0 - leverage).clip(LEAST_LEFT)
+    taken = np.einsum('pq,jbpq->jb', covariance, scores)
+    freedom = counts * (1.0 - taken / counts).clip(LEAST_LEFT)
     ends = np.append(values, -1.0)
     power = np.einsum('p,jbpq,q->jb', ends, bands.products, ends, optimize=True)
     noise = np.maximum(power, _LEAST_NOISE * bands.products[..., -1, -1]) / freedom
 
-    usual = float(np.sum(noise * bands.counts) / np.sum(bands.counts))
+    usual = float(np.sum(noise * taken) / np.sum(taken))
     meat = (
         root.T @ np.tensordot(noise, scores, axes=2) @ root + usual * inverse.T @ ridge @ inverse
     )
