@@ -11,6 +11,7 @@ LIBRARY = {
     '__main__',
     'bic_selection',
     'browser',
+    'change_information',
     'leg_pair_in_mujoco',
     'real_recordings',
 }

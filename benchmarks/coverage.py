@@ -4,7 +4,10 @@
 How often 95 % intervals hold the truth, over repeats with coloured torque and encoder noise.
 
 The truth of a base parameter, of an effect and of the torque along a motion that was not recorded
-is known here, because the arm is simulated. The intervals are those that an identification prints.
+is known here, because the arm is simulated. The intervals are those that an identification prints,
+from a recording and online.
+
+    python -m benchmarks.coverage [--repeats 500] [--online-repeats 200] [--duration 20]
 
 """
 
@@ -15,6 +18,7 @@ import time
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
+from armid_ros.identification.online import OnlineIdentifier
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import load_robot
@@ -74,7 +78,22 @@ def coloured(rng, shape, pole):
     return lfilter([np.sqrt(1 - pole**2)], [1.0, -pole], white, axis=0)[500:]
 
 
-def coverage(repeats, duration, encoder, torque, pole, seed=0):
+def from_recording(arm, recording):
+    """Identify offline; return what is estimated and the estimate."""
+    settings = IdentificationSettings(signals=SignalSettings(10.0, 4))
+    result = identify(arm, [recording], settings, rng=np.random.default_rng(0))
+    return result.base, result.estimate
+
+
+def online(arm, recording):
+    """Identify sample by sample; return what is estimated and the estimate."""
+    identifier = OnlineIdentifier(arm, rng=np.random.default_rng(0))
+    for t, q, tau in zip(recording.t, recording.q, recording.tau, strict=True):
+        identifier.update(float(t), q, None, tau)
+    return identifier.base, identifier.estimate()
+
+
+def coverage(identified, repeats, duration, encoder, torque, pole, seed=0):
     """Identify again and again; prints a table."""
     rng = np.random.default_rng(seed)
     robot = load_robot('humanoid_arm')
@@ -85,7 +104,6 @@ def coverage(repeats, duration, encoder, torque, pole, seed=0):
     motion, other = (multisine(robot.joints, duration, rng) for _ in range(2))
     tau = arm.torque(motion)
     other = other.select(slice(None, None, 20))
-    settings = IdentificationSettings(signals=SignalSettings(10.0, 4))
     tallies = {'base parameters': Tally(), 'effects': Tally(), 'predicted torque': Tally()}
     start = time.perf_counter()
     columns = None
@@ -97,10 +115,10 @@ def coverage(repeats, duration, encoder, torque, pole, seed=0):
             tau=tau + torque * coloured(rng, tau.shape, pole),
             source='repeat',
         )
-        result = identify(structure, [recording], settings, rng=np.random.default_rng(0))
-        estimate, truth = result.estimate, result.base.values(arm.theta)
+        base, estimate = identified(structure, recording)
+        truth = base.values(arm.theta)
         if columns is None:
-            columns = arm.columns(other)[:, :, result.base.independent]
+            columns = arm.columns(other)[:, :, base.independent]
             rigid = np.array(['_' not in p.name for p in estimate.parameters])
         flat = columns.reshape(-1, columns.shape[2])
         std = np.sqrt(np.sum((flat @ estimate.covariance) * flat, axis=1))
@@ -108,8 +126,9 @@ def coverage(repeats, duration, encoder, torque, pole, seed=0):
         tallies['effects'].add(estimate.values[~rigid], truth[~rigid], estimate.std[~rigid])
         tallies['predicted torque'].add(flat @ estimate.values, flat @ truth, std)
     print(
-        f'{repeats} repeats of {duration:g} s, torque noise {torque:g} N m with pole {pole:g} at '
-        f'{RATE:g} Hz, encoder noise {encoder:g} rad ({time.perf_counter() - start:.0f} s)'
+        f'{identified.__name__}, {repeats} repeats of {duration:g} s, torque noise {torque:g} N m '
+        f'with pole {pole:g} at {RATE:g} Hz, encoder noise {encoder:g} rad '
+        f'({time.perf_counter() - start:.0f} s)'
     )
     for what, tally in tallies.items():
         print(tally.line(what), flush=True)
@@ -119,10 +138,16 @@ def main():
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--repeats', type=int, default=500)
+    parser.add_argument('--online-repeats', type=int, default=200)
     parser.add_argument('--duration', type=float, default=20.0)
     arguments = parser.parse_args()
-    for encoder, pole in ((2e-5, 0.95), (2e-4, 0.95), (0.0, 0.0)):
-        coverage(arguments.repeats, arguments.duration, encoder, 0.05, pole)
+    for identified, repeats in (
+        (from_recording, arguments.repeats),
+        (online, arguments.online_repeats),
+    ):
+        for encoder, pole in ((2e-5, 0.95), (2e-4, 0.95), (0.0, 0.0)):
+            if repeats:
+                coverage(identified, repeats, arguments.duration, encoder, 0.05, pole)
 
 
 if __name__ == '__main__':

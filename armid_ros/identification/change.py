@@ -87,6 +87,14 @@ class Change:
     detected: float
     size: Estimate
 
+    @property
+    def reopened(self) -> FloatArray:
+        """Independent directions of all that may have changed, shape (P, k)."""
+        columns = np.hstack([c.reopened for c in (self.candidate, *self.rivals)])
+        columns = columns / np.linalg.norm(columns, axis=0)
+        left, size, _ = np.linalg.svd(columns, full_matrices=False)
+        return np.asarray(left[:, size > _INDEPENDENT * size[0]])
+
     def __str__(self) -> str:
         """Say what changed, by how much, and what else it may have been."""
         sizes = ', '.join(

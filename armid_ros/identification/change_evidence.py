@@ -13,34 +13,23 @@ as information on delta and its score: the estimate is S^-1 s, and s^T S^-1 s tw
 of the likelihood ratio. What was not known before, where A D is nothing, cannot be seen to change.
 Source: Willsky and Jones 1976, the generalised likelihood ratio test.
 
-Twice the logarithm is chi-square of p degrees only if noise is white and the model right. Noise
-that is coloured, and what the model lacks, make it larger, by a factor that is measured for every
-candidate and every length of window while nothing changes (``UsualSize``); the ratio of the two
-is then of Fisher's distribution, its degrees of freedom counting how much was measured.
+Twice the logarithm is chi-square of p degrees only if noise is white and the model right; how
+large it is otherwise is measured while nothing changes (``usual_size``).
 
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.identification.recursive import Learned
 from armid_ros.motion import FloatArray
 import numpy as np
-from scipy import linalg, stats
+from scipy import linalg
 
 #: Eigenvalues of an information below this share of the largest are nothing [-].
 _NOTHING = 1e-9
-#: Windows that are remembered: ten minutes of four a second.
-_MEMORY = 2400
-#: Windows between two looks at how large statistics usually are.
-_EVERY = 8
-#: The usual size is measured by what so many exceed.
-_TAIL = 0.05
-#: Independent windows before anything is judged.
-_FEWEST = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +71,14 @@ class Evidence:
         S.
     score : ndarray, shape (Q,)
         s.
+    strength : ndarray, shape (Q,)
+        Squares of the torques in the window that a unit of each change would make.
 
     """
 
     information: FloatArray
     score: FloatArray
+    strength: FloatArray
 
     def ratio(self, some: slice) -> float:
         """Return twice the logarithm of the likelihood ratio of some changes at once."""
@@ -126,56 +118,5 @@ def evidence(blocks: Sequence[Block], before: Learned, directions: FloatArray) -
     moved = np.column_stack([information @ directions, right - information @ before.values])
     solved = linalg.cho_solve(factor, scale[:, np.newaxis] * moved, check_finite=False)
     shared = (known @ directions).T @ (scale[:, np.newaxis] * solved)
-    return Evidence((shared[:, :-1] + shared[:, :-1].T) / 2.0, shared[:, -1])
-
-
-class UsualSize:
-    """
-    How large statistics usually are, compared with those of white noise.
-
-    By the quantile that one in twenty exceeds, of the later half of what was seen and of ten
-    minutes at most: so what came while little was known, or before a change was noticed, soon has
-    no part in it.
-
-    Parameters
-    ----------
-    sizes : sequence of int
-        Degrees of freedom of each statistic.
-    overlap : int
-        Successive windows of which one is independent of the one before.
-
-    """
-
-    def __init__(self, sizes: Sequence[int], overlap: int) -> None:
-        self._sizes = np.array(sizes)
-        self._overlap = overlap
-        self._seen: deque[FloatArray] = deque(maxlen=_MEMORY)
-        self._expected = stats.chi2.isf(_TAIL, self._sizes)
-        self.factors = np.full(len(sizes), np.nan)
-        self._independent = np.zeros(len(sizes))
-
-    def learn(self, ratios: FloatArray) -> None:
-        """Take in what the statistics were while nothing changed; zero: no data."""
-        if not np.any(ratios > 0.0):
-            return
-        self._seen.append(ratios)
-        if len(self._seen) % _EVERY:
-            return
-        later = np.array(self._seen)[len(self._seen) // 2 :]
-        later = np.where(later > 0.0, later, np.nan)
-        known = np.sum(np.isfinite(later), axis=0)
-        self._independent = known / self._overlap
-        self.factors = np.full(len(self._sizes), np.nan)
-        some = known > 0
-        self.factors[some] = (
-            np.nanquantile(later[:, some], 1.0 - _TAIL, axis=0) / self._expected[some]
-        )
-
-    def excess(self, ratios: FloatArray, chance: float) -> FloatArray:
-        """Return statistics over what they exceed with so small a chance; 0: too early to say."""
-        judged = (self._independent >= _FEWEST) & (self.factors > 0.0)
-        result = np.zeros(len(ratios))
-        sizes = self._sizes[judged]
-        limit = sizes * stats.f.isf(chance, sizes, sizes * self._independent[judged])
-        result[judged] = ratios[judged] / self.factors[judged] / limit
-        return result
+    strength = np.sum(directions * moved[:, :-1], axis=0)
+    return Evidence((shared[:, :-1] + shared[:, :-1].T) / 2.0, shared[:, -1], strength)

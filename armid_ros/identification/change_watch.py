@@ -20,10 +20,10 @@ from dataclasses import dataclass
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.change import Candidate, Change
-from armid_ros.identification.change_evidence import Block, Evidence, evidence, UsualSize
+from armid_ros.identification.change_evidence import Block, Evidence, evidence
 from armid_ros.identification.loudness import Loudness
 from armid_ros.identification.recursive import Learned, RecursiveLeastSquares
-from armid_ros.identification.score_variance import ScoreVariance
+from armid_ros.identification.usual_size import UsualSize, Weighed
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -36,8 +36,14 @@ _KEPT = 9
 #: Blocks since the change before which it is not named, and after which it is in any case.
 _EARLIEST = 4
 _LATEST = 6
+#: Share of an assumed noise, of which only the ratios between joints are known, below which no
+#: torque is measured: a hundredth of a hundredth of its range.
+_LEAST_NOISE = 0.01
 #: Logarithm of the likelihood ratio by which the best explanation is clear.
 _CLEAR = 5.0
+#: Of two begins of a change that differ by less the later one is taken: soon after a change any
+#: begin before it will do, and all that can be told apart by then is not much.
+_ALIKE = 2.0
 #: For so long after a change its size is still being learned [s]; what is less likely than this
 #: share of it corrects the size.
 _LEARNING = 10.0
@@ -100,8 +106,6 @@ class ChangeWatch:
         self._slices = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
         self._sizes = np.array(sizes, dtype=float)
         self._directions = np.hstack([c.directions for c in self._candidates])
-        size = len(estimator.values)
-        self._nothing = np.zeros((size, size)), np.zeros(size)
         tests = len(sizes) * len(_LENGTHS)
         self._chance = BLOCK / settings.false_alarm_time / tests
         self.reset()
@@ -109,27 +113,19 @@ class ChangeWatch:
     def reset(self) -> None:
         """Forget what noise usually does, and all changes."""
         self.changes: list[Change] = []
-        self._loudness = Loudness()
-        self._scores = ScoreVariance(len(self._estimator.values))
-        self._usual = {m: UsualSize(self._sizes.astype(int).tolist(), m) for m in _LENGTHS}
+        self._loudness = Loudness(_LEAST_NOISE if self._estimator.noise_is_relative else 1.0)
+        sizes, places = self._sizes.astype(int).tolist(), {c.joint for c in self._candidates}
+        self._usual = {m: UsualSize(sizes, m, len(places)) for m in _LENGTHS}
         self._fresh = -np.inf, 0.0
         self.interrupt()
 
     def interrupt(self) -> None:
         """Begin a new stretch of rows, which does not continue the one before."""
         self._blocks: deque[Block] = deque(maxlen=_KEPT)
-        self._waiting: deque[dict[int, FloatArray]] = deque()
+        self._waiting: deque[dict[int, Weighed]] = deque()
         self._samples: list[tuple[FloatArray, FloatArray, FloatArray]] = []
         self._before: Learned | None = None
         self._begin = 0.0
-        self._ended = 0
-        self._sums = self._nothing
-        self._last_score: tuple[FloatArray, FloatArray] | None = None
-
-    @property
-    def widening(self) -> FloatArray:
-        """Factor by which errors that last widen every standard deviation, shape (P,)."""
-        return self._scores.widening(self._estimator.covariance_factor)
 
     def update(
         self, t: float, rows: FloatArray, tau: FloatArray, weights: FloatArray
@@ -157,43 +153,31 @@ class ChangeWatch:
         rows, tau, weights = (np.stack(part) for part in zip(*self._samples, strict=True))
         scale = np.array([self._estimator.scale(w) for w in weights])
         w, y = scale[..., np.newaxis] * rows, scale * tau
-        information, right = _normal(w, y)
-        self._sums = self._sums[0] + information, self._sums[1] + right
         loudness = self._loudness.value
         self._loudness.learn(y - w @ self._before.values, weights)
         sums = _normal(w / loudness[:, np.newaxis], y / loudness)
         block = Block(self._begin, t, *sums, self._before, tuple(self._samples))
         self._blocks.append(block)
         self._samples, self._before = [], None
-        ratios = {
-            m: self._ratios(self._window(len(self._blocks) - m))
-            for m in _LENGTHS
-            if m <= len(self._blocks)
-        }
-        if any(np.any(self._usual[m].excess(r, self._chance) > 1.0) for m, r in ratios.items()):
+        weighed = {m: self._weigh(m) for m in _LENGTHS if m <= len(self._blocks)}
+        if any(np.any(self._usual[m].excess(r, self._chance) > 1.0) for m, r in weighed.items()):
             self._judge()
         if self._blocks:
-            self._sum_scores()
-            self._waiting.append(ratios)
+            self._waiting.append(weighed)
             if len(self._waiting) > _LENGTHS[-1]:  # by now a change in it would have been named
                 for m, values in self._waiting.popleft().items():
                     self._usual[m].learn(values)
-
-    def _sum_scores(self) -> None:
-        """Keep the score of every longest window, once the next one is without a change."""
-        self._ended += 1
-        if self._ended % _LENGTHS[-1] == 0:
-            if self._last_score is not None:
-                self._scores.add(*self._last_score)
-            information, right = self._sums
-            self._last_score = information, right - information @ self._estimator.values
-            self._sums = self._nothing
 
     def _window(self, first: int, before: int | None = None) -> Evidence:
         """Weigh the blocks from one on against what was known before it, or another one."""
         blocks = list(self._blocks)
         known = blocks[first if before is None else before].before
         return evidence(blocks[first:], known, self._directions)
+
+    def _weigh(self, length: int) -> Weighed:
+        """Return how large the statistics of a window of blocks are, and what it can show."""
+        window = self._window(len(self._blocks) - length)
+        return Weighed(self._ratios(window), window.strength)
 
     def _ratios(self, window: Evidence) -> FloatArray:
         return np.array([window.ratio(some) for some in self._slices])
@@ -203,7 +187,8 @@ class ChangeWatch:
         count = len(self._blocks)
         starts = range(count - 1)
         likelihood = np.array([self._likelihood(self._ratios(self._window(k))) for k in starts])
-        first = int(np.argmax(likelihood.max(axis=1)))
+        of_start = likelihood.max(axis=1)
+        first = int(np.flatnonzero(of_start > of_start.max() - _ALIKE)[-1])
         seen, at = count - first, likelihood[first]
         best = int(np.argmax(at))
         near = np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))
@@ -247,7 +232,7 @@ class ChangeWatch:
         self.changes.append(change)
         self._fresh = change.detected, likelihood
         self._estimator.restore(blocks[before].before)
-        self._estimator.reopen(_joined([best, *rivals]))
+        self._estimator.reopen(change.reopened)
         for block in blocks[after:]:
             for sample in block.samples:
                 self._estimator.update(*sample)
@@ -258,11 +243,3 @@ def _normal(rows: FloatArray, tau: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the normal equations of rows of shape (k, m, P)."""
     w = rows.reshape(-1, rows.shape[2])
     return w.T @ w, w.T @ tau.reshape(-1)
-
-
-def _joined(candidates: Sequence[Candidate]) -> FloatArray:
-    """Return independent directions that span those of all candidates."""
-    columns = np.hstack([c.reopened for c in candidates])
-    columns = columns / np.linalg.norm(columns, axis=0)
-    left, size, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(left[:, size > 1e-6 * size[0]])

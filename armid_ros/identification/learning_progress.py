@@ -21,6 +21,10 @@ _KNOWN = 0.1
 #: Time over which something has to be learned [s], and by how much deviations have to fall.
 _WAIT = 10.0
 _LEARNED = 0.9
+#: Where nothing has been learned, and so many times the usual torque is uncertain, deviations are
+#: as the noise is, and have to fall by more.
+_NOTHING = 100.0
+_BEGUN = 0.5
 #: Joints that are named at most.
 _NAMED = 3
 _WORDS = {'kg m^2': 'inertia', 'kg m': 'balance', 'kg': 'mass'}
@@ -109,7 +113,8 @@ class LearningProgress:
         if self._past[0][0] > t - _WAIT:
             return ()
         unknown = self._share * estimate.std
-        stuck = (unknown > _KNOWN) & (estimate.std > _LEARNED * self._past[0][1])
+        learned = np.where(unknown > _NOTHING, _BEGUN, _LEARNED)
+        stuck = (unknown > _KNOWN) & (estimate.std > learned * self._past[0][1])
         by_joint: dict[str, list[int]] = {}
         for k in sorted(np.flatnonzero(stuck).tolist(), key=lambda k: -float(unknown[k])):
             by_joint.setdefault(estimate.parameters[k].joint, []).append(k)

@@ -25,9 +25,15 @@ class Loudness:
     Sums of residuals over a block: what is quick cancels in them. By their median, which neither
     the first blocks nor a change that is not yet noticed moves.
 
+    Parameters
+    ----------
+    least : float
+        What the factor is at least.
+
     """
 
-    def __init__(self) -> None:
+    def __init__(self, least: float) -> None:
+        self._least = least
         self._seen: deque[FloatArray] = deque(maxlen=_MEMORY)
         self._value: FloatArray | None = None
 
@@ -49,4 +55,4 @@ class Loudness:
         known = np.any(later > 0.0, axis=0)
         value = np.ones(later.shape[1]) if self._value is None else self._value.copy()
         value[known] = np.sqrt(np.nanmedian(later[:, known], axis=0) / _MEDIAN)
-        self._value = np.where(value > 0.0, value, 1.0)
+        self._value = np.maximum(value, self._least)

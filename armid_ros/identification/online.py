@@ -19,6 +19,7 @@ from armid_ros.identification.causal import (
 from armid_ros.identification.change import Change, change_candidates
 from armid_ros.identification.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.recursive import RecursiveLeastSquares
+from armid_ros.identification.score_variance import ScoreVariance
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -30,6 +31,8 @@ import pinocchio as pin
 _NOISE_OF_LIMIT = 0.01
 #: Time constants of the row filter until its start, or a joint's rest, is forgotten, to 3e-3.
 _FORGOTTEN = 10.0
+#: Windows of which the colour of the noise is learned [s]: longer than what it lasts.
+_WINDOW = 4.0
 
 
 @dataclass(frozen=True)
@@ -172,6 +175,8 @@ class OnlineIdentifier:
             start=self.base.values(arm.theta),
             scale_covariance=settings.torque_noise is None,
         )
+        window = max(1, round(_WINDOW / self._row_period))
+        self._scores = ScoreVariance(window, settings.forgetting)
         self._watch = None
         if settings.changes is not None:
             candidates = change_candidates(arm, self.base)
@@ -189,6 +194,7 @@ class OnlineIdentifier:
         """Forget everything that was learned, and set the counters to zero."""
         self._filter.reset()
         self._estimator.reset()
+        self._scores.reset()
         if self._watch is not None:
             self._watch.reset()
 
@@ -229,10 +235,8 @@ class OnlineIdentifier:
     def estimate(self) -> Estimate:
         """Return values and covariance of the base parameters, errors that last included."""
         estimate = self._estimator.estimate
-        if self._watch is None:
-            return estimate
-        factor = self._watch.widening
-        return replace(estimate, covariance=estimate.covariance * np.outer(factor, factor))
+        covariance = self._scores.covariance(self._estimator.learned().root)
+        return estimate if covariance is None else replace(estimate, covariance=covariance)
 
     def model(self) -> ArmModel:
         """Return the arm with the estimate, otherwise as near as possible to what it was."""
@@ -272,6 +276,7 @@ class OnlineIdentifier:
     def _begin(self) -> None:
         """Start the row filter anew, together with the motion filter."""
         self._row_filter.reset()
+        self._scores.interrupt()
         if self._watch is not None:
             self._watch.interrupt()
         self._generation = self._filter.generation
@@ -299,11 +304,17 @@ class OnlineIdentifier:
         rows, measured = filtered[:, :rank], filtered[:, rank]
         gain, independent = self._noise_of_row(step)
         stamp = motion.t - (self.delay or 0.0)
-        sample = rows / gain, measured / gain, np.asarray(used * independent)
+        weights = np.asarray(used * independent)
+        sample = rows / gain, measured / gain, weights
         if self._watch is None:
             innovation = self._estimator.update(*sample)
         else:
+            known = len(self._watch.changes)
             innovation = self._watch.update(stamp, *sample)
+            for change in self._watch.changes[known:]:
+                self._scores.reopen(change.reopened, self._estimator.values)
+        scale = self._estimator.scale(weights) / gain
+        self._scores.add(rows * scale[:, np.newaxis], measured * scale, self._estimator.values)
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
 
     def _rows(self, motion: CausalMotion) -> FloatArray:

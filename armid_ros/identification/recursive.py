@@ -232,6 +232,11 @@ class RecursiveLeastSquares:
         return np.asarray(inverse @ inverse.T * self.covariance_factor)
 
     @property
+    def noise_is_relative(self) -> bool:
+        """Whether the noise is known up to a factor only, which the residuals tell."""
+        return self._scale
+
+    @property
     def covariance_factor(self) -> float:
         """What the covariance is multiplied by: the variance factor, or 1 for known noise."""
         return self.variance_factor if self._scale else 1.0

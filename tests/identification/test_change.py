@@ -6,13 +6,16 @@ from __future__ import annotations
 
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.change import change_candidates
-from armid_ros.identification.change_evidence import Block, evidence, UsualSize
+from armid_ros.identification.change_evidence import Block, evidence
 from armid_ros.identification.recursive import RecursiveLeastSquares
+from armid_ros.identification.usual_size import UsualSize, Weighed
 import numpy as np
 import pytest
 from scipy import stats
 
 from benchmarks import changes
+from benchmarks.change_information import Noise, visibility
+from tests.identification.conftest import multisine
 
 NAMES = tuple(ParameterName(f'p{k}', '', '') for k in range(5))
 TRUTH = np.array([1.0, -2.0, 0.5, 3.0, 0.0])
@@ -80,12 +83,14 @@ def test_reopening_forgets_one_direction_and_nothing_else():
 
 def test_a_statistic_that_is_usually_large_is_not_surprising():
     rng = np.random.default_rng(4)
-    usual = UsualSize([1, 3], 1)
+    usual, strength = UsualSize([1, 3], 1, 2), np.ones(4)
     for _ in range(400):
-        usual.learn(100.0 * np.array([rng.chisquare(1), rng.chisquare(3)]))
+        usual.learn(Weighed(100.0 * np.array([rng.chisquare(1), rng.chisquare(3)]), strength))
     np.testing.assert_allclose(usual.factors, 100.0, rtol=0.3)
-    assert np.all(usual.excess(np.array([2000.0, 2500.0]), 1e-8) < 1.0)
-    assert np.all(usual.excess(np.array([8000.0, 9000.0]), 1e-8) > 1.0)
+    assert np.all(usual.excess(Weighed(np.array([2000.0, 2500.0]), strength), 1e-8) < 1.0)
+    large = np.array([8000.0, 9000.0])
+    assert np.all(usual.excess(Weighed(large, strength), 1e-8) > 1.0)
+    assert np.all(usual.excess(Weighed(large, 9.0 * strength), 1e-8) < 1.0)  # a faster motion
 
 
 def test_candidates_are_every_effect_the_friction_of_a_joint_and_a_load():
@@ -104,28 +109,30 @@ def test_candidates_are_every_effect_the_friction_of_a_joint_and_a_load():
     )
 
 
-BEFORE = 30.0
+#: The simulation of the benchmark, at a rate that takes a fifth of its time [Hz].
+RATE = 200.0
 
 
 @pytest.mark.parametrize(
-    ('change', 'name', 'truth'),
+    ('change', 'before', 'name', 'truth'),
     [
-        (changes.CHANGES[1], 'payload', 0.3),
-        (changes.CHANGES[5], 'coulomb_friction', 0.1),
+        ('payload:' + changes.ball(0.3), 30.0, 'payload', 0.3),
+        ('coulomb_friction@shoulder_pitch:coulomb_torque=0.1', 30.0, 'coulomb_friction', 0.1),
+        ('coulomb_friction@elbow_pitch:coulomb_torque=0.08', 60.0, 'coulomb_friction', 0.08),
     ],
 )
-def test_a_change_in_mid_motion_is_seen_and_nothing_else_forgotten(change, name, truth):
+def test_a_change_in_mid_motion_is_seen_and_nothing_else_forgotten(change, before, name, truth):
     seen_at, known = None, None
     online = changes.watch(iter(()))
-    for t, q, tau in changes.changing(change, 0, BEFORE, 3.0):
+    for t, q, tau in changes.changing(change, 0, before, 3.0, RATE):
         online.update(t, q, None, tau)
-        if known is None and t >= BEFORE:
+        if known is None and t >= before:
             known = online.estimate()
         if seen_at is None and online.changes:
             seen_at = t
     (found,) = online.changes
-    assert BEFORE < seen_at < BEFORE + changes.WANTED
-    assert abs(found.t - BEFORE) < 0.5
+    assert before < seen_at < before + changes.WANTED
+    assert abs(found.t - before) < 0.5
     assert found.candidate.name == name
     lower, upper = found.size.interval(0.999)[0]
     assert 0.0 < lower < truth < upper
@@ -141,4 +148,44 @@ def test_a_change_in_mid_motion_is_seen_and_nothing_else_forgotten(change, name,
 
 
 def test_work_without_a_change_raises_no_alarm():
-    assert not changes.watch(changes.unchanging(2, 1)).changes
+    assert not changes.watch(changes.unchanging(2, 1, RATE)).changes
+
+
+def test_a_motion_without_noise_raises_no_alarm(arm):
+    """What filtering leaves of it is anything but normal: nothing, and much at reversals."""
+    motion = multisine(arm.robot.joints, 20.0, 250.0, seed=0)
+    online = changes.watch(zip(motion.t, motion.q, arm.torque(motion), strict=True))
+    assert not online.changes
+
+
+def test_the_best_test_sees_a_step_in_white_noise_when_theory_says():
+    """Means of 0.1 s at 1 kHz: d^2 t / (sigma^2 T) reaches the square of the quantile."""
+    noise, step = Noise(0.1, 0.0, 0.0), np.full((3000, 1), 0.01)
+    chance = 1e-6
+    needed = stats.norm.isf(chance) ** 2
+    seconds = needed * 0.1**2 * 1e-3 / 0.01**2
+    can = visibility(step, 1e-3, noise, 2.0, chance)
+    assert seconds <= can.delay < seconds + 0.1 + 1e-9
+    assert can.smallest == pytest.approx(np.sqrt(seconds / 2.0), rel=1e-6)
+
+
+def test_noise_that_lasts_hides_a_step_better():
+    step = np.full((3000, 1), 0.05)
+    white, lasting = Noise(0.05, 0.0, 0.0), Noise(0.0, 0.05, 0.98)
+    shares = [visibility(step, 1e-3, n, 2.0, 1e-6).smallest for n in (white, lasting)]
+    # its spectrum at zero is (1 + keep) / (1 - keep) times that of white noise
+    assert shares[1] / shares[0] == pytest.approx(np.sqrt(1.98 / 0.02), rel=0.1)
+
+
+def test_a_statistic_with_rare_large_values_is_judged_by_those():
+    """One joint in the six has a spike in one window of thirty."""
+    rng = np.random.default_rng(5)
+    plain, spiky, strength = UsualSize([1] * 6, 2, 6), UsualSize([1] * 6, 2, 6), np.ones(6)
+    for k in range(600):
+        ratios = rng.chisquare(1, 6)
+        plain.learn(Weighed(ratios, strength))
+        spike = 30.0 * (k % 30 == 0) * (np.arange(6) == k // 30 % 6)
+        spiky.learn(Weighed(ratios + spike, strength))
+    large = Weighed(np.full(6, 65.0), strength)
+    assert np.all(plain.excess(large, 1e-8) > 1.0)
+    assert np.all(spiky.excess(large, 1e-8) < plain.excess(large, 1e-8))
