@@ -15,7 +15,8 @@ from armid_ros.diagnosis.model_search import as_described, explain, Explanation,
 from armid_ros.diagnosis.problem import make_problem, Problem, project, Projection
 from armid_ros.diagnosis.refine import Workspace
 from armid_ros.diagnosis.remembering import remembering
-from armid_ros.diagnosis.search import next_step, not_beaten, Step, Survey
+from armid_ros.diagnosis.rivals import not_beaten
+from armid_ros.diagnosis.search import next_step, Step, Survey
 from armid_ros.diagnosis.selection import Score, Trial, try_group
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.tied import Ties
