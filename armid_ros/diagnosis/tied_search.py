@@ -20,6 +20,7 @@ from armid_ros.diagnosis.search import next_step, Step, Survey
 from armid_ros.diagnosis.selection import Score, Trial, try_group
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.tied import Ties
+from armid_ros.effects import Effect
 from armid_ros.effects.tied import Partner, Tied
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -106,7 +107,7 @@ def _explanation(ties: Ties, fitted: Fitted) -> Explanation:
     steps = []
     for k, own in enumerate(fitted.named):
         problem, projection, columns = view.without(k, ())
-        group = Group(own.effect, slice(0, columns.shape[2]), own.kept)
+        group = _group(own.effect, slice(0, columns.shape[2]), own.kept, ties.arm)
         trial = _trial(group, problem, projection, columns, ties.settings)
         steps.append(Step(trial, rivals, (trial,), before, after, (trial,)))
     return Explanation(ties.base, fitted, reference, tuple(steps), survey, after, before)
@@ -131,7 +132,8 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
     kind = ties.partner.slack if loose else ties.partner.interaction
     whole = kind.on(ties.arm.robot, [own.effect.joints[0] for own in fitted.named])
     each = len(whole.quantities)
-    group = Group(whole, span, tuple(range(0, each * len(whole.joints), each)))
+    kept = tuple(range(0, each * len(whole.joints), each))
+    group = _group(whole, span, kept, ties.arm)
     projection = project(problem, free)
     trial = _trial(group, problem, projection, problem.x[:, :, span], settings)
     work = Workspace(remembering(reference.arm), data, settings)
@@ -141,6 +143,11 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
         return survey, ()
     left = projection.rest(problem.y)
     return survey, tuple(not_beaten([trial, *step.passing], problem, left, settings))
+
+
+def _group(effect: Effect, columns: slice, kept: tuple[int, ...], arm: ArmModel) -> Group:
+    precision = effect.spread(arm.robot) ** -2.0
+    return Group(effect, columns, kept, precision[list(kept)])
 
 
 def _trial(
