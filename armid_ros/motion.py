@@ -28,6 +28,36 @@ def read_only(values: npt.ArrayLike) -> FloatArray:
 
 
 @dataclass(frozen=True)
+class MovingPoints:
+    """
+    Points of something else that moved beside an arm, such as of a person in an exoskeleton.
+
+    Attributes
+    ----------
+    names : tuple of str
+        What the S points are called.
+    position, velocity : ndarray, shape (N, S, 3)
+        In the base frame of the arm, at the samples of its motion [m, m/s].
+
+    """
+
+    names: tuple[str, ...]
+    position: FloatArray
+    velocity: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        for name in ('position', 'velocity'):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    def select(
+        self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
+    ) -> MovingPoints:
+        """Return the points at some of the samples."""
+        return replace(self, position=self.position[samples], velocity=self.velocity[samples])
+
+
+@dataclass(frozen=True)
 class Motion:
     """
     Joint motion sampled on one time base, with or without measured torque.
@@ -46,6 +76,8 @@ class Motion:
     band_hz : float
         What positions that were measured have above this frequency is noise, as far as second
         derivatives of torques go; infinite for a reference.
+    beside : MovingPoints or None
+        What moved beside the arm and was recorded with it.
 
     """
 
@@ -56,6 +88,7 @@ class Motion:
     ddq: FloatArray
     tau: FloatArray | None = None
     band_hz: float = field(default=np.inf, kw_only=True)
+    beside: MovingPoints | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check that their shapes agree."""
@@ -91,6 +124,7 @@ class Motion:
             dq=self.dq[samples],
             ddq=self.ddq[samples],
             tau=tau,
+            beside=None if self.beside is None else self.beside.select(samples),
         )
 
     def at_rest(self) -> Motion:

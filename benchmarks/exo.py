@@ -15,7 +15,12 @@ import argparse
 from dataclasses import replace
 
 from armid_ros.identification.interaction import identify_interaction, Interaction
-from armid_ros.identification.interaction_problem import Inertias, interaction_problem
+from armid_ros.identification.interaction_poses import choose_poses, stiffness_bound
+from armid_ros.identification.interaction_problem import (
+    Inertias,
+    interaction_problem,
+    InteractionProblem,
+)
 from armid_ros.identification.interaction_recording import recorded_interaction_problem
 from armid_ros.identification.interaction_search import find_interaction, InteractionFinding
 from armid_ros.motion import FloatArray, Motion
@@ -25,7 +30,6 @@ from armid_ros.simulation.leg_pair import (
     leg_pair,
     pair_torques,
     PairMotion,
-    SEGMENTS,
     stepping,
     TiedPair,
     walking,
@@ -33,20 +37,13 @@ from armid_ros.simulation.leg_pair import (
 from armid_ros.simulation.torque_driven import splined
 import numpy as np
 
+from benchmarks.exo_diagnosis import cases, diagnosed
 from benchmarks.leg_pair_in_mujoco import drive_in_mujoco
 
 TORQUE_NOISE = 0.5
 SECONDS = 6.0
-#: Hidden springs: which segments, at each of the stiffnesses.
-HIDDEN = (
-    SEGMENTS,
-    ('swing_shank',),
-    ('swing_thigh',),
-    ('stance_thigh',),
-    ('swing_shank', 'stance_shank'),
-    ('swing_thigh', 'stance_thigh'),
-)
-STIFFNESSES = (1e3, 3e3, 1e4, 5e4)
+#: Time of a step forward and back, of the steps that poses are chosen from [s].
+SPEEDS = (1.8, 1.2, 0.9)
 
 
 def main() -> None:
@@ -58,6 +55,7 @@ def main() -> None:
     gait_by_torque()
     stiffness(asked.draws)
     hidden(asked.sets)
+    diagnosed(asked.sets)
 
 
 def gait_by_torque() -> None:
@@ -99,36 +97,92 @@ def _error(
 def stiffness(draws: int) -> None:
     """Find the springs from 200 poses and from a recording, with noise."""
     pair, gait = leg_pair(1e4), read_gait()
-    poses = stepping(pair, gait, np.linspace(0.0, 1.8, 201)[:-1])
     seconds = stepping(pair, gait, np.arange(0.0, 10.0, 1e-3))
-    tau = {id(m): pair_torques(pair, *m).tau for m in (poses, seconds)}
+    sets = {
+        '200 poses': stepping(pair, gait, np.linspace(0.0, 1.8, 201)[:-1]),
+        '200 chosen': chosen_poses(pair),
+        '10 s 1 kHz': seconds,
+    }
     print(
         f'stiffness, {TORQUE_NOISE} N m noise: mean error (scatter) of {draws} draws in per cent'
     )
-    print('  data       angles   inertias  springs       this          least squares    wanted')
+    print(
+        '  data       angles   inertias  springs       this          bound    '
+        'least squares    wanted'
+    )
     for degrees in (0.05, 0.1):
         for inertias in ('known', 'free'):
             for separate in (False, True):
-                for data, motions in (('200 poses', poses), ('10 s 1 kHz', seconds)):
+                for data, motions in sets.items():
+                    tau = pair_torques(pair, *motions).tau
                     found = [
-                        _find(pair, motions, tau[id(motions)], degrees, draw, inertias, separate)
+                        _find(pair, motions, tau, degrees, draw, inertias, separate)
                         for draw in range(draws)
                     ]
+                    least = None
+                    if motions is not seconds:
+                        least = _bound(pair, motions, degrees, inertias, separate)
                     line = f'  {data:10s} {degrees:4.2f} deg  {inertias:5s}  '
-                    print(line + _judged(found, degrees, inertias))
+                    print(line + _judged(found, degrees, inertias, least), flush=True)
 
 
-def _judged(found: list[Interaction], degrees: float, inertias: Inertias) -> str:
+def chosen_poses(pair: TiedPair) -> PairMotion:
+    """Choose 200 poses that tell four springs best, of steps at three speeds."""
+    gait = read_gait()
+    parts = [stepping(pair, gait, np.linspace(0.0, period, 601)[:-1], period) for period in SPEEDS]
+    own, other = (_joined([part[side] for part in parts]) for side in (0, 1))
+    problem, theta = _planned(pair, PairMotion(own, other), 0.05, 'free', True)
+    rows = choose_poses(problem, theta, TORQUE_NOISE, 200)
+    return PairMotion(own.select(rows), other.select(rows))
+
+
+def _joined(motions: list[Motion]) -> Motion:
+    arrays = (np.concatenate([getattr(m, name) for m in motions]) for name in ('q', 'dq', 'ddq'))
+    return Motion(motions[0].joints, np.arange(float(sum(map(len, motions)))), *arrays)
+
+
+def _planned(
+    pair: TiedPair, motions: PairMotion, degrees: float, inertias: Inertias, separate: bool
+) -> tuple[InteractionProblem, FloatArray]:
+    """Return the regression on poses without noise, and its solution."""
+    problem = interaction_problem(
+        pair.robot,
+        motions.own.with_torque(pair_torques(pair, *motions).tau),
+        pair.other,
+        motions.other,
+        pair.ties,
+        position_noise=np.radians(degrees),
+        inertias=inertias,
+        separate=separate,
+    )
+    columns = problem.columns.reshape(-1, problem.columns.shape[2])
+    size = np.linalg.norm(columns, axis=0)
+    aim = (problem.tau - problem.known).ravel()
+    return problem, np.linalg.lstsq(columns / size, aim, rcond=None)[0] / size
+
+
+def _bound(
+    pair: TiedPair, motions: PairMotion, degrees: float, inertias: Inertias, separate: bool
+) -> FloatArray:
+    """Return the least scatter that any estimate without bias can have [per cent]."""
+    problem, theta = _planned(pair, motions, degrees, inertias, separate)
+    return 100.0 * stiffness_bound(problem, theta, TORQUE_NOISE) / 1e4
+
+
+def _judged(
+    found: list[Interaction], degrees: float, inertias: Inertias, bound: FloatArray | None
+) -> str:
     """Return mean error, scatter and what plain least squares gives, of the worst spring."""
     errors = np.array([100.0 * (part.stiffness / 1e4 - 1.0) for part in found])
     plain = errors + np.array([100.0 * part.bias / 1e4 for part in found])
-    mean, scatter = errors.mean(axis=0), errors.std(axis=0)
+    mean, scatter = errors.mean(axis=0), errors.std(axis=0, ddof=1)
     worst = int(np.argmax(np.abs(mean) + scatter))
     one = 1.0 if inertias == 'free' or degrees > 0.05 else 0.5
     count, wanted = ('one', one) if len(mean) == 1 else ('four', 5.0)
+    least = '    -' if bound is None else f'{bound[worst]:5.2f}'
     return (
-        f'{count:5s}  {mean[worst]:+7.2f} ({scatter[worst]:.2f})'
-        f'      {plain.mean(axis=0)[worst]:+8.1f}        <= {wanted}'
+        f'{count:5s}  {mean[worst]:+7.2f} ({scatter[worst]:.2f})    {least}'
+        f'    {plain.mean(axis=0)[worst]:+8.1f}        <= {wanted}'
         + (f'  (worst: {found[0].segments[worst]})' if len(mean) > 1 else '')
     )
 
@@ -174,10 +228,9 @@ def hidden(sets: int) -> None:
     gait, every = read_gait(), leg_pair()
     t = np.arange(0.0, SECONDS, 1e-3)
     motions = stepping(every, gait, t)
-    cases = [(k, segments) for k in STIFFNESSES for segments in HIDDEN][:sets]
     right = alarms = 0
     closed = []
-    for number, (k, segments) in enumerate(cases):
+    for number, (k, segments) in enumerate(cases()[:sets]):
         found = _search(every, leg_pair(k, segments), motions, number)
         right += set(found.segments) == set(segments)
         closed.append(found.closed_fraction)

@@ -20,7 +20,7 @@ from armid_ros.model import (
     regressor,
     rigid_parameter_names,
 )
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
@@ -128,6 +128,12 @@ class ArmModel:
         assert self._acting.robot is not None
         return self._acting.robot
 
+    def along(self, motion: Motion) -> ArmModel:
+        """Return the arm with effects that know what moved beside it along a motion."""
+        effects = tuple(effect.along(motion) for effect in self.effects)
+        known = all(new is old for new, old in zip(effects, self.effects, strict=True))
+        return self if known else replace(self, effects=effects)
+
     def link_motion(self, motion: Motion) -> Motion:
         """Return the true motion of the links where another one was recorded."""
         displacement = self._acting.displacement
@@ -158,7 +164,7 @@ class ArmModel:
         """
         link = self.link_motion(motion)
         load = self.load(link)
-        return load + self._acting.effort(motion, link, load)
+        return load + self.along(motion).action().effort(motion, link, load)
 
     def torque(self, motion: Motion) -> FloatArray:
         """
@@ -246,7 +252,7 @@ class ArmModel:
         if not self.quasi_static:
             columns += by_dq @ change.dq + by_ddq @ change.ddq
         columns = self.with_load_friction(motion, columns)
-        law = self._acting.link_torque
+        law = self.along(motion).action().link_torque
         if law is not None:
             columns += _directional(law, link, change)
         return columns
@@ -309,6 +315,11 @@ class ArmModel:
     def base_parameters(self, rng: np.random.Generator) -> BaseParameters:
         """Find the combinations of all standard parameters that any motion can tell apart."""
         motion = random_motion(self.robot, 40 * self.robot.n_joints, rng)
+        names = tuple(name for effect in self.effects for name in effect.points)
+        if names:
+            size = (len(motion), len(names), 3)
+            points = MovingPoints(names, rng.normal(size=size), rng.normal(size=size))
+            motion = replace(motion, beside=points)
         columns = self.columns(motion)
         return group_columns(columns.reshape(-1, columns.shape[-1]), self.parameters)
 

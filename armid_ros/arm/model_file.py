@@ -6,7 +6,8 @@ model.yaml: an arm model as a file that a person can read and a simulator can lo
 Schema armid/model/1: ``robot`` (shipped name or path of the description), ``gravity`` [m/s^2],
 ``rigid_parameters`` and ``effects``, each a list of parameters with name, joint, value, std, unit.
 A std of null says that the data did not determine the parameter on its own. An effect has
-``shapes`` as well if the torque is not linear in all that describes it.
+``shapes`` as well if the torque is not linear in all that describes it, and ``partner`` and
+``ties`` - points of both machines, in the frames of their joints [m] - if it ends at another one.
 
 """
 
@@ -17,9 +18,11 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.arm.arm_model import ArmModel
-from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.effects import CATALOGUE, Effect, Kind
+from armid_ros.effects.tied import TIED, Tied, TiedKind
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot, Robot
 import numpy as np
@@ -72,6 +75,8 @@ def model_document(arm: ArmModel, robot: str, estimate: Estimate | None = None) 
         entry = {'name': effect.name, 'joints': list(effect.joints), 'parameters': rows}
         if effect.shapes:
             entry['shapes'] = _shape_table(effect, arm.robot, known)
+        if isinstance(effect, Tied):
+            entry |= {'partner': effect.partner, 'ties': [_tie_row(tie) for tie in effect.ties]}
         effects.append(entry)
         start += len(values)
     return {
@@ -89,6 +94,35 @@ def _shape_table(
     names = effect.shape_parameters(robot)
     std = [known.get((name.name, name.joint)) for name in names]
     return parameter_table(names, np.array(effect.shape), std)
+
+
+def _tie_row(tie: Tie) -> dict[str, Any]:
+    return {
+        'name': tie.name,
+        'joint': tie.joint,
+        'point': list(tie.point),
+        'partner_joint': tie.other_joint,
+        'partner_point': list(tie.other_point),
+    }
+
+
+def _tied(kind: type[Tied], entry: dict[str, Any]) -> TiedKind:
+    ties = [
+        Tie(
+            str(row['name']),
+            str(row['joint']),
+            str(row['partner_joint']),
+            _point(row['point']),
+            _point(row['partner_point']),
+        )
+        for row in entry['ties']
+    ]
+    return TiedKind(kind, tuple(ties), str(entry['partner']))
+
+
+def _point(values: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
 
 
 def save_model(
@@ -148,7 +182,10 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
             raise ModelError(
                 f"no effect '{entry['name']}'; the catalogue has {', '.join(CATALOGUE)}"
             )
-        effect = CATALOGUE[entry['name']].on(robot, tuple(entry['joints']))
+        kind: Kind = CATALOGUE[entry['name']]
+        if 'ties' in entry:
+            kind = _tied(TIED[entry['name']], entry)
+        effect = kind.on(robot, tuple(entry['joints']))
         if 'shapes' in entry:
             shape = _values(entry['shapes'], effect.shape_parameters(robot))
             effect = effect.with_shape(shape.reshape(effect.shape_values.shape))

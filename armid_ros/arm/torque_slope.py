@@ -44,7 +44,7 @@ class TorqueSlope:
     @classmethod
     def of(cls, arm: ArmModel, motion: Motion) -> TorqueSlope:
         """Differentiate the torque of an arm along a motion."""
-        action, link = arm.action(), arm.link_motion(motion)
+        action, link = arm.along(motion).action(), arm.link_motion(motion)
         slopes = inverse_dynamics_derivatives(arm.body, arm.felt(link))
         if arm.quasi_static:
             slopes = slopes[0], np.zeros_like(slopes[1]), np.zeros_like(slopes[2])

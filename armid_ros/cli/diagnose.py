@@ -10,6 +10,7 @@ from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_model, save_model
 from armid_ros.cli import options
+from armid_ros.cli import partner as partner_options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
 from armid_ros.diagnosis import diagnose as run
@@ -56,6 +57,7 @@ import numpy as np
 @click.option('--cutoff', type=float, help='Of the position filter [Hz]; from the noise if none.')
 @click.option('--decimation', type=int, help='Keep one sample of this many.')
 @click.option('--topic', help='JointState topic, where a bag has several.')
+@partner_options.options
 @options.gravity
 @options.joints
 @options.seed
@@ -70,6 +72,9 @@ def diagnose(
     cutoff: float | None,
     decimation: int | None,
     topic: str | None,
+    partner: str | None,
+    partner_topic: str | None,
+    ties: tuple[str, ...],
     gravity: str,
     joints: str | None,
     seed: int,
@@ -79,10 +84,14 @@ def diagnose(
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = ArmModel(robot) if model is None else load_model(model, robot)
     arm = options.with_effects(arm, effects)
-    settings = DiagnosisSettings(signals=SignalSettings(cutoff, decimation))
+    beside = partner_options.open_partner(partner, ties, robot, gravity)
+    settings = DiagnosisSettings(signals=SignalSettings(cutoff, decimation), partner=beside)
     with progress('reading') as tick:
         recordings = options.read(bags, robot, topic)
         held_out = options.read(validate, robot, topic)
+        if beside is not None:
+            recordings = partner_options.read_together(bags, recordings, beside, partner_topic)
+            held_out = partner_options.read_together(validate, held_out, beside, partner_topic)
         result = run(
             arm,
             recordings,
@@ -103,7 +112,9 @@ def diagnose(
     document['forward'] = [pair.document() for pair in forward]
     document['next_run'] = None if run_next is None else run_next.document()
     out.mkdir(parents=True, exist_ok=True)
-    save_model(out / 'model.yaml', result.arm, options.kept_source(robot_source, robot, out))
+    estimate = None if result.explanation is None else result.explanation.fitted.estimate
+    source = options.kept_source(robot_source, robot, out)
+    save_model(out / 'model.yaml', result.arm, source, estimate)
     page = diagnosis_report(
         result,
         robot=robot_source,

@@ -20,7 +20,7 @@ from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.fit import Fitted
 from armid_ros.diagnosis.remembering import remembering
 from armid_ros.diagnosis.shapes import shape_starts
-from armid_ros.effects import Effect
+from armid_ros.effects import Effect, Kind
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -77,9 +77,7 @@ class Group:
         return int(self.columns.stop) - int(self.columns.start)
 
 
-def group_effects(
-    arm: ArmModel, kinds: Sequence[type[Effect]]
-) -> Iterator[tuple[Effect, list[Effect]]]:
+def group_effects(arm: ArmModel, kinds: Sequence[Kind]) -> Iterator[tuple[Effect, list[Effect]]]:
     """
     Yield effects whose columns are computed together, with the groups they are shared out to.
 
@@ -105,7 +103,7 @@ def group_effects(
                 yield whole, [whole]
             if name not in _ALSO_JOINTS:
                 continue
-        joints = robot.joints[-1:] if name == 'payload' else robot.joints
+        joints = robot.joints[-1:] if name == 'payload' else whole.joints or robot.joints
         free = tuple(joint for joint in joints if (name, joint) not in there)
         if free:
             yield kind.on(robot, free), [kind.on(robot, (joint,)) for joint in free]
@@ -162,7 +160,7 @@ def candidates(
     fitted: Fitted,
     data: Sequence[Trajectory],
     sigma: Sequence[FloatArray],
-    kinds: Sequence[type[Effect]],
+    kinds: Sequence[Kind],
 ) -> Candidates:
     """Compute the columns of every effect that a fitted arm does not have."""
     fitted = replace(fitted, arm=remembering(fitted.arm))

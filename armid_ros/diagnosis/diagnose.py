@@ -24,12 +24,16 @@ from armid_ros.diagnosis.league import League, make_league
 from armid_ros.diagnosis.model_search import as_described, explain, Explanation, no_worse
 from armid_ros.diagnosis.pattern import find_pattern, Pattern
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.tied_search import explain_tied, within_its_noise
 from armid_ros.diagnosis.verdict import decide, Finding, Verdict
 from armid_ros.diagnosis.where import locate, Where
 from armid_ros.diagnosis.wrong_body import wrong_body
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.checks import check_motion
+from armid_ros.identification.interaction_recording import band_of_motion
 from armid_ros.identification.signals import Conditioning, conditioning, MODEL_BANDS
+from armid_ros.model import BaseParameters
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -39,6 +43,9 @@ Progress = Callable[[float, str], None]
 #: A diagnosis keeps six times the band of the motion where an identification keeps ten: what is
 #: beyond is mostly noise, which a gap has to stand out of.
 _BANDS = 6.0
+#: Beside a partner, noise of angles is all there is: the pass band is so much wider than where the
+#: motion sinks into it, or a fit takes inertia away to get rid of the noise of accelerations.
+_NARROW = 1.25
 #: Causes that a model as described may lack before a fit of everything is the better explanation.
 _FIXED_STEPS = 3
 
@@ -145,7 +152,7 @@ def diagnose(
     tell = progress or _silent
     tell(0.02, 'filtering')
     used = conditioning(list(recordings), settings.signals)
-    used = _narrower(used, settings)
+    used = _narrower(used, settings, recordings)
     data = trajectories(recordings, used)
     gate = check_data(arm, recordings, data)
     faults, notes = list(gate.faults), [*gate.notes]
@@ -167,24 +174,15 @@ def diagnose(
             'nothing repeats in some recordings: their noise floor is assumed from the upper part '
             'of the spectrum; two equal periods would measure it'
         )
-    tell(0.25, 'model as described')
-    fixed = explain(arm, data, as_told, None, settings, _FIXED_STEPS)
-    explained = bool(np.all(fixed.losses < settings.consistent_loss))
-    if explained and len(fixed.steps) == 1:
-        chosen = fixed
-    elif explained and not fixed.steps:
-        refitted = explain(arm, data, sigma, base, settings, 1)
-        chosen = replace(fixed, survey=refitted.survey)
+    found = None
+    if settings.partner is not None:
+        tell(0.2, f'ties to {settings.partner.source}')
+        found = explain_tied(arm, settings.partner, data, sigma, base, settings)
+        found = found or within_its_noise(arm, data, as_told, settings)
+    if found is None:
+        chosen = _explained(arm, data, (sigma, as_told), base, settings, tell)
     else:
-        tell(0.5, 'model fitted anew')
-        chosen = explain(arm, data, sigma, base, settings, settings.most_steps)
-        chosen = as_described(chosen, fixed, arm, data, as_told, settings)
-        names = len(fixed.steps)
-        fewer = 0 < names <= max(1, len(chosen.steps))
-        if fewer and no_worse(fixed.losses, chosen.losses, settings):
-            chosen = fixed
-        elif not chosen.steps and np.all(chosen.losses < settings.consistent_loss):
-            chosen = wrong_body(chosen, fixed, arm, data, as_told, settings)
+        chosen, sigma = found
     chosen, remarks = as_bodies(chosen, arm, data, sigma, settings)
     notes += remarks
     pattern = None if chosen.steps else find_pattern(chosen, arm, data, sigma)
@@ -225,8 +223,42 @@ def diagnose(
     )
 
 
-def _narrower(used: Conditioning, settings: DiagnosisSettings) -> Conditioning:
+def _explained(
+    arm: ArmModel,
+    data: Sequence[Trajectory],
+    sigmas: tuple[Sequence[FloatArray], Sequence[FloatArray]],
+    base: BaseParameters,
+    settings: DiagnosisSettings,
+    tell: Progress,
+) -> Explanation:
+    """Explain the gap of the arm as described or fitted anew, each at its own noise."""
+    sigma, as_told = sigmas
+    tell(0.25, 'model as described')
+    fixed = explain(arm, data, as_told, None, settings, _FIXED_STEPS)
+    explained = bool(np.all(fixed.losses < settings.consistent_loss))
+    if explained and len(fixed.steps) == 1:
+        return fixed
+    if explained and not fixed.steps:
+        refitted = explain(arm, data, sigma, base, settings, 1)
+        return replace(fixed, survey=refitted.survey)
+    tell(0.5, 'model fitted anew')
+    chosen = explain(arm, data, sigma, base, settings, settings.most_steps)
+    chosen = as_described(chosen, fixed, arm, data, as_told, settings)
+    names = len(fixed.steps)
+    fewer = 0 < names <= max(1, len(chosen.steps))
+    if fewer and no_worse(fixed.losses, chosen.losses, settings):
+        return fixed
+    if not chosen.steps and np.all(chosen.losses < settings.consistent_loss):
+        return wrong_body(chosen, fixed, arm, data, as_told, settings)
+    return chosen
+
+
+def _narrower(
+    used: Conditioning, settings: DiagnosisSettings, recordings: Sequence[Recording]
+) -> Conditioning:
     """Return the filters of an identification, narrowed to what a diagnosis needs."""
+    if settings.partner is not None:
+        return band_of_motion(recordings, used, settings.signals, _NARROW)
     band = used.rate_hz / (2.5 * MODEL_BANDS * used.decimation)
     if settings.signals.decimation is None:
         used = replace(used, decimation=max(1, int(used.rate_hz / (2.5 * _BANDS * band))))

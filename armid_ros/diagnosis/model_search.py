@@ -74,13 +74,17 @@ def explain(
     settings: DiagnosisSettings,
     most_steps: int,
     progress: Progress | None = None,
+    start: Explanation | None = None,
 ) -> Explanation:
-    """Search forward from an arm, fit, and prune backward."""
+    """Search forward from an arm, or from what explains a part already, fit, prune backward."""
     reference = current = fit(arm, (), data, sigma, base)
     steps: list[Step] = []
     survey: Survey | None = None
     named: list[Named] = []
     losses = before = joint_losses_of(reference, data, sigma)
+    if start is not None:
+        current, steps, survey = start.fitted, list(start.steps), start.survey
+        named, losses = list(current.named), start.losses
     found: Candidates | None = None
     total = _excess(reference, data, sigma)
     problem, free = None, []
@@ -118,7 +122,7 @@ def explain(
             current = fit(arm, named, data, sigma, base, _start(named, steps, arm))
             named = list(current.named)
             losses, found = joint_losses_of(current, data, sigma), None
-    if named:
+    if len(named) > (0 if start is None else len(start.steps)):
         current = fit(arm, named, data, sigma, base, _start(named, steps, arm))
         kept = _prune(current, data, sigma, steps, settings)
         if len(kept) < len(named):
@@ -195,7 +199,7 @@ def _prune(
     kept = list(range(len(steps)))
     if len(steps) < 2:
         return kept
-    view = _View.of(fitted, data, sigma)
+    view = View.of(fitted, data, sigma)
     for k in reversed(range(len(steps))):
         gone = [other for other in range(len(steps)) if other not in kept]
         problem, projection, columns = view.without(k, gone)
@@ -215,7 +219,7 @@ def _doubts(
     """Ask for every name again which others are possible, now that the rest is known."""
     if len(steps) < 2:
         return list(steps)
-    view = _View.of(fitted, data, sigma)
+    view = View.of(fitted, data, sigma)
     arm = remembering(fitted.arm)
     named = {own.effect.name for own in fitted.named}
     result = []
@@ -238,7 +242,7 @@ def _doubts(
 
 
 @dataclass(frozen=True)
-class _View:
+class View:
     """A fitted arm as a linear problem, in which names can be taken away again."""
 
     problem: Problem
@@ -246,7 +250,7 @@ class _View:
     values: FloatArray
 
     @staticmethod
-    def of(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> _View:
+    def of(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> View:
         problem = make_problem(data, sigma, fitted.residual, list(fitted.columns))
         spans, start = [], problem.x.shape[2] - len(fitted.estimate.values)
         for own in fitted.named:
@@ -254,7 +258,7 @@ class _View:
             end = stop + len(own.effect.shape)
             spans.append((start, stop, end))
             start = end
-        return _View(problem, tuple(spans), fitted.estimate.values)
+        return View(problem, tuple(spans), fitted.estimate.values)
 
     def without(self, k: int, gone: Sequence[int]) -> tuple[Problem, Projection, FloatArray]:
         """Return the problem as if one name and others were not there, and its columns."""

@@ -17,6 +17,7 @@ from typing import Any
 from armid_ros.diagnosis.diagnose import Diagnosis
 from armid_ros.diagnosis.separation import Doubt, Load, Separation
 from armid_ros.diagnosis.templates import CLEARANCE, Template, templates
+from armid_ros.effects.tied import Tied
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
@@ -125,7 +126,7 @@ def next_run(
     Returns
     -------
     NextRun or None
-        None if no name is in doubt.
+        None if no name is in doubt, or the arm is tied to a machine whose motion nobody plans.
 
     Raises
     ------
@@ -134,9 +135,9 @@ def next_run(
 
     """
     doubts = _doubts(diagnosis)
-    if not doubts:
-        return None
     arm = diagnosis.arm
+    if not doubts or any(isinstance(effect, Tied) for effect in arm.effects):
+        return None
     clearance = ClearanceModel.of(collision or collision_model(arm.robot))
     joints = dict.fromkeys(joint for doubt in doubts for joint in doubt.joints)
     whole_arm = any(not doubt.joints for doubt in doubts)

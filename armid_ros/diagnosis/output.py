@@ -12,12 +12,15 @@ from typing import Any
 from armid_ros.diagnosis.detectable import detectable, smallest_size
 from armid_ros.diagnosis.diagnose import Diagnosis
 from armid_ros.diagnosis.league import Standing
+from armid_ros.diagnosis.verdict import Finding
 from armid_ros.motion import FloatArray
 import numpy as np
 
 SCHEMA = 'armid/diagnosis/1'
 
 _MOST_CANDIDATES = 20
+#: Standard deviations to either side of a 95 % interval.
+_NORMAL = 1.96
 
 
 def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[str, Any]:
@@ -54,6 +57,7 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
                 ],
                 'ambiguous_with': list(finding.ambiguous_with),
                 'experiment': finding.experiment,
+                **_ties(finding),
                 **_sureness(diagnosis.league.of(finding.name)),
             }
             for finding in diagnosis.findings
@@ -69,6 +73,27 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
         'pattern': None if diagnosis.pattern is None else asdict(diagnosis.pattern),
         'model': model,
     }
+
+
+def _ties(finding: Finding) -> dict[str, Any]:
+    """Return where a finding ends at another machine, and the intervals of its stiffnesses."""
+    if not finding.ties:
+        return {}
+    rows = []
+    for tie in finding.ties:
+        _, value, std = finding.of_joint(tie.joint)[0]
+        rows.append(
+            {
+                'segment': tie.name,
+                'joint': tie.joint,
+                'point': list(tie.point),
+                'partner_joint': tie.other_joint,
+                'partner_point': list(tie.other_point),
+                'stiffness': value,
+                'interval': [value - _NORMAL * std, value + _NORMAL * std],
+            }
+        )
+    return {'ties': rows}
 
 
 def _gap(diagnosis: Diagnosis) -> dict[str, Any]:

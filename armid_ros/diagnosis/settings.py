@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.effects import CATALOGUE, Kind
+from armid_ros.effects.tied import Partner, TiedInteraction, TiedSlack
 from armid_ros.identification import SignalSettings
 
 
@@ -21,8 +22,11 @@ class DiagnosisSettings:
     ----------
     library : tuple of str
         Names that may be given.
-    own : tuple of type
+    own : tuple of Kind
         Effects of one's own that may be named besides.
+    partner : Partner or None
+        Another machine that was recorded beside the arm, to which it may be tied. What holds the
+        arm is then looked for between the two, and not at unknown places.
     signals : SignalSettings
         Filters; chosen from the recordings by default.
     consistent_loss : float
@@ -58,7 +62,8 @@ class DiagnosisSettings:
     """
 
     library: tuple[str, ...] = tuple(CATALOGUE)
-    own: tuple[type[Effect], ...] = ()
+    own: tuple[Kind, ...] = ()
+    partner: Partner | None = None
     signals: SignalSettings = field(default_factory=SignalSettings)
     consistent_loss: float = 1.2
     partial_loss: float = 1.4
@@ -74,6 +79,7 @@ class DiagnosisSettings:
     blocks: int = 12
 
     @property
-    def kinds(self) -> tuple[type[Effect], ...]:
+    def kinds(self) -> tuple[Kind, ...]:
         """All effects that may be named."""
-        return (*(CATALOGUE[name] for name in self.library), *self.own)
+        tied = () if self.partner is None else (TiedInteraction.name, TiedSlack.name)
+        return (*(CATALOGUE[name] for name in self.library if name not in tied), *self.own)

@@ -48,7 +48,7 @@ def shape_starts(
     """
     if effect.name == 'torque_ripple':
         return (_orders(effect, fitted, data, sigma),)
-    if isinstance(effect, InterfaceSlack) and effect.anchor is None:
+    if isinstance(effect, InterfaceSlack) and not effect.anchored:
         return _straps(effect, fitted, data, sigma)
     parts = [part.motion for part in data]
     names = ('q', 'dq', 'ddq', 'tau')

@@ -15,7 +15,10 @@ from armid_ros.diagnosis.gap import Gap
 from armid_ros.diagnosis.model_search import Explanation
 from armid_ros.diagnosis.search import Step
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.effects import Effect
+from armid_ros.effects.tied import Tied
 from armid_ros.estimate import ParameterName
+from armid_ros.model.spring_ties import Tie
 import numpy as np
 
 Word = Literal[
@@ -49,6 +52,8 @@ class Finding:
         What would separate them; empty if there is nothing to separate.
     gain : float
         Sum of squares over noise that it takes, held out.
+    ties : tuple of Tie
+        Where it holds the arm, in the order of its joints, if it ends at another machine.
 
     """
 
@@ -60,6 +65,16 @@ class Finding:
     ambiguous_with: tuple[str, ...]
     experiment: str
     gain: float
+    ties: tuple[Tie, ...] = ()
+
+    def place_of(self, joint: str) -> str:
+        """Return where a joint's parameters act: at a segment that is tied, or the joint."""
+        return next((tie.name for tie in self.ties if tie.joint == joint), joint)
+
+    def of_joint(self, joint: str) -> list[tuple[ParameterName, float, float]]:
+        """Return name, value and standard deviation of the parameters of one joint."""
+        rows = zip(self.parameters, self.values, self.std, strict=True)
+        return [row for row in rows if row[0].joint == joint]
 
 
 @dataclass(frozen=True)
@@ -149,9 +164,15 @@ def _findings(explanation: Explanation, arm: ArmModel) -> tuple[Finding, ...]:
                 rivals,
                 separating(name, rivals[0], order) if rivals else '',
                 float(sum(steps[k].trial.gain for k in indices)),
+                _ties([fitted.named[k].effect for k in indices], order),
             )
         )
     return tuple(result)
+
+
+def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
+    ties = {t.joint: t for effect in effects if isinstance(effect, Tied) for t in effect.ties}
+    return tuple(ties[joint] for joint in joints if joint in ties)
 
 
 def _rivals(steps: Sequence[Step], named: set[str]) -> tuple[str, ...]:
@@ -206,8 +227,10 @@ def _names(findings: Sequence[Finding]) -> str:
 
 
 def _name(finding: Finding) -> str:
-    where = f'{", ".join(finding.joints)}: ' if finding.joints else ''
     words = finding.name.replace('_', ' ')
+    if finding.ties:
+        return f'{words} at {", ".join(_tie(finding, tie) for tie in finding.ties)}'
+    where = f'{", ".join(finding.joints)}: ' if finding.joints else ''
     shown = [
         f'{p.name.replace("_", " ")} {value:.3g} +- {std:.1g} {p.unit}'.strip()
         for p, value, std in zip(finding.parameters, finding.values, finding.std, strict=True)
@@ -215,6 +238,14 @@ def _name(finding: Finding) -> str:
     if len(shown) > 3:
         shown = [*shown[:2], f'and {len(shown) - 2} more']
     return f'{where}{words} ({", ".join(shown)})'
+
+
+def _tie(finding: Finding, tie: Tie) -> str:
+    shown = [
+        f'{p.name.replace("_", " ")} {value:.4g} +- {std:.1g} {p.unit}'
+        for p, value, std in finding.of_joint(tie.joint)
+    ]
+    return f'{tie.name} ({", ".join(shown)})'
 
 
 def _closes(gap: Gap) -> str:

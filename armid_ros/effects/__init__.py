@@ -9,7 +9,7 @@ from armid_ros.effects.action import (
     TorqueLaw,
     Transmission,
 )
-from armid_ros.effects.base import Effect, Quantity, Shape
+from armid_ros.effects.base import Effect, Kind, Quantity, Shape
 from armid_ros.effects.catalogue import CATALOGUE, make_effect, parse_effect
 from armid_ros.effects.merge import merge_actions
 from armid_ros.effects.readings import Displacing, TorqueReading
@@ -20,6 +20,7 @@ __all__ = [
     'make_effect',
     'parse_effect',
     'Effect',
+    'Kind',
     'Quantity',
     'Shape',
     'Displacing',

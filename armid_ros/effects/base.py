@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import ClassVar, TYPE_CHECKING
+from typing import ClassVar, Protocol, Self, TYPE_CHECKING
 
 from armid_ros.effects.action import Action
 from armid_ros.errors import ModelError
@@ -261,6 +261,15 @@ class Effect(ABC):
         upper = np.array([q.upper for q in self.quantities] * len(self.owners))
         return lower, upper
 
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the points beside the arm that it ends at."""
+        return ()
+
+    def along(self, motion: Motion) -> Self:
+        """Return the effect with what it takes from beside the arm, along a motion."""
+        return self
+
     @abstractmethod
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """
@@ -298,6 +307,21 @@ class Effect(ABC):
     def indices(self, motion_joints: tuple[str, ...]) -> list[int]:
         """Return the columns of the effect's joints among the joints of a motion or robot."""
         return [motion_joints.index(joint) for joint in self.joints]
+
+
+class Kind(Protocol):
+    """A kind of effect: a class of the catalogue, or anything else that makes effects so."""
+
+    @property
+    def name(self) -> str:
+        """What its effects are called."""
+
+    @property
+    def changes_body(self) -> bool:
+        """Whether they act by changing the rigid body or its gravity."""
+
+    def on(self, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
+        """Make the effect for a robot."""
 
 
 def joint_unit(unit: str, joint: str, robot: Robot) -> str:

@@ -28,7 +28,8 @@ from scipy.interpolate import CubicHermiteSpline
 if TYPE_CHECKING:
     from armid_ros.arm import ArmModel
 
-#: Position and velocity, each of shape (N, 3) [m, m/s], of a point at times of shape (N,).
+#: Position and velocity [m, m/s] at times of shape (N,): (N, 3) for one anchor of all k springs,
+#: (N, k, 3) for one of each.
 Anchor = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 #: A way so short that it has no direction [m].
@@ -70,7 +71,7 @@ class RecordedPoint:
 
 
 @dataclass(frozen=True)
-class _Attached(Effect):
+class Attached(Effect):
     """An effect between a point of each link and an anchor; None is a fixed point."""
 
     anchor: Anchor | None = None
@@ -91,15 +92,26 @@ class _Attached(Effect):
             for index, shape in enumerate(self.shapes)
         )
 
+    @property
+    def anchored(self) -> bool:
+        """Whether it is known where the springs end."""
+        return self.anchor is not None
+
+    @property
+    def _attachments(self) -> FloatArray:
+        """Points of the links that springs are attached to, shape (k, 3) [m]."""
+        return self.shape_values[:, :3]
+
     def _points(self, robot: Robot, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return positions (N, k, 3) and Jacobians (N, k, 3, n) of the attachments."""
-        return points_motion(robot, self.joints, self.shape_values[:, :3], q)
+        return points_motion(robot, self.joints, self._attachments, q)
 
-    def _from(self, t: FloatArray, reference: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return position and velocity of the anchor of a link; of the reference if fixed."""
+    def _anchors(self, reference: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return positions and velocities of all anchors, shape (N or 1, k, 3)."""
         if self.anchor is None:
-            return reference, np.zeros(3)
-        return self.anchor(t)
+            return reference[np.newaxis], np.zeros((1, 1, 3))
+        position, velocity = self.anchor(t)
+        return position.reshape(len(t), -1, 3), velocity.reshape(len(t), -1, 3)
 
     def _reference(self, robot: Robot) -> FloatArray:
         """Return the fixed points that the anchors are taken from, shape (k, 3) [m]."""
@@ -111,8 +123,8 @@ class _Attached(Effect):
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
             times = np.broadcast_to(np.atleast_1d(t), (len(np.atleast_2d(q)),))
-            motion = (times, np.atleast_2d(q), np.atleast_2d(dq))
-            columns = self._columns(robot, reference, *motion)
+            anchors = self._anchors(reference, times)
+            columns = self._columns(robot, np.atleast_2d(q), np.atleast_2d(dq), *anchors)
             return np.asarray((columns @ values).reshape(np.shape(q)))
 
         return Action(link_torque=torque if np.any(values) else None)
@@ -120,17 +132,22 @@ class _Attached(Effect):
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return the torque per quantity of every spring, shape (N, n, P)."""
         link, reference = arm.link_motion(motion), self._reference(arm.robot)
-        return self._columns(arm.robot, reference, link.t, link.q, link.dq)
+        return self._columns(arm.robot, link.q, link.dq, *self._anchors(reference, link.t))
 
     @abstractmethod
     def _columns(
-        self, robot: Robot, reference: FloatArray, t: FloatArray, q: FloatArray, dq: FloatArray
+        self,
+        robot: Robot,
+        q: FloatArray,
+        dq: FloatArray,
+        anchors: FloatArray,
+        velocities: FloatArray,
     ) -> FloatArray:
-        """Return the columns along positions and velocities of the links."""
+        """Return the columns along positions and velocities of links and anchors."""
 
 
 @dataclass(frozen=True)
-class HumanInteraction(_Attached):
+class HumanInteraction(Attached):
     """
     Spring and damper between a link and an anchor, tau = J^T (k (p - r) + d (v - w) - f).
 
@@ -176,22 +193,25 @@ class HumanInteraction(_Attached):
         return np.asarray(self._points(robot, _middle(robot))[0][0])
 
     def _columns(
-        self, robot: Robot, reference: FloatArray, t: FloatArray, q: FloatArray, dq: FloatArray
+        self,
+        robot: Robot,
+        q: FloatArray,
+        dq: FloatArray,
+        anchors: FloatArray,
+        velocities: FloatArray,
     ) -> FloatArray:
         positions, jacobians = self._points(robot, q)
-        columns = np.empty((*q.shape, len(self.joints), 5))
-        for owner in range(len(self.joints)):
-            jacobian, block = jacobians[:, owner], columns[:, :, owner]
-            anchor, velocity = self._from(t, reference[owner])
-            block[:, :, 0] = np.einsum('nxj,nx->nj', jacobian, positions[:, owner] - anchor)
-            relative = np.einsum('nxj,nj->nx', jacobian, dq) - velocity
-            block[:, :, 1] = np.einsum('nxj,nx->nj', jacobian, relative)
-            block[:, :, 2:] = -jacobian.transpose(0, 2, 1)
+        relative = np.einsum('nkxj,nj->nkx', jacobians, dq) - velocities
+        columns = np.empty((*q.shape, len(self.joints), len(self.quantities)))
+        columns[..., 0] = np.einsum('nkxj,nkx->njk', jacobians, positions - anchors)
+        columns[..., 1] = np.einsum('nkxj,nkx->njk', jacobians, relative)
+        for axis in range(len(self.quantities) - 2):
+            columns[..., 2 + axis] = -jacobians[:, :, axis].transpose(0, 2, 1)
         return columns.reshape(*q.shape, -1)
 
 
 @dataclass(frozen=True)
-class InterfaceSlack(_Attached):
+class InterfaceSlack(Attached):
     """
     Spring between a link and an anchor that pulls beyond a slack only, like a strap.
 
@@ -222,16 +242,30 @@ class InterfaceSlack(_Attached):
             values[:, 3:6] = placed[0][0]
         return values
 
+    @property
+    def _loose(self) -> FloatArray:
+        """Slack of every strap, shape (k,) [m]."""
+        return self.shape_values[:, -1]
+
+    def _anchors(self, reference: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        position, velocity = super()._anchors(reference, t)
+        return position + self.shape_values[:, 3:6], velocity
+
     def _columns(
-        self, robot: Robot, reference: FloatArray, t: FloatArray, q: FloatArray, dq: FloatArray
+        self,
+        robot: Robot,
+        q: FloatArray,
+        dq: FloatArray,
+        anchors: FloatArray,
+        velocities: FloatArray,
     ) -> FloatArray:
         positions, jacobians = self._points(robot, q)
-        columns = np.empty((*q.shape, len(self.joints)))
-        for owner, shape in enumerate(self.shape_values):
-            anchor, _ = self._from(t, reference[owner])
-            way = positions[:, owner] - anchor - shape[3:6]
-            columns[:, :, owner] = _pulled(way, jacobians[:, owner], shape[6])
-        return columns
+        ways = positions - anchors
+        pulls = [
+            _pulled(ways[:, owner], jacobians[:, owner], slack)
+            for owner, slack in enumerate(self._loose)
+        ]
+        return np.stack(pulls, axis=2)
 
     def columns_of_straps(
         self, robot: Robot, q: FloatArray, anchors: FloatArray, slacks: FloatArray

@@ -170,7 +170,7 @@ def forward_validation(
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
     motion = motion.select(motion.t <= motion.t[0] + duration)
     reference = replace(motion, t=motion.t - motion.t[0])
-    believed = nominal or arm
+    arm, believed = arm.along(reference), nominal or arm
     added = believed.action().inertia
     n = motion.n_joints
     controller = RecordedTorque(

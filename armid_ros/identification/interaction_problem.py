@@ -34,6 +34,9 @@ _RANK_TOLERANCE = 1e-6
 #: Step of the central differences of rigid columns [rad or m].
 _STEP = 1e-5
 
+#: Samples over which errors may last after filtering.
+_LAGS = 6
+
 Inertias = Literal['known', 'free']
 #: Arrays of a problem that have its samples first.
 STACKED = ('tau', 'known', 'columns', 'known_by_motion', 'columns_by_motion')
@@ -68,6 +71,8 @@ class InteractionProblem:
         The combinations of inertias that are free.
     typical_way : float
         How far springs are drawn out, root mean square [m].
+    lags : int
+        Samples over which errors last; zero where they are independent.
 
     """
 
@@ -82,6 +87,7 @@ class InteractionProblem:
     spring_joints: tuple[str, ...]
     rigid: tuple[ParameterName, ...]
     typical_way: float
+    lags: int = 0
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -194,6 +200,7 @@ def interaction_problem(
         tuple(tie.joint for tie in ties) if separate else ('',),
         rigid,
         float(np.sqrt(np.mean(np.sum(geometry.way**2, axis=2)))),
+        0 if used is None else _LAGS,
     )
 
 

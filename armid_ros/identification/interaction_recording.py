@@ -15,14 +15,18 @@ from armid_ros.identification.interaction_problem import (
     InteractionProblem,
     STACKED,
 )
-from armid_ros.identification.signals import conditioning, segments, SignalSettings
+from armid_ros.identification.signals import (
+    Conditioning,
+    conditioning,
+    segments,
+    SignalSettings,
+)
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.recording import Recording
+from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import Robot
 import numpy as np
 from scipy import signal
-from scipy.interpolate import CubicSpline
 
 #: Order of the differences that noise is measured by.
 _ORDER = 6
@@ -76,15 +80,11 @@ def recorded_interaction_problem(
         If there are no torques, no common time, or too little of it.
 
     """
-    both = _together(recording, other_recording)
+    both = _together(recording, other, other_recording, ties)
     settings = settings or SignalSettings()
     used = conditioning([both], settings)
-    noise, crossing = _white_noise(both, used.rate_hz)
-    if settings.cutoff_hz is None:
-        used = replace(used, cutoff_hz=min(used.cutoff_hz, _MARGIN * crossing))
-    if settings.decimation is None:
-        factor = int(used.rate_hz / (2.0 * used.cutoff_hz))
-        used = replace(used, decimation=max(used.decimation, factor))
+    used = band_of_motion([both], used, settings)
+    noise = _white(both.q)
     n = len(recording.joints)
     assert both.tau is not None
     torque_noise = _white(both.tau[:, :n])
@@ -120,24 +120,22 @@ def _stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
     return replace(problems[0], **joined)  # type: ignore[arg-type]
 
 
-def _together(recording: Recording, other: Recording) -> Recording:
+def _together(
+    recording: Recording, other: Robot, other_recording: Recording, ties: Sequence[Tie]
+) -> Recording:
     """Return one recording of both machines' joints at the stamps of the first."""
     if recording.tau is None:
         raise IdentificationError(f'{recording.source}: {recording.topic} has no effort')
-    t = recording.t + 1e-9 * (recording.start_ns - other.start_ns)
-    inside = (t >= other.t[0]) & (t <= other.t[-1])
-    if np.count_nonzero(inside) < 4:
-        raise IdentificationError(
-            f'{recording.topic} and {other.topic} have no time in common; record them together'
-        )
-    far = CubicSpline(other.t, other.q)(t[inside])
+    own = recorded_together(recording, other_recording, other, ties)
+    assert own.beside is not None and own.tau is not None
+    far = own.beside.q
     return replace(
-        recording,
-        joints=(*recording.joints, *other.joints),
-        t=recording.t[inside],
-        q=np.hstack([recording.q[inside], far]),
+        own,
+        joints=(*own.joints, *other_recording.joints),
+        q=np.hstack([own.q, far]),
         dq=None,
-        tau=np.hstack([recording.tau[inside], np.zeros_like(far)]),
+        tau=np.hstack([own.tau, np.zeros_like(far)]),
+        beside=None,
     )
 
 
@@ -147,9 +145,39 @@ def _joints(motion: Motion, columns: slice, joints: tuple[str, ...]) -> Motion:
     return Motion(joints, motion.t, *(np.array(part[:, columns]) for part in parts))
 
 
-def _white_noise(recording: Recording, rate: float) -> tuple[FloatArray, float]:
-    """Return the deviation of every angle's noise [rad], and where motion sinks into it [Hz]."""
-    noise = _white(recording.q)
+def band_of_motion(
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    settings: SignalSettings,
+    margin: float = _MARGIN,
+) -> Conditioning:
+    """
+    Return filters that leave the motion and nothing else, as far as settings leave them open.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        What is to be filtered.
+    used : Conditioning
+        Filters that are to be narrowed.
+    settings : SignalSettings
+        What was asked for.
+    margin : float
+        How much wider than the motion the pass band is. Accelerations have noise that grows with
+        its power of 2.5.
+
+    """
+    if settings.cutoff_hz is None:
+        crossing = max(_crossing(recording, used.rate_hz) for recording in recordings)
+        used = replace(used, cutoff_hz=min(used.cutoff_hz, margin * crossing))
+    if settings.decimation is None:
+        factor = int(used.rate_hz / (2.0 * used.cutoff_hz))
+        used = replace(used, decimation=max(used.decimation, factor))
+    return used
+
+
+def _crossing(recording: Recording, rate: float) -> float:
+    """Return where the motion of the fastest angle sinks into its noise [Hz]."""
     frequency, power = signal.welch(
         recording.q,
         fs=rate,
@@ -158,10 +186,9 @@ def _white_noise(recording: Recording, rate: float) -> tuple[FloatArray, float]:
         detrend='linear',
         axis=0,
     )
-    above = power > _ABOVE * 2.0 * noise**2 / rate
+    above = power > _ABOVE * 2.0 * _white(recording.q) ** 2 / rate
     above[-1] = False
-    crossing = max(float(frequency[2:][np.argmin(column)]) for column in above[2:].T)
-    return noise, crossing
+    return max(float(frequency[2:][np.argmin(column)]) for column in above[2:].T)
 
 
 def _white(signals: FloatArray) -> FloatArray:

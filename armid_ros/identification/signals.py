@@ -16,8 +16,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
-from armid_ros.motion import FloatArray, Motion
-from armid_ros.recording import Recording
+from armid_ros.model import points_motion
+from armid_ros.motion import FloatArray, Motion, MovingPoints
+from armid_ros.recording import Beside, Recording
 import numpy as np
 from scipy import signal
 from scipy.interpolate import CubicSpline
@@ -155,14 +156,17 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
             f'{recording.source}: {recording.topic} has no effort; identification needs '
             'the joint torques in JointState.effort'
         )
+    positions = recording.q
+    if recording.beside is not None:
+        positions = np.hstack([positions, recording.beside.q])
     period = 1.0 / used.rate_hz
     shortest = 2 * _HALF_TAPS * used.decimation + 10 * used.rate_hz / used.cutoff_hz
     longest = GAP_PERIODS * max(period, recording.period)
     breaks = np.flatnonzero(np.diff(recording.t) > longest) + 1
     for part in np.split(np.arange(len(recording.t)), breaks):
         if len(part) > 3 and recording.t[part[-1]] - recording.t[part[0]] > shortest * period:
-            t, q, tau = _even(recording.t[part], recording.q[part], recording.tau[part], period)
-            yield _differentiated(recording.joints, t, q, tau, used)
+            t, q, tau = _even(recording.t[part], positions[part], recording.tau[part], period)
+            yield _differentiated(recording, t, q, tau, used)
 
 
 def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatArray:
@@ -219,17 +223,34 @@ def _even(
 
 
 def _differentiated(
-    joints: tuple[str, ...], t: FloatArray, q: FloatArray, tau: FloatArray, used: Conditioning
+    recording: Recording, t: FloatArray, q: FloatArray, tau: FloatArray, used: Conditioning
 ) -> Motion:
+    """Filter and differentiate positions of the arm, and of what moved beside it after them."""
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     smooth = signal.sosfiltfilt(sections, q, axis=0)
     dq = _central_difference(smooth, t[1] - t[0])
-    ddq = _central_difference(dq, t[1] - t[0])
+    n = recording.n_joints
+    ddq = _central_difference(dq[:, :n], t[1] - t[0])
     edge = int(np.ceil(EDGE_PERIODS * used.rate_hz / used.cutoff_hz))
     inner = slice(edge, len(t) - edge)
-    band = _CURVATURE_BANDS * _motion_band(smooth, used.rate_hz, used.cutoff_hz)
-    parts = (part[inner] for part in (smooth, dq, ddq, tau))
-    return Motion(joints, t[inner], *parts, band_hz=band)
+    band = _CURVATURE_BANDS * _motion_band(smooth[:, :n], used.rate_hz, used.cutoff_hz)
+    beside = None
+    if recording.beside is not None:
+        beside = _points(recording.beside, smooth[inner, n:], dq[inner, n:])
+    parts = (part[inner] for part in (smooth[:, :n], dq[:, :n], ddq, tau))
+    return Motion(recording.joints, t[inner], *parts, band_hz=band, beside=beside)
+
+
+def _points(beside: Beside, q: FloatArray, dq: FloatArray) -> MovingPoints:
+    """Follow the other machine's ends of the ties along its positions and velocities (N, m)."""
+    position, jacobian = points_motion(
+        beside.robot,
+        [tie.other_joint for tie in beside.ties],
+        np.array([tie.other_point for tie in beside.ties]).reshape(-1, 3),
+        q,
+    )
+    names = tuple(tie.name for tie in beside.ties)
+    return MovingPoints(names, position, np.einsum('nsxj,nj->nsx', jacobian, dq))
 
 
 def _central_difference(x: FloatArray, step: float) -> FloatArray:

@@ -10,6 +10,7 @@ for the nodes; none of it needs ROS.
 """
 
 from armid_ros.recording.bag import Bag, iter_raw, topics
+from armid_ros.recording.beside import Beside
 from armid_ros.recording.joint_state_encoder import (
     joint_state_cdr,
     write_joint_states,
@@ -21,6 +22,7 @@ from armid_ros.recording.recording import Gap, ReadReport, Recording
 from armid_ros.recording.recover import recover, RecoveryReport
 from armid_ros.recording.source import RawMessage, Topic
 from armid_ros.recording.string_message import read_robot_description, string_cdr
+from armid_ros.recording.together import recorded_together
 from armid_ros.recording.trajectory import (
     joint_trajectory_cdr,
     read_joint_trajectory,
@@ -33,6 +35,8 @@ __all__ = [
     'Recording',
     'ReadReport',
     'Gap',
+    'Beside',
+    'recorded_together',
     'read_recording',
     'read_robot_description',
     'write_recording',

@@ -211,16 +211,29 @@ def leg_pair(
         If there is no such segment.
 
     """
+    exo, human = load_robot('exoskeleton_legs'), load_robot('human_legs')
+    ties = leg_ties(exo, human, segments)
+    if stiffness is None:
+        stiffness = read_assumptions()['interaction_stiffness'].value
+    return TiedPair(exo, human, ties, np.asarray(stiffness, dtype=float))
+
+
+def leg_ties(exo: Robot, human: Robot, segments: Sequence[str] = SEGMENTS) -> tuple[Tie, ...]:
+    """
+    Tie the shipped exoskeleton to its wearer where the source has springs.
+
+    Raises
+    ------
+    ModelError
+        If there is no such segment.
+
+    """
     unknown = [segment for segment in segments if segment not in SEGMENTS]
     if unknown:
         raise ModelError(f"no segment '{unknown[0]}'; there are {', '.join(SEGMENTS)}")
-    exo, human = load_robot('exoskeleton_legs'), load_robot('human_legs')
     joints = [_MOVED_BY[SEGMENTS.index(segment)] for segment in segments]
     ties = centroid_ties(exo, human, [(f'exo_{j}', f'human_{j}') for j in joints])
-    named = tuple(replace(tie, name=s) for tie, s in zip(ties, segments, strict=True))
-    if stiffness is None:
-        stiffness = read_assumptions()['interaction_stiffness'].value
-    return TiedPair(exo, human, named, np.asarray(stiffness, dtype=float))
+    return tuple(replace(tie, name=s) for tie, s in zip(ties, segments, strict=True))
 
 
 def walking(pair: TiedPair, gait: Gait, t: FloatArray, start: float | None = None) -> PairMotion:
@@ -245,7 +258,7 @@ def walking(pair: TiedPair, gait: Gait, t: FloatArray, start: float | None = Non
     return _moving(pair, gait, t, lambda time: steady_phase(time, cycle, begin))
 
 
-def stepping(pair: TiedPair, gait: Gait, t: FloatArray) -> PairMotion:
+def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = None) -> PairMotion:
     """
     Let the leg pair step forward through single support and back, for as long as one likes.
 
@@ -257,12 +270,14 @@ def stepping(pair: TiedPair, gait: Gait, t: FloatArray) -> PairMotion:
         Of one leg.
     t : ndarray, shape (N,)
         Time [s].
+    period : float, optional
+        Of a step forward and back [s]; by default what ``assumptions.yaml`` has.
 
     """
     known = read_assumptions()
     begin, end = known['single_support'].value
-    period = known['stepping_period'].value
-    return _moving(pair, gait, t, lambda time: stepping_phase(time, period, begin, end))
+    length = known['stepping_period'].value if period is None else period
+    return _moving(pair, gait, t, lambda time: stepping_phase(time, length, begin, end))
 
 
 def _moving(

@@ -33,12 +33,12 @@ class NamedParameters(Section):
 
     @property
     def rows(self) -> list[tuple[str, str, str, str, str, str]]:
-        """Effect, parameter, joint, value, standard deviation and unit, as text."""
+        """Effect, parameter, joint or segment, value, deviation and unit, as text."""
         return [
             (
                 finding.name.replace('_', ' '),
                 name.name.replace('_', ' '),
-                name.joint,
+                finding.place_of(name.joint),
                 digits(value, 4),
                 digits(std) if math.isfinite(std) else 'not told',
                 pretty(name.unit),

@@ -1,0 +1,116 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Options for a machine or a person that was recorded beside the arm, and what they stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from armid_ros.effects.tied import Partner
+from armid_ros.errors import ModelError
+from armid_ros.model.spring_ties import centroid_ties, Tie
+from armid_ros.recording import read_recording, recorded_together, Recording
+from armid_ros.robots import load_robot, Robot
+from armid_ros.simulation.leg_pair import leg_ties
+import click
+
+_Command = TypeVar('_Command', bound=Callable[..., Any])
+
+_OPTIONS = (
+    click.option(
+        '--partner',
+        metavar='R',
+        help='Shipped name, URDF or xacro of a machine or person recorded in the same bags, to '
+        'which the arm may be tied, such as the wearer of an exoskeleton.',
+    ),
+    click.option('--partner-topic', help="The partner's JointState topic, where several name it."),
+    click.option(
+        '--tie',
+        'ties',
+        multiple=True,
+        metavar='JOINT=JOINT',
+        help="Where they may be tied: a joint of the arm and one of the partner, whose links' "
+        'centroids the tie joins, or points of them, JOINT@X,Y,Z=JOINT@X,Y,Z [m]. By default '
+        'links of equal number.',
+    ),
+)
+
+
+def options(command: _Command) -> _Command:
+    """Give a command the options --partner, --partner-topic and --tie."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def open_partner(
+    source: str | None, ties: Sequence[str], robot: Robot, gravity: str
+) -> Partner | None:
+    """
+    Load what --partner and --tie ask for; None where there is no partner.
+
+    Raises
+    ------
+    ModelError
+        If it is not clear where the two may be tied, or a tie names no joint.
+
+    """
+    if source is None:
+        if ties:
+            raise ModelError('--tie says where the arm is tied, --partner to what: give both')
+        return None
+    other = load_robot(source, gravity=gravity)
+    kept = str(Path(source).resolve()) if Path(source).is_file() else source
+    found = [_tie(text, robot, other) for text in ties] or _equal_links(robot, other)
+    return Partner(other, tuple(found), kept)
+
+
+def read_together(
+    bags: Sequence[Path], recordings: Sequence[Recording], partner: Partner, topic: str | None
+) -> list[Recording]:
+    """Put the partner, as the same bags have it, beside recordings of the arm."""
+    return [
+        recorded_together(
+            recording,
+            read_recording(bag, joints=partner.robot.joints, topic=topic),
+            partner.robot,
+            partner.ties,
+        )
+        for bag, recording in zip(bags, recordings, strict=True)
+    ]
+
+
+def _equal_links(robot: Robot, other: Robot) -> list[Tie]:
+    if (robot.name, other.name) == ('exoskeleton_legs', 'human_legs'):
+        return list(leg_ties(robot, other))
+    if robot.n_joints != other.n_joints:
+        raise ModelError(
+            f'{robot.name} has {robot.n_joints} joints and {other.name} {other.n_joints}: say '
+            f'where they may be tied with --tie JOINT=JOINT; joints of {robot.name} are '
+            f'{", ".join(robot.joints)}, of {other.name} {", ".join(other.joints)}'
+        )
+    return centroid_ties(robot, other, list(zip(robot.joints, other.joints, strict=True)))
+
+
+def _tie(text: str, robot: Robot, other: Robot) -> Tie:
+    ends = [end.partition('@') for end in text.split('=')]
+    if len(ends) != 2:
+        raise ModelError(f"--tie '{text}' has to be JOINT=JOINT, of the arm and of its partner")
+    (joint, _, point), (far, _, far_point) = ends
+    (tie,) = centroid_ties(robot, other, [(joint, far)])
+    return replace(
+        tie,
+        point=_point(text, point) if point else tie.point,
+        other_point=_point(text, far_point) if far_point else tie.other_point,
+    )
+
+
+def _point(text: str, numbers: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(number) for number in numbers.split(','))
+    except ValueError:
+        raise ModelError(f"--tie '{text}': a point is X,Y,Z in the joint's frame [m]") from None
+    return x, y, z

@@ -1,0 +1,215 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What holds a link to a machine or a person whose motion was recorded beside that of the arm.
+
+The springs are those of ``interaction``. Where they end on the other side is known: points of
+``Motion.beside`` with the names of the ties. So neither attachments nor anchors are to be found.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import ClassVar, Self, TYPE_CHECKING
+
+from armid_ros.effects.base import Effect
+from armid_ros.effects.interaction import Attached, HumanInteraction, InterfaceSlack
+from armid_ros.errors import ModelError
+from armid_ros.model.spring_ties import Tie
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+if TYPE_CHECKING:
+    from armid_ros.arm import ArmModel
+
+
+#: Slacks that a search starts from [m]: straps are drawn out by millimetres.
+_SLACKS = (0.001, 0.002, 0.004, 0.008)
+
+
+@dataclass(frozen=True)
+class Tied(Attached):
+    """
+    Springs to points that moved beside the arm.
+
+    Attributes
+    ----------
+    ties : tuple of Tie
+        Where they are, one on each joint.
+    partner : str
+        The description of the other machine: a shipped name or a path.
+
+    """
+
+    ties: tuple[Tie, ...] = ()
+    partner: str = ''
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the points beside the arm that it ends at."""
+        return tuple(tie.name for tie in self.ties)
+
+    def along(self, motion: Motion) -> Self:
+        """
+        Return the effect with its anchors along a motion.
+
+        Raises
+        ------
+        ModelError
+            If nothing was recorded beside the motion, or other points.
+
+        """
+        beside, names = motion.beside, self.points
+        if beside is None or not set(names) <= set(beside.names):
+            raise ModelError(
+                f'{self.name} of {", ".join(self.joints)}: it ends at points of '
+                f'{self.partner or "another machine"} ({", ".join(names)}), whose motion was not '
+                f'recorded with that of the arm; name it with --partner'
+            )
+        columns = [beside.names.index(name) for name in names]
+        position, velocity = beside.position[:, columns], beside.velocity[:, columns]
+        curve = CubicHermiteSpline(motion.t, position, velocity)
+        return replace(self, anchor=lambda t: (curve(t), curve(t, 1)))
+
+    @property
+    def anchored(self) -> bool:
+        """Whether it is known where the springs end: it is, along a motion."""
+        return True
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return the torque per quantity of every spring, shape (N, n, P)."""
+        return Attached.columns(self.along(motion), motion, arm)
+
+    @property
+    def _attachments(self) -> FloatArray:
+        return np.array([tie.point for tie in self.ties]).reshape(-1, 3)
+
+    def _anchors(self, reference: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if self.anchor is None:
+            raise ModelError(
+                f'{self.name} of {", ".join(self.joints)} acts along recordings of '
+                f'{self.partner or "its partner"} alone; take it out of the model to simulate'
+            )
+        return Attached._anchors(self, reference, t)
+
+    def _reference(self, robot: Robot) -> FloatArray:
+        return np.zeros((len(self.ties), 3))
+
+    def _default_shape(self, robot: Robot) -> FloatArray:
+        return self.shape_values
+
+
+@dataclass(frozen=True)
+class TiedInteraction(Tied, HumanInteraction):
+    """Spring and damper to a point whose motion is known, tau = J^T (k (p - r) + d (v - w))."""
+
+    quantities = HumanInteraction.quantities[:2]
+    shapes = ()
+
+
+@dataclass(frozen=True)
+class TiedSlack(Tied, InterfaceSlack):
+    """Strap to a point whose motion is known: it pulls beyond a slack only."""
+
+    shapes = (replace(InterfaceSlack.shapes[-1], default=0.003, grid=_SLACKS),)
+
+
+#: Tied effects by their names in the catalogue.
+TIED: Mapping[str, type[Tied]] = MappingProxyType(
+    {TiedInteraction.name: TiedInteraction, TiedSlack.name: TiedSlack}
+)
+
+
+@dataclass(frozen=True)
+class TiedKind:
+    """
+    A kind of tied effect with its ties, which makes effects as a class of the catalogue does.
+
+    Attributes
+    ----------
+    effect : type of Tied
+        The class.
+    ties : tuple of Tie
+        Where there may be springs, one on each joint at most.
+    partner : str
+        The description of the other machine.
+
+    """
+
+    effect: type[Tied]
+    ties: tuple[Tie, ...]
+    partner: str = ''
+
+    changes_body: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        """Refuse two ties on one joint, whose parameters would have one name."""
+        joints = [tie.joint for tie in self.ties]
+        twice = [joint for joint in joints if joints.count(joint) > 1]
+        if twice:
+            raise ModelError(f'{self.name}: two ties on {twice[0]}; one on each joint can be told')
+
+    @property
+    def name(self) -> str:
+        """Name in the catalogue."""
+        return self.effect.name
+
+    def on(self, robot: Robot, joints: Sequence[str] | None = None) -> Effect:
+        """
+        Make the effect on the joints named, or on all that have a tie.
+
+        Raises
+        ------
+        ModelError
+            If a joint has none.
+
+        """
+        by_joint = {tie.joint: tie for tie in self.ties}
+        chosen = tuple(by_joint) if joints is None else tuple(joints)
+        missing = [joint for joint in chosen if joint not in by_joint]
+        if missing:
+            raise ModelError(
+                f"{self.name}: no tie on joint '{missing[0]}'; there are ties on "
+                f'{", ".join(by_joint)}'
+            )
+        for joint in chosen:
+            robot.index(joint)
+        return self.effect(
+            chosen, ties=tuple(by_joint[joint] for joint in chosen), partner=self.partner
+        )
+
+
+@dataclass(frozen=True)
+class Partner:
+    """
+    A machine that moves beside an arm, and where the two may be tied.
+
+    Attributes
+    ----------
+    robot : Robot
+        Its description; its base frame is that of the arm.
+    ties : tuple of Tie
+        Where there may be springs, one on each joint of the arm at most.
+    source : str
+        The description's shipped name or path.
+
+    """
+
+    robot: Robot
+    ties: tuple[Tie, ...]
+    source: str = ''
+
+    @property
+    def interaction(self) -> TiedKind:
+        """What makes springs and dampers."""
+        return TiedKind(TiedInteraction, self.ties, self.source or self.robot.name)
+
+    @property
+    def slack(self) -> TiedKind:
+        """What makes straps with slack."""
+        return TiedKind(TiedSlack, self.ties, self.source or self.robot.name)

@@ -1,0 +1,66 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Two recordings of machines that moved together, as one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.beside import Beside
+from armid_ros.recording.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+if TYPE_CHECKING:
+    from armid_ros.model.spring_ties import Tie
+
+#: A step of this many nominal periods of the other machine is a hole that nothing bridges.
+_HOLE = 5.0
+#: Samples in common that are any use.
+_LEAST = 4
+
+
+def recorded_together(
+    recording: Recording, other: Recording, robot: Robot, ties: Sequence[Tie] = ()
+) -> Recording:
+    """
+    Put another machine beside a recording, at its stamps.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of the arm.
+    other : Recording
+        Of the other machine, on the same clock.
+    robot : Robot
+        Its description.
+    ties : sequence of Tie
+        Where the two may be tied.
+
+    Returns
+    -------
+    Recording
+        Of the arm, where both were recorded.
+
+    Raises
+    ------
+    RecordingError
+        If the two have no time in common.
+
+    """
+    t = recording.t + 1e-9 * (recording.start_ns - other.start_ns)
+    inside = (t >= other.t[0]) & (t <= other.t[-1])
+    steps = np.diff(other.t)
+    after = np.clip(np.searchsorted(other.t, t), 1, len(steps))
+    inside &= steps[after - 1] <= _HOLE * other.period
+    if np.count_nonzero(inside) < _LEAST:
+        raise RecordingError(
+            f'{recording.source}: {recording.topic} and {other.topic} have no time in common; '
+            'record them together'
+        )
+    q = CubicSpline(other.t, other.q)(t[inside])
+    return replace(recording.select(inside), beside=Beside(robot, tuple(ties), q))

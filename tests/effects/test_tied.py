@@ -1,0 +1,122 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Springs to a machine that was recorded beside the arm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel, load_model, save_model
+from armid_ros.effects.tied import Partner
+from armid_ros.errors import ModelError
+from armid_ros.identification.signals import Conditioning, segments
+from armid_ros.motion import Motion
+from armid_ros.recording import recorded_together, Recording
+from armid_ros.simulation.gait import read_gait
+from armid_ros.simulation.leg_pair import leg_pair, pair_torques, PairMotion, TiedPair, walking
+import numpy as np
+import pytest
+
+STIFFNESS = np.array([1.0e4, 2.0e4, 5.0e3, 3.0e4])
+SLACK = np.array([0.001, 0.002, 0.003, 0.0015])
+
+
+@pytest.fixture(scope='module')
+def pair() -> TiedPair:
+    return leg_pair(STIFFNESS)
+
+
+@pytest.fixture(scope='module')
+def motions(pair) -> PairMotion:
+    return walking(pair, read_gait(), np.linspace(0.0, 0.456, 457))
+
+
+@pytest.fixture(scope='module')
+def together(pair, motions) -> Motion:
+    """Return the motion of the exoskeleton with the points of its wearer beside it."""
+    own = Recording(
+        joints=pair.robot.joints, t=motions.own.t, q=motions.own.q, tau=motions.own.q * 0.0
+    )
+    other = Recording(joints=pair.other.joints, t=motions.own.t, q=motions.other.q)
+    recording = recorded_together(own, other, pair.other, pair.ties)
+    (seen,) = segments(recording, Conditioning(1000.0, 200.0, 1))
+    return seen
+
+
+def truth(pair: TiedPair, motion: Motion, motions: PairMotion) -> np.ndarray:
+    inside = np.searchsorted(motions.own.t, motion.t - 1e-6)
+    return pair_torques(pair, motion, motions.other.select(inside)).tau
+
+
+def test_springs_to_recorded_points_are_those_of_the_pair(pair, motions, together) -> None:
+    kind = Partner(pair.other, pair.ties).interaction
+    values = np.column_stack([STIFFNESS, np.zeros(4)]).ravel()
+    arm = ArmModel(pair.robot).with_effect(kind.on(pair.robot), values)
+    np.testing.assert_allclose(
+        arm.torque(together), truth(pair, together, motions), rtol=1e-4, atol=2e-2
+    )
+
+
+def test_slack_straps_to_recorded_points_are_those_of_the_pair(pair, motions, together) -> None:
+    straps = Partner(pair.other, pair.ties).slack.on(pair.robot).with_shape(SLACK[:, np.newaxis])
+    arm = ArmModel(pair.robot).with_effect(straps, STIFFNESS)
+    expected = truth(pair.with_slack(SLACK), together, motions)
+    np.testing.assert_allclose(arm.torque(together), expected, rtol=1e-4, atol=2e-2)
+
+
+def test_columns_are_the_derivative_of_the_torque(pair, together) -> None:
+    effect = Partner(pair.other, pair.ties).interaction.on(pair.robot)
+    values = np.arange(1.0, 9.0)
+    arm = ArmModel(pair.robot).with_effect(effect, values)
+    bare = ArmModel(pair.robot)
+    np.testing.assert_allclose(
+        arm.columns_of(effect, together) @ values,
+        arm.torque(together) - bare.torque(together),
+        atol=1e-9,
+    )
+
+
+def test_a_motion_without_the_partner_is_refused_by_name(pair, motions) -> None:
+    effect = Partner(pair.other, pair.ties, 'human_legs').interaction.on(pair.robot)
+    arm = ArmModel(pair.robot).with_effect(effect)
+    with pytest.raises(ModelError, match=r'human_legs .*swing_shank.* --partner'):
+        arm.torque(motions.own)
+
+
+def test_two_ties_on_a_joint_and_joints_without_any_are_refused(pair) -> None:
+    with pytest.raises(ModelError, match='two ties on exo_swing_knee'):
+        twice = (pair.ties[0], replace(pair.ties[0], name='again'))
+        Partner(pair.other, twice).interaction.on(pair.robot)
+    with pytest.raises(ModelError, match="no tie on joint 'exo_stance_hip'"):
+        Partner(pair.other, pair.ties).slack.on(pair.robot, ('exo_stance_hip',))
+
+
+def test_any_motion_of_both_tells_springs_from_inertias(pair) -> None:
+    effect = Partner(pair.other, pair.ties).interaction.on(pair.robot)
+    alone, tied = ArmModel(pair.robot), ArmModel(pair.robot).with_effect(effect)
+    ranks = [arm.base_parameters(np.random.default_rng(0)).rank for arm in (alone, tied)]
+    assert ranks[1] == ranks[0] + 8
+
+
+def test_a_model_file_keeps_ties_and_slack(pair, together, tmp_path) -> None:
+    partner = Partner(pair.other, pair.ties, 'human_legs')
+    straps = partner.slack.on(pair.robot, ('exo_swing_hip',)).with_shape([0.002])
+    arm = ArmModel(pair.robot).with_effect(straps, [4e3])
+    springs = partner.interaction.on(pair.robot, ('exo_stance_ankle', 'exo_swing_knee'))
+    arm = arm.with_effect(springs, [1e4, 5.0, 2e4, 0.0])
+    save_model(tmp_path / 'model.yaml', arm, 'exoskeleton_legs')
+    again = load_model(tmp_path / 'model.yaml')
+    assert again.effects == arm.effects
+    np.testing.assert_allclose(again.torque(together), arm.torque(together), atol=1e-9)
+
+
+def test_where_the_partner_was_not_recorded_there_is_a_gap(pair, motions) -> None:
+    t = motions.own.t
+    kept = (t < 0.15) | (t > 0.3)
+    own = Recording(joints=pair.robot.joints, t=t, q=motions.own.q, tau=motions.own.q * 0.0)
+    other = Recording(joints=pair.other.joints, t=t[kept], q=motions.other.q[kept])
+    both = recorded_together(own, other, pair.other, pair.ties)
+    assert not np.any((both.t > 0.15) & (both.t < 0.3))
+    assert both.beside is not None
+    expected = motions.other.q[np.isin(t, both.t)]
+    np.testing.assert_allclose(both.beside.q, expected, atol=1e-9)
