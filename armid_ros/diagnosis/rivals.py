@@ -11,6 +11,7 @@ from armid_ros.diagnosis.candidates import Group
 from armid_ros.diagnosis.problem import Problem, Projection
 from armid_ros.diagnosis.selection import (
     block_z,
+    excess,
     joint_losses,
     Score,
     SPARSE_GAIN,
@@ -31,6 +32,8 @@ _OFF = 0.12
 #: What holds the arm from outside is another machine or a person: a cause as rich as this many
 #: quantities, which the arm alone has to fail to explain.
 STRAPS, _OUTSIDE = ('human_interaction', 'interface_slack'), 4
+#: Share of the gap below which what holds the arm from outside waits for causes of its own.
+_MOST = 0.5
 #: Gains within this share of each other are alike; a lead of less than this share is none.
 _EQUAL, _LEAD = 0.98, 0.02
 #: A lead of this share that no part of the data denies is one, however few parts show it.
@@ -39,6 +42,20 @@ _FAR = 0.25
 _UNSEEN = 1e-6
 #: What contains a simpler cause is no rival of it, unless it gains this much more.
 _MORE = 1.1
+
+
+def own_causes_first(passing: Sequence[Trial], problem: Problem, left: FloatArray) -> list[Trial]:
+    """
+    Return the groups without what holds the arm from outside, where that is not most of the gap.
+
+    A strap pulls at every joint, and takes a little of whatever is wrong with each; friction of
+    one joint takes all of that one.
+
+    """
+    own = [trial for trial in passing if trial.score.group.effect.name not in STRAPS]
+    most = float(excess(problem, left).sum())
+    outside = passing[0].score.group.effect.name in STRAPS
+    return own if own and outside and passing[0].gain < _MOST * most else list(passing)
 
 
 def simplest(tied: Sequence[Trial]) -> Trial:

@@ -15,6 +15,7 @@ from armid_ros.diagnosis.rivals import (
     likelier_body,
     likelier_links,
     not_beaten,
+    own_causes_first,
     simplest,
     STRAPS,
 )
@@ -167,6 +168,7 @@ def next_step(
     survey = Survey(league, hidden, tuple(scores), len(screened), unseen)
     if not passing:
         return None, survey, problem
+    passing = own_causes_first(passing, problem, left)
     tied = [passing[0], *not_beaten(passing, problem, left, settings)]
     winner = likelier_body(simplest(tied), tied, work.arm)
     if winner.score.group.effect.name in STRAPS:
