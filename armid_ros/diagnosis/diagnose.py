@@ -152,7 +152,10 @@ def diagnose(
     tell = progress or _silent
     tell(0.02, 'filtering')
     used = conditioning(list(recordings), settings.signals)
-    used = _narrower(used, settings, recordings)
+    if settings.partner is None:
+        used = _narrower(used, settings)
+    else:
+        used = band_of_motion(recordings, used, settings.signals, _NARROW)
     data = trajectories(recordings, used)
     gate = check_data(arm, recordings, data)
     faults, notes = list(gate.faults), [*gate.notes]
@@ -253,12 +256,8 @@ def _explained(
     return chosen
 
 
-def _narrower(
-    used: Conditioning, settings: DiagnosisSettings, recordings: Sequence[Recording]
-) -> Conditioning:
+def _narrower(used: Conditioning, settings: DiagnosisSettings) -> Conditioning:
     """Return the filters of an identification, narrowed to what a diagnosis needs."""
-    if settings.partner is not None:
-        return band_of_motion(recordings, used, settings.signals, _NARROW)
     band = used.rate_hz / (2.5 * MODEL_BANDS * used.decimation)
     if settings.signals.decimation is None:
         used = replace(used, decimation=max(1, int(used.rate_hz / (2.5 * _BANDS * band))))
