@@ -37,8 +37,6 @@ _CONVERGED = 1e-3
 _HALVINGS = 10
 #: Of the residuals' mean square at least this share is the torques' own noise.
 _LEAST_SHARE = 0.01
-#: Directions of the parameters of which noise leaves less than this share of the best stay untold.
-_LEAST_INFORMATION = 1e-12
 #: Torque per stiffness below which a spring is not drawn out, root mean square [m^2].
 _DRAWN_OUT = 1e-9
 
@@ -257,16 +255,15 @@ def _covariance(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray, excess: float
 ) -> FloatArray:
     """
-    Return the covariance of the parameters at the solution, K^-1 H K^-1 (Fuller 1987, 1.2.15).
+    Return the covariance of the parameters at the solution.
 
-    The columns at the motion that the residuals make likely still have noise: their products H
-    are larger than K, those at the true motion, by what is uncertain of the motion. Filtered
+    Filtered
     samples are not independent of each other; where their scores add up to more than independent
     ones would, deviations are widened (Newey and West 1987).
 
     """
     _, information, scores = _gauss_newton(problem, theta, variance)
-    inverse = _inverse(_true_information(problem, theta, variance, information))
+    inverse = _inverse(information)
     independent = excess * inverse @ information @ inverse
     if not problem.lags:
         return np.asarray(independent)
@@ -277,24 +274,6 @@ def _covariance(
     lasting = np.diag(inverse @ squares @ inverse) / np.diag(independent)
     factor = np.sqrt(np.maximum(lasting, 1.0))
     return np.asarray(independent * np.outer(factor, factor))
-
-
-def _true_information(
-    problem: InteractionProblem, theta: FloatArray, variance: FloatArray, information: FloatArray
-) -> FloatArray:
-    """Return the information less what the noise that is left in the columns adds to it."""
-    by_motion = problem.sensitivity(theta)
-    weighted = by_motion @ problem.motion_noise
-    weight = np.linalg.inv(np.diag(variance) + weighted @ by_motion.transpose(0, 2, 1))
-    slopes = problem.columns_by_motion
-    spread = np.einsum('nipx,xy->nipy', slopes, problem.motion_noise)
-    told = np.einsum('nipx,nkx->nipk', slopes, weighted)
-    noise = np.einsum('nipx,nij,njqx->pq', spread, weight, slopes, optimize=True)
-    noise -= np.einsum('nipk,nkl,nij,njql->pq', told, weight, weight, told, optimize=True)
-    size = np.sqrt(np.diag(information))
-    values, vectors = np.linalg.eigh((information - noise) / np.outer(size, size))
-    told_apart = np.maximum(values, _LEAST_INFORMATION * values[-1])
-    return np.asarray((vectors * told_apart) @ vectors.T * np.outer(size, size))
 
 
 def _inverse(information: FloatArray) -> FloatArray:
