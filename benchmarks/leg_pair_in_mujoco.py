@@ -12,15 +12,15 @@ put back onto the reference after every step.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from xml.etree import ElementTree
 
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import Robot
 from armid_ros.simulation.leg_pair import PairMotion, TiedPair
 from armid_ros.simulation.torque_driven import DrivingTorque
 import mujoco
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
+from tests.hidden.leg_pair import side_by_side
 
 #: Inertia of a prescribed joint [kg m^2].
 _HEAVY = 1e8
@@ -30,7 +30,7 @@ _SUBSTEPS = 4
 
 def pair_model(pair: TiedPair) -> mujoco.MjModel:
     """Let MuJoCo read both machines and tie them."""
-    spec = mujoco.MjSpec.from_string(_side_by_side(pair.robot, pair.other))
+    spec = mujoco.MjSpec.from_string(side_by_side(pair.robot.urdf, pair.other.urdf))
     for number, tie in enumerate(pair.ties):
         ends = ((pair.robot, tie.joint, tie.point), (pair.other, tie.other_joint, tie.other_point))
         tendon = spec.add_tendon(name=tie.name, springlength=[0.0, pair.slack[number]])
@@ -98,28 +98,3 @@ def _curves(
         CubicHermiteSpline(motion.t, motion.dq, motion.ddq),
         CubicSpline(motion.t, motion.ddq),
     )
-
-
-def _side_by_side(*robots: Robot) -> str:
-    """Put descriptions into one, without looks and limits, which are not dynamics."""
-    whole = ElementTree.Element('robot', name='pair')
-    ElementTree.SubElement(whole, 'link', name='ground')
-    for robot in robots:
-        parts = ElementTree.fromstring(robot.urdf)
-        children = {joint.find('child').get('link') for joint in parts.findall('joint')}
-        for link in parts.findall('link'):
-            for element in [e for e in link if e.tag != 'inertial']:
-                link.remove(element)
-            if link.get('name') not in children:
-                fixed = ElementTree.SubElement(
-                    whole, 'joint', name=f'{link.get("name")}_on_ground', type='fixed'
-                )
-                ElementTree.SubElement(fixed, 'parent', link='ground')
-                ElementTree.SubElement(fixed, 'child', link=link.get('name'))
-        for joint in parts.findall('joint'):
-            joint.set('type', 'continuous')
-            joint.remove(joint.find('limit'))
-        whole.extend(parts)
-    settings = ElementTree.SubElement(whole, 'mujoco')
-    ElementTree.SubElement(settings, 'compiler', fusestatic='true', balanceinertia='false')
-    return ElementTree.tostring(whole, encoding='unicode')

@@ -23,6 +23,7 @@ from armid_ros.diagnosis.shapes import shape_starts
 from armid_ros.effects import Effect, Kind
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
 import numpy as np
 
 #: Effects whose joints are pairs, and which pairs are likely enough to be looked at.
@@ -65,6 +66,11 @@ class Group:
     columns: slice
     kept: tuple[int, ...]
     precision: FloatArray
+
+    @classmethod
+    def of(cls, effect: Effect, columns: slice, kept: tuple[int, ...], robot: Robot) -> Group:
+        """Make a group that is held to what may be expected of the effect on a robot."""
+        return cls(effect, columns, kept, effect.spread(robot)[list(kept)] ** -2.0)
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
@@ -173,11 +179,10 @@ def candidates(
             for block, part in zip(blocks, data, strict=True):
                 block.append(effect_rows(arm, whole, part))
             for single in singles:
-                precision = single.spread(arm.robot) ** -2.0
-                size = len(precision)
+                size = len(single.parameters(arm.robot))
                 for kept in _ALONE.get(single.name, (tuple(range(size)),)):
                     span = slice(start + kept[0], start + kept[-1] + 1)
-                    groups.append(Group(single, span, kept, precision[list(kept)]))
+                    groups.append(Group.of(single, span, kept, arm.robot))
                 start += size
     return Candidates(tuple(groups), tuple(np.concatenate(block, axis=2) for block in blocks))
 

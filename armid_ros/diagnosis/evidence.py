@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.period import find_period
 from armid_ros.effects.timing import smoothed
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.signals import (
@@ -75,6 +76,11 @@ class Trajectory:
     def smooth(self) -> Trajectory:
         """The same with positions that have nothing beyond the band of the motion."""
         return replace(self, motion=smoothed(self.motion))
+
+    @cached_property
+    def period(self) -> tuple[int, slice] | None:
+        """The repeated period of the motion; see `find_period`."""
+        return find_period(self.motion)
 
     def residual(self, arm: ArmModel) -> FloatArray:
         """Return measured torque minus that of a model, in rows, shape (M, n) [N m]."""

@@ -16,15 +16,11 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-#: Positions of two periods agree within this share of the range of motion.
-_SAME = 0.02
-#: The shortest period that is looked for [s].
-_SHORTEST = 1.5
 #: Where the difference of two periods has this many times the power at low frequency that it has
 #: at high frequency, something happened in one period that did not in the other: coloured noise
 #: of torques came to 3.6 at the most in 60 sets of recordings in which nothing happened.
@@ -62,51 +58,6 @@ class Floor:
         return np.asarray(self.structure < _STRUCTURED)
 
 
-def find_period(motion: Motion) -> tuple[int, slice] | None:
-    """
-    Find a repeated period in the positions of a motion.
-
-    Returns
-    -------
-    lag : int
-        Length of the period in samples.
-    where : slice
-        Samples of which each has its like one period later.
-
-    """
-    rate = 1.0 / float(motion.t[1] - motion.t[0])
-    stride = max(1, int(rate / 25.0))
-    q = motion.q[::stride]
-    size = np.ptp(q, axis=0)
-    if not np.any(size > 0.0):
-        return None
-    q = q[:, size > 0.0] / size[size > 0.0]
-    change = np.abs(np.gradient(q, axis=0))
-    speed = change.max(axis=1)
-    moving = speed > 0.05 * speed.max()
-    allowed = _SAME + change  # the lag is only known to a sample yet
-    shortest = int(_SHORTEST * rate / stride)
-    best: tuple[int, int, int] | None = None
-    for lag in range(shortest, int(0.7 * len(q))):
-        same = np.all(np.abs(q[lag:] - q[:-lag]) < allowed[:-lag], axis=1)
-        start, stop = _longest(same)
-        length = int(np.sum(moving[start:stop]))
-        if length > 0.6 * lag and (best is None or length > 1.2 * (best[2] - best[1])):
-            best = lag, start, stop
-    if best is None:
-        return None
-    lag, start, stop = (value * stride for value in best)
-    part = slice(start, min(stop, len(motion) - lag - stride))
-    lags = range(max(1, lag - 2 * stride), lag + 2 * stride + 1)
-    errors = []
-    for shift in lags:
-        end = min(part.stop, len(motion) - shift)
-        gap = motion.q[part.start + shift : end + shift] - motion.q[part.start : end]
-        errors.append(float(np.mean(gap**2)))
-    lag = lags[int(np.argmin(errors))]
-    return lag, slice(part.start, min(part.stop, len(motion) - lag))
-
-
 def noise_floor(trajectory: Trajectory, arm: ArmModel) -> Floor:
     """
     Measure the noise of a trajectory beside a model.
@@ -125,7 +76,7 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> Floor:
     taps = trajectory.used.taps()
     half = (len(taps) - 1) // 2
     smooth = signal.fftconvolve(left, taps[:, np.newaxis], mode='same', axes=0)
-    found = find_period(motion)
+    found = trajectory.period
     if found is None:
         return Floor(_assumed(trajectory, smooth), None, np.ones(motion.n_joints))
     lag, where = found
@@ -195,13 +146,3 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
 
 def _least(sigma: FloatArray) -> float:
     return max(1e-6 * float(np.max(sigma)), 1e-12)
-
-
-def _longest(flags: npt.NDArray[np.bool_]) -> tuple[int, int]:
-    """Return begin and end of the longest run of True."""
-    padded = np.concatenate([[False], flags, [False]]).astype(int)
-    edges = np.flatnonzero(np.diff(padded)).reshape(-1, 2)
-    if not len(edges):
-        return 0, 0
-    start, stop = edges[int(np.argmax(edges[:, 1] - edges[:, 0]))]
-    return int(start), int(stop)

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.model_search import Explanation
-from armid_ros.diagnosis.rivals import likelier_body, simplest
-from armid_ros.diagnosis.selection import replicated, SPARSE_GAIN, Trial
+from armid_ros.diagnosis.rivals import FAR, likelier_body, simplest
+from armid_ros.diagnosis.selection import replicated, sure_of_few_rows, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -26,8 +26,6 @@ Key = tuple[str, tuple[str, ...], tuple[int, ...]]
 
 #: Resamplings: a frequency of one half is known to 5 %.
 _RESAMPLINGS = 100
-#: A lead of this share of the gain is one, however few parts of the data show it.
-_FAR = 0.25
 
 
 @dataclass(frozen=True)
@@ -201,8 +199,7 @@ def _picked(
         drawn = np.take_along_axis(blocks, chosen[np.newaxis], axis=2)
         gains, z = drawn.sum(axis=(1, 2)), _block_z(drawn)
         halves = drawn[:, :, : count // 2].sum(axis=2), drawn[:, :, count // 2 :].sum(axis=2)
-        sparse = np.minimum(*halves) > SPARSE_GAIN
-        z = np.where(sparse, np.maximum(z, 1.5 * settings.least_z), z)
+        z = sure_of_few_rows(z, np.minimum(*halves), settings)
         able = [
             k
             for k, trial in enumerate(pool)
@@ -213,7 +210,7 @@ def _picked(
         best = max(able, key=lambda k: gains[k])
         lead = drawn[best] - drawn
         surely = np.sum(_block_z(lead) >= settings.rival_z, axis=1) >= min(2, parts)
-        beaten = surely | (lead.sum(axis=(1, 2)) > _FAR * gains[best])
+        beaten = surely | (lead.sum(axis=(1, 2)) > FAR * gains[best])
         tied = {id(pool[k]): k for k in able if k == best or not beaten[k]}
         trials = [pool[k] for k in tied.values()]
         winner = likelier_body(simplest(trials), trials, arm)

@@ -97,7 +97,7 @@ def make_problem(
     columns: Sequence[FloatArray],
 ) -> Problem:
     """Stack and weight rows; arguments are per trajectory: (n,), (M, n), (M, n, P)."""
-    weight = np.concatenate([part.told / s for part, s in zip(data, sigma, strict=True)])
+    weight = row_weights(data, sigma)
     x = np.concatenate(columns)
     x *= weight[:, :, np.newaxis]
     y = np.concatenate(residual) * weight
@@ -110,6 +110,11 @@ def make_problem(
         flat = stacked.reshape(-1, size)
         product[:] = flat.T @ flat
     return Problem(x, y, weight, fold, products)
+
+
+def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
+    """Return one over the noise of all rows, zero where they tell nothing, (R, n) [1/(N m)]."""
+    return np.concatenate([part.told / s for part, s in zip(data, sigma, strict=True)])
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:

@@ -37,7 +37,7 @@ _MOST = 0.5
 #: Gains within this share of each other are alike; a lead of less than this share is none.
 _EQUAL, _LEAD = 0.98, 0.02
 #: A lead of this share that no part of the data denies is one, however few parts show it.
-_FAR = 0.25
+FAR = 0.25
 #: Columns below this share of the largest are not seen.
 _UNSEEN = 1e-6
 #: What contains a simpler cause is no rival of it, unless it gains this much more.
@@ -92,6 +92,7 @@ def likelier_links(
     scores: Sequence[Score],
     problem: Problem,
     projection: Projection,
+    left: FloatArray,
     settings: DiagnosisSettings,
 ) -> list[Trial]:
     """
@@ -104,15 +105,15 @@ def likelier_links(
     """
 
     def taken(trial: Trial) -> float:
-        left = projection.rest(problem.y)
         return float(np.sum(left**2) - np.sum((left - trial.torque) ** 2))
 
+    least = taken(winner)
     bodies = [
         try_group(problem, projection, score, problem.x[:, :, score.group.columns], settings)
         for score in scores
         if score.group.effect.changes_body
     ]
-    able = [t for t in bodies if within_bounds(t.score) and taken(t) >= taken(winner)]
+    able = [t for t in bodies if within_bounds(t.score) and taken(t) >= least]
     return sorted(able, key=lambda t: -taken(t))
 
 
@@ -121,6 +122,7 @@ def is_rival(
     winner: Trial,
     problem: Problem,
     projection: Projection,
+    left: FloatArray,
     settings: DiagnosisSettings,
 ) -> bool:
     """
@@ -129,7 +131,7 @@ def is_rival(
     One that only imitates or contains it does not, unless it alone brings a joint to its noise.
 
     """
-    if _finishes(trial, winner, problem, projection, settings):
+    if _finishes(trial, winner, problem, left, settings):
         return True
     if imitates(trial, winner):
         return False
@@ -147,7 +149,7 @@ def not_beaten(
         z = block_z(problem.fold, lead.sum(axis=1), settings.blocks)
         worse = lead.sum() > _LEAD * best.gain
         beaten = worse and np.sum(z >= settings.rival_z) >= min(2, problem.folds)
-        far = lead.sum() > max(_FAR * best.gain, SPARSE_GAIN)
+        far = lead.sum() > max(FAR * best.gain, SPARSE_GAIN)
         beaten |= far and bool(np.all(z > -settings.rival_z))
         alike = _cosine(best.torque, other.torque) > settings.same_cosine and not worse
         if not beaten or alike:
@@ -185,14 +187,9 @@ def _contains(big: Trial, small: Trial, problem: Problem, projection: Projection
 
 
 def _finishes(
-    big: Trial,
-    small: Trial,
-    problem: Problem,
-    projection: Projection,
-    settings: DiagnosisSettings,
+    big: Trial, small: Trial, problem: Problem, left: FloatArray, settings: DiagnosisSettings
 ) -> bool:
     """Return whether a larger group brings a joint to its noise that a smaller one does not."""
-    left = projection.rest(problem.y)
     after, before = (joint_losses(problem, left - trial.torque) for trial in (big, small))
     limit = settings.consistent_loss
     return bool(np.any((before > limit) & (after < limit)))

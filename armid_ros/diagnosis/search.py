@@ -172,12 +172,12 @@ def next_step(
     tied = [passing[0], *not_beaten(passing, problem, left, settings)]
     winner = likelier_body(simplest(tied), tied, work.arm)
     if winner.score.group.effect.name in STRAPS:
-        links = likelier_links(winner, scores, problem, projection, settings)
+        links = likelier_links(winner, scores, problem, projection, left, settings)
         winner, tied = (links[0], [*links, winner]) if links else (winner, tied)
     rivals = tuple(
         trial
         for trial in tied
-        if trial is not winner and is_rival(trial, winner, problem, projection, settings)
+        if trial is not winner and is_rival(trial, winner, problem, projection, left, settings)
     )
     before = joint_losses(problem, left)
     after = joint_losses(problem, left - winner.torque)

@@ -175,8 +175,7 @@ def try_group(
     gains = np.array([gain[problem.fold == k].sum(axis=0) for k in range(problem.folds)])
     scored = Score(score.group, values, std, float(gains.sum()), score.visible)
     z = block_z(problem.fold, gain.sum(axis=1), settings.blocks)
-    sparse = _in_both_halves(problem.fold, gain.sum(axis=1))
-    z = np.where(sparse, np.maximum(z, 1.5 * settings.least_z), z)
+    z = sure_of_few_rows(z, _lesser_half(problem.fold, gain.sum(axis=1)), settings)
     blocks = block_sums(problem.fold, gain.sum(axis=1), settings.blocks)
     return Trial(scored, own_columns @ values, held_out, gains, z, blocks, fold_values, only)
 
@@ -208,10 +207,18 @@ def block_z(fold: npt.NDArray[np.intp], gain: FloatArray, blocks: int) -> FloatA
     return z
 
 
-def _in_both_halves(fold: npt.NDArray[np.intp], gain: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return for which folds a gain that comes in few rows comes in both halves, shape (F,)."""
+def sure_of_few_rows(
+    z: FloatArray, lesser_half: FloatArray, settings: DiagnosisSettings
+) -> FloatArray:
+    """Return the z of folds, beyond doubt where a gain of few rows comes in both halves."""
+    sure = np.maximum(z, 1.5 * settings.least_z)
+    return np.where(lesser_half > SPARSE_GAIN, sure, z)
+
+
+def _lesser_half(fold: npt.NDArray[np.intp], gain: FloatArray) -> FloatArray:
+    """Return the gain of that half of each fold which gains less, shape (F,)."""
     halves = [np.array_split(gain[fold == k], 2) for k in range(int(fold.max()) + 1)]
-    return np.array([min(part.sum() for part in pair) > SPARSE_GAIN for pair in halves])
+    return np.array([min(part.sum() for part in pair) for pair in halves])
 
 
 def excess(problem: Problem, left: FloatArray) -> FloatArray:

@@ -45,8 +45,8 @@ class DiagnosisSettings:
         Block z of a gain in every part of the data that counts although no joint has a gap of its
         own: a little of all joints.
     tautology : float
-        A group that leaves a joint less than this share of its noise explains the noise itself:
-        its columns are made of the measured torque.
+        A group whose columns are made of the measured torque explains noise by noise where it
+        leaves a joint less than this share of its noise.
     rival_z : float
         Block z by which a name has to beat another one to exclude it.
     same_cosine : float

@@ -9,6 +9,7 @@ from itertools import product
 
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.fit import Fitted
+from armid_ros.diagnosis.problem import row_weights
 from armid_ros.effects import Effect
 from armid_ros.effects.interaction import InterfaceSlack
 from armid_ros.model import points_motion
@@ -66,7 +67,7 @@ def _orders(
     The rows of all trajectories count together, as a ripple has one order and phase in all.
 
     """
-    weight = _weight(data, sigma)
+    weight = row_weights(data, sigma)
     left = np.concatenate(fitted.residual) * weight
     q = np.concatenate([part.motion.q[part.rows] for part in data])
     starts = []
@@ -105,11 +106,6 @@ def wave_gains(
     return np.asarray(2.0 * squares / determinant)
 
 
-def _weight(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
-    """Return one over the noise of all rows, zero where they tell nothing [1/(N m)]."""
-    return np.concatenate([part.told / s for part, s in zip(data, sigma, strict=True)])
-
-
 def _straps(
     effect: InterfaceSlack,
     fitted: Fitted,
@@ -120,7 +116,7 @@ def _straps(
     robot, left = fitted.arm.robot, np.concatenate(fitted.residual)
     q = np.concatenate([part.motion.q[part.rows] for part in data])
     rows = np.unique(np.linspace(0, len(q) - 1, _ROWS).astype(int))
-    weight = _weight(data, sigma)[rows]
+    weight = row_weights(data, sigma)[rows]
     beside = np.concatenate(fitted.columns)[rows] * weight[:, :, np.newaxis]
     basis, _ = np.linalg.qr(beside.reshape(weight.size, -1))
 

@@ -20,7 +20,6 @@ from armid_ros.diagnosis.search import next_step, Step, Survey
 from armid_ros.diagnosis.selection import Score, Trial, try_group
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.tied import Ties
-from armid_ros.effects import Effect
 from armid_ros.effects.tied import Partner, Tied
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -107,7 +106,7 @@ def _explanation(ties: Ties, fitted: Fitted) -> Explanation:
     steps = []
     for k, own in enumerate(fitted.named):
         problem, projection, columns = view.without(k, ())
-        group = _group(own.effect, slice(0, columns.shape[2]), own.kept, ties.arm)
+        group = Group.of(own.effect, slice(0, columns.shape[2]), own.kept, ties.arm.robot)
         trial = _trial(group, problem, projection, columns, ties.settings)
         steps.append(Step(trial, rivals, (trial,), before, after, (trial,)))
     return Explanation(ties.base, fitted, reference, tuple(steps), survey, after, before)
@@ -133,7 +132,7 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
     whole = kind.on(ties.arm.robot, [own.effect.joints[0] for own in fitted.named])
     each = len(whole.quantities)
     kept = tuple(range(0, each * len(whole.joints), each))
-    group = _group(whole, span, kept, ties.arm)
+    group = Group.of(whole, span, kept, ties.arm.robot)
     projection = project(problem, free)
     trial = _trial(group, problem, projection, problem.x[:, :, span], settings)
     work = Workspace(remembering(reference.arm), data, settings)
@@ -143,11 +142,6 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
         return survey, ()
     left = projection.rest(problem.y)
     return survey, tuple(not_beaten([trial, *step.passing], problem, left, settings))
-
-
-def _group(effect: Effect, columns: slice, kept: tuple[int, ...], arm: ArmModel) -> Group:
-    precision = effect.spread(arm.robot) ** -2.0
-    return Group(effect, columns, kept, precision[list(kept)])
 
 
 def _trial(

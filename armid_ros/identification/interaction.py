@@ -257,14 +257,13 @@ def _covariance(
     """
     Return the covariance of the parameters at the solution.
 
-    Filtered
-    samples are not independent of each other; where their scores add up to more than independent
-    ones would, deviations are widened (Newey and West 1987).
+    Filtered samples are not independent of each other; where their scores add up to more than
+    independent ones would, deviations are widened (Newey and West 1987).
 
     """
     _, information, scores = _gauss_newton(problem, theta, variance)
     inverse = _inverse(information)
-    independent = excess * inverse @ information @ inverse
+    independent = excess * inverse
     if not problem.lags:
         return np.asarray(independent)
     squares = scores.T @ scores

@@ -4,7 +4,7 @@
 
 from armid_ros.diagnosis.diagnose import _narrower
 from armid_ros.diagnosis.evidence import trajectories
-from armid_ros.diagnosis.floor import find_period, noise_floor
+from armid_ros.diagnosis.floor import noise_floor
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.signals import conditioning, SignalSettings
 import numpy as np
@@ -22,7 +22,7 @@ def cut(recordings):
 def test_the_period_is_found_in_the_positions(bench):
     data = cut(bench.recordings())
     for part, period in zip(data, PERIODS, strict=True):
-        lag, _ = find_period(part.motion)
+        lag, _ = part.period
         step = float(part.motion.t[1] - part.motion.t[0])
         assert lag * step == pytest.approx(period, abs=2 * step)
 

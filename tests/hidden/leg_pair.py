@@ -146,7 +146,11 @@ def _gait() -> Path:
 
 
 def _tied(straps: Straps, masses: FloatArray) -> mujoco.MjModel:
-    spec = mujoco.MjSpec.from_string(_both())
+    spec = mujoco.MjSpec.from_string(
+        side_by_side(
+            *(description(name).read_text() for name in ('exoskeleton_legs', 'human_legs'))
+        )
+    )
     for segment in straps.segments:
         tendon = spec.add_tendon(name=segment, springlength=[0.0, straps.slack])
         for side in ('exo', 'human'):
@@ -181,12 +185,12 @@ def _torques(
     return tau
 
 
-def _both() -> str:
-    """Put both descriptions on one ground; MuJoCo takes one file."""
+def side_by_side(*descriptions: str) -> str:
+    """Put URDFs on one ground, without looks and limits, which are not dynamics."""
     whole = ElementTree.Element('robot', name='pair')
     ElementTree.SubElement(whole, 'link', name='ground')
-    for name in ('exoskeleton_legs', 'human_legs'):
-        parts = ElementTree.parse(description(name)).getroot()
+    for urdf in descriptions:
+        parts = ElementTree.fromstring(urdf)
         moved = {joint.find('child').get('link') for joint in parts.findall('joint')}
         for link in parts.findall('link'):
             for element in [e for e in link if e.tag != 'inertial']:

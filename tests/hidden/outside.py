@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -37,9 +38,9 @@ class _Outside(HiddenEffect):
             live.t, live.data.qpos[live.dofs[self.index]], live.data.qvel[live.dofs[self.index]]
         )
 
+    @abstractmethod
     def shape(self, t: float, q: float, dq: float) -> float:
         """Return the torque per value."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -16,7 +17,7 @@ from tests.hidden.base import HiddenEffect, pick, Setting
 
 
 @dataclass(frozen=True)
-class _Reading(HiddenEffect):
+class _OneJoint(HiddenEffect):
     """A fault of one torque reading or encoder."""
 
     joint: str
@@ -30,14 +31,18 @@ class _Reading(HiddenEffect):
     def scaled(self, factor: float) -> Self:
         return replace(self, value=self.value * factor)
 
+
+class _Reading(_OneJoint):
+    """A fault of one torque reading."""
+
     def distort(self, signals: Signals, robot: Robot) -> Signals:
         tau = signals.tau.copy()
         tau[:, self.index] = self.reading(signals.t, tau[:, self.index])
         return replace(signals, tau=tau)
 
+    @abstractmethod
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         """Return what is read, shape (N,), for a true torque."""
-        raise NotImplementedError
 
 
 class TorqueOffset(_Reading):
@@ -194,7 +199,7 @@ class TorqueLag(_Reading):
         return lfilter(numerator, [1.0, -decay], tau, zi=start)[0]
 
 
-class EncoderOffset(_Reading):
+class EncoderOffset(_OneJoint):
     """The encoder reads too little by a constant."""
 
     name = 'encoder_offset'

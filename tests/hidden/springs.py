@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -224,9 +225,9 @@ class _Strap(HiddenEffect):
         force = self.force(point - self.anchor, velocity)
         live.applied += (jacobian.T @ force)[live.dofs]
 
+    @abstractmethod
     def force(self, way: FloatArray, velocity: FloatArray) -> FloatArray:
         """Return the force on the arm, shape (3,) [N]."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

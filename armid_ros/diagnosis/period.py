@@ -1,0 +1,69 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where a motion repeats itself."""
+
+from __future__ import annotations
+
+from armid_ros.motion import Motion
+import numpy as np
+import numpy.typing as npt
+
+#: Positions of two periods agree within this share of the range of motion.
+_SAME = 0.02
+#: The shortest period that is looked for [s].
+_SHORTEST = 1.5
+
+
+def find_period(motion: Motion) -> tuple[int, slice] | None:
+    """
+    Find a repeated period in the positions of a motion.
+
+    Returns
+    -------
+    lag : int
+        Length of the period in samples.
+    where : slice
+        Samples of which each has its like one period later.
+
+    """
+    rate = 1.0 / float(motion.t[1] - motion.t[0])
+    stride = max(1, int(rate / 25.0))
+    q = motion.q[::stride]
+    size = np.ptp(q, axis=0)
+    if not np.any(size > 0.0):
+        return None
+    q = q[:, size > 0.0] / size[size > 0.0]
+    change = np.abs(np.gradient(q, axis=0))
+    speed = change.max(axis=1)
+    moving = speed > 0.05 * speed.max()
+    allowed = _SAME + change  # the lag is only known to a sample yet
+    shortest = int(_SHORTEST * rate / stride)
+    best: tuple[int, int, int] | None = None
+    for lag in range(shortest, int(0.7 * len(q))):
+        same = np.all(np.abs(q[lag:] - q[:-lag]) < allowed[:-lag], axis=1)
+        start, stop = _longest(same)
+        length = int(np.sum(moving[start:stop]))
+        if length > 0.6 * lag and (best is None or length > 1.2 * (best[2] - best[1])):
+            best = lag, start, stop
+    if best is None:
+        return None
+    lag, start, stop = (value * stride for value in best)
+    part = slice(start, min(stop, len(motion) - lag - stride))
+    lags = range(max(1, lag - 2 * stride), lag + 2 * stride + 1)
+    errors = []
+    for shift in lags:
+        end = min(part.stop, len(motion) - shift)
+        gap = motion.q[part.start + shift : end + shift] - motion.q[part.start : end]
+        errors.append(float(np.mean(gap**2)))
+    lag = lags[int(np.argmin(errors))]
+    return lag, slice(part.start, min(part.stop, len(motion) - lag))
+
+
+def _longest(flags: npt.NDArray[np.bool_]) -> tuple[int, int]:
+    """Return begin and end of the longest run of True."""
+    padded = np.concatenate([[False], flags, [False]]).astype(int)
+    edges = np.flatnonzero(np.diff(padded)).reshape(-1, 2)
+    if not len(edges):
+        return 0, 0
+    start, stop = edges[int(np.argmax(edges[:, 1] - edges[:, 0]))]
+    return int(start), int(stop)
