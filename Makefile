@@ -43,7 +43,7 @@ demo: $(STAMPS)/armid_ros $(VENV)/setup.bash  ## identify the shipped arm on the
 
 test: lint  ## lint, types, layers, and every test with coverage
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --cov=armid_ros --cov-report=term \
-		--durations=15 $(PYTEST)
+		--durations=15 --numprocesses=auto --dist=loadfile $(PYTEST)
 
 lint: $(STAMPS)/armid_ros $(STAMPS)/test  ## format, lint, layers, types
 	$(BIN)/ruff format --check .
