@@ -5,26 +5,23 @@ The human-exoskeleton leg pair: gait by torque in MuJoCo, stiffness from noisy a
 
 What the source claims, what is wanted here, what is measured.
 
-    python -m benchmarks.exo [--draws 8] [--sets 24]
+    python -m benchmarks.exo [--draws 8] [--repeats 400] [--sets 24]
 
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 
-from armid_ros.identification.interaction import identify_interaction, Interaction
+from armid_ros.identification.interaction import Interaction
 from armid_ros.identification.interaction_poses import choose_poses, stiffness_bound
 from armid_ros.identification.interaction_problem import (
     Inertias,
     interaction_problem,
     InteractionProblem,
 )
-from armid_ros.identification.interaction_recording import recorded_interaction_problem
 from armid_ros.identification.interaction_search import find_interaction, InteractionFinding
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.recording import Recording
 from armid_ros.simulation.gait import read_gait
 from armid_ros.simulation.leg_pair import (
     leg_pair,
@@ -37,10 +34,11 @@ from armid_ros.simulation.leg_pair import (
 from armid_ros.simulation.torque_driven import splined
 import numpy as np
 
+from benchmarks.exo_deviations import deviations
 from benchmarks.exo_diagnosis import cases, diagnosed
+from benchmarks.exo_noise import find_springs, measured, recorded, TORQUE_NOISE
 from benchmarks.leg_pair_in_mujoco import drive_in_mujoco
 
-TORQUE_NOISE = 0.5
 SECONDS = 6.0
 #: Time of a step forward and back, of the steps that poses are chosen from [s].
 SPEEDS = (1.8, 1.2, 0.9)
@@ -50,10 +48,12 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--draws', type=int, default=8, help='noise drawn so many times')
+    parser.add_argument('--repeats', type=int, default=400, help='for stated deviations')
     parser.add_argument('--sets', type=int, default=24, help='recordings with hidden springs')
     asked = parser.parse_args()
     gait_by_torque()
     stiffness(asked.draws)
+    deviations(asked.repeats)
     hidden(asked.sets)
     diagnosed(asked.sets)
 
@@ -116,7 +116,7 @@ def stiffness(draws: int) -> None:
                 for data, motions in sets.items():
                     tau = pair_torques(pair, *motions).tau
                     found = [
-                        _find(pair, motions, tau, degrees, draw, inertias, separate)
+                        find_springs(pair, motions, tau, degrees, draw, inertias, separate)
                         for draw in range(draws)
                     ]
                     least = None
@@ -187,42 +187,6 @@ def _judged(
     )
 
 
-def _find(
-    pair: TiedPair,
-    motions: PairMotion,
-    tau: FloatArray,
-    degrees: float,
-    seed: int,
-    inertias: Inertias,
-    separate: bool,
-) -> Interaction:
-    own, other = _measured(motions, tau, degrees, np.random.default_rng(seed))
-    if len(own) < 1000:
-        problem = interaction_problem(
-            pair.robot,
-            own,
-            pair.other,
-            other,
-            pair.ties,
-            position_noise=np.radians(degrees),
-            inertias=inertias,
-            separate=separate,
-        )
-        return identify_interaction(problem, TORQUE_NOISE)
-    recordings = _recorded(own), _recorded(other)
-    return identify_interaction(
-        recorded_interaction_problem(
-            pair.robot,
-            recordings[0],
-            pair.other,
-            recordings[1],
-            pair.ties,
-            inertias=inertias,
-            separate=separate,
-        )
-    )
-
-
 def hidden(sets: int) -> None:
     """Hide springs in recordings, and none in as many others."""
     gait, every = read_gait(), leg_pair()
@@ -249,21 +213,8 @@ def hidden(sets: int) -> None:
 def _search(every: TiedPair, real: TiedPair, motions: PairMotion, seed: int) -> InteractionFinding:
     rng = np.random.default_rng(seed)
     tau = pair_torques(real, *motions).tau
-    runs = [tuple(map(_recorded, _measured(motions, tau, 0.05, rng))) for _ in range(2)]
+    runs = [tuple(map(recorded, measured(motions, tau, 0.05, rng))) for _ in range(2)]
     return find_interaction(every.robot, every.other, every.ties, runs[0], runs[1])
-
-
-def _measured(
-    motions: PairMotion, tau: FloatArray, degrees: float, rng: np.random.Generator
-) -> PairMotion:
-    own, other = (
-        replace(m, q=m.q + np.radians(degrees) * rng.normal(size=m.q.shape)) for m in motions
-    )
-    return PairMotion(own.with_torque(tau + TORQUE_NOISE * rng.normal(size=tau.shape)), other)
-
-
-def _recorded(motion: Motion) -> Recording:
-    return Recording(joints=motion.joints, t=motion.t, q=motion.q, tau=motion.tau)
 
 
 if __name__ == '__main__':

@@ -33,8 +33,8 @@ _FREE = 5
 _SETTLED = 25
 #: Steps below this share of a standard deviation end the iteration.
 _CONVERGED = 1e-3
-#: A step that overshoots is halved so many times.
-_HALVINGS = 10
+#: A step that overshoots is halved so many times, one that is too short doubled so many.
+_HALVINGS, _DOUBLINGS = 10, 4
 #: Of the residuals' mean square at least this share is the torques' own noise.
 _LEAST_SHARE = 0.01
 #: Torque per stiffness below which a spring is not drawn out, root mean square [m^2].
@@ -124,8 +124,8 @@ def identify_interaction(
         if given is None and iteration < _SETTLED:  # or the two chase each other
             share = 1.0 / max(1, iteration - _FREE)
             used = (1.0 - share) * used + share * _torque_variance(problem, theta)
-        step, information, _ = _gauss_newton(problem, theta, used)
-        step = _shortened(problem, theta, step, used)
+        step, information, _, _ = _gauss_newton(problem, theta, used)
+        step = _scaled(problem, theta, step, used)
         theta = theta + step
         if step @ information @ step < _CONVERGED**2 * len(step):
             break
@@ -169,9 +169,7 @@ def _compensated(
     Linear, so that it leads from anywhere to near the solution; weights are those at theta.
 
     """
-    by_motion = problem.sensitivity(theta)
-    covariance = by_motion @ problem.motion_noise @ by_motion.transpose(0, 2, 1)
-    weight = np.linalg.inv(covariance + np.diag(variance))
+    weight = np.linalg.inv(_noise(problem, problem.sensitivity(theta), variance))
     weighted = np.einsum('nij,njp->nip', weight, problem.columns)
     each = np.einsum('nij,njpx->nipx', weight, problem.columns_by_motion @ problem.motion_noise)
     matrix = np.einsum('nip,niq->pq', problem.columns, weighted)
@@ -182,23 +180,37 @@ def _compensated(
     return np.asarray(np.linalg.solve(matrix / np.outer(size, size), aim / size) / size)
 
 
-def _shortened(
+def _scaled(
     problem: InteractionProblem, theta: FloatArray, step: FloatArray, variance: FloatArray
 ) -> FloatArray:
-    """Return the part of a step that makes the weighted residuals smaller, nothing if none."""
+    """
+    Return a step, by powers of two as long as the weighted residuals become smaller.
+
+    Where noise makes most of a column, as of accelerations that are small, the information is too
+    large and steps are too short, ten times and more; others overshoot. Nothing if none is good.
+
+    """
     before = _loss(problem, theta, variance)
+    reached = _loss(problem, theta + step, variance)
     for _ in range(_HALVINGS):
-        if _loss(problem, theta + step, variance) <= before:
-            return step
+        if reached <= before:
+            break
         step = step / 2.0
-    return np.zeros_like(step)
+        reached = _loss(problem, theta + step, variance)
+    else:
+        return np.zeros_like(step)
+    for _ in range(_DOUBLINGS):
+        further = _loss(problem, theta + 2.0 * step, variance)
+        if further >= reached:
+            break
+        step, reached = 2.0 * step, further
+    return step
 
 
 def _loss(problem: InteractionProblem, theta: FloatArray, variance: FloatArray) -> float:
-    by_motion = problem.sensitivity(theta)
-    covariance = by_motion @ problem.motion_noise @ by_motion.transpose(0, 2, 1)
+    covariance = _noise(problem, problem.sensitivity(theta), variance)
     residual = problem.residual(theta)
-    pull = np.linalg.solve(covariance + np.diag(variance), residual[..., np.newaxis])[..., 0]
+    pull = np.linalg.solve(covariance, residual[..., np.newaxis])[..., 0]
     return float(np.sum(residual * pull))
 
 
@@ -234,45 +246,64 @@ def _torque_variance(problem: InteractionProblem, theta: FloatArray) -> FloatArr
 
 def _gauss_newton(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the step of the parameters, their information and every sample's score (N, P)."""
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """
+    Return the step of the parameters and their information, and what both are made of.
+
+    These are the columns at the motion that the residuals make likely, shape (N, n, P), and the
+    residuals over their covariance, shape (N, n).
+
+    """
     by_motion = problem.sensitivity(theta)
-    weighted = by_motion @ problem.motion_noise
-    covariance = np.diag(variance) + weighted @ by_motion.transpose(0, 2, 1)
+    covariance = _noise(problem, by_motion, variance)
     pull = np.linalg.solve(covariance, problem.residual(theta)[..., np.newaxis])[..., 0]
-    correction = np.einsum('nij,ni->nj', weighted, pull)
+    correction = np.einsum('nij,ni->nj', by_motion @ problem.motion_noise, pull)
     columns = problem.columns + np.einsum('nipj,nj->nip', problem.columns_by_motion, correction)
-    scaled = np.linalg.solve(covariance, columns)
-    information = np.einsum('nip,niq->pq', columns, scaled)
-    scores = np.einsum('nip,ni->np', columns, pull)
-    gradient = scores.sum(axis=0)
+    information = np.einsum('nip,niq->pq', columns, np.linalg.solve(covariance, columns))
+    gradient = np.einsum('nip,ni->p', columns, pull)
     size = np.sqrt(np.diag(information))
     step = np.linalg.solve(information / np.outer(size, size), gradient / size) / size
-    return np.asarray(step), np.asarray(information), np.asarray(scores)
+    return np.asarray(step), np.asarray(information), np.asarray(columns), np.asarray(pull)
+
+
+def _noise(problem: InteractionProblem, by_motion: FloatArray, variance: FloatArray) -> FloatArray:
+    """Return S, the covariance of the residuals of every sample, shape (N, n, n)."""
+    covariance = by_motion @ problem.motion_noise @ by_motion.transpose(0, 2, 1)
+    return np.asarray(covariance + np.diag(variance))
 
 
 def _covariance(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray, excess: float
 ) -> FloatArray:
     """
-    Return the covariance of the parameters at the solution.
+    Return the covariance of the parameters at the solution, H^-1 B H^-1.
 
-    Filtered samples are not independent of each other; where their scores add up to more than
-    independent ones would, deviations are widened (Newey and West 1987).
+    B is that of the scores. Filters make neighbours alike, by how much is known; where the scores
+    add up to more, as of noise that was not white before, deviations are widened (Newey and West
+    1987). Poses are independent, and B is H.
 
     """
-    _, information, scores = _gauss_newton(problem, theta, variance)
+    _, information, columns, pull = _gauss_newton(problem, theta, variance)
     inverse = _inverse(information)
-    independent = excess * inverse
-    if not problem.lags:
-        return np.asarray(independent)
-    squares = scores.T @ scores
-    for lag in range(1, problem.lags + 1):
-        product = (1.0 - lag / (problem.lags + 1.0)) * scores[lag:].T @ scores[:-lag]
-        squares = squares + product + product.T
-    lasting = np.diag(inverse @ squares @ inverse) / np.diag(independent)
+    if len(problem.torque_lags) == 1:
+        return np.asarray(excess * inverse)
+    by_motion = problem.sensitivity(theta)
+    weighted = np.linalg.solve(_noise(problem, by_motion, variance), columns)
+    moved = np.einsum('nij,nip->npj', by_motion, weighted)
+    scores = np.einsum('nip,ni->np', columns, pull)
+    known, seen = information, scores.T @ scores
+    lags = len(problem.torque_lags)
+    for lag in range(1, lags):
+        alike = np.einsum('npj,jk,nqk->pq', moved[:-lag], problem.motion_lags[lag], moved[lag:])
+        torque = problem.torque_lags[lag] * variance
+        alike += np.einsum('nip,i,niq->pq', weighted[:-lag], torque, weighted[lag:])
+        known = known + alike + alike.T
+        product = (1.0 - lag / lags) * scores[:-lag].T @ scores[lag:]
+        seen = seen + product + product.T
+    covariance = excess * inverse @ known @ inverse
+    lasting = np.diag(inverse @ seen @ inverse) / np.diag(covariance)
     factor = np.sqrt(np.maximum(lasting, 1.0))
-    return np.asarray(independent * np.outer(factor, factor))
+    return np.asarray(covariance * np.outer(factor, factor))
 
 
 def _inverse(information: FloatArray) -> FloatArray:

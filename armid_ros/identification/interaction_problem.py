@@ -59,8 +59,11 @@ class InteractionProblem:
         Derivatives by positions, velocities and accelerations of the J = n + m joints of both.
     columns_by_motion : ndarray, shape (N, n, P, 3 J)
         Derivatives by the same.
-    motion_noise : ndarray, shape (3 J, 3 J)
-        Covariance of what noisy angles make of positions, velocities and accelerations.
+    motion_lags : ndarray, shape (1 + L, 3 J, 3 J)
+        Covariances of what noisy angles make of positions, velocities and accelerations of a
+        sample and of itself and the L next; none where errors are independent.
+    torque_lags : ndarray, shape (1 + L,)
+        Correlations of the noise of torques of the same.
     torque_noise : ndarray, shape (n,)
         Standard deviation that the torques have at least, as they are here [N m].
     segments : tuple of str
@@ -71,8 +74,6 @@ class InteractionProblem:
         The combinations of inertias that are free.
     typical_way : float
         How far springs are drawn out, root mean square [m].
-    lags : int
-        Samples over which errors last; zero where they are independent.
 
     """
 
@@ -81,18 +82,23 @@ class InteractionProblem:
     columns: FloatArray
     known_by_motion: FloatArray
     columns_by_motion: FloatArray
-    motion_noise: FloatArray
+    motion_lags: FloatArray
+    torque_lags: FloatArray
     torque_noise: FloatArray
     segments: tuple[str, ...]
     spring_joints: tuple[str, ...]
     rigid: tuple[ParameterName, ...]
     typical_way: float
-    lags: int = 0
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in (*STACKED, 'motion_noise', 'torque_noise'):
+        for name in (*STACKED, 'motion_lags', 'torque_lags', 'torque_noise'):
             object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def motion_noise(self) -> FloatArray:
+        """Covariance of what noisy angles make of the motion of a sample, shape (3 J, 3 J)."""
+        return np.asarray(self.motion_lags[0])
 
     @property
     def position_noise(self) -> FloatArray:
@@ -183,10 +189,10 @@ def interaction_problem(
         body_by = _placed(_regressor_by_motion(robot, slow, independent), count)
         columns_by = np.concatenate([springs_by, body_by], axis=2)
     tau = motion.tau
-    passed, left = np.diag([1.0, 0.0, 0.0]), 1.0
+    passed, left = np.diag([1.0, 0.0, 0.0])[np.newaxis], np.ones(1)
     if used is not None:
         tau, known, columns = (decimate(values, used) for values in (tau, known, columns))
-        passed, left = _passed(used), float(np.sqrt(np.sum(used.taps() ** 2)))
+        passed, left = _passed(used), _torque_passed(used)
     deviation = np.broadcast_to(np.asarray(position_noise, dtype=float), (count,))
     return InteractionProblem(
         tau,
@@ -195,23 +201,39 @@ def interaction_problem(
         known_by,
         columns_by,
         np.asarray(np.kron(passed, np.diag(deviation**2))),
-        left * np.broadcast_to(np.asarray(torque_noise, dtype=float), tau.shape[1:]),
+        left / left[0],
+        np.sqrt(left[0]) * np.broadcast_to(np.asarray(torque_noise, float), tau.shape[1:]),
         tuple(tie.name for tie in ties) if separate else ('all',),
         tuple(tie.joint for tie in ties) if separate else ('',),
         rigid,
         float(np.sqrt(np.mean(np.sum(geometry.way**2, axis=2)))),
-        0 if used is None else _LAGS,
     )
 
 
 def _passed(used: Conditioning) -> FloatArray:
-    """Return the covariance of position, velocity and acceleration from white noise (3, 3)."""
+    """
+    Return what is left of white noise in position, velocity and acceleration, (1 + lags, 3, 3).
+
+    Covariances of a row with itself and with later ones. Columns are slow beside the filter of the
+    decimation, so that noise in them goes through it as if it were by itself.
+
+    """
     w = np.linspace(0.0, np.pi, 8001)
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     gain = np.abs(signal.sosfreqz(sections, w)[1]) ** 4
-    speed = used.rate_hz * w
-    variance, slope, curvature = (float(np.mean(gain * speed**k)) for k in (0, 2, 4))
-    return np.array([[variance, 0.0, -slope], [0.0, slope, 0.0], [-slope, 0.0, curvature]])
+    gain = gain * np.abs(signal.freqz(used.taps(), worN=w)[1]) ** 2
+    result = np.empty((1 + _LAGS, 3, 3))
+    for lag, i, j in np.ndindex(result.shape):
+        turned = np.cos(w * lag * used.decimation + (i + j) * np.pi / 2.0)
+        result[lag, i, j] = (-1) ** i * np.mean(gain * (used.rate_hz * w) ** (i + j) * turned)
+    return result
+
+
+def _torque_passed(used: Conditioning) -> FloatArray:
+    """Return the same of white noise of torques, shape (1 + lags,)."""
+    taps = used.taps()
+    ends = [len(taps) - lag * used.decimation for lag in range(1 + _LAGS)]
+    return np.array([taps[:end] @ taps[-end:] if end > 0 else 0.0 for end in ends])
 
 
 def _told_apart(

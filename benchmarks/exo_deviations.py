@@ -1,0 +1,78 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Deviations of springs as they are stated, beside the scatter of repeats.
+
+    python -m benchmarks.exo_deviations [--repeats 400]
+
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from armid_ros.identification.interaction_problem import Inertias
+from armid_ros.motion import FloatArray
+from armid_ros.simulation.gait import read_gait
+from armid_ros.simulation.leg_pair import leg_pair, pair_torques, PairMotion, stepping
+import numpy as np
+
+from benchmarks.exo_noise import find_springs
+
+STIFFNESS = 1e4
+#: Repeats of a recording for each of poses: they take ten times as long.
+_SHARE = 4
+
+
+def deviations(repeats: int) -> None:
+    """Print stated deviations over scatter, and how many 95 % intervals hold the stiffness."""
+    pair, gait = leg_pair(STIFFNESS), read_gait()
+    poses = stepping(pair, gait, np.linspace(0.0, 1.8, 201)[:-1])
+    seconds = stepping(pair, gait, np.arange(0.0, 10.0, 1e-3))
+    print(
+        'stated deviation over scatter of repeats, 0.05 deg  wanted      measured  intervals hold'
+    )
+    rows: list[tuple[str, PairMotion, Inertias, bool, int]] = [
+        ('200 poses', poses, 'known', False, repeats),
+        ('200 poses', poses, 'free', False, repeats),
+        ('200 poses', poses, 'known', True, repeats),
+        ('10 s 1 kHz', seconds, 'known', False, repeats // _SHARE),
+        ('10 s 1 kHz', seconds, 'known', True, repeats // _SHARE),
+        ('10 s 1 kHz', seconds, 'free', True, repeats // (2 * _SHARE)),
+    ]
+    for data, motions, inertias, separate, count in rows:
+        ratio, spread, inside = stated(motions, inertias, separate, count)
+        what = f'{data}, inertias {inertias}, {"four" if separate else "one"} k, {count} times'
+        wanted = '0.95-1.05' if motions is poses and not separate else '        -'
+        print(f'  {what:50s}{wanted}  {ratio:.2f} +- {spread:.2f}  {inside:.0f} %', flush=True)
+
+
+def stated(
+    motions: PairMotion, inertias: Inertias, separate: bool, repeats: int
+) -> tuple[float, float, float]:
+    """Return the ratio, its own deviation, and the per cent of intervals; means of all springs."""
+    pair = leg_pair(STIFFNESS)
+    tau = pair_torques(pair, *motions).tau
+    found = [
+        find_springs(pair, motions, tau, 0.05, seed, inertias, separate) for seed in range(repeats)
+    ]
+    values = np.array([part.stiffness for part in found])
+    variance = np.mean([part.std**2 for part in found], axis=0)
+    ratio = np.sqrt(variance) / values.std(axis=0, ddof=1)
+    hold = [_holds(part.interval()) for part in found]
+    return float(np.mean(ratio)), float(_spread(values)), 100.0 * float(np.mean(hold))
+
+
+def _holds(interval: FloatArray) -> FloatArray:
+    return np.asarray((interval[:, 0] <= STIFFNESS) & (interval[:, 1] >= STIFFNESS))
+
+
+def _spread(values: FloatArray) -> float:
+    """Return how sure a mean ratio is: as of one spring, for those of one draw are alike."""
+    return 1.0 / float(np.sqrt(2.0 * (len(values) - 1)))
+
+
+if __name__ == '__main__':
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('--repeats', type=int, default=400, help='of 200 poses')
+    deviations(parser.parse_args().repeats)

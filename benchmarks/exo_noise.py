@@ -1,0 +1,69 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Noise of the leg pair's sensors, and springs that are found in spite of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.identification.interaction import identify_interaction, Interaction
+from armid_ros.identification.interaction_problem import Inertias, interaction_problem
+from armid_ros.identification.interaction_recording import recorded_interaction_problem
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+from armid_ros.simulation.leg_pair import PairMotion, TiedPair
+import numpy as np
+
+TORQUE_NOISE = 0.5
+
+
+def find_springs(
+    pair: TiedPair,
+    motions: PairMotion,
+    tau: FloatArray,
+    degrees: float,
+    seed: int,
+    inertias: Inertias,
+    separate: bool,
+) -> Interaction:
+    """Draw noise, and find the springs of poses or, where there are many, of a recording."""
+    own, other = measured(motions, tau, degrees, np.random.default_rng(seed))
+    if len(own) < 1000:
+        problem = interaction_problem(
+            pair.robot,
+            own,
+            pair.other,
+            other,
+            pair.ties,
+            position_noise=np.radians(degrees),
+            inertias=inertias,
+            separate=separate,
+        )
+        return identify_interaction(problem, TORQUE_NOISE)
+    recordings = recorded(own), recorded(other)
+    return identify_interaction(
+        recorded_interaction_problem(
+            pair.robot,
+            recordings[0],
+            pair.other,
+            recordings[1],
+            pair.ties,
+            inertias=inertias,
+            separate=separate,
+        )
+    )
+
+
+def measured(
+    motions: PairMotion, tau: FloatArray, degrees: float, rng: np.random.Generator
+) -> PairMotion:
+    """Return a motion with noisy angles and torques."""
+    own, other = (
+        replace(m, q=m.q + np.radians(degrees) * rng.normal(size=m.q.shape)) for m in motions
+    )
+    return PairMotion(own.with_torque(tau + TORQUE_NOISE * rng.normal(size=tau.shape)), other)
+
+
+def recorded(motion: Motion) -> Recording:
+    """Return a motion as a sensor records it."""
+    return Recording(joints=motion.joints, t=motion.t, q=motion.q, tau=motion.tau)
