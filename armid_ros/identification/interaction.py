@@ -135,7 +135,7 @@ def identify_interaction(
             f'{1e3 * problem.typical_way:.2g} mm; filter them, or move more'
         )
     freedom = max(1, problem.tau.size - len(theta))
-    misfit = _loss(problem, theta, used)
+    misfit = _misfit(problem, theta, used)
     excess = max(1.0, misfit / freedom)
     names = tuple(
         ParameterName('interaction_stiffness', joint, 'N/m') for joint in problem.spring_joints
@@ -176,6 +176,8 @@ def _compensated(
     matrix -= np.einsum('nipx,niqx->pq', problem.columns_by_motion, each)
     aim = np.einsum('nip,ni->p', weighted, problem.tau - problem.known)
     aim += np.einsum('nipx,nix->p', each, problem.known_by_motion)
+    matrix += problem.precision
+    aim += problem.precision @ problem.described
     size = np.sqrt(np.abs(np.diag(matrix)))
     return np.asarray(np.linalg.solve(matrix / np.outer(size, size), aim / size) / size)
 
@@ -208,6 +210,11 @@ def _scaled(
 
 
 def _loss(problem: InteractionProblem, theta: FloatArray, variance: FloatArray) -> float:
+    away = theta - problem.described
+    return _misfit(problem, theta, variance) + float(away @ problem.precision @ away)
+
+
+def _misfit(problem: InteractionProblem, theta: FloatArray, variance: FloatArray) -> float:
     covariance = _noise(problem, problem.sensitivity(theta), variance)
     residual = problem.residual(theta)
     pull = np.linalg.solve(covariance, residual[..., np.newaxis])[..., 0]
@@ -260,7 +267,9 @@ def _gauss_newton(
     correction = np.einsum('nij,ni->nj', by_motion @ problem.motion_noise, pull)
     columns = problem.columns + np.einsum('nipj,nj->nip', problem.columns_by_motion, correction)
     information = np.einsum('nip,niq->pq', columns, np.linalg.solve(covariance, columns))
+    information += problem.precision
     gradient = np.einsum('nip,ni->p', columns, pull)
+    gradient += problem.precision @ (problem.described - theta)
     size = np.sqrt(np.diag(information))
     step = np.linalg.solve(information / np.outer(size, size), gradient / size) / size
     return np.asarray(step), np.asarray(information), np.asarray(columns), np.asarray(pull)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from armid_ros.effects.load import described_spread
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.signals import (
@@ -16,6 +17,7 @@ from armid_ros.identification.signals import (
     decimated_samples,
 )
 from armid_ros.model import (
+    BaseParameters,
     group_columns,
     inverse_dynamics,
     inverse_dynamics_derivatives,
@@ -27,6 +29,7 @@ from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
 from scipy import signal
 
 #: A column of which others leave less than this share is not told apart from them.
@@ -40,6 +43,8 @@ _LAGS = 6
 Inertias = Literal['known', 'free']
 #: Arrays of a problem that have its samples first.
 STACKED = ('tau', 'known', 'columns', 'known_by_motion', 'columns_by_motion')
+#: The others.
+_ALIKE = ('motion_lags', 'torque_lags', 'torque_noise', 'described', 'precision')
 
 
 @dataclass(frozen=True)
@@ -72,6 +77,11 @@ class InteractionProblem:
         The joint that moves each; empty for all at once.
     rigid : tuple of ParameterName
         The combinations of inertias that are free.
+    described : ndarray, shape (P,)
+        Parameters as the machine's description has them; zero where it says nothing.
+    precision : ndarray, shape (P, P)
+        How strongly it is believed. Of columns that are hardly more than noise any value explains
+        the torques, the larger the better; it keeps them to what a body can have.
     typical_way : float
         How far springs are drawn out, root mean square [m].
 
@@ -88,11 +98,13 @@ class InteractionProblem:
     segments: tuple[str, ...]
     spring_joints: tuple[str, ...]
     rigid: tuple[ParameterName, ...]
+    described: FloatArray
+    precision: FloatArray
     typical_way: float
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in (*STACKED, 'motion_lags', 'torque_lags', 'torque_noise'):
+        for name in (*STACKED, *_ALIKE):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
@@ -176,13 +188,18 @@ def interaction_problem(
         springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))
     count = springs_by.shape[3] // 3
     rigid: tuple[ParameterName, ...] = ()
+    described, precision = np.zeros(0), np.zeros((0, 0))
     if inertias == 'known':
         known = inverse_dynamics(robot, motion)
         known_by = _placed(np.stack(inverse_dynamics_derivatives(robot, slow), axis=2), count)
         columns, columns_by = springs, springs_by
     else:
         body = regressor(robot, motion)
-        independent, rigid = _told_apart(robot, body, springs, ties, separate)
+        base = _told_apart(robot, body, springs, ties, separate)
+        independent, rigid = base.independent, base.parameters
+        described = base.values(robot.rigid_parameters)
+        spread = base.grouping * described_spread(robot).ravel()
+        precision = np.linalg.inv(spread @ spread.T)
         known = np.zeros_like(motion.tau)
         known_by = np.zeros((*slow.q.shape, 3 * count))
         columns = np.concatenate([springs, body[:, :, independent]], axis=2)
@@ -206,6 +223,8 @@ def interaction_problem(
         tuple(tie.name for tie in ties) if separate else ('all',),
         tuple(tie.joint for tie in ties) if separate else ('',),
         rigid,
+        np.concatenate([np.zeros(springs.shape[2]), described]),
+        scipy.linalg.block_diag(np.zeros((springs.shape[2],) * 2), precision),
         float(np.sqrt(np.mean(np.sum(geometry.way**2, axis=2)))),
     )
 
@@ -238,7 +257,7 @@ def _torque_passed(used: Conditioning) -> FloatArray:
 
 def _told_apart(
     robot: Robot, body: FloatArray, springs: FloatArray, ties: Sequence[Tie], separate: bool
-) -> tuple[npt.NDArray[np.intp], tuple[ParameterName, ...]]:
+) -> BaseParameters:
     """Return the rigid columns that the motion tells apart beside the springs."""
     names = rigid_parameter_names(robot)
     base = group_columns(body.reshape(-1, body.shape[2]), names, _RANK_TOLERANCE)
@@ -253,7 +272,7 @@ def _told_apart(
             f'{name}: this motion does not tell its stiffness from weight and inertia; '
             'keep the inertias known, or move more'
         )
-    return base.independent, base.parameters
+    return base
 
 
 def _springs_by_motion(

@@ -118,6 +118,8 @@ def _with_springs(problem: InteractionProblem, kept: npt.NDArray[np.intp]) -> In
         problem,
         columns=problem.columns[:, :, columns],
         columns_by_motion=problem.columns_by_motion[:, :, columns],
+        described=problem.described[columns],
+        precision=problem.precision[np.ix_(columns, columns)],
         segments=tuple(problem.segments[k] for k in kept),
         spring_joints=tuple(problem.spring_joints[k] for k in kept),
     )
