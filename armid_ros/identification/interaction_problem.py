@@ -29,8 +29,8 @@ from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 from scipy import signal
+import scipy.linalg
 
 #: A column of which others leave less than this share is not told apart from them.
 _RANK_TOLERANCE = 1e-6
@@ -188,7 +188,8 @@ def interaction_problem(
         springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))
     count = springs_by.shape[3] // 3
     rigid: tuple[ParameterName, ...] = ()
-    described, precision = np.zeros(0), np.zeros((0, 0))
+    described: FloatArray = np.zeros(0)
+    precision: FloatArray = np.zeros((0, 0))
     if inertias == 'known':
         known = inverse_dynamics(robot, motion)
         known_by = _placed(np.stack(inverse_dynamics_derivatives(robot, slow), axis=2), count)
