@@ -19,11 +19,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator
+import copy
 from dataclasses import replace
+import sys
 import time
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
+from armid_ros.estimate import ParameterName
 from armid_ros.identification.change import Change
 from armid_ros.identification.change_watch import BLOCK, ChangeSettings
 from armid_ros.identification.online import OnlineIdentifier
@@ -35,6 +38,7 @@ import numpy as np
 from scipy import signal
 
 from benchmarks.change_information import Noise, Visibility, visibility
+from benchmarks.change_tally import Tally
 
 
 def ball(mass: float) -> str:
@@ -120,23 +124,45 @@ def coloured(count: int, joints: int, rate: float, rng: np.random.Generator) -> 
     return np.asarray(NOISE * signal.lfilter([1.0], [1.0, -keep], white, axis=0))
 
 
+def moving_arm(seed: int, duration: float, rate: float = RATE) -> tuple[SimulatedArm, FloatArray]:
+    """Return an arm that begins to move, and noise for each sample of its torques."""
+    rng = np.random.default_rng(seed)
+    motion = working_motion(duration + _RAMP, 1.0, rng)
+    plant = Plant(arm_with(*IDENTIFIED, *LACKING), dt=1.0 / rate)
+    simulated = SimulatedArm(plant, rng=rng, sensors=SENSORS, start=motion.q[0])
+    simulated.set_trajectory(motion)
+    return simulated, coloured(round(duration * rate), len(motion.joints), rate, rng)
+
+
+def sampled(simulated: SimulatedArm, noise: FloatArray) -> Iterator[Sample]:
+    """Let an arm go on, one sample for every row of noise."""
+    for more in noise:
+        sample = simulated.advance()
+        yield sample.t, sample.q, sample.tau + more
+
+
+def changed(change: str) -> ArmModel:
+    """Return the simulated arm after a change."""
+    arm = arm_with(*IDENTIFIED, *LACKING)
+    return arm.with_effect(*parse_effect(change, arm.robot))
+
+
+def size(change: str) -> dict[ParameterName, float]:
+    """Return what is added to which parameter by a change."""
+    effect, values = parse_effect(change, load_robot('humanoid_arm'))
+    names = effect.parameters(load_robot('humanoid_arm'))
+    return dict(zip(names, values, strict=True))
+
+
 def changing(
     change: str, seed: int, before: float = BEFORE, after: float = AFTER, rate: float = RATE
 ) -> Iterator[Sample]:
     """Let the arm move and change at the time `before`."""
-    rng = np.random.default_rng(seed)
-    arm = arm_with(*IDENTIFIED, *LACKING)
-    motion = working_motion(before + after + _RAMP, 1.0, rng)
-    plant = Plant(arm, dt=1.0 / rate)
-    simulated = SimulatedArm(plant, rng=rng, sensors=SENSORS, start=motion.q[0])
-    simulated.set_trajectory(motion)
-    count, at = round((before + after) * rate), round(before * rate)
-    more = coloured(count, len(motion.joints), rate, rng)
-    for k in range(count):
-        if k == at:
-            simulated.become(arm.with_effect(*parse_effect(change, arm.robot)))
-        sample = simulated.advance()
-        yield sample.t, sample.q, sample.tau + more[k]
+    simulated, noise = moving_arm(seed, before + after, rate)
+    count = round(before * rate)
+    yield from sampled(simulated, noise[:count])
+    simulated.become(changed(change))
+    yield from sampled(simulated, noise[count:])
 
 
 def unchanging(minutes: int, seed: int, rate: float = RATE) -> Iterator[Sample]:
@@ -155,13 +181,20 @@ def unchanging(minutes: int, seed: int, rate: float = RATE) -> Iterator[Sample]:
             yield 60.0 * minute + t, q, torque
 
 
-def watch(
-    samples: Iterator[Sample], tell: Callable[[float, Change], None] | None = None
-) -> OnlineIdentifier:
-    """Identify online; what is not given is unknown."""
+def identifier() -> OnlineIdentifier:
+    """Return an identifier to which what is not given is unknown."""
     nothing = replace(arm_with(*IDENTIFIED, 'torque_offset'), values=())
-    online = OnlineIdentifier(nothing, rng=np.random.default_rng(0))
-    seen = 0
+    return OnlineIdentifier(nothing, rng=np.random.default_rng(0))
+
+
+def watch(
+    samples: Iterator[Sample],
+    tell: Callable[[float, Change], None] | None = None,
+    online: OnlineIdentifier | None = None,
+) -> OnlineIdentifier:
+    """Identify online, and tell of changes as they are named."""
+    online = online or identifier()
+    seen = len(online.changes)
     for t, q, tau in samples:
         online.update(t, q, None, tau)
         if len(online.changes) > seen:
@@ -182,40 +215,46 @@ def what_can_be_seen(change: str, seed: int) -> Visibility:
         for part in (motion.q, motion.dq, motion.ddq)
     )
     moving = Motion(motion.joints, t, *parts)
-    changed = arm.with_effect(*parse_effect(change, arm.robot))
     noise = Noise(NOISE, NOISE, np.exp(-1.0 / (COLOUR * RATE)))
     chance = BLOCK / ChangeSettings().false_alarm_time
-    more = changed.torque(moving) - arm.torque(moving)
+    more = changed(change).torque(moving) - arm.torque(moving)
     return visibility(more, 1.0 / RATE, noise, WANTED, chance)
 
 
 def print_changes(draws: int) -> None:
     """Print how soon every change is seen and could be, and what is said."""
-    rows = []
-    for change in CHANGES:
-        print(change)
-        delays = []
-        for seed in range(draws):
-            can = what_can_be_seen(change, seed)
+    delays = np.full((len(CHANGES), draws, 3), np.nan)
+    tally = Tally()
+    for seed in range(draws):
+        arm, noise = moving_arm(seed, BEFORE + AFTER)
+        count = round(BEFORE * RATE)
+        learned = watch(sampled(arm, noise[:count]))
+        print(f'draw {seed}: {len(learned.changes)} alarms before the change')
+        for k, change in enumerate(CHANGES):
+            can, truth = what_can_be_seen(change, seed), size(change)
+            simulated, online = copy.deepcopy((arm, learned))
+            simulated.become(changed(change))
             told: list[tuple[float, Change]] = []
-            watch(changing(change, seed), lambda t, c, told=told: told.append((t, c)))
+            after = sampled(simulated, noise[count:])
+            watch(after, lambda t, c, told=told: told.append((t, c)), online)
+            print(f'{change}; the best test: after {can.delay:.1f} s')
             for t, found in told:
-                print(f'  seen after {t - BEFORE:.2f} s: {found}')
+                remark = tally.add(truth, found) if found is told[0][1] else '(once more)'
+                print(f'  seen after {t - BEFORE:.2f} s: {found} {remark}')
             if not told:
                 print('  not seen')
-            print(f'  the best test: after {can.delay:.1f} s', flush=True)
-            delays.append((told[0][0] - BEFORE if told else np.nan, can.delay, can.smallest))
-        seen, could, share = np.array(delays).T
-        rows.append(
+            seen = told[0][0] - BEFORE if told else np.nan
+            delays[k, seed] = seen, can.delay, can.smallest
+            sys.stdout.flush()
+    print(f'\n{tally}')
+    print(f'after {BEFORE:g} s of motion; wanted: seen within {WANTED:g} s; -: not in {AFTER:g} s')
+    print('| change | seen after [s] | best test [s] | smallest share seen in 2 s |')
+    print('|---|---|---|---|')
+    for change, (seen, could, share) in zip(CHANGES, delays.transpose(0, 2, 1), strict=True):
+        print(
             f'| {change.split("=")[0].split(":")[0]} {change.split("=")[1].split(",")[0]:5s} | '
             f'{_listed(seen, 2)} | {_listed(could, 1)} | {_listed(100.0 * share, 0)} % |'
         )
-    print(
-        f'\nafter {BEFORE:g} s of motion; wanted: seen within {WANTED:g} s; -: not in {AFTER:g} s'
-    )
-    print('| change | seen after [s] | best test [s] | smallest share seen in 2 s |')
-    print('|---|---|---|---|')
-    print('\n'.join(rows))
 
 
 def _listed(values: FloatArray, digits: int) -> str:

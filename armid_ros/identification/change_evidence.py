@@ -47,6 +47,8 @@ class Block:
         c = W^T tau.
     before : Learned
         What was known when it began.
+    asked : Learned
+        What the estimator that is asked for its parameters knew then.
     samples : tuple of (rows, tau, weights)
         What it was made of, to learn from it once more.
 
@@ -57,6 +59,7 @@ class Block:
     information: FloatArray
     right: FloatArray
     before: Learned
+    asked: Learned
     samples: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]
 
 
@@ -95,7 +98,9 @@ class Evidence:
         return np.asarray(covariance @ self.score[some]), np.asarray(covariance)
 
 
-def evidence(blocks: Sequence[Block], before: Learned, directions: FloatArray) -> Evidence:
+def evidence(
+    blocks: Sequence[Block], before: Learned, directions: FloatArray, loudness: float = 1.0
+) -> Evidence:
     """
     Weigh possible changes by a window of rows.
 
@@ -107,11 +112,13 @@ def evidence(blocks: Sequence[Block], before: Learned, directions: FloatArray) -
         What was known before it.
     directions : ndarray, shape (P, Q)
         What the changes do to the parameters.
+    loudness : float
+        Noise of what was learned before, in the unit of the window's.
 
     """
     information = np.sum([block.information for block in blocks], axis=0)
     right = np.sum([block.right for block in blocks], axis=0)
-    known = before.root.T @ before.root
+    known = before.root.T @ before.root / loudness**2
     scale = 1.0 / np.sqrt(np.diag(known) + np.diag(information))
     both = scale[:, np.newaxis] * (known + information) * scale + _NOTHING * np.eye(len(scale))
     factor = linalg.cho_factor(both, check_finite=False)

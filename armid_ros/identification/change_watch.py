@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate
+from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.change import Candidate, Change
 from armid_ros.identification.change_evidence import Block, Evidence, evidence
 from armid_ros.identification.loudness import Loudness
@@ -43,7 +43,7 @@ _LEAST_NOISE = 0.01
 _CLEAR = 5.0
 #: Of two begins of a change that differ by less the later one is taken: soon after a change any
 #: begin before it will do, and all that can be told apart by then is not much.
-_ALIKE = 2.0
+_ALIKE = 4.0
 #: For so long after a change its size is still being learned [s]; what is less likely than this
 #: share of it corrects the size.
 _LEARNING = 10.0
@@ -80,6 +80,8 @@ class ChangeWatch:
     ----------
     estimator : RecursiveLeastSquares
         Learns.
+    beside : sequence of ParameterName
+        What the rows hold behind its parameters, which is learned for the tests alone.
     candidates : sequence of Candidate
         What may change.
     settings : ChangeSettings, optional
@@ -95,17 +97,20 @@ class ChangeWatch:
     def __init__(
         self,
         estimator: RecursiveLeastSquares,
+        beside: tuple[ParameterName, ...],
         candidates: Sequence[Candidate],
         settings: ChangeSettings | None = None,
     ) -> None:
         settings = settings or ChangeSettings()
         self._estimator = estimator
+        self._wider = estimator.with_more(beside)
+        self._asked = len(estimator.parameters)
         self._candidates = tuple(candidates)
         sizes = [len(c.parameters) for c in self._candidates]
         ends = np.cumsum(sizes)
         self._slices = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
         self._sizes = np.array(sizes, dtype=float)
-        self._directions = np.hstack([c.directions for c in self._candidates])
+        self._directions = self._among_all(np.hstack([c.directions for c in self._candidates]))
         tests = len(sizes) * len(_LENGTHS)
         self._chance = BLOCK / settings.false_alarm_time / tests
         self.reset()
@@ -113,6 +118,7 @@ class ChangeWatch:
     def reset(self) -> None:
         """Forget what noise usually does, and all changes."""
         self.changes: list[Change] = []
+        self._wider.reset()
         self._loudness = Loudness(_LEAST_NOISE if self._estimator.noise_is_relative else 1.0)
         sizes, places = self._sizes.astype(int).tolist(), {c.joint for c in self._candidates}
         self._usual = {m: UsualSize(sizes, m, len(places)) for m in _LENGTHS}
@@ -124,7 +130,7 @@ class ChangeWatch:
         self._blocks: deque[Block] = deque(maxlen=_KEPT)
         self._waiting: deque[dict[int, Weighed]] = deque()
         self._samples: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-        self._before: Learned | None = None
+        self._before: tuple[Learned, Learned] | None = None
         self._begin = 0.0
 
     def update(
@@ -137,16 +143,27 @@ class ChangeWatch:
         ----------
         t : float
             Time of the sample [s].
-        rows, tau, weights : ndarray, shapes (m, P), (m,), (m,)
+        rows : ndarray, shape (m, P + K)
+            Sensitivities to its parameters and to those beside them.
+        tau, weights : ndarray, shapes (m,), (m,)
             As for the estimator.
 
         """
         if self._before is not None and t - self._begin >= BLOCK:
             self._end_block(t)
         if self._before is None:
-            self._before, self._begin = self._estimator.learned(), t
+            self._before, self._begin = (self._wider.learned(), self._estimator.learned()), t
         self._samples.append((rows, tau, weights))
-        return self._estimator.update(rows, tau, weights)
+        return self._learn(rows, tau, weights)
+
+    def _learn(self, rows: FloatArray, tau: FloatArray, weights: FloatArray) -> FloatArray:
+        self._wider.update(rows, tau, weights)
+        return self._estimator.update(rows[:, : self._asked], tau, weights)
+
+    def _among_all(self, directions: FloatArray) -> FloatArray:
+        """Return directions in the parameters of the estimator in those of the wider one."""
+        more = len(self._wider.parameters) - self._asked
+        return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
     def _end_block(self, t: float) -> None:
         assert self._before is not None
@@ -154,9 +171,9 @@ class ChangeWatch:
         scale = np.array([self._estimator.scale(w) for w in weights])
         w, y = scale[..., np.newaxis] * rows, scale * tau
         loudness = self._loudness.value
-        self._loudness.learn(y - w @ self._before.values, weights)
+        self._loudness.learn(y - w @ self._before[0].values, weights)
         sums = _normal(w / loudness[:, np.newaxis], y / loudness)
-        block = Block(self._begin, t, *sums, self._before, tuple(self._samples))
+        block = Block(self._begin, t, *sums, *self._before, tuple(self._samples))
         self._blocks.append(block)
         self._samples, self._before = [], None
         weighed = {m: self._weigh(m) for m in _LENGTHS if m <= len(self._blocks)}
@@ -172,7 +189,8 @@ class ChangeWatch:
         """Weigh the blocks from one on against what was known before it, or another one."""
         blocks = list(self._blocks)
         known = blocks[first if before is None else before].before
-        return evidence(blocks[first:], known, self._directions)
+        usual = float(np.exp(np.mean(np.log(self._loudness.value))))
+        return evidence(blocks[first:], known, self._directions, usual)
 
     def _weigh(self, length: int) -> Weighed:
         """Return how large the statistics of a window of blocks are, and what it can show."""
@@ -187,10 +205,10 @@ class ChangeWatch:
         count = len(self._blocks)
         starts = range(count - 1)
         likelihood = np.array([self._likelihood(self._ratios(self._window(k))) for k in starts])
-        of_start = likelihood.max(axis=1)
-        first = int(np.flatnonzero(of_start > of_start.max() - _ALIKE)[-1])
-        seen, at = count - first, likelihood[first]
+        at = likelihood.max(axis=0)
         best = int(np.argmax(at))
+        first = int(np.flatnonzero(likelihood[:, best] > at[best] - _ALIKE)[-1])
+        seen = count - first
         near = np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))
         if at[best] > self._least_likelihood() and seen >= _EARLIEST:
             alike = [self._candidates[k] for k in near]
@@ -231,11 +249,13 @@ class ChangeWatch:
         change = Change(best, tuple(rivals), blocks[first].begin, blocks[-1].end, size)
         self.changes.append(change)
         self._fresh = change.detected, likelihood
-        self._estimator.restore(blocks[before].before)
+        self._wider.restore(blocks[before].before)
+        self._wider.reopen(self._among_all(change.reopened))
+        self._estimator.restore(blocks[before].asked)
         self._estimator.reopen(change.reopened)
         for block in blocks[after:]:
             for sample in block.samples:
-                self._estimator.update(*sample)
+                self._learn(*sample)
         self.interrupt()
 
 

@@ -18,6 +18,7 @@ from armid_ros.identification.causal import (
 )
 from armid_ros.identification.change import Change, change_candidates
 from armid_ros.identification.change_watch import ChangeSettings, ChangeWatch
+from armid_ros.identification.friction_beside import by_joint, FrictionBeside
 from armid_ros.identification.recursive import RecursiveLeastSquares
 from armid_ros.identification.score_variance import ScoreVariance
 from armid_ros.model import BaseParameters
@@ -179,8 +180,13 @@ class OnlineIdentifier:
         self._scores = ScoreVariance(window, settings.forgetting)
         self._watch = None
         if settings.changes is not None:
-            candidates = change_candidates(arm, self.base)
-            self._watch = ChangeWatch(self._estimator, candidates, settings.changes)
+            self._beside = FrictionBeside(arm)
+            self._watch = ChangeWatch(
+                self._estimator,
+                self._beside.parameters,
+                change_candidates(arm, self.base),
+                settings.changes,
+            )
         self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
         self._held = np.array([joint in held for joint in robot.joints])
@@ -297,20 +303,20 @@ class OnlineIdentifier:
     def _learn(
         self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_]
     ) -> OnlineSample:
-        rows = self._rows(motion)
-        n, rank = rows.shape
-        stacked = np.concatenate([rows, motion.tau[:, np.newaxis]], axis=1).reshape(-1)
-        filtered = self._row_filter.update(step, stacked)[2].reshape(n, rank + 1)
-        rows, measured = filtered[:, :rank], filtered[:, rank]
+        stacked = np.column_stack([motion.tau, self._rows(motion), self._rows_beside(motion)])
+        filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
+        measured, rows, beside = np.split(filtered, [1, 1 + self.base.rank], axis=1)
+        measured = measured[:, 0]
         gain, independent = self._noise_of_row(step)
         stamp = motion.t - (self.delay or 0.0)
         weights = np.asarray(used * independent)
-        sample = rows / gain, measured / gain, weights
+        sample = measured / gain, weights
         if self._watch is None:
-            innovation = self._estimator.update(*sample)
+            innovation = self._estimator.update(rows / gain, *sample)
         else:
             known = len(self._watch.changes)
-            innovation = self._watch.update(stamp, *sample)
+            wider = np.hstack([rows, by_joint(beside)]) / gain
+            innovation = self._watch.update(stamp, wider, *sample)
             for change in self._watch.changes[known:]:
                 self._scores.reopen(change.reopened, self._estimator.values)
         scale = self._estimator.scale(weights) / gain
@@ -326,6 +332,12 @@ class OnlineIdentifier:
         one = Motion(robot.joints, np.array([motion.t]), q[None], dq[None], ddq[None])
         effects = self.arm.effect_columns(one)[0]
         return np.concatenate([rigid, effects], axis=1).take(self.base.independent, axis=1)
+
+    def _rows_beside(self, motion: CausalMotion) -> FloatArray:
+        """Return what the search for changes learns beside, joint by joint, shape (n, K)."""
+        if self._watch is None:
+            return np.empty((len(motion.q), 0))
+        return self._beside.torques(motion.q, motion.dq, motion.ddq)
 
     def _noise_of_row(self, step: float) -> tuple[float, float]:
         """

@@ -16,6 +16,7 @@ that what a strong burst of motion taught is forgotten late by the weak motion a
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
@@ -125,6 +126,19 @@ class RecursiveLeastSquares:
         # without a prior the first P observations fit exactly and say nothing of the noise
         self._initial_freedom = -float(len(parameters)) if prior is None else 0.0
         self.reset()
+
+    def with_more(self, parameters: tuple[ParameterName, ...]) -> RecursiveLeastSquares:
+        """Return an estimator in its beginning, of more parameters that nothing is known of."""
+        more, (root, right) = len(parameters), self._prior
+        wider = copy(self)
+        wider.parameters = self.parameters + parameters
+        wider._prior = (
+            scipy.linalg.block_diag(root, np.eye(more) / PRIOR_STD),
+            np.concatenate([right, np.zeros((more, 1))]),
+        )
+        wider._initial_freedom = self._initial_freedom - float(more)
+        wider.reset()
+        return wider
 
     def reset(self) -> None:
         """Return to the prior."""

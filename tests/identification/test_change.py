@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.change import change_candidates
 from armid_ros.identification.change_evidence import Block, evidence
@@ -32,7 +34,8 @@ def learned_and_block(
         estimator.update(row[np.newaxis], np.atleast_1d(row @ TRUTH + rng.normal()))
     w = rng.normal(size=(60, 5))
     tau = w @ (TRUTH + delta * CHANGED[:, 0]) + rng.normal(size=60)
-    block = Block(0.0, 1.0, w.T @ w, w.T @ tau, estimator.learned(), ())
+    known = estimator.learned()
+    block = Block(0.0, 1.0, w.T @ w, w.T @ tau, known, known, ())
     return estimator, block, w, tau
 
 
@@ -47,6 +50,16 @@ def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows():
     expected = np.linalg.lstsq(both, aim, rcond=None)[0][-1]
     assert found[0] == pytest.approx(expected, rel=1e-6)
     assert covariance[0, 0] == pytest.approx(np.linalg.inv(both.T @ both)[-1, -1], rel=1e-6)
+
+
+def test_what_was_learned_in_another_unit_of_noise_is_as_certain():
+    rng = np.random.default_rng(6)
+    _, block, w, tau = learned_and_block(rng, 0.7, seen=5)
+    loud = replace(block, information=w.T @ w / 9.0, right=w.T @ tau / 9.0)
+    found, covariance = evidence([loud], block.before, CHANGED, 3.0).size(slice(0, 1))
+    expected, certain = evidence([block], block.before, CHANGED).size(slice(0, 1))
+    assert found[0] == pytest.approx(expected[0], rel=1e-6)
+    assert covariance[0, 0] == pytest.approx(9.0 * certain[0, 0], rel=1e-6)
 
 
 def test_without_a_change_the_ratio_is_chi_square():

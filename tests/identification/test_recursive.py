@@ -250,3 +250,15 @@ def test_bad_settings_are_refused():
         RecursiveLeastSquares(names(2), prior=Estimate(names(2), np.zeros(2), np.zeros((2, 2))))
     with pytest.raises(IdentificationError, match='start'):
         RecursiveLeastSquares(names(2), start=[1.0, 2.0, 3.0])
+
+
+def test_with_more_parameters_it_begins_anew_and_equals_batch_of_all():
+    """Whatever it had learned, and its own estimate is not touched."""
+    rows, tau, _ = linear_data(np.random.default_rng(13))
+    estimator = feed(RecursiveLeastSquares(names(8)[:5], NOISE), rows[:, :, :5], tau)
+    before = estimator.estimate
+    wider = feed(estimator.with_more(names(8)[5:]), rows, tau)
+    assert wider.parameters == names(8)
+    w, y = weighted(rows, tau)
+    np.testing.assert_allclose(wider.values, np.linalg.lstsq(w, y)[0], rtol=1e-6)
+    np.testing.assert_array_equal(estimator.values, before.values)
