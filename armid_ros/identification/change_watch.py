@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
@@ -44,6 +44,8 @@ _CLEAR = 5.0
 #: Of two begins of a change that differ by less the later one is taken: soon after a change any
 #: begin before it will do, and all that can be told apart by then is not much.
 _ALIKE = 4.0
+#: Blocks whose residuals are remembered: a minute of four a second.
+_REMEMBERED = 240
 #: For so long after a change its size is still being learned [s]; what is less likely than this
 #: share of it corrects the size.
 _LEARNING = 10.0
@@ -121,6 +123,7 @@ class ChangeWatch:
         self._wider.reset()
         self._loudness = Loudness(_LEAST_NOISE if self._estimator.noise_is_relative else 1.0)
         sizes, places = self._sizes.astype(int).tolist(), {c.joint for c in self._candidates}
+        self._left: deque[float] = deque(maxlen=_REMEMBERED)
         self._usual = {m: UsualSize(sizes, m, len(places)) for m in _LENGTHS}
         self._fresh = -np.inf, 0.0
         self.interrupt()
@@ -168,10 +171,12 @@ class ChangeWatch:
     def _end_block(self, t: float) -> None:
         assert self._before is not None
         rows, tau, weights = (np.stack(part) for part in zip(*self._samples, strict=True))
-        scale = np.array([self._estimator.scale(w) for w in weights])
-        w, y = scale[..., np.newaxis] * rows, scale * tau
+        w, y = self._scaled(rows, weights), self._scaled(tau, weights)
         loudness = self._loudness.value
-        self._loudness.learn(y - w @ self._before[0].values, weights)
+        residual = y - w @ self._before[0].values
+        self._loudness.learn(residual, weights)
+        if weights.any():
+            self._left.append(float(np.sum((residual / loudness) ** 2) / np.sum(weights)))
         sums = _normal(w / loudness[:, np.newaxis], y / loudness)
         block = Block(self._begin, t, *sums, *self._before, tuple(self._samples))
         self._blocks.append(block)
@@ -247,16 +252,45 @@ class ChangeWatch:
         usual = np.nanmax([u.factors[self._candidates.index(best)] for u in self._usual.values()])
         size = Estimate(best.parameters, values, covariance * usual)
         change = Change(best, tuple(rivals), blocks[first].begin, blocks[-1].end, size)
-        self.changes.append(change)
+        self._learn_again(blocks[before], blocks[after:], change.reopened)
+        louder = self._louder(blocks[after:], change.reopened.shape[1])
+        self.changes.append(
+            replace(change, size=replace(size, covariance=louder * size.covariance))
+        )
         self._fresh = change.detected, likelihood
-        self._wider.restore(blocks[before].before)
-        self._wider.reopen(self._among_all(change.reopened))
-        self._estimator.restore(blocks[before].asked)
-        self._estimator.reopen(change.reopened)
-        for block in blocks[after:]:
+        self.interrupt()
+
+    def _learn_again(self, last: Block, since: Sequence[Block], reopened: FloatArray) -> None:
+        """Return to what was known when a block began, and learn what may have changed anew."""
+        self._wider.restore(last.before)
+        self._wider.reopen(self._among_all(reopened))
+        self._estimator.restore(last.asked)
+        self._estimator.reopen(reopened)
+        for block in since:
             for sample in block.samples:
                 self._learn(*sample)
-        self.interrupt()
+
+    def _louder(self, blocks: Sequence[Block], free: int) -> float:
+        """
+        Return how much larger squares of residuals are than usual, 1 at least.
+
+        A change shakes the arm, and its motion is none that the parameters were learned from.
+
+        """
+        squares = count = 0.0
+        for block in blocks:
+            rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
+            residual = self._scaled(tau - rows @ self._wider.values, weights)
+            squares += float(np.sum((residual / self._loudness.value) ** 2))
+            count += float(np.sum(weights))
+        if not self._left or count <= free:
+            return 1.0
+        return max(1.0, squares / (count - free) / float(np.median(self._left)))
+
+    def _scaled(self, values: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return torques (k, m) or rows (k, m, P) in units of the assumed noise."""
+        scale = np.array([self._estimator.scale(w) for w in weights])
+        return np.asarray(values * scale.reshape(*scale.shape, *[1] * (values.ndim - scale.ndim)))
 
 
 def _normal(rows: FloatArray, tau: FloatArray) -> tuple[FloatArray, FloatArray]:

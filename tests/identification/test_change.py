@@ -7,8 +7,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.estimate import ParameterName
-from armid_ros.identification.change import change_candidates
+from armid_ros.identification.change import Candidate, change_candidates
 from armid_ros.identification.change_evidence import Block, evidence
+from armid_ros.identification.change_watch import ChangeWatch
 from armid_ros.identification.recursive import RecursiveLeastSquares
 from armid_ros.identification.usual_size import UsualSize, Weighed
 import numpy as np
@@ -202,3 +203,26 @@ def test_a_statistic_with_rare_large_values_is_judged_by_those():
     large = Weighed(np.full(6, 65.0), strength)
     assert np.all(plain.excess(large, 1e-8) > 1.0)
     assert np.all(spiky.excess(large, 1e-8) < plain.excess(large, 1e-8))
+
+
+def test_a_window_that_the_model_fits_worse_than_usual_says_less_of_the_size():
+    """The same change, and noise three times as loud from then on."""
+    rng, truth = np.random.default_rng(7), np.array([1.0, -2.0, 0.5])
+    parameters = tuple(ParameterName(f'p{k}', '', '') for k in range(3))
+    step = np.array([[0.0], [0.0], [1.0]])
+    candidate = Candidate('payload', 'hand', parameters[2:], step, step)
+    widths = []
+    rows, noise = rng.normal(size=(6000, 4, 3)), rng.normal(size=(6000, 4))
+    for louder in (1.0, 3.0):
+        watch = ChangeWatch(RecursiveLeastSquares(parameters, np.ones(4)), (), [candidate])
+        for k in range(6000):
+            after = k >= 5000
+            now = truth + 5.0 * after * step[:, 0]
+            tau = rows[k] @ now + noise[k] * (louder if after else 1.0)
+            watch.update(0.005 * k, rows[k], tau, np.ones(4))
+        (change,) = watch.changes
+        assert change.t == pytest.approx(25.0, abs=0.26)
+        lower, upper = change.size.interval()[0]
+        assert lower < 5.0 < upper
+        widths.append(upper - lower)
+    assert 2.0 < widths[1] / widths[0] < 4.0  # one window may be a block longer
