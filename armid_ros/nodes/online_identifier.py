@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 import time
@@ -35,6 +35,14 @@ from std_msgs.msg import String
 _LOOK_PERIOD = 0.1
 #: Update times that are kept for diagnostics.
 _TIMED = 2000
+#: What is said of joint states that are left out, or begin a new stretch.
+_DISTURBANCES = {
+    'out_of_order': 'joint states whose stamp is not after that of the one before are left out; '
+    'do two nodes publish them?',
+    'no_velocity': 'joint states without velocity are left out: measured_velocity asks for it',
+    'jump_back': 'joint states jump back in time: the filters begin anew',
+    'dropout': 'joint states are missing for longer than max_gap: the filters begin anew',
+}
 
 
 class OnlineIdentifierNode(ArmidNode):
@@ -74,7 +82,7 @@ class OnlineIdentifierNode(ArmidNode):
         self.update_times: deque[float] = deque(maxlen=_TIMED)
         self._description: str | None = None
         self._published = -1
-        self._restarts = 0
+        self._disturbed: Counter[str] = Counter()
         if identifier is None and self.value('robot'):
             identifier = make_identifier(self.value)
         if identifier is not None:
@@ -144,10 +152,10 @@ class OnlineIdentifierNode(ArmidNode):
             values |= {'update_p50_us': float(p50), 'update_p99_us': float(p99)}
         values |= {f'left out {reason}': n for reason, n in identifier.rejected.items()}
         values |= {f'restarted {reason}': n for reason, n in identifier.restarts.items()}
-        restarts = sum(identifier.restarts.values())
-        if restarts > self._restarts:
-            self.complaints.say('time', f'joint states jump in time: {dict(identifier.restarts)}')
-        self._restarts = restarts
+        counted = Counter(identifier.rejected) + Counter(identifier.restarts)
+        for reason in (counted - self._disturbed).keys() & _DISTURBANCES.keys():
+            self.complaints.say(reason, _DISTURBANCES[reason])
+        self._disturbed = counted
         self._begin_statistics()
         return self._trouble(identifier), values
 

@@ -242,6 +242,19 @@ def test_a_jump_back_in_time_is_said_and_survived(bench, arm, samples, expected)
     )
 
 
+def test_messages_out_of_order_are_said_and_left_out(bench, arm, samples):
+    diagnostics = bench.diagnostics()
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    batch = messages(arm, samples)[:200]
+    batch[100], batch[101] = batch[101], batch[100]
+    batch[150], batch[151] = batch[151], batch[150]
+    publish(bench, node, publisher, batch)
+    bench.diagnose(node, diagnostics)
+    assert any('stamp is not after' in d.status[0].message for d in diagnostics)
+    assert node.identifier.rejected['out_of_order'] == 2
+
+
 def test_messages_without_a_stamp_are_taken_at_the_clock(bench, arm, samples):
     node = identifying(bench)
     publisher = bench.matched_publisher(JointState, 'joint_states')
