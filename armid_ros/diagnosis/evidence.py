@@ -16,6 +16,7 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.period import find_period
+from armid_ros.diagnosis.tied_noise import SensorNoise
 from armid_ros.effects.timing import smoothed
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.signals import (
@@ -58,6 +59,8 @@ class Trajectory:
         Samples of the motion that the rows sit on.
     told : ndarray of bool, shape (M, n)
         False where a joint rests or turns round: friction is undetermined there.
+    sensors : SensorNoise or None
+        What their noise does beside another machine; None where there is none.
 
     """
 
@@ -67,6 +70,7 @@ class Trajectory:
     used: Conditioning
     rows: npt.NDArray[np.intp]
     told: npt.NDArray[np.bool_]
+    sensors: SensorNoise | None = None
 
     def reduce(self, values: FloatArray) -> FloatArray:
         """Filter and decimate samples (N, ...) to rows (M, ...)."""
@@ -93,9 +97,14 @@ class Trajectory:
         return self.motion.t[self.rows]
 
 
-def trajectories(recordings: Sequence[Recording], used: Conditioning) -> list[Trajectory]:
+def trajectories(
+    recordings: Sequence[Recording], used: Conditioning, arm: ArmModel | None = None
+) -> list[Trajectory]:
     """
     Cut recordings into unbroken stretches, conditioned alike.
+
+    Where another machine was recorded beside the arm, what noise of the angles does to it is
+    measured as well.
 
     Raises
     ------
@@ -111,6 +120,9 @@ def trajectories(recordings: Sequence[Recording], used: Conditioning) -> list[Tr
                 f'{recording.source}: no stretch is long enough to be filtered at '
                 f'{used.cutoff_hz:g} Hz'
             )
+        if recording.beside is not None and arm is not None:
+            sensors = SensorNoise.of(arm, recording, used)
+            found = [replace(part, sensors=sensors) for part in found]
         result += found
     return result
 

@@ -77,8 +77,10 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> Floor:
     half = (len(taps) - 1) // 2
     smooth = signal.fftconvolve(left, taps[:, np.newaxis], mode='same', axes=0)
     found = trajectory.period
+    least = 0.0 if trajectory.sensors is None else trajectory.sensors.floor(arm)
     if found is None:
-        return Floor(_assumed(trajectory, smooth), None, np.ones(motion.n_joints))
+        sigma = np.maximum(_assumed(trajectory, smooth), least)
+        return Floor(sigma, None, np.ones(motion.n_joints))
     lag, where = found
     first = np.arange(max(where.start, half), min(where.stop, len(motion) - lag - half))
     rows = first[:: trajectory.used.decimation]
@@ -89,9 +91,8 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> Floor:
         sigma[joint] = np.sqrt(np.sum(rest[used] ** 2) / freedom / 2.0)
         rest, used = _difference(trajectory, left, first, lag, joint)
         structure[joint] = _structure(np.where(used, rest, 0.0), trajectory.used.rate_hz)
-    return Floor(
-        np.maximum(sigma, _least(sigma)), lag * float(motion.t[1] - motion.t[0]), structure
-    )
+    sigma = np.maximum(np.maximum(sigma, _least(sigma)), least)
+    return Floor(sigma, lag * float(motion.t[1] - motion.t[0]), structure)
 
 
 def _difference(

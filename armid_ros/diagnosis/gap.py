@@ -90,7 +90,7 @@ def measure_gap(
     """Measure the gap on recordings to be predicted, else on each part of the data in turn."""
     before, after = explanation.reference.arm, explanation.fitted.arm
     if validate:
-        unseen = trajectories(validate, used)
+        unseen = trajectories(validate, used, before)
         sigma = [noise_floor(part, after).sigma for part in unseen]
         overlays = [
             _overlay(part, s, before, after) for part, s in zip(unseen, sigma, strict=True)

@@ -25,12 +25,11 @@ from armid_ros.diagnosis.problem import make_problem, project
 from armid_ros.diagnosis.remembering import remembering
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
+from armid_ros.identification.interaction_search import LEAST_Z
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: A value so many standard deviations above zero is there: a chance of 3e-5 for each.
-_LEAST_Z = 4.0
 #: Squares over noise that slack has to take: z > 5.
 _LEAST_GAIN = 25.0
 #: Golden sections of a common slack around the best of those that are tried.
@@ -57,6 +56,8 @@ class Ties:
         What of the arm is fitted with them; None takes it as described.
     settings : DiagnosisSettings
         Thresholds.
+    sure : frozenset of str
+        Joints whose ties are surely there, whatever least squares say.
 
     """
 
@@ -66,6 +67,7 @@ class Ties:
     sigma: tuple[FloatArray, ...]
     base: BaseParameters | None
     settings: DiagnosisSettings
+    sure: frozenset[str] = frozenset()
 
     def find(self) -> tuple[Ties, Fitted]:
         """
@@ -98,16 +100,16 @@ class Ties:
         taut = self.surely([self._plain(joint) for joint in joints])
         kept = list(joints)
         slack, values, z = self._common_slack(kept)
-        while len(kept) > 1 and min(z) < _LEAST_Z:
+        while len(kept) > 1 and min(z) < LEAST_Z:
             kept.pop(int(np.argmin(z)))
             slack, values, z = self._common_slack(kept)
-        if min(z) < _LEAST_Z:
+        if min(z) < LEAST_Z:
             return taut
         loose = [self._loose(joint, slack) for joint in kept]
         found = self.fitted(loose, self._start(loose, values))
         sure = _certainty(found, last=True)
         named = [
-            own if z >= _LEAST_Z else self._plain(own.effect.joints[0])
+            own if z >= LEAST_Z else self._plain(own.effect.joints[0])
             for own, z in zip(found.named, sure, strict=True)
         ]
         if named != list(found.named):
@@ -132,7 +134,9 @@ class Ties:
             weak = [
                 (z, k)
                 for k, (own, z) in enumerate(zip(fitted.named, _certainty(fitted), strict=True))
-                if isinstance(own.effect, Tied) and not z >= _LEAST_Z
+                if isinstance(own.effect, Tied)
+                and not z >= LEAST_Z
+                and own.effect.joints[0] not in self.sure
             ]
             if not weak:
                 return fitted
@@ -187,7 +191,7 @@ class Ties:
             replace(own, kept=(0, 1)) if spring else own
             for own, spring in zip(fitted.named, springs, strict=True)
         ]
-        sure = [z >= _LEAST_Z for z in _certainty(self.fitted(both), last=True)]
+        sure = [z >= LEAST_Z for z in _certainty(self.fitted(both), last=True)]
         named = [
             more if spring and there else own
             for own, more, spring, there in zip(fitted.named, both, springs, sure, strict=True)

@@ -33,6 +33,7 @@ def explain_tied(
     sigma: Sequence[FloatArray],
     base: BaseParameters,
     settings: DiagnosisSettings,
+    sure: frozenset[str] = frozenset(),
 ) -> tuple[Explanation, list[FloatArray]] | None:
     """
     Explain a gap by ties to a machine beside the arm, and by what is named in what they leave.
@@ -51,6 +52,8 @@ def explain_tied(
         What a fit frees, so that a wrong mass is not taken for a spring.
     settings : DiagnosisSettings
         Thresholds and library.
+    sure : frozenset of str
+        Joints whose ties are surely there.
 
     Returns
     -------
@@ -62,7 +65,7 @@ def explain_tied(
         None if there is no tie.
 
     """
-    ties, fitted = Ties(arm, partner, tuple(data), tuple(sigma), base, settings).find()
+    ties, fitted = Ties(arm, partner, tuple(data), tuple(sigma), base, settings, sure).find()
     if not fitted.named:
         return None
     noise = list(ties.sigma)

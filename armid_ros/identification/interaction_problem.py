@@ -127,6 +127,12 @@ class InteractionProblem:
         spring = np.einsum('nipj,p->nij', self.columns_by_motion, theta)
         return np.asarray(self.known_by_motion + spring)
 
+    def deviation(self, theta: FloatArray) -> FloatArray:
+        """Return what noise gives the residuals, root mean square, shape (n,) [N m]."""
+        by_motion = self.sensitivity(theta)
+        angles = np.sum(by_motion @ self.motion_noise * by_motion, axis=2)
+        return np.asarray(np.sqrt(np.mean(angles, axis=0) + self.torque_noise**2))
+
 
 def interaction_problem(
     robot: Robot,
@@ -200,7 +206,7 @@ def interaction_problem(
         independent, rigid = base.independent, base.parameters
         described = base.values(robot.rigid_parameters)
         spread = base.grouping * described_spread(robot).ravel()
-        precision = np.linalg.inv(spread @ spread.T)
+        precision = np.asarray(np.linalg.inv(spread @ spread.T))
         known = np.zeros_like(motion.tau)
         known_by = np.zeros((*slow.q.shape, 3 * count))
         columns = np.concatenate([springs, body[:, :, independent]], axis=2)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import comb
 
@@ -80,61 +80,108 @@ def recorded_interaction_problem(
         If there are no torques, no common time, or too little of it.
 
     """
-    both = _together(recording, other, other_recording, ties)
+    if recording.tau is None:
+        raise IdentificationError(f'{recording.source}: {recording.topic} has no effort')
+    together = recorded_together(recording, other_recording, other, ties)
     settings = settings or SignalSettings()
-    used = conditioning([both], settings)
-    used = band_of_motion([both], used, settings)
-    noise = _white(both.q)
-    n = len(recording.joints)
+    both = _one_machine(together)
+    used = band_of_motion([both], conditioning([both], settings), settings)
+    return together_interaction_problem(
+        robot, together, used, inertias=inertias, separate=separate, slack=slack
+    )
+
+
+def together_interaction_problem(
+    robot: Robot,
+    recording: Recording,
+    used: Conditioning,
+    *,
+    inertias: Inertias = 'known',
+    separate: bool = False,
+    slack: float = 0.0,
+    rest: Callable[[Motion], FloatArray] | None = None,
+) -> InteractionProblem:
+    """
+    Set up the regression on a recording with the other machine beside it.
+
+    Parameters
+    ----------
+    robot : Robot
+        The machine whose torques were measured.
+    recording : Recording
+        Of it, with torques, and with the other one and their ties beside it.
+    used : Conditioning
+        Filters.
+    inertias, separate, slack
+        As of `recorded_interaction_problem`.
+    rest : callable, optional
+        Torque along a motion of what else acts on the machine, such as friction, shape (N, n)
+        [N m].
+
+    Raises
+    ------
+    IdentificationError
+        If there is too little of it.
+
+    """
+    beside, n = recording.beside, len(recording.joints)
+    assert beside is not None
+    both = _one_machine(recording)
     assert both.tau is not None
-    torque_noise = _white(both.tau[:, :n])
-    problems = [
-        interaction_problem(
-            robot,
-            _joints(stretch, slice(0, n), recording.joints),
-            other,
-            _joints(stretch, slice(n, None), other_recording.joints),
-            ties,
-            position_noise=noise,
-            torque_noise=torque_noise,
-            used=used,
-            inertias=inertias,
-            separate=separate,
-            slack=slack,
+    noise, torque_noise = _white(both.q), _white(both.tau[:, :n])
+    problems = []
+    for stretch, own in zip(segments(both, used), segments(recording, used), strict=True):
+        assert own.tau is not None
+        tau = own.tau if rest is None else own.tau - rest(own)
+        problems.append(
+            interaction_problem(
+                robot,
+                own.with_torque(tau),
+                beside.robot,
+                _joints(stretch, slice(n, None), both.joints[n:]),
+                beside.ties,
+                position_noise=noise,
+                torque_noise=torque_noise,
+                used=used,
+                inertias=inertias,
+                separate=separate,
+                slack=slack,
+            )
         )
-        for stretch in segments(both, used)
-    ]
     if not problems:
         raise IdentificationError(
             f'{recording.source}: no stretch is long enough for a filter of '
             f'{used.cutoff_hz:.3g} Hz'
         )
-    return problems[0] if len(problems) == 1 else _stacked(problems)
+    return stacked(problems)
 
 
-def _stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
-    """Put stretches together; all are of the same columns, or there is no one problem."""
+def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
+    """
+    Put stretches or recordings together.
+
+    Raises
+    ------
+    IdentificationError
+        If they do not free the same inertias.
+
+    """
     if any(part.rigid != problems[0].rigid for part in problems):
         raise IdentificationError('a stretch between gaps moves too little to free the inertias')
     joined = {name: np.concatenate([getattr(part, name) for part in problems]) for name in STACKED}
     return replace(problems[0], **joined)  # type: ignore[arg-type]
 
 
-def _together(
-    recording: Recording, other: Robot, other_recording: Recording, ties: Sequence[Tie]
-) -> Recording:
-    """Return one recording of both machines' joints at the stamps of the first."""
-    if recording.tau is None:
-        raise IdentificationError(f'{recording.source}: {recording.topic} has no effort')
-    own = recorded_together(recording, other_recording, other, ties)
-    assert own.beside is not None and own.tau is not None
-    far = own.beside.q
+def _one_machine(recording: Recording) -> Recording:
+    """Return a recording and what is beside it as of one machine, without torques of the other."""
+    assert recording.beside is not None and recording.tau is not None
+    far = recording.beside.q
     return replace(
-        own,
-        joints=(*own.joints, *other_recording.joints),
-        q=np.hstack([own.q, far]),
+        recording,
+        joints=(*recording.joints, *recording.beside.robot.joints),
+        q=np.hstack([recording.q, far]),
         dq=None,
-        tau=np.hstack([own.tau, np.zeros_like(far)]),
+        tau=np.hstack([recording.tau, np.zeros_like(far)]),
         beside=None,
     )
 

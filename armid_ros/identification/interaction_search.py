@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 #: A stiffness so many standard deviations above zero is there: a chance of 3e-5 for each.
-_LEAST_Z = 4.0
+LEAST_Z = 4.0
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,8 @@ class InteractionFinding:
     gap_before, gap_after : ndarray, shape (n,)
         Held-out residual of every joint without springs and with those found, root mean square
         [N m].
+    gap_noise : ndarray, shape (n,)
+        What noise of torques and angles makes of it with those found [N m].
 
     """
 
@@ -55,11 +57,15 @@ class InteractionFinding:
     z: FloatArray
     gap_before: FloatArray
     gap_after: FloatArray
+    gap_noise: FloatArray
 
     @property
     def closed_fraction(self) -> float:
-        """Share of the held-out gap, as a mean square, that the springs close."""
-        before, after = (float(np.sum(gap**2)) for gap in (self.gap_before, self.gap_after))
+        """Share of the held-out gap beyond the noise, as a mean square, that the springs close."""
+        before, after = (
+            float(np.sum(np.maximum(gap**2 - self.gap_noise**2, 0.0)))
+            for gap in (self.gap_before, self.gap_after)
+        )
         return 1.0 - after / before if before > 0.0 else 0.0
 
 
@@ -71,7 +77,7 @@ def find_interaction(
     held_out: tuple[Recording, Recording],
     *,
     inertias: Inertias = 'free',
-    least_z: float = _LEAST_Z,
+    least_z: float = LEAST_Z,
 ) -> InteractionFinding:
     """
     Look for springs between two machines.
@@ -101,17 +107,20 @@ def find_interaction(
     everywhere = identify_interaction(seen)
     z = everywhere.stiffness / everywhere.std
     kept = np.flatnonzero(z > least_z)
-    unsprung = _held_out_gap(seen, unseen, kept[:0])
+    loose, aim = with_springs(seen, kept[:0]), with_springs(unseen, kept[:0])
+    theta = _plain(loose)
+    before = _gap(aim, theta)
     if not len(kept):
-        return InteractionFinding((), None, everywhere, z, unsprung, unsprung)
-    named = identify_interaction(_with_springs(seen, kept))
+        return InteractionFinding((), None, everywhere, z, before, before, aim.deviation(theta))
+    named = identify_interaction(with_springs(seen, kept))
+    aim, theta = with_springs(unseen, kept), named.estimate.values
     return InteractionFinding(
-        named.segments, named, everywhere, z, unsprung, _held_out_gap(seen, unseen, kept)
+        named.segments, named, everywhere, z, before, _gap(aim, theta), aim.deviation(theta)
     )
 
 
-def _with_springs(problem: InteractionProblem, kept: npt.NDArray[np.intp]) -> InteractionProblem:
-    """Return the problem with some of its springs only."""
+def with_springs(problem: InteractionProblem, kept: npt.NDArray[np.intp]) -> InteractionProblem:
+    """Return a problem with some of its springs only."""
     springs = len(problem.segments)
     columns = [*kept.tolist(), *range(springs, problem.columns.shape[2])]
     return replace(
@@ -125,21 +134,13 @@ def _with_springs(problem: InteractionProblem, kept: npt.NDArray[np.intp]) -> In
     )
 
 
-def _held_out_gap(
-    seen: InteractionProblem, unseen: InteractionProblem, kept: npt.NDArray[np.intp]
-) -> FloatArray:
-    """Fit to what was seen, and return the residual of what was not, shape (n,) [N m]."""
-    fitted, aim = _with_springs(seen, kept), _with_springs(unseen, kept)
-    if fitted.columns.shape[2] == 0:
-        theta = np.zeros(0)
-    elif not len(kept):
-        theta = _plain(fitted)
-    else:
-        theta = identify_interaction(fitted).estimate.values
-    return np.asarray(np.sqrt(np.mean(aim.residual(theta) ** 2, axis=0)))
+def _gap(problem: InteractionProblem, theta: FloatArray) -> FloatArray:
+    """Return the residual of every joint, root mean square, shape (n,) [N m]."""
+    return np.asarray(np.sqrt(np.mean(problem.residual(theta) ** 2, axis=0)))
 
 
 def _plain(problem: InteractionProblem) -> FloatArray:
+    """Fit inertias alone, if they are free, by least squares."""
     w = problem.columns.reshape(-1, problem.columns.shape[2])
     scale = np.linalg.norm(w, axis=0)
     aim = (problem.tau - problem.known).ravel()
