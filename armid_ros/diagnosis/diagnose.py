@@ -25,7 +25,7 @@ from armid_ros.diagnosis.model_search import as_described, explain, Explanation,
 from armid_ros.diagnosis.pattern import find_pattern, Pattern
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.tied_search import explain_tied, within_its_noise
-from armid_ros.diagnosis.tied_values import sure_ties, without_bias
+from armid_ros.diagnosis.tied_values import TieRegression
 from armid_ros.diagnosis.verdict import decide, Finding, Verdict
 from armid_ros.diagnosis.where import locate, Where
 from armid_ros.diagnosis.wrong_body import wrong_body
@@ -181,14 +181,13 @@ def diagnose(
     found = None
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
-        sure = sure_ties(arm, recordings, used, settings)
-        found = explain_tied(arm, settings.partner, data, sigma, base, settings, sure)
+        ties = TieRegression(arm, tuple(recordings), used, settings)
+        found = explain_tied(arm, settings.partner, data, sigma, base, settings, ties)
         found = found or within_its_noise(arm, data, as_told, settings)
     if found is None:
         chosen = _explained(arm, data, (sigma, as_told), base, settings, tell)
     else:
         chosen, sigma = found
-        chosen = without_bias(chosen, recordings, used, arm, data, sigma)
     chosen, remarks = as_bodies(chosen, arm, data, sigma, settings)
     notes += remarks
     pattern = None if chosen.steps else find_pattern(chosen, arm, data, sigma)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects.tied import Tied
+from armid_ros.effects.tied import Tied, TiedSlack
 from armid_ros.identification.interaction_problem import InteractionProblem
 from armid_ros.identification.interaction_recording import together_interaction_problem
 from armid_ros.identification.signals import Conditioning
@@ -42,9 +42,16 @@ class SensorNoise:
         return SensorNoise(together_interaction_problem(arm.robot, recording, used, separate=True))
 
     def floor(self, arm: ArmModel) -> FloatArray:
-        """Return the standard deviation of a row beside an arm with its ties, (n,) [N m]."""
+        """
+        Return the standard deviation of a row beside an arm with its ties, (n,) [N m].
+
+        Zero where straps have slack: across them they hold less than springs would.
+
+        """
         stiffness = dict.fromkeys(self.problem.spring_joints, 0.0)
         for effect, values in zip(arm.effects, arm.values, strict=True):
+            if isinstance(effect, TiedSlack):
+                return np.zeros(arm.robot.n_joints)
             if isinstance(effect, Tied):
                 each = len(values) // len(effect.joints)
                 stiffness.update(zip(effect.joints, values[::each].tolist(), strict=True))

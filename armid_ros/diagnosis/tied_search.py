@@ -20,6 +20,7 @@ from armid_ros.diagnosis.search import next_step, Step, Survey
 from armid_ros.diagnosis.selection import Score, Trial, try_group
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.tied import Ties
+from armid_ros.diagnosis.tied_values import TieRegression
 from armid_ros.effects.tied import Partner, Tied
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -33,7 +34,7 @@ def explain_tied(
     sigma: Sequence[FloatArray],
     base: BaseParameters,
     settings: DiagnosisSettings,
-    sure: frozenset[str] = frozenset(),
+    regression: TieRegression,
 ) -> tuple[Explanation, list[FloatArray]] | None:
     """
     Explain a gap by ties to a machine beside the arm, and by what is named in what they leave.
@@ -52,8 +53,8 @@ def explain_tied(
         What a fit frees, so that a wrong mass is not taken for a spring.
     settings : DiagnosisSettings
         Thresholds and library.
-    sure : frozenset of str
-        Joints whose ties are surely there.
+    regression : TieRegression
+        The same recordings for the ties alone, with what noise of angles does to them.
 
     Returns
     -------
@@ -65,6 +66,7 @@ def explain_tied(
         None if there is no tie.
 
     """
+    sure = regression.sure()
     ties, fitted = Ties(arm, partner, tuple(data), tuple(sigma), base, settings, sure).find()
     if not fitted.named:
         return None
@@ -77,8 +79,10 @@ def explain_tied(
             return None
         if len(fitted.named) < len(found.fitted.named):
             found = _without(found, fitted, ties)
-    described = explain(arm, data, noise, None, settings, 0)
-    return as_described(found, described, arm, data, noise, settings), noise
+    if regression.described(found):
+        described = explain(arm, data, noise, None, settings, 0)
+        found = as_described(found, described, arm, data, noise, settings)
+    return regression.without_bias(found, data, noise), noise
 
 
 def within_its_noise(

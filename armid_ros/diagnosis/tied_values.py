@@ -1,17 +1,18 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Stiffnesses of ties that were named, without what noisy angles take away from them.
+Ties of a diagnosis as ``armid exo`` looks at them, who knows what noisy angles do to springs.
 
-A search compares least squares of all causes, in which springs are too soft by a little. What is
-named at last is identified as ``armid exo`` does.
+A search compares least squares of all causes. Springs are too soft by a little in them, and soft
+ones beside stiff ones are missed: noise of angles is alike in all joints, which least squares
+joint by joint do not know.
 
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
@@ -33,123 +34,124 @@ import numpy as np
 
 #: A tie so many standard deviations above zero may well be there.
 _DOUBTFUL = 1.0
+#: Squares over noise that each inertia has to take for its description to be wrong: one by chance,
+#: two where filters make neighbours alike.
+_TOLD = 5.0
+_KINDS: tuple[Inertias, ...] = ('known', 'free')
 
 
-def sure_ties(
-    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, settings: DiagnosisSettings
-) -> frozenset[str]:
+@dataclass(frozen=True)
+class TieRegression:
     """
-    Return the joints whose ties are surely there, if ties and inertias leave nothing but noise.
+    Recordings of an arm and of a machine beside it, as a regression of the ties.
 
-    Noise of angles is alike in all joints, which least squares joint by joint do not know: they
-    miss a soft strap beside others.
-
-    """
-    try:
-        problem = _problem(arm, arm, recordings, used, 'free')
-        found = identify_interaction(problem)
-    except IdentificationError:
-        return frozenset()
-    if found.misfit > settings.partial_loss * problem.tau.size:
-        return frozenset()
-    z = found.stiffness / found.std
-    sure = {joint for k, joint in enumerate(problem.spring_joints) if z[k] > LEAST_Z}
-    return frozenset(sure - _tied_joints(arm))
-
-
-def without_bias(
-    explanation: Explanation,
-    recordings: Sequence[Recording],
-    used: Conditioning,
-    arm: ArmModel,
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
-) -> Explanation:
-    """
-    Return an explanation whose springs are without what noisy angles take away from them.
-
-    Parameters
+    Attributes
     ----------
-    explanation : Explanation
-        What was found; as it is if no springs are among it, or straps with slack are.
-    recordings : sequence of Recording
-        With what was beside the arm.
-    used : Conditioning
-        Filters of the data.
     arm : ArmModel
         The arm as described.
-    data : sequence of Trajectory
-        The data.
-    sigma : sequence of ndarray, each (n,)
-        Noise [N m].
+    recordings : tuple of Recording
+        With what was beside it.
+    used : Conditioning
+        Filters of the data.
+    settings : DiagnosisSettings
+        Thresholds.
 
     """
-    ties = [own.effect for own in explanation.fitted.named if isinstance(own.effect, Tied)]
-    springs = [tie for tie in ties if isinstance(tie, TiedInteraction)]
-    if not springs or len(springs) < len(ties):
-        return explanation
-    try:
-        found = _identified(explanation, springs, recordings, used, arm)
-    except IdentificationError:
-        return explanation
-    fitted = _with_springs(explanation, found, data, sigma)
-    return replace(explanation, fitted=fitted, losses=joint_losses_of(fitted, data, sigma))
 
+    arm: ArmModel
+    recordings: tuple[Recording, ...]
+    used: Conditioning
+    settings: DiagnosisSettings
 
-def _identified(
-    explanation: Explanation,
-    springs: Sequence[TiedInteraction],
-    recordings: Sequence[Recording],
-    used: Conditioning,
-    arm: ArmModel,
-) -> Interaction:
-    """
-    Identify the springs, with the inertias free if they were; all else stays as fitted.
+    def sure(self) -> frozenset[str]:
+        """Return joints with ties surely there, if ties and inertias leave nothing but noise."""
+        try:
+            problem = self._problem(self.arm, 'free')
+            found = identify_interaction(problem)
+        except IdentificationError:
+            return frozenset()
+        if found.misfit > self.settings.partial_loss * problem.tau.size:
+            return frozenset()
+        z = found.stiffness / found.std
+        sure = {joint for k, joint in enumerate(problem.spring_joints) if z[k] > LEAST_Z}
+        return frozenset(sure - _tied_joints(self.arm))
 
-    Ties that may well be there are identified beside them: a strap too weak to be named pulls all
-    the same, and would be taken for a part of those that are.
+    def described(self, explanation: Explanation) -> bool:
+        """Return whether inertias as described explain the torques as well as fitted ones do."""
+        known, free = (self._identified(explanation, kind) for kind in _KINDS)
+        if known is None or free is None:
+            return True
+        freed = len(free.estimate.values) - len(free.segments)
+        noise = max(1.0, free.misfit / free.residual.size)
+        return known.misfit - free.misfit < _TOLD * freed * noise
 
-    """
-    bare = explanation.fitted.arm
-    for effect in springs:
-        theta = bare.theta.copy()
-        theta[_place(effect.parameters(arm.robot)[0], bare.parameters)] = 0.0
-        bare = bare.with_theta(theta)
-    problem = _problem(
-        arm, bare, recordings, used, 'known' if explanation.base is None else 'free'
-    )
-    everywhere = identify_interaction(problem)
-    named = {effect.joints[0] for effect in springs}
-    there = _tied_joints(arm)
-    kept = [
-        k
-        for k, joint in enumerate(problem.spring_joints)
-        if joint in named
-        or (joint not in there and everywhere.stiffness[k] > _DOUBTFUL * everywhere.std[k])
-    ]
-    return identify_interaction(with_springs(problem, np.array(kept)))
+    def without_bias(
+        self, explanation: Explanation, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
+    ) -> Explanation:
+        """
+        Return an explanation whose springs are without what noisy angles take away from them.
 
+        Parameters
+        ----------
+        explanation : Explanation
+            What was found; as it is if no springs are among it, or straps with slack are.
+        data : sequence of Trajectory
+            The data.
+        sigma : sequence of ndarray, each (n,)
+            Noise [N m].
 
-def _problem(
-    arm: ArmModel,
-    bare: ArmModel,
-    recordings: Sequence[Recording],
-    used: Conditioning,
-    inertias: Inertias,
-) -> InteractionProblem:
-    """Set up the regression of all ties on an arm, beside what a bare one has but its body."""
+        """
+        found = self._identified(explanation, 'known' if explanation.base is None else 'free')
+        if found is None:
+            return explanation
+        fitted = _with_springs(explanation, found, data, sigma)
+        return replace(explanation, fitted=fitted, losses=joint_losses_of(fitted, data, sigma))
 
-    def rest(motion: Motion) -> FloatArray:
-        return np.asarray(bare.torque(motion) - inverse_dynamics(bare.robot, motion))
+    def _identified(self, explanation: Explanation, inertias: Inertias) -> Interaction | None:
+        """
+        Identify springs that were named, if all ties among the names are such and data tell them.
 
-    return stacked(
-        [
-            together_interaction_problem(
-                arm.robot, recording, used, inertias=inertias, separate=True, rest=rest
-            )
-            for recording in recordings
-        ]
-    )
+        Ties that may well be there are identified beside them: a strap too weak to be named pulls
+        all the same, and would be taken for a part of those that are. All else stays as fitted.
+
+        """
+        ties = [own.effect for own in explanation.fitted.named if isinstance(own.effect, Tied)]
+        if not ties or not all(isinstance(tie, TiedInteraction) for tie in ties):
+            return None
+        bare = explanation.fitted.arm
+        for effect in ties:
+            theta = bare.theta.copy()
+            theta[_place(effect.parameters(bare.robot)[0], bare.parameters)] = 0.0
+            bare = bare.with_theta(theta)
+        try:
+            problem = self._problem(bare, inertias)
+            everywhere = identify_interaction(problem)
+            named, there = {tie.joints[0] for tie in ties}, _tied_joints(self.arm)
+            doubtful = everywhere.stiffness > _DOUBTFUL * everywhere.std
+            kept = [
+                k
+                for k, joint in enumerate(problem.spring_joints)
+                if joint in named or (joint not in there and doubtful[k])
+            ]
+            return identify_interaction(with_springs(problem, np.array(kept)))
+        except IdentificationError:
+            return None
+
+    def _problem(self, bare: ArmModel, inertias: Inertias) -> InteractionProblem:
+        """Set up the regression of all ties, beside what a bare arm has but its body."""
+
+        def rest(motion: Motion) -> FloatArray:
+            return np.asarray(bare.torque(motion) - inverse_dynamics(bare.robot, motion))
+
+        robot = self.arm.robot
+        return stacked(
+            [
+                together_interaction_problem(
+                    robot, recording, self.used, inertias=inertias, separate=True, rest=rest
+                )
+                for recording in self.recordings
+            ]
+        )
 
 
 def _tied_joints(arm: ArmModel) -> set[str]:
