@@ -121,7 +121,7 @@ def trajectories(
                 f'{used.cutoff_hz:g} Hz'
             )
         if recording.beside is not None and arm is not None:
-            sensors = SensorNoise.of(arm, recording, used)
+            sensors = SensorNoise(arm.robot, recording, used)
             found = [replace(part, sensors=sensors) for part in found]
         result += found
     return result

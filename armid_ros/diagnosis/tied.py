@@ -11,7 +11,7 @@ only what they leave is looked at further.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
@@ -56,8 +56,8 @@ class Ties:
         What of the arm is fitted with them; None takes it as described.
     settings : DiagnosisSettings
         Thresholds.
-    sure : frozenset of str
-        Joints whose ties are surely there, whatever least squares say.
+    sure : callable
+        Tells joints whose ties are surely there with a slack [m], whatever least squares say.
 
     """
 
@@ -67,7 +67,7 @@ class Ties:
     sigma: tuple[FloatArray, ...]
     base: BaseParameters | None
     settings: DiagnosisSettings
-    sure: frozenset[str] = frozenset()
+    sure: Callable[[float], frozenset[str]]
 
     def find(self) -> tuple[Ties, Fitted]:
         """
@@ -100,17 +100,22 @@ class Ties:
         taut = self.surely([self._plain(joint) for joint in joints])
         kept = list(joints)
         slack, values, z = self._common_slack(kept)
-        while len(kept) > 1 and min(z) < LEAST_Z:
-            kept.pop(int(np.argmin(z)))
+        sure = self.sure(slack)
+        while True:
+            weak = [(z[k], k) for k, joint in enumerate(kept) if z[k] < LEAST_Z]
+            weak = [(value, k) for value, k in weak if kept[k] not in sure]
+            if not weak:
+                break
+            kept.pop(min(weak)[1])
+            if not kept:
+                return taut
             slack, values, z = self._common_slack(kept)
-        if min(z) < LEAST_Z:
-            return taut
         loose = [self._loose(joint, slack) for joint in kept]
         found = self.fitted(loose, self._start(loose, values))
-        sure = _certainty(found, last=True)
+        certain = _certainty(found, last=True)
         named = [
-            own if z >= LEAST_Z else self._plain(own.effect.joints[0])
-            for own, z in zip(found.named, sure, strict=True)
+            own if z >= LEAST_Z or joint in sure else self._plain(joint)
+            for own, z, joint in zip(found.named, certain, kept, strict=True)
         ]
         if named != list(found.named):
             found = self.fitted(named)
@@ -128,7 +133,7 @@ class Ties:
 
     def surely(self, named: Sequence[Named]) -> Fitted:
         """Fit, and take ties away, the weakest first, until all are surely there."""
-        kept = list(named)
+        kept, sure = list(named), self.sure(0.0)
         while True:
             fitted = self.fitted(kept)
             weak = [
@@ -136,7 +141,7 @@ class Ties:
                 for k, (own, z) in enumerate(zip(fitted.named, _certainty(fitted), strict=True))
                 if isinstance(own.effect, Tied)
                 and not z >= LEAST_Z
-                and own.effect.joints[0] not in self.sure
+                and own.effect.joints[0] not in sure
             ]
             if not weak:
                 return fitted

@@ -11,6 +11,7 @@ far better than from what two periods of some seconds differ by.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects.tied import Tied, TiedSlack
@@ -19,6 +20,7 @@ from armid_ros.identification.interaction_recording import together_interaction_
 from armid_ros.identification.signals import Conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
+from armid_ros.robots import Robot
 import numpy as np
 
 
@@ -29,30 +31,39 @@ class SensorNoise:
 
     Attributes
     ----------
-    problem : InteractionProblem
-        Of the arm as described, with a spring for every tie.
+    robot : Robot
+        The arm as described.
+    recording : Recording
+        Of it, with what was beside it.
+    used : Conditioning
+        Filters.
 
     """
 
-    problem: InteractionProblem
-
-    @staticmethod
-    def of(arm: ArmModel, recording: Recording, used: Conditioning) -> SensorNoise:
-        """Measure the noise of a recording with something beside it."""
-        return SensorNoise(together_interaction_problem(arm.robot, recording, used, separate=True))
+    robot: Robot
+    recording: Recording
+    used: Conditioning
 
     def floor(self, arm: ArmModel) -> FloatArray:
-        """
-        Return the standard deviation of a row beside an arm with its ties, (n,) [N m].
-
-        Zero where straps have slack: across them they hold less than springs would.
-
-        """
-        stiffness = dict.fromkeys(self.problem.spring_joints, 0.0)
+        """Return the standard deviation of a row beside an arm with its ties, (n,) [N m]."""
+        problem = self._taut
+        stiffness = dict.fromkeys(problem.spring_joints, 0.0)
+        slack = dict.fromkeys(problem.spring_joints, 0.0)
         for effect, values in zip(arm.effects, arm.values, strict=True):
-            if isinstance(effect, TiedSlack):
-                return np.zeros(arm.robot.n_joints)
             if isinstance(effect, Tied):
                 each = len(values) // len(effect.joints)
                 stiffness.update(zip(effect.joints, values[::each].tolist(), strict=True))
-        return self.problem.deviation(np.array(list(stiffness.values())))
+            if isinstance(effect, TiedSlack):
+                slack.update(zip(effect.joints, effect.slacks.tolist(), strict=True))
+        if any(slack.values()):
+            problem = self._problem(np.array(list(slack.values())))
+        return problem.deviation(np.array(list(stiffness.values())))
+
+    @cached_property
+    def _taut(self) -> InteractionProblem:
+        return self._problem(0.0)
+
+    def _problem(self, slack: float | FloatArray) -> InteractionProblem:
+        return together_interaction_problem(
+            self.robot, self.recording, self.used, separate=True, slack=slack
+        )

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.candidates import candidates, Group
@@ -66,7 +67,7 @@ def explain_tied(
         None if there is no tie.
 
     """
-    sure = regression.sure()
+    sure = cache(regression.sure)
     ties, fitted = Ties(arm, partner, tuple(data), tuple(sigma), base, settings, sure).find()
     if not fitted.named:
         return None

@@ -63,10 +63,18 @@ class TieRegression:
     used: Conditioning
     settings: DiagnosisSettings
 
-    def sure(self) -> frozenset[str]:
-        """Return joints with ties surely there, if ties and inertias leave nothing but noise."""
+    def sure(self, slack: float) -> frozenset[str]:
+        """
+        Return joints with ties surely there, if ties and inertias leave nothing but noise.
+
+        Parameters
+        ----------
+        slack : float
+            Way that all ties give before they pull [m].
+
+        """
         try:
-            problem = self._problem(self.arm, 'free')
+            problem = self._problem(self.arm, 'free', slack)
             found = identify_interaction(problem)
         except IdentificationError:
             return frozenset()
@@ -137,7 +145,9 @@ class TieRegression:
         except IdentificationError:
             return None
 
-    def _problem(self, bare: ArmModel, inertias: Inertias) -> InteractionProblem:
+    def _problem(
+        self, bare: ArmModel, inertias: Inertias, slack: float = 0.0
+    ) -> InteractionProblem:
         """Set up the regression of all ties, beside what a bare arm has but its body."""
 
         def rest(motion: Motion) -> FloatArray:
@@ -147,7 +157,13 @@ class TieRegression:
         return stacked(
             [
                 together_interaction_problem(
-                    robot, recording, self.used, inertias=inertias, separate=True, rest=rest
+                    robot,
+                    recording,
+                    self.used,
+                    inertias=inertias,
+                    separate=True,
+                    slack=slack,
+                    rest=rest,
                 )
                 for recording in self.recordings
             ]

@@ -243,7 +243,7 @@ class InterfaceSlack(Attached):
         return values
 
     @property
-    def _loose(self) -> FloatArray:
+    def slacks(self) -> FloatArray:
         """Slack of every strap, shape (k,) [m]."""
         return self.shape_values[:, -1]
 
@@ -263,7 +263,7 @@ class InterfaceSlack(Attached):
         ways = positions - anchors
         pulls = [
             _pulled(ways[:, owner], jacobians[:, owner], slack)
-            for owner, slack in enumerate(self._loose)
+            for owner, slack in enumerate(self.slacks)
         ]
         return np.stack(pulls, axis=2)
 

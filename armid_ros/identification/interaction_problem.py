@@ -146,7 +146,7 @@ def interaction_problem(
     used: Conditioning | None = None,
     inertias: Inertias = 'known',
     separate: bool = False,
-    slack: float = 0.0,
+    slack: float | FloatArray = 0.0,
 ) -> InteractionProblem:
     """
     Set up the regression on motions of both machines.
@@ -170,7 +170,7 @@ def interaction_problem(
         Whether the machine's inertias are those of its description or are estimated as well.
     separate : bool
         Whether every spring has a stiffness of its own, or all have one.
-    slack : float
+    slack : float or ndarray, shape (S,)
         Way that the springs give before they pull [m].
 
     Raises
@@ -288,7 +288,7 @@ def _springs_by_motion(
     other: Robot,
     other_motion: Motion,
     ties: Sequence[Tie],
-    slack: float,
+    slack: float | FloatArray,
 ) -> FloatArray:
     """Return the derivatives of the spring columns, shape (N, n, S, 3 J)."""
     by_q, by_far = tie_columns_derivatives(robot, motion.q, other, other_motion.q, ties, slack)

@@ -48,7 +48,7 @@ def recorded_interaction_problem(
     settings: SignalSettings | None = None,
     inertias: Inertias = 'known',
     separate: bool = False,
-    slack: float = 0.0,
+    slack: float | FloatArray = 0.0,
 ) -> InteractionProblem:
     """
     Set up the regression on recordings, the noise of their angles being measured in them.
@@ -71,7 +71,7 @@ def recorded_interaction_problem(
         Whether the machine's inertias are those of its description or are estimated as well.
     separate : bool
         Whether every spring has a stiffness of its own, or all have one.
-    slack : float
+    slack : float or ndarray, shape (S,)
         Way that the springs give before they pull [m].
 
     Raises
@@ -98,7 +98,7 @@ def together_interaction_problem(
     *,
     inertias: Inertias = 'known',
     separate: bool = False,
-    slack: float = 0.0,
+    slack: float | FloatArray = 0.0,
     rest: Callable[[Motion], FloatArray] | None = None,
 ) -> InteractionProblem:
     """

@@ -79,7 +79,7 @@ class TieGeometry(NamedTuple):
         """Torque of the machine's actuators per stiffness, J^T D, shape (N, n, S) [m^2]."""
         return np.asarray(np.einsum('nsxj,nsx->njs', self.jacobian, self.way))
 
-    def pulled(self, slack: float) -> FloatArray:
+    def pulled(self, slack: float | FloatArray) -> FloatArray:
         """Return the columns of springs that give by a slack [m] before they pull, (N, n, S)."""
         length = np.maximum(np.linalg.norm(self.way, axis=2), _SHORTEST)
         share = np.maximum(1.0 - slack / length, 0.0)
@@ -155,7 +155,7 @@ def tie_columns_derivatives(
     other: Robot,
     other_q: FloatArray,
     ties: Sequence[Tie],
-    slack: float = 0.0,
+    slack: float | FloatArray = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
     """
     Differentiate ``TieGeometry.pulled`` by the positions of both machines.
@@ -168,7 +168,7 @@ def tie_columns_derivatives(
         Their positions.
     ties : sequence of Tie
         Where the springs are.
-    slack : float
+    slack : float or ndarray, shape (S,)
         Way that they give before they pull [m].
 
     Returns
@@ -184,7 +184,7 @@ def tie_columns_derivatives(
         after = tie_geometry(robot, q + step, other, other_q, ties).pulled(slack)
         before = tie_geometry(robot, q - step, other, other_q, ties).pulled(slack)
         by_q[..., j] = (after - before) / (2.0 * _STEP)
-    if slack > 0.0:
+    if np.any(slack):
         by_other = np.empty((*by_q.shape[:3], other.n_joints))
         for j, step in enumerate(_STEP * np.eye(other.n_joints)):
             after = tie_geometry(robot, q, other, other_q + step, ties).pulled(slack)
