@@ -242,10 +242,18 @@ def _name(finding: Finding) -> str:
 
 def _tie(finding: Finding, tie: Tie) -> str:
     shown = [
-        f'{p.name.replace("_", " ")} {value:.4g} +- {std:.1g} {p.unit}'
+        f'{p.name.replace("_", " ")} {_as_sure(value, std)} {p.unit}'
         for p, value, std in finding.of_joint(tie.joint)
     ]
     return f'{tie.name} ({", ".join(shown)})'
+
+
+def _as_sure(value: float, std: float) -> str:
+    """Return a value to the second digit of its deviation, and that."""
+    if not 0.0 < std < np.inf:
+        return f'{value:.4g}'
+    decimals = max(0, 1 - int(np.floor(np.log10(std))))
+    return f'{value:.{decimals}f} +- {std:.{decimals}f}'
 
 
 def _closes(gap: Gap) -> str:

@@ -214,6 +214,29 @@ def test_deviations_that_are_stated_are_those_of_repeats(pair) -> None:
     assert low < ratio < high
 
 
+def test_deviations_of_a_recording_allow_for_samples_that_filters_make_alike(pair) -> None:
+    """As if rows were independent they would be a third too small, half of the variance."""
+    short = measured(pair, stepping(pair, read_gait(), np.arange(0.0, 3.0, 1e-3)))
+    found = [from_recording(pair, short, 0.05, seed) for seed in range(60)]
+    values = np.array([part.stiffness[0] for part in found])
+    stated = np.mean([part.std[0] ** 2 for part in found])
+    low, high = chi2.ppf([0.0005, 0.9995], len(found) - 1) / (len(found) - 1)
+    assert low < values.var(ddof=1) / stated < high
+
+
+def test_inertias_of_links_that_hardly_turn_stay_near_their_description(pair) -> None:
+    """The trunk's inertia is a column of noise: without a belief its best value is infinite."""
+    real = leg_pair(3e3, ('stance_thigh',))
+    own, other = recorded(real, 9)
+    problem = recorded_interaction_problem(
+        pair.robot, own, pair.other, other, pair.ties, inertias='free', separate=True
+    )
+    found = identify_interaction(problem)
+    away = found.estimate.values - problem.described
+    spread = np.sqrt(np.diag(np.linalg.inv(problem.precision[4:, 4:])))
+    assert np.all(np.abs(away[4:]) < 3.0 * spread)
+
+
 def test_no_estimate_is_better_than_the_bound_and_chosen_poses_lower_it(pair) -> None:
     """Four springs of 200 poses: 5.5 per cent at best, of poses of quick steps chosen 2.4."""
     gait = read_gait()

@@ -66,12 +66,15 @@ class Stiffness(Section):
         found = self.found[0]
         angles = np.degrees(found.position_noise)
         return [
-            ('Noise of the angles, as filtered', f'{angles.min():.3f} to {angles.max():.3f}°'),
-            (
-                'Noise of the torques, as filtered',
-                f'{found.torque_noise.min():.2g} to {found.torque_noise.max():.2g} N m',
-            ),
+            ('Noise of the angles, as filtered', f'{_range(angles)}°'),
+            ('Noise of the torques, as filtered', f'{_range(found.torque_noise)} N m'),
         ]
+
+
+def _range(values: FloatArray) -> str:
+    """Return the least and the largest of values to two digits, once if they are alike."""
+    ends = dict.fromkeys(f'{end:.2g}' for end in (values.min(), values.max()))
+    return ' to '.join(ends)
 
 
 @dataclass(frozen=True)
