@@ -212,6 +212,7 @@ class OnlineIdentifierNode(ArmidNode):
     def _tell(self, change: Change) -> None:
         """Publish a change."""
         self._told += 1
+        self._progress.reset()  # what is learned anew has ten seconds, too
         self.get_logger().warning(str(change))
         message = estimate_message(
             change.size, self._require().samples, self._require().condition_number
