@@ -15,13 +15,12 @@ from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.candidates import candidates, Group
-from armid_ros.diagnosis.diagnose import _narrower
 from armid_ros.diagnosis.evidence import trajectories
 from armid_ros.diagnosis.fit import excited, fit
+from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.diagnosis.problem import make_problem, project
 from armid_ros.diagnosis.selection import solve_products
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.identification.signals import conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -51,7 +50,7 @@ def bic_selection(
         Draws the states over which base parameters are found.
 
     """
-    used = _narrower(conditioning(list(recordings), settings.signals), settings)
+    used = choose_filters(recordings, settings)
     data = trajectories(recordings, used)
     base, _ = excited(arm, arm.base_parameters(rng), data)
     one = [np.ones(arm.robot.n_joints)] * len(data)

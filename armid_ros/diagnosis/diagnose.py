@@ -16,13 +16,13 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.bodies import as_bodies
 from armid_ros.diagnosis.evidence import trajectories, Trajectory
-from armid_ros.diagnosis.fit import excited, fit
 from armid_ros.diagnosis.floor import Floor, noise_floor
 from armid_ros.diagnosis.gap import Gap, measure_gap
 from armid_ros.diagnosis.gate import check_data, Gate
 from armid_ros.diagnosis.league import League, make_league
 from armid_ros.diagnosis.model_search import as_described, explain, Explanation, no_worse
 from armid_ros.diagnosis.pattern import find_pattern, Pattern
+from armid_ros.diagnosis.prepare import choose_filters, prepare
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.tied_search import explain_tied, within_its_noise
 from armid_ros.diagnosis.tied_values import TieRegression
@@ -31,8 +31,6 @@ from armid_ros.diagnosis.where import locate, Where
 from armid_ros.diagnosis.wrong_body import wrong_body
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.checks import check_motion
-from armid_ros.identification.interaction_recording import band_of_motion
-from armid_ros.identification.signals import Conditioning, conditioning, MODEL_BANDS
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -41,12 +39,6 @@ import numpy as np
 #: Told the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
-#: A diagnosis keeps six times the band of the motion where an identification keeps ten: what is
-#: beyond is mostly noise, which a gap has to stand out of.
-_BANDS = 6.0
-#: Beside a partner, noise of angles is all there is: the pass band is so much wider than where the
-#: motion sinks into it, or a fit takes inertia away to get rid of the noise of accelerations.
-_NARROW = 1.25
 #: Causes that a model as described may lack before a fit of everything is the better explanation.
 _FIXED_STEPS = 3
 
@@ -152,12 +144,8 @@ def diagnose(
     settings = settings or DiagnosisSettings()
     tell = progress or _silent
     tell(0.02, 'filtering')
-    used = conditioning(list(recordings), settings.signals)
-    if settings.partner is None:
-        used = _narrower(used, settings)
-    else:
-        used = band_of_motion(recordings, used, settings.signals, _NARROW)
-    data = trajectories(recordings, used, arm)
+    used = choose_filters(recordings, settings)
+    data: Sequence[Trajectory] = trajectories(recordings, used, arm)
     gate = check_data(arm, recordings, data)
     faults, notes = list(gate.faults), [*gate.notes]
     try:
@@ -167,12 +155,9 @@ def diagnose(
     if faults:
         return _bad(arm, gate, data, tuple(faults))
     tell(0.1, 'noise floor')
-    base, _ = excited(arm, arm.base_parameters(rng), data)
-    told = [noise_floor(part, arm) for part in data]
-    refit = fit(arm, (), data, [floor.sigma for floor in told], base)
-    floors = [noise_floor(part, refit.arm) for part in data]
-    sigma = [floor.sigma for floor in floors]
-    as_told = [(a if a.period else b).sigma for a, b in zip(told, floors, strict=True)]
+    prepared = prepare(arm, recordings, used, data, settings, rng)
+    data, base, floors = prepared.data, prepared.base, prepared.floors
+    sigma, as_told = prepared.sigma, prepared.as_told
     if any(floor.period is None for floor in floors):
         notes.append(
             'nothing repeats in some recordings: their noise floor is assumed from the upper part '
@@ -181,7 +166,7 @@ def diagnose(
     found = None
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
-        ties = TieRegression(arm, tuple(recordings), used, settings)
+        ties = TieRegression(arm, tuple(recordings), prepared.used, settings)
         found = explain_tied(arm, settings.partner, data, sigma, base, settings, ties)
         found = found or within_its_noise(arm, data, as_told, settings)
     if found is None:
@@ -194,8 +179,8 @@ def diagnose(
     if pattern is not None:
         notes.append(pattern.sentence)
     tell(0.85, 'held-out gap')
-    floors = [noise_floor(part, chosen.fitted.arm) for part in data]
-    gap = measure_gap(chosen, data, floors, validate, used, settings.consistent_loss)
+    floors = tuple(noise_floor(part, chosen.fitted.arm) for part in data)
+    gap = measure_gap(chosen, data, floors, validate, prepared.used, settings.consistent_loss)
     verdict: Verdict = decide(chosen, floors, gap, settings, arm)
     where = locate(
         chosen.reference.arm,
@@ -220,7 +205,7 @@ def diagnose(
         arm=chosen.fitted.arm,
         gate=gate,
         data=tuple(data),
-        floors=tuple(floors),
+        floors=floors,
         not_visible=_not_visible(chosen, settings),
         refitted=chosen.base is not None,
         pattern=pattern,
@@ -256,14 +241,6 @@ def _explained(
     if not chosen.steps and np.all(chosen.losses < settings.consistent_loss):
         return wrong_body(chosen, fixed, arm, data, as_told, settings)
     return chosen
-
-
-def _narrower(used: Conditioning, settings: DiagnosisSettings) -> Conditioning:
-    """Return the filters of an identification, narrowed to what a diagnosis needs."""
-    band = used.rate_hz / (2.5 * MODEL_BANDS * used.decimation)
-    if settings.signals.decimation is None:
-        used = replace(used, decimation=max(1, int(used.rate_hz / (2.5 * _BANDS * band))))
-    return used
 
 
 def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:

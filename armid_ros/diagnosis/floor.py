@@ -45,12 +45,16 @@ class Floor:
         Length of the repeated period [s]; None where nothing repeats.
     structure : ndarray, shape (n,)
         Power of the difference of two periods at low frequency over that at high frequency.
+    growth : ndarray, shape (n,)
+        Power per bin of that difference in the upper third of what rows keep, over that in the
+        lower one: noise of positions grows with frequency on its way through the model.
 
     """
 
     sigma: FloatArray
     period: float | None
     structure: FloatArray
+    growth: FloatArray
 
     @property
     def repeats(self) -> npt.NDArray[np.bool_]:
@@ -80,19 +84,22 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> Floor:
     least = 0.0 if trajectory.sensors is None else trajectory.sensors.floor(arm)
     if found is None:
         sigma = np.maximum(_assumed(trajectory, smooth), least)
-        return Floor(sigma, None, np.ones(motion.n_joints))
+        return Floor(sigma, None, *np.ones((2, motion.n_joints)))
     lag, where = found
     first = np.arange(max(where.start, half), min(where.stop, len(motion) - lag - half))
     rows = first[:: trajectory.used.decimation]
-    sigma, structure = np.empty((2, motion.n_joints))
+    sigma, structure, growth = np.empty((3, motion.n_joints))
+    kept = 0.4 * trajectory.used.rate_hz / trajectory.used.decimation
     for joint in range(motion.n_joints):
         rest, used = _difference(trajectory, smooth, rows, lag, joint)
         freedom = max(1.0, used.sum() - 4.0)
         sigma[joint] = np.sqrt(np.sum(rest[used] ** 2) / freedom / 2.0)
         rest, used = _difference(trajectory, left, first, lag, joint)
-        structure[joint] = _structure(np.where(used, rest, 0.0), trajectory.used.rate_hz)
+        spectrum = _spectrum(np.where(used, rest, 0.0), trajectory.used.rate_hz)
+        structure[joint] = _over(spectrum, (0.0, _SLOW_HZ), _FAST_HZ)
+        growth[joint] = _over(spectrum, (2.0 * kept / 3.0, kept), (kept / 12.0, kept / 3.0))
     sigma = np.maximum(np.maximum(sigma, _least(sigma)), least)
-    return Floor(sigma, lag * float(motion.t[1] - motion.t[0]), structure)
+    return Floor(sigma, lag * float(motion.t[1] - motion.t[0]), structure, growth)
 
 
 def _difference(
@@ -125,15 +132,24 @@ def _between_rows(
     return np.asarray(trajectory.told[nearest, joint])
 
 
-def _structure(difference: FloatArray, rate: float) -> float:
-    """Return the power per bin of what is slow over that of what is fast."""
+def _spectrum(difference: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies [Hz] and the power per bin."""
     length = min(len(difference), int(_WINDOW * rate))
     frequency, power = signal.welch(difference, fs=rate, nperseg=length, detrend=False)
-    slow = power[(frequency > 0.0) & (frequency < _SLOW_HZ)]
-    fast = power[(frequency > _FAST_HZ[0]) & (frequency < _FAST_HZ[1])]
-    if not len(slow) or len(fast) < 3:
+    return frequency, power
+
+
+def _over(
+    spectrum: tuple[FloatArray, FloatArray],
+    band: tuple[float, float],
+    other: tuple[float, float],
+) -> float:
+    """Return the power per bin of one band over that of another; 1 where there are no bins."""
+    frequency, power = spectrum
+    upper, lower = (power[(frequency > low) & (frequency < high)] for low, high in (band, other))
+    if not len(upper) or len(lower) < 3:
         return 1.0
-    return float(np.mean(slow) / max(float(np.mean(fast)), 1e-300))
+    return float(np.mean(upper) / max(float(np.mean(lower)), 1e-300))
 
 
 def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:

@@ -27,6 +27,7 @@ from armid_ros.diagnosis.selection import (
     Trial,
     try_group,
 )
+from armid_ros.effects.interaction import HumanInteraction, InterfaceSlack
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -150,14 +151,15 @@ def next_step(
         promising = refined < _REFINED and score.gain > 0.4 * best
         if score.group.effect.shapes and promising:
             refined += 1
-            score, columns = refine(problem, projection, score, left, work)
-            start = problem.x.shape[2]
-            problem = problem.with_columns(columns)
-            span = slice(start, start + columns.shape[2])
-            score = replace(score, group=replace(score.group, columns=span))
-            columns = problem.x[:, :, span]
+            score, problem = _refined(problem, projection, score, left, work)
+            columns = problem.x[:, :, score.group.columns]
         trials.append(try_group(problem, projection, score, columns, settings))
     trials.sort(key=lambda trial: -trial.gain)
+    for score in _taut(trials[:1], scores):
+        score, problem = _refined(problem, projection, score, left, work)
+        columns = problem.x[:, :, score.group.columns]
+        trials.append(try_group(problem, projection, score, columns, settings))
+        trials.sort(key=lambda trial: -trial.gain)
     passing = [
         trial
         for trial in trials
@@ -182,6 +184,29 @@ def next_step(
     before = joint_losses(problem, left)
     after = joint_losses(problem, left - winner.torque)
     return Step(winner, rivals, league, before, after, tuple(passing)), survey, problem
+
+
+def _refined(
+    problem: Problem, projection: Projection, score: Score, left: FloatArray, work: Workspace
+) -> tuple[Score, Problem]:
+    """Return a group of a better shape, and the problem with its columns behind the others."""
+    score, columns = refine(problem, projection, score, left, work)
+    start = problem.x.shape[2]
+    span = slice(start, start + columns.shape[2])
+    return replace(score, group=replace(score.group, columns=span)), problem.with_columns(columns)
+
+
+def _taut(trials: Sequence[Trial], scores: Sequence[Score]) -> list[Score]:
+    """Return springs from where the straps among trials are attached: straps without slack."""
+    straps = [t.score.group.effect for t in trials]
+    return [
+        replace(score, group=replace(score.group, effect=score.group.effect.with_shape(taut)))
+        for strap in straps
+        if isinstance(strap, InterfaceSlack) and not strap.anchored
+        for score in scores
+        if score.group.key[:2] == (HumanInteraction.name, strap.joints)
+        for taut in [strap.shape[: len(score.group.effect.shape)]]
+    ]
 
 
 def made_of_noise(

@@ -12,7 +12,7 @@ does to the other (parallel filtering; Gautier 1997).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
@@ -20,6 +20,7 @@ from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints
 from armid_ros.recording import Beside, Recording
 import numpy as np
+import numpy.typing as npt
 from scipy import signal
 from scipy.interpolate import CubicSpline
 
@@ -123,13 +124,10 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     rate = float(np.median([sampling_rate(recording) for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
-        crossing = max(_noise_crossing(recording) for recording in recordings)
-        band = MODEL_BANDS * max(
-            _motion_band(recording.q, sampling_rate(recording), crossing)
-            for recording in recordings
-        )
+        crossings = [_noise_crossing(recording) for recording in recordings]
+        band = MODEL_BANDS * _motion_band([r.q for r in recordings], rate, crossings)
         decimation = decimation or max(1, int(rate / (2.5 * band)))
-        cutoff = cutoff or min(max(crossing, band), 0.2 * rate)
+        cutoff = cutoff or min(max(float(np.max(crossings)), band), 0.2 * rate)
     if cutoff >= 0.5 * rate:
         raise IdentificationError(
             f'{recordings[0].source}: a cut-off of {cutoff:g} Hz needs more than '
@@ -233,7 +231,7 @@ def _differentiated(
     ddq = _central_difference(dq[:, :n], t[1] - t[0])
     edge = int(np.ceil(EDGE_PERIODS * used.rate_hz / used.cutoff_hz))
     inner = slice(edge, len(t) - edge)
-    band = _CURVATURE_BANDS * _motion_band(smooth[:, :n], used.rate_hz, used.cutoff_hz)
+    band = _CURVATURE_BANDS * _motion_band([smooth[:, :n]], used.rate_hz, [used.cutoff_hz])
     beside = None
     if recording.beside is not None:
         beside = _points(recording.beside, smooth[inner, n:], dq[inner, n:])
@@ -260,25 +258,34 @@ def _central_difference(x: FloatArray, step: float) -> FloatArray:
     return np.asarray(difference / (12.0 * step))
 
 
-def _motion_band(q: FloatArray, rate: float, noise_hz: float) -> float:
+def _motion_band(
+    positions: Sequence[FloatArray], rate: float, ends: Sequence[npt.ArrayLike]
+) -> float:
     """
     Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint.
 
-    What is above a given frequency is noise and does not count.
+    What is above the end of a recording, of all its joints or each, is noise and does not count:
+    a joint that hardly moves has nothing but noise where another is still moving. All recordings
+    count together, for the same reason.
 
     """
-    band = rate / len(q)
-    for position in q.T:
-        if np.ptp(position) > 0.0:
-            frequency, power = signal.periodogram(np.diff(position), fs=rate)
-            share = np.cumsum(power[frequency <= noise_hz])
-            band = max(band, float(frequency[np.searchsorted(share, 0.99 * share[-1])]))
+    band = rate / max(len(q) for q in positions)
+    for joint in range(positions[0].shape[1]):
+        spectra = []
+        for q, end in zip(positions, ends, strict=True):
+            spectrum = np.array(signal.periodogram(np.diff(q[:, joint]), fs=rate))
+            spectra.append(spectrum[:, spectrum[0] <= np.broadcast_to(end, q.shape[1])[joint]])
+        frequency, power = np.hstack(spectra)
+        order = np.argsort(frequency)
+        share = np.cumsum(power[order])
+        if share[-1] > 0.0:
+            band = max(band, float(frequency[order[np.searchsorted(share, 0.99 * share[-1])]]))
     return band
 
 
-def _noise_crossing(recording: Recording) -> float:
+def _noise_crossing(recording: Recording) -> FloatArray:
     """
-    Return where the spectrum of the positions meets their noise [Hz], the widest joint counting.
+    Return where the spectrum of each position meets its noise, shape (n,) [Hz].
 
     The noise is white at the sensor; its level is the median of the upper two fifths.
 
@@ -290,4 +297,4 @@ def _noise_crossing(recording: Recording) -> float:
     )
     floor = np.median(power[frequency > 0.3 * rate], axis=0)
     above = power > NOISE_MARGIN * floor
-    return float(max(frequency[np.argmin(column)] for column in above.T))
+    return np.array([frequency[np.argmin(column)] for column in above.T])

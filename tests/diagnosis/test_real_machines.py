@@ -4,13 +4,12 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.diagnose import _narrower
 from armid_ros.diagnosis.evidence import trajectories
 from armid_ros.diagnosis.fit import excited, fit
 from armid_ros.diagnosis.floor import noise_floor
 from armid_ros.diagnosis.patch import Named
+from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.effects import CATALOGUE, make_effect
-from armid_ros.identification.signals import conditioning
 from armid_ros.identification.two_inertia.transmission import fit_transmission
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
@@ -74,7 +73,7 @@ def test_friction_of_a_tx40_bends_with_speed_in_both_halves_of_its_recording(rea
     bare, recording = Machines(real_data, tmp_path).bare('tx40')
     arm = known_arm(bare, 'tx40', None)
     settings = DiagnosisSettings()
-    used = _narrower(conditioning([recording], settings.signals), settings)
+    used = choose_filters([recording], settings)
     bend = CATALOGUE['quadratic_friction'].on(arm.robot, ('joint_2',))
     middle = len(recording.t) // 2
     values, std = [], []
