@@ -81,7 +81,11 @@ class NextRun:
             f'it should tell {one.name} from {one.rival} by {one.z:.0f} standard deviations'
             for one in told
         ]
-        parts += [f'no motion tells {one.name} from {one.rival}' for one in alike]
+        parts += [
+            f'no motion alone tells {one.name} from {one.rival} (this one by {one.z:.1f} standard '
+            'deviations)'
+            for one in alike
+        ]
         again = ''
         if self.load is not None:
             again = f', then again with {self.load.mass:g} kg fixed to {self.load.frame}'

@@ -25,6 +25,8 @@ _BANDS = 6.0
 #: Where noise of positions makes the upper third of that this many times as noisy as the lower
 #: one, in any joint, the upper third is cut off: there is less in it than it hides.
 _GROWTH = 4.0
+#: Wider rows hide more of the motion beside reversals: at least this share of it has to stay.
+_MOVING = 0.7
 #: Beside a partner, noise of angles is all there is: the pass band is so much wider than where the
 #: motion sinks into it, or a fit takes inertia away to get rid of the noise of accelerations.
 _NARROW = 1.25
@@ -88,7 +90,15 @@ def prepare(
     if not (free and growth and np.max(np.mean(growth, axis=0)) > _GROWTH):
         return prepared
     used = replace(prepared.used, decimation=round(1.5 * prepared.used.decimation + 0.1))
-    return _measured(arm, trajectories(recordings, used), whole)
+    fewer = trajectories(recordings, used)
+    if np.any(_told(fewer) < _MOVING * _told(data)):
+        return prepared
+    return _measured(arm, fewer, whole)
+
+
+def _told(data: Sequence[Trajectory]) -> FloatArray:
+    """Return in what share of the rows each joint moves, shape (n,)."""
+    return np.asarray(np.concatenate([part.told for part in data]).mean(axis=0))
 
 
 def _measured(arm: ArmModel, data: Sequence[Trajectory], whole: BaseParameters) -> Prepared:

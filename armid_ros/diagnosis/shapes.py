@@ -73,6 +73,9 @@ def _orders(
     starts = []
     for joint in effect.indices(fitted.arm.robot.joints):
         rows = weight[:, joint] > 0.0
+        if not rows.any():
+            starts.append(np.full(_MOST_PEAKS, _ORDERS[0]))
+            continue
         angle, rest, scale = q[rows, joint], left[rows, joint], weight[rows, joint]
         step = 0.5 * np.pi / max(float(np.ptp(angle)), 0.1)
         orders = np.arange(_ORDERS[0], _ORDERS[1], step)

@@ -216,7 +216,7 @@
     for (const entry of spec.series) {
       if (entry.kind === 'band') {
         const edge = {label: entry.label, stroke: () => 'transparent', points: {show: false}};
-        series.push(edge, {...edge});
+        series.push({...edge, class: 'u-band'}, {...edge, class: 'u-edge'});
         data.push(entry.upper, entry.y);
         bands.push({series: [series.length - 2, series.length - 1], fill: () => clear(entry.role, 25)});
       } else {

@@ -105,11 +105,15 @@ class GapOverlay(Section):
 
     @property
     def charts(self) -> tuple[Chart, Chart]:
-        """Torques, and residuals with a band of two standard deviations."""
+        """Torques while the joint moves, and residuals with a band of two standard deviations."""
         j, shown = self.joint, self.overlay
         unit = torque_unit(self.robot, j)
-        measured, before, after = (x[:, j] for x in (shown.measured, shown.before, shown.after))
-        t = shown.trajectory.t
+        told = np.flatnonzero(shown.trajectory.told[:, j])
+        moving = slice(told[0], told[-1] + 1)
+        measured, before, after = (
+            x[moving, j] for x in (shown.measured, shown.before, shown.after)
+        )
+        t = shown.trajectory.t[moving]
         kept = thinned(measured, measured - before, measured - after)
         band: FloatArray = np.full(len(kept), 2.0 * shown.sigma[j])
         torque = Chart(
