@@ -78,22 +78,23 @@ def choose_filters(recordings: Sequence[Recording], settings: DiagnosisSettings)
 def prepare(
     arm: ArmModel,
     recordings: Sequence[Recording],
+    used: Conditioning,
     data: Sequence[Trajectory],
     settings: DiagnosisSettings,
     rng: np.random.Generator,
 ) -> Prepared:
     """Measure the noise of data, and once more without the upper third of the band if it is it."""
     whole = arm.base_parameters(rng)
-    prepared = _measured(arm, data, whole)
+    prepared = _measured(arm, used, data, whole)
     growth = [floor.growth for floor in prepared.floors if floor.period is not None]
     free = settings.partner is None and settings.signals.decimation is None
     if not (free and growth and np.max(np.mean(growth, axis=0)) > _GROWTH):
         return prepared
-    used = replace(prepared.used, decimation=round(1.5 * prepared.used.decimation + 0.1))
-    fewer = trajectories(recordings, used)
+    narrower = replace(used, decimation=round(1.5 * used.decimation + 0.1))
+    fewer = trajectories(recordings, narrower)
     if np.any(_told(fewer) < _MOVING * _told(data)):
         return prepared
-    return _measured(arm, fewer, whole)
+    return _measured(arm, narrower, fewer, whole)
 
 
 def _told(data: Sequence[Trajectory]) -> FloatArray:
@@ -101,10 +102,12 @@ def _told(data: Sequence[Trajectory]) -> FloatArray:
     return np.asarray(np.concatenate([part.told for part in data]).mean(axis=0))
 
 
-def _measured(arm: ArmModel, data: Sequence[Trajectory], whole: BaseParameters) -> Prepared:
+def _measured(
+    arm: ArmModel, used: Conditioning, data: Sequence[Trajectory], whole: BaseParameters
+) -> Prepared:
     base, _ = excited(arm, whole, data)
     told = [noise_floor(part, arm) for part in data]
     refit = fit(arm, (), data, [floor.sigma for floor in told], base)
     floors = tuple(noise_floor(part, refit.arm) for part in data)
     as_told = tuple((a if a.period else b).sigma for a, b in zip(told, floors, strict=True))
-    return Prepared(data[0].used, tuple(data), base, floors, as_told)
+    return Prepared(used, tuple(data), base, floors, as_told)
