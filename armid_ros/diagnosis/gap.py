@@ -20,6 +20,8 @@ import numpy as np
 
 #: A joint that had no gap counts when it has this much more than passes as noise.
 _WORSE = 1.2
+#: Of recordings that nothing was fitted to.
+_PREDICTED = 'held-out'
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,11 @@ class Gap:
     data: str
     overlays: tuple[Overlay, ...]
 
+    @property
+    def predicted(self) -> bool:
+        """Whether it was measured on recordings that nothing was fitted to."""
+        return self.data == _PREDICTED
+
 
 def measure_gap(
     explanation: Explanation,
@@ -96,7 +103,7 @@ def measure_gap(
             _overlay(part, s, before, after) for part, s in zip(unseen, sigma, strict=True)
         ]
         pairs = [(o.measured - o.before, o.measured - o.after) for o in overlays]
-        return _gap(unseen, sigma, pairs, 'held-out', lowest, overlays)
+        return _gap(unseen, sigma, pairs, _PREDICTED, lowest, overlays)
     sigma = [floor.sigma for floor in floors]
     overlays = [_overlay(part, s, before, after) for part, s in zip(data, sigma, strict=True)]
     pairs = _left_out(explanation, data, sigma)

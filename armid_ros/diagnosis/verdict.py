@@ -127,6 +127,14 @@ def decide(
             f'{worst:.2g} times the power of the noise: there is more than this.'
         )
         return Verdict('partial', text, findings)
+    if gap.predicted and np.max(gap.loss_after) > settings.held_out_loss:
+        joint = arm.robot.joints[int(np.argmax(gap.loss_after))]
+        text = (
+            f'Provisional: {_names(findings)} explains the data it was found in, but where the '
+            f'motion is new {joint} is left at {np.max(gap.loss_after):.2g} times the power of '
+            'the noise: it is not this, or not only this.'
+        )
+        return Verdict('partial', text, findings)
     doubtful = [f for f in findings if f.ambiguous_with]
     if doubtful:
         first = doubtful[0]

@@ -70,6 +70,18 @@ def test_drag_is_named_with_its_coefficient_and_joint(bench):
     assert found.gap.closed > 0.9
 
 
+def test_a_name_that_does_not_hold_where_the_motion_is_new_is_provisional(bench):
+    def drag(size):
+        return lambda m, tau: on_elbow(size * m.dq[:, 1] * np.abs(m.dq[:, 1]))
+
+    learned = bench.recordings(drag(0.08))
+    same, other = (bench.recordings(drag(size), seed=5)[-1:] for size in (0.08, 0.2))
+    assert look(bench, learned, validate=same).verdict == 'named'
+    found = look(bench, learned, validate=other)
+    assert found.verdict == 'partial'
+    assert 'the motion is new elbow' in found.summary
+
+
 def test_an_effect_that_lives_in_the_fast_motion_only_is_found(bench):
     found = look(bench, bench.recordings(lambda m, tau: on_elbow(0.02 * m.ddq[:, 1])))
     assert 'rotor_inertia' in {n for f in found.findings for n in (f.name, *f.ambiguous_with)}
