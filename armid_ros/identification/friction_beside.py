@@ -13,14 +13,15 @@ to the load, and a curve over velocity, which is a sum of humps at low velocitie
 
 from __future__ import annotations
 
-from armid_ros.arm import ArmModel
-from armid_ros.estimate import ParameterName
-from armid_ros.motion import FloatArray
-import numpy as np
-import pinocchio as pin
+from dataclasses import replace
 
-#: Velocities of the humps [rad/s or m/s].
-_HUMPS = (0.03, 0.1, 0.3)
+from armid_ros.arm import ArmModel
+from armid_ros.effects import Effect, make_effect
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+
+#: Velocities [rad/s or m/s] and exponent of the humps.
+_HUMPS, _EXPONENT = (0.03, 0.1, 0.3), 2.0
 
 
 class FrictionBeside:
@@ -30,7 +31,7 @@ class FrictionBeside:
     Parameters
     ----------
     arm : ArmModel
-        Its robot says what load the joints have.
+        What it has already, and the load of its joints.
 
     Attributes
     ----------
@@ -40,35 +41,22 @@ class FrictionBeside:
     """
 
     def __init__(self, arm: ArmModel) -> None:
-        robot = arm.robot
-        self._model, self._data = robot.model, robot.model.createData()
-        known = {effect.name for effect in arm.effects}
-        self._viscous = 'viscous_friction' not in known
-        self._coulomb = 'coulomb_friction' not in known
-        self._humps = np.array([] if 'stribeck_friction' in known else _HUMPS)
-        self._load = 'load_dependent_friction' not in known
+        self._arm = arm
+        self._effects = _lacking(arm)
         self.parameters = tuple(
-            ParameterName(f'{name}_beside', joint, unit)
-            for name, unit in self._quantities()
-            for joint in robot.joints
+            replace(name, name=f'{name.name}_beside_{number}')
+            for number, effect in enumerate(self._effects)
+            for name in effect.parameters(arm.robot)
         )
 
-    def _quantities(self) -> list[tuple[str, str]]:
-        return [
-            *[('viscous_coefficient', 'N m s/rad')] * self._viscous,
-            *[('coulomb_torque', 'N m')] * self._coulomb,
-            *[(f'hump_{velocity:g}', 'N m') for velocity in self._humps],
-            *[('load_coefficient', '')] * self._load,
-        ]
-
-    def torques(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+    def torques(self, motion: Motion) -> FloatArray:
         """
         Return the friction of a unit of each quantity, joint by joint, at one sample.
 
         Parameters
         ----------
-        q, dq, ddq : ndarray, shape (n,)
-            Motion.
+        motion : Motion
+            Of one sample.
 
         Returns
         -------
@@ -76,12 +64,22 @@ class FrictionBeside:
             Torques; each acts on its own joint.
 
         """
-        sign = np.sign(dq)
-        parts = [dq] * self._viscous + [sign] * self._coulomb
-        parts += list(np.exp(-((dq / self._humps[:, np.newaxis]) ** 2)) * sign)
-        if self._load:
-            parts.append(np.abs(pin.rnea(self._model, self._data, q, dq, ddq)) * sign)
-        return np.array(parts).reshape(-1, len(dq)).T
+        n = motion.n_joints
+        columns = [effect.columns(motion, self._arm)[0] for effect in self._effects]
+        return np.array([np.diagonal(torque) for torque in columns]).reshape(-1, n).T
+
+
+def _lacking(arm: ArmModel) -> list[Effect]:
+    """Return the friction that an arm may have, but for what is known of it."""
+    curve = make_effect('stribeck_friction', arm.robot)
+    friction = [
+        make_effect('viscous_friction', arm.robot),
+        make_effect('coulomb_friction', arm.robot),
+        *(curve.with_shape((velocity, _EXPONENT)) for velocity in _HUMPS),
+        make_effect('load_dependent_friction', arm.robot),
+    ]
+    known = {effect.name for effect in arm.effects}
+    return [effect for effect in friction if effect.name not in known]
 
 
 def by_joint(torques: FloatArray) -> FloatArray:

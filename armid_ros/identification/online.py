@@ -303,7 +303,8 @@ class OnlineIdentifier:
     def _learn(
         self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_]
     ) -> OnlineSample:
-        stacked = np.column_stack([motion.tau, self._rows(motion), self._rows_beside(motion)])
+        one = _one_sample(self.arm, motion)
+        stacked = np.column_stack([motion.tau, self._rows(one), self._rows_beside(one)])
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
         measured, rows, beside = np.split(filtered, [1, 1 + self.base.rank], axis=1)
         measured = measured[:, 0]
@@ -323,21 +324,20 @@ class OnlineIdentifier:
         self._scores.add(rows * scale[:, np.newaxis], measured * scale, self._estimator.values)
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
 
-    def _rows(self, motion: CausalMotion) -> FloatArray:
+    def _rows(self, motion: Motion) -> FloatArray:
         """Return the regressor of one sample in the independent columns, shape (n, r)."""
         robot = self.arm.robot
-        q, dq, ddq = motion.q, motion.dq, motion.ddq
+        q, dq, ddq = motion.q[0], motion.dq[0], motion.ddq[0]
         rigid = pin.computeJointTorqueRegressor(robot.model, self._data, q, dq, ddq)
         rigid = rigid.reshape(robot.n_joints, -1)  # of a single joint it is a vector
-        one = Motion(robot.joints, np.array([motion.t]), q[None], dq[None], ddq[None])
-        effects = self.arm.effect_columns(one)[0]
+        effects = self.arm.effect_columns(motion)[0]
         return np.concatenate([rigid, effects], axis=1).take(self.base.independent, axis=1)
 
-    def _rows_beside(self, motion: CausalMotion) -> FloatArray:
+    def _rows_beside(self, motion: Motion) -> FloatArray:
         """Return what the search for changes learns beside, joint by joint, shape (n, K)."""
         if self._watch is None:
-            return np.empty((len(motion.q), 0))
-        return self._beside.torques(motion.q, motion.dq, motion.ddq)
+            return np.empty((motion.n_joints, 0))
+        return self._beside.torques(motion)
 
     def _noise_of_row(self, step: float) -> tuple[float, float]:
         """
@@ -381,6 +381,11 @@ def _noise(arm: ArmModel, settings: OnlineSettings) -> FloatArray:
     if not known.any():
         return np.ones(robot.n_joints)
     return _NOISE_OF_LIMIT * np.where(known, limit, np.median(limit[known]))
+
+
+def _one_sample(arm: ArmModel, motion: CausalMotion) -> Motion:
+    state = (motion.q[None], motion.dq[None], motion.ddq[None])
+    return Motion(arm.robot.joints, np.array([motion.t]), *state)
 
 
 def _bandwidth(motion_pole: float, row_pole: float, nyquist: float) -> float:

@@ -30,8 +30,8 @@ def test_columns_are_those_of_the_effects_that_the_arm_lacks():
     )
     q, dq, ddq = np.random.default_rng(0).normal(size=(3, arm.robot.n_joints))
     beside = FrictionBeside(arm)
-    rows = by_joint(beside.torques(q, 0.2 * dq, ddq))
     one = Motion(arm.robot.joints, np.zeros(1), q[None], 0.2 * dq[None], ddq[None])
+    rows = by_joint(beside.torques(one))
     expected = np.concatenate([effect.columns(one, arm)[0] for effect in lacking], axis=1)
     np.testing.assert_allclose(rows, expected, atol=1e-12)
     assert [p.joint for p in beside.parameters] == list(arm.robot.joints) * len(lacking)
@@ -44,4 +44,5 @@ def test_what_is_identified_is_not_beside_it():
     beside = FrictionBeside(everything)
     assert beside.parameters == ()
     n = everything.robot.n_joints
-    assert beside.torques(*np.ones((3, n))).shape == (n, 0)
+    one = Motion(everything.robot.joints, np.zeros(1), *np.ones((3, 1, n)))
+    assert beside.torques(one).shape == (n, 0)
