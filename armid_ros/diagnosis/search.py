@@ -139,35 +139,14 @@ def next_step(
     hidden = frozenset(group.effect.name for group in groups) - visible
     seen = {score.group.key[:2] for score in scores}
     unseen = tuple(dict.fromkeys(g.key[:2] for g in groups if g.key[:2] not in seen))
-    trials: list[Trial] = []
-    refined = 0
-    best = max((s.gain for s in scores if s.group.effect.name not in STRAPS), default=0.0)
-    for score in scores[:_LOOKED_AT]:
-        columns = problem.x[:, :, score.group.columns]
-        if score.gain <= 0.0:
-            break
-        if score.group.effect.name in _AT_PEAKS and _share(problem, columns) > _PEAK_SHARE:
-            continue
-        promising = refined < _REFINED and score.gain > 0.4 * best
-        if score.group.effect.shapes and promising:
-            refined += 1
-            score, problem = _refined(problem, projection, score, left, work)
-            columns = problem.x[:, :, score.group.columns]
-        trials.append(try_group(problem, projection, score, columns, settings))
-    trials.sort(key=lambda trial: -trial.gain)
-    for score in _taut(trials[:1], scores):
-        score, problem = _refined(problem, projection, score, left, work)
-        columns = problem.x[:, :, score.group.columns]
-        trials.append(try_group(problem, projection, score, columns, settings))
-        trials.sort(key=lambda trial: -trial.gain)
+    trials, problem = _tried(problem, projection, scores, left, work)
     passing = [
         trial
         for trial in trials
         if acceptable(trial, problem, left, settings, total)
         and not made_of_noise(trial, problem, projection, left, work)
     ]
-    league = tuple(trials)
-    survey = Survey(league, hidden, tuple(scores), len(screened), unseen)
+    survey = Survey(trials, hidden, tuple(scores), len(screened), unseen)
     if not passing:
         return None, survey, problem
     passing = own_causes_first(passing, problem, left)
@@ -183,30 +162,66 @@ def next_step(
     )
     before = joint_losses(problem, left)
     after = joint_losses(problem, left - winner.torque)
-    return Step(winner, rivals, league, before, after, tuple(passing)), survey, problem
+    return Step(winner, rivals, trials, before, after, tuple(passing)), survey, problem
+
+
+def _tried(
+    problem: Problem,
+    projection: Projection,
+    scores: Sequence[Score],
+    left: FloatArray,
+    work: Workspace,
+) -> tuple[tuple[Trial, ...], Problem]:
+    """Try the best groups, shapes refined, best first; return the problem with those shapes."""
+    trials: list[Trial] = []
+    refined = 0
+    best = max((s.gain for s in scores if s.group.effect.name not in STRAPS), default=0.0)
+    for score in scores[:_LOOKED_AT]:
+        columns = problem.x[:, :, score.group.columns]
+        if score.gain <= 0.0:
+            break
+        if score.group.effect.name in _AT_PEAKS and _share(problem, columns) > _PEAK_SHARE:
+            continue
+        promising = refined < _REFINED and score.gain > 0.4 * best
+        if score.group.effect.shapes and promising:
+            refined += 1
+            trial, problem = _refined(problem, projection, score, left, work)
+        else:
+            trial = try_group(problem, projection, score, columns, work.settings)
+        trials.append(trial)
+    trials.sort(key=lambda trial: -trial.gain)
+    taut = _taut(trials[0], scores) if trials else None
+    if taut is not None:
+        trial, problem = _refined(problem, projection, taut, left, work)
+        trials.append(trial)
+        trials.sort(key=lambda trial: -trial.gain)
+    return tuple(trials), problem
 
 
 def _refined(
     problem: Problem, projection: Projection, score: Score, left: FloatArray, work: Workspace
-) -> tuple[Score, Problem]:
-    """Return a group of a better shape, and the problem with its columns behind the others."""
+) -> tuple[Trial, Problem]:
+    """Try a group in a better shape; return the problem with its columns behind the others too."""
     score, columns = refine(problem, projection, score, left, work)
     start = problem.x.shape[2]
     span = slice(start, start + columns.shape[2])
-    return replace(score, group=replace(score.group, columns=span)), problem.with_columns(columns)
+    score = replace(score, group=replace(score.group, columns=span))
+    problem = problem.with_columns(columns)
+    columns = problem.x[:, :, span]
+    return try_group(problem, projection, score, columns, work.settings), problem
 
 
-def _taut(trials: Sequence[Trial], scores: Sequence[Score]) -> list[Score]:
-    """Return springs from where the straps among trials are attached: straps without slack."""
-    straps = [t.score.group.effect for t in trials]
-    return [
-        replace(score, group=replace(score.group, effect=score.group.effect.with_shape(taut)))
-        for strap in straps
-        if isinstance(strap, InterfaceSlack) and not strap.anchored
-        for score in scores
-        if score.group.key[:2] == (HumanInteraction.name, strap.joints)
-        for taut in [strap.shape[: len(score.group.effect.shape)]]
-    ]
+def _taut(best: Trial, scores: Sequence[Score]) -> Score | None:
+    """Return a spring from where the best is attached, if that is a strap to a point unknown."""
+    strap = best.score.group.effect
+    if not isinstance(strap, InterfaceSlack) or strap.anchored:
+        return None
+    for score in scores:
+        group = score.group
+        if group.key[:2] == (HumanInteraction.name, strap.joints):
+            spring = group.effect.with_shape(strap.shape[: len(group.effect.shape)])
+            return replace(score, group=replace(group, effect=spring))
+    return None
 
 
 def made_of_noise(
