@@ -8,7 +8,14 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
-from armid_ros.effects import Action, Displacement, Effect, merge_actions, TorqueLaw, TorqueReading
+from armid_ros.effects import (
+    Action,
+    Displacement,
+    Effect,
+    law_derivatives,
+    merge_actions,
+    TorqueReading,
+)
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.model import (
@@ -16,6 +23,7 @@ from armid_ros.model import (
     group_columns,
     inverse_dynamics,
     inverse_dynamics_derivatives,
+    LinkFrames,
     random_motion,
     regressor,
     rigid_parameter_names,
@@ -27,8 +35,6 @@ import numpy.typing as npt
 
 #: Samples to either side that rates of change of rates of change are taken from.
 _STENCIL = 4
-#: Step of the differences along a change of motion [rad or m, rad/s or m/s].
-_STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -144,6 +150,10 @@ class ArmModel:
             motion, q=motion.q + change.q, dq=motion.dq + change.dq, ddq=motion.ddq + change.ddq
         )
 
+    def link_frames(self, motion: Motion) -> LinkFrames:
+        """Return where all links are along a recorded motion, for any of their points."""
+        return LinkFrames.of(self.robot, self.link_motion(motion).q)
+
     def load(self, motion: Motion) -> FloatArray:
         """Return what the rigid body takes along a motion of the links, shape (N, n) [N m]."""
         return inverse_dynamics(self.body, self.felt(motion))
@@ -151,6 +161,19 @@ class ArmModel:
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
         return inverse_dynamics_derivatives(self.body, self.felt(motion))
+
+    def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
+        """
+        Differentiate what holds the links by their position and velocity.
+
+        Returns
+        -------
+        tuple of ndarray, each of shape (N, n, n), or None
+            None where nothing does.
+
+        """
+        law = self.along(motion).action().link_torque
+        return None if law is None else law_derivatives(law, self.link_motion(motion))
 
     def joint_torque(self, motion: Motion) -> FloatArray:
         """
@@ -252,9 +275,9 @@ class ArmModel:
         if not self.quasi_static:
             columns += by_dq @ change.dq + by_ddq @ change.ddq
         columns = self.with_load_friction(motion, columns)
-        law = self.along(motion).action().link_torque
-        if law is not None:
-            columns += _directional(law, link, change)
+        slopes = self.link_torque_derivatives(motion)
+        if slopes is not None:
+            columns += slopes[0] @ change.q + slopes[1] @ change.dq
         return columns
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
@@ -322,14 +345,3 @@ class ArmModel:
             motion = replace(motion, beside=points)
         columns = self.columns(motion)
         return group_columns(columns.reshape(-1, columns.shape[-1]), self.parameters)
-
-
-def _directional(law: TorqueLaw, link: Motion, change: Displacement) -> FloatArray:
-    """Differentiate a torque law along directions, by central differences, (N, n, P)."""
-    columns = np.empty(change.q.shape)
-    for index in range(change.q.shape[-1]):
-        q, dq = change.q[:, :, index], change.dq[:, :, index]
-        step = _STEP / max(float(np.max(np.abs(q))), float(np.max(np.abs(dq))), _STEP)
-        ends = [law(link.t, link.q + s * q, link.dq + s * dq) for s in (step, -step)]
-        columns[:, :, index] = (ends[0] - ends[1]) / (2.0 * step)
-    return columns

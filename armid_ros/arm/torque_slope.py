@@ -7,13 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from armid_ros.arm.arm_model import ArmModel
-from armid_ros.effects import Hysteresis, TorqueLaw
+from armid_ros.effects import Hysteresis, law_derivatives
 from armid_ros.model import inverse_dynamics_derivatives
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
-
-#: Step of the differences of a torque law [rad or m, rad/s or m/s].
-_STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,7 @@ class TorqueSlope:
             by_ddq = by_ddq + action.inertia
         for law, side in ((action.torque, motion), (action.link_torque, link)):
             if law is not None:
-                more = _law_slopes(law, side)
+                more = law_derivatives(law, side)
                 by_q, by_dq = by_q + more[0], by_dq + more[1]
         return cls(motion, by_q, by_dq, by_ddq, action.hysteresis)
 
@@ -79,17 +76,3 @@ class TorqueSlope:
         if self.hysteresis is not None:
             by_q = by_q + self.hysteresis.pullback(self.motion.q, self.motion.dq, weights)
         return by_q, by_dq, by_ddq
-
-
-def _law_slopes(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Differentiate a torque law by q and dq, by central differences, each (N, n, n)."""
-    n = motion.n_joints
-    slopes = np.empty((2, len(motion), n, n))
-    for argument, joint in np.ndindex(2, n):
-        ends = []
-        for step in (_STEP, -_STEP):
-            state = [motion.q.copy(), motion.dq.copy()]
-            state[argument][:, joint] += step
-            ends.append(law(motion.t, *state))
-        slopes[argument, :, :, joint] = (ends[0] - ends[1]) / (2.0 * _STEP)
-    return slopes[0], slopes[1]

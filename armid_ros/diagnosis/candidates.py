@@ -190,5 +190,5 @@ def candidates(
 def effect_rows(arm: ArmModel, effect: Effect, part: Trajectory) -> FloatArray:
     """Return the columns of an effect in the rows of a trajectory, shape (M, n, P)."""
     if effect.name in _SMOOTH:
-        return arm.columns_of(effect, part.motion.select(part.rows))
+        return arm.columns_of(effect, part.at_rows)
     return part.reduce(arm.columns_of(effect, part.motion))

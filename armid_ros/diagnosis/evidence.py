@@ -82,6 +82,11 @@ class Trajectory:
         return replace(self, motion=smoothed(self.motion))
 
     @cached_property
+    def at_rows(self) -> Motion:
+        """The motion at the samples that the rows sit on."""
+        return self.motion.select(self.rows)
+
+    @cached_property
     def period(self) -> tuple[int, slice] | None:
         """The repeated period of the motion; see `find_period`."""
         return find_period(self.motion)

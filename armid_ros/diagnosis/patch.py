@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.remembering import remembering
-from armid_ros.effects import Effect
+from armid_ros.effects import Effect, TorqueReading
 from armid_ros.estimate import ParameterName
 from armid_ros.model import BaseParameters
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
 #: Largest relative step of a shape in a round: the search has refined it already.
@@ -129,26 +129,31 @@ def patch_columns(state: Patch, part: Trajectory, base: BaseParameters | None) -
         blocks.append(np.concatenate(own, axis=2)[:, :, :known][:, :, base.independent])
     first = len(state.arm.effects)
     for position, named in enumerate(state.named):
-        effect = named.effect
-        blocks.append(model.columns_of(effect, motion)[:, :, list(named.kept)])
-        if effect.shape:
-            low, high, step = _shape_bounds(effect)
-            shape = np.array(effect.shape)
-            ends = []
-            for sign in (1.0, -1.0):
-                for index in range(len(shape)):
-                    moved = shape.copy()
-                    moved[index] = np.clip(
-                        shape[index] + sign * step[index], low[index], high[index]
-                    )
-                    effects = list(model.effects)
-                    effects[first + position] = effect.with_shape(moved)
-                    shifted = replace(model, effects=tuple(effects))
-                    ends.append((moved[index], shifted.torque(motion)))
-            count = len(shape)
-            slopes = [
-                (ends[k][1] - ends[count + k][1]) / max(ends[k][0] - ends[count + k][0], 1e-12)
-                for k in range(count)
-            ]
-            blocks.append(np.stack(slopes, axis=2))
+        blocks.append(model.columns_of(named.effect, motion)[:, :, list(named.kept)])
+        if named.effect.shape:
+            blocks.append(_shape_columns(model, first + position, motion))
     return part.reduce(np.concatenate(blocks, axis=2))
+
+
+def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray:
+    """Return the columns of the shape of one of a model's effects, by differences, (N, n, S)."""
+    effect = model.effects[position]
+    low, high, step = _shape_bounds(effect)
+    shape = np.array(effect.shape)
+    columns = np.empty((len(motion), motion.n_joints, len(shape)))
+    for index, own in enumerate(step):
+        ends, torques = np.clip(shape[index] + [own, -own], low[index], high[index]), []
+        for end in ends:
+            moved = shape.copy()
+            moved[index] = end
+            torques.append(_torque_with(model, position, effect.with_shape(moved), motion))
+        columns[:, :, index] = (torques[0] - torques[1]) / max(ends[0] - ends[1], 1e-12)
+    return columns
+
+
+def _torque_with(model: ArmModel, position: int, effect: Effect, motion: Motion) -> FloatArray:
+    """Return the torque with another shape of an effect, without what does not depend on it."""
+    if effect.linear and not isinstance(effect, TorqueReading):
+        return np.asarray(model.columns_of(effect, motion) @ model.values[position])
+    effects = (*model.effects[:position], effect, *model.effects[position + 1 :])
+    return replace(model, effects=effects).torque(motion)

@@ -79,11 +79,12 @@ class Problem:
         products = np.empty((self.folds, size + added + 1, size + added + 1))
         old = [*range(size), size + added]
         new = range(size, size + added)
-        for k in range(self.folds):
-            rows = self.fold == k
-            part = more[rows].reshape(-1, added)
-            stacked = np.concatenate([x[rows], self.y[rows][:, :, np.newaxis]], axis=2)
-            border = part.T @ stacked.reshape(-1, size + added + 1)
+        in_fold = self.fold == np.arange(self.folds)[:, np.newaxis]
+        parts = (more * in_fold[:, :, np.newaxis, np.newaxis]).reshape(self.folds, -1, added)
+        parts = parts.transpose(0, 2, 1).reshape(self.folds * added, -1)
+        flat = x.reshape(-1, size + added)
+        borders = np.column_stack([parts @ flat, parts @ self.y.ravel()])
+        for k, border in enumerate(np.split(borders, self.folds)):
             products[k][np.ix_(old, old)] = self.products[k]
             products[k][new, :] = border
             products[k][:, new] = border.T
@@ -153,6 +154,11 @@ class Projection:
         """Return what is left of weighted rows (R, n) or (R, n, p)."""
         flat = values.reshape(len(self.basis), -1)
         return np.asarray((flat - self.basis @ (self.basis.T @ flat)).reshape(values.shape))
+
+    def products(self, columns: FloatArray) -> FloatArray:
+        """Return the products (p, p) of what is left of weighted columns (R n, p)."""
+        made = self.basis.T @ columns
+        return np.asarray(columns.T @ columns - made.T @ made)
 
     def sweep(self, products: FloatArray) -> FloatArray:
         """Return the products (F, P, P) of what is left of all columns, in each fold."""

@@ -64,7 +64,12 @@ def refine(
     left: FloatArray,
     work: Workspace,
 ) -> tuple[Score, FloatArray]:
-    """Refine the shape of a group by variable projection; return it with its columns."""
+    """
+    Refine the shape of a group by variable projection; return it with its columns.
+
+    What is left has nothing in it that the free columns could make.
+
+    """
     effect, kept = score.group.effect, score.group.kept
     lower, upper = (bound[list(kept)] for bound in effect.bounds())
     cache: dict[tuple[float, ...], tuple[float, FloatArray]] = {}
@@ -76,9 +81,8 @@ def refine(
                 columns = work.columns(effect.with_shape(shape), kept)
             except ModelError:
                 return -np.inf
-            weighted = columns * problem.weight[:, :, np.newaxis]
-            flat = projection.rest(weighted).reshape(-1, len(kept))
-            own, aim = flat.T @ flat, flat.T @ left.ravel()
+            weighted = (columns * problem.weight[:, :, np.newaxis]).reshape(-1, len(kept))
+            own, aim = projection.products(weighted), weighted.T @ left.ravel()
             values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
             if len(kept) == 1:  # what is not possible is no gain
                 values = np.clip(values, lower, upper)

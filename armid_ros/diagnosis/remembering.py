@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from armid_ros.arm import ArmModel
+from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
@@ -33,6 +34,11 @@ class _Remembering(ArmModel):
         linked: Motion = self._once('link', motion, super().link_motion)
         return linked
 
+    def link_frames(self, motion: Motion) -> LinkFrames:
+        """Return where all links are along a recorded motion."""
+        frames: LinkFrames = self._once('frames', motion, super().link_frames)
+        return frames
+
     def load(self, motion: Motion) -> FloatArray:
         """Return what the rigid body takes, shape (N, n) [N m]."""
         return np.array(self._once('load', motion, super().load))
@@ -41,6 +47,12 @@ class _Remembering(ArmModel):
         """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
         by_q, by_dq, by_ddq = self._once('derivatives', motion, super().load_derivatives)
         return by_q, by_dq, by_ddq
+
+    def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
+        """Differentiate what holds the links by position and velocity, each (N, n, n)."""
+        slopes: tuple[FloatArray, FloatArray] | None
+        slopes = self._once('holding', motion, super().link_torque_derivatives)
+        return slopes
 
     def joint_torque(self, motion: Motion) -> FloatArray:
         """Return the true torques of a recorded motion, shape (N, n) [N m]."""

@@ -12,7 +12,7 @@ from armid_ros.diagnosis.fit import Fitted
 from armid_ros.diagnosis.problem import row_weights
 from armid_ros.effects import Effect
 from armid_ros.effects.interaction import InterfaceSlack
-from armid_ros.model import points_motion
+from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
@@ -116,7 +116,7 @@ def _straps(
     sigma: Sequence[FloatArray],
 ) -> tuple[FloatArray, ...]:
     """Return the anchors and slacks that take most of what is left, beside what is free."""
-    robot, left = fitted.arm.robot, np.concatenate(fitted.residual)
+    left = np.concatenate(fitted.residual)
     q = np.concatenate([part.motion.q[part.rows] for part in data])
     rows = np.unique(np.linspace(0, len(q) - 1, _ROWS).astype(int))
     weight = row_weights(data, sigma)[rows]
@@ -130,13 +130,12 @@ def _straps(
         return np.asarray(flat - basis @ (basis.T @ flat))
 
     target = rest(left[rows])[:, 0]
-    starts = []
+    starts, frames = [], LinkFrames.of(fitted.arm.robot, q[rows])
     for owner, joint in enumerate(effect.joints):
         shape = effect.shape_values[owner]
         single = InterfaceSlack((joint,), tuple(shape.tolist()))
-        places = points_motion(robot, (joint,), shape[np.newaxis, :3], q[rows])[0][:, 0]
-        anchors, slacks = _proposals(places)
-        columns = rest(single.columns_of_straps(robot, q[rows], anchors, slacks))
+        anchors, slacks = _proposals(frames.places(joint, shape[:3]))
+        columns = rest(single.columns_of_straps(frames, anchors, slacks))
         own, aim = np.sum(columns**2, axis=0), columns.T @ target
         gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
         best = np.argsort(-gain)[:_STRAPS]

@@ -6,6 +6,7 @@ from armid_ros.effects.action import (
     Action,
     Displacement,
     DryFriction,
+    law_derivatives,
     TorqueLaw,
     Transmission,
 )
@@ -31,5 +32,6 @@ __all__ = [
     'Hysteresis',
     'Transmission',
     'TorqueLaw',
+    'law_derivatives',
     'merge_actions',
 ]

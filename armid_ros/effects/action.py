@@ -23,6 +23,9 @@ import numpy as np
 #: Torque of the actuators [N m] as a function of time, position and velocity.
 TorqueLaw = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
+#: Step of the differences of a torque law [rad or m, rad/s or m/s].
+_STEP = 1e-6
+
 
 class Displacement(NamedTuple):
     """A change of a motion: of position, velocity and acceleration, each of shape (N, n, ...)."""
@@ -178,3 +181,17 @@ class Action:
         if self.link_torque is not None:
             tau += self.link_torque(links.t, links.q, links.dq)
         return tau
+
+
+def law_derivatives(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Differentiate a torque law by q and dq, by central differences, each (N, n, n)."""
+    n = motion.n_joints
+    slopes = np.empty((2, len(motion), n, n))
+    for argument, joint in np.ndindex(2, n):
+        ends = []
+        for step in (_STEP, -_STEP):
+            state = [motion.q.copy(), motion.dq.copy()]
+            state[argument][:, joint] += step
+            ends.append(law(motion.t, *state))
+        slopes[argument, :, :, joint] = (ends[0] - ends[1]) / (2.0 * _STEP)
+    return slopes[0], slopes[1]

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Effect, Quantity, Shape
-from armid_ros.model import point_motion, points_motion
+from armid_ros.model import LinkFrames, point_motion, points_motion
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -102,10 +102,6 @@ class Attached(Effect):
         """Points of the links that springs are attached to, shape (k, 3) [m]."""
         return self.shape_values[:, :3]
 
-    def _points(self, robot: Robot, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return positions (N, k, 3) and Jacobians (N, k, 3, n) of the attachments."""
-        return points_motion(robot, self.joints, self._attachments, q)
-
     def _anchors(self, reference: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return positions and velocities of all anchors, shape (N or 1, k, 3)."""
         if self.anchor is None:
@@ -124,7 +120,8 @@ class Attached(Effect):
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
             times = np.broadcast_to(np.atleast_1d(t), (len(np.atleast_2d(q)),))
             anchors = self._anchors(reference, times)
-            columns = self._columns(robot, np.atleast_2d(q), np.atleast_2d(dq), *anchors)
+            frames = LinkFrames.of(robot, np.atleast_2d(q), self.joints)
+            columns = self._columns(frames, np.atleast_2d(dq), *anchors)
             return np.asarray((columns @ values).reshape(np.shape(q)))
 
         return Action(link_torque=torque if np.any(values) else None)
@@ -132,18 +129,14 @@ class Attached(Effect):
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return the torque per quantity of every spring, shape (N, n, P)."""
         link, reference = arm.link_motion(motion), self._reference(arm.robot)
-        return self._columns(arm.robot, link.q, link.dq, *self._anchors(reference, link.t))
+        anchors = self._anchors(reference, link.t)
+        return self._columns(arm.link_frames(motion), link.dq, *anchors)
 
     @abstractmethod
     def _columns(
-        self,
-        robot: Robot,
-        q: FloatArray,
-        dq: FloatArray,
-        anchors: FloatArray,
-        velocities: FloatArray,
+        self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
     ) -> FloatArray:
-        """Return the columns along positions and velocities of links and anchors."""
+        """Return the columns (N, n, P) along positions and velocities of links and anchors."""
 
 
 @dataclass(frozen=True)
@@ -190,24 +183,20 @@ class HumanInteraction(Attached):
         return np.concatenate([[stiffness, damping, *force] for force in forces])
 
     def _reference(self, robot: Robot) -> FloatArray:
-        return np.asarray(self._points(robot, _middle(robot))[0][0])
+        middle = points_motion(robot, self.joints, self._attachments, _middle(robot))
+        return np.asarray(middle[0][0])
 
     def _columns(
-        self,
-        robot: Robot,
-        q: FloatArray,
-        dq: FloatArray,
-        anchors: FloatArray,
-        velocities: FloatArray,
+        self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
     ) -> FloatArray:
-        positions, jacobians = self._points(robot, q)
+        positions, jacobians = frames.points(self.joints, self._attachments)
         relative = np.einsum('nkxj,nj->nkx', jacobians, dq) - velocities
-        columns = np.empty((*q.shape, len(self.joints), len(self.quantities)))
+        columns = np.empty((*dq.shape, len(self.joints), len(self.quantities)))
         columns[..., 0] = np.einsum('nkxj,nkx->njk', jacobians, positions - anchors)
         columns[..., 1] = np.einsum('nkxj,nkx->njk', jacobians, relative)
         for axis in range(len(self.quantities) - 2):
             columns[..., 2 + axis] = -jacobians[:, :, axis].transpose(0, 2, 1)
-        return columns.reshape(*q.shape, -1)
+        return columns.reshape(*dq.shape, -1)
 
 
 @dataclass(frozen=True)
@@ -252,51 +241,41 @@ class InterfaceSlack(Attached):
         return position + self.shape_values[:, 3:6], velocity
 
     def _columns(
-        self,
-        robot: Robot,
-        q: FloatArray,
-        dq: FloatArray,
-        anchors: FloatArray,
-        velocities: FloatArray,
+        self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
     ) -> FloatArray:
-        positions, jacobians = self._points(robot, q)
-        ways = positions - anchors
-        pulls = [
-            _pulled(ways[:, owner], jacobians[:, owner], slack)
-            for owner, slack in enumerate(self.slacks)
-        ]
-        return np.stack(pulls, axis=2)
+        columns = np.empty((*dq.shape, len(self.joints)))
+        straps = zip(self.joints, self._attachments, self.slacks, strict=True)
+        for owner, (joint, attachment, slack) in enumerate(straps):
+            places = frames.places(joint, attachment)
+            pulls = _pulls(places - anchors[:, owner], slack)
+            columns[:, :, owner] = frames.torques(joint, places, pulls)
+        return columns
 
     def columns_of_straps(
-        self, robot: Robot, q: FloatArray, anchors: FloatArray, slacks: FloatArray
+        self, frames: LinkFrames, anchors: FloatArray, slacks: FloatArray
     ) -> FloatArray:
         """
         Return the torque per stiffness of many straps from the first attachment, (N, n, A).
 
         Parameters
         ----------
-        robot : Robot
-            The arm.
-        q : ndarray, shape (N, n)
-            Positions of the joints.
+        frames : LinkFrames
+            Where the links are.
         anchors : ndarray, shape (A, 3)
             Fixed points of the base frame [m].
         slacks : ndarray, shape (A,)
             Their slacks [m].
 
         """
-        positions, jacobians = self._points(robot, q)
-        straps = zip(anchors, slacks, strict=True)
-        return np.stack(
-            [_pulled(positions[:, 0] - a, jacobians[:, 0], slack) for a, slack in straps], axis=2
-        )
+        joint, places = self.joints[0], frames.places(self.joints[0], self._attachments[0])
+        pulls = [_pulls(places - a, slack) for a, slack in zip(anchors, slacks, strict=True)]
+        return np.stack([frames.torques(joint, places, pull) for pull in pulls], axis=2)
 
 
-def _pulled(way: FloatArray, jacobian: FloatArray, slack: float) -> FloatArray:
-    """Return the torque, over stiffness, of a strap as long as the way (N, 3), shape (N, n)."""
-    length = np.linalg.norm(way, axis=1, keepdims=True)
-    pull = way * np.maximum(1.0 - slack / np.maximum(length, _SHORTEST), 0.0)
-    return np.asarray(np.einsum('nxj,nx->nj', jacobian, pull))
+def _pulls(ways: FloatArray, slack: float) -> FloatArray:
+    """Return the force, over stiffness, of a strap that reaches over ways, shape (N, 3) [m]."""
+    length = np.sqrt(np.einsum('nx,nx->n', ways, ways))[:, np.newaxis]
+    return np.asarray(ways * np.maximum(1.0 - slack / np.maximum(length, _SHORTEST), 0.0))
 
 
 def _middle(robot: Robot) -> FloatArray:

@@ -9,7 +9,7 @@ from armid_ros.model.base_parameters import (
     regroup,
     rigid_base_parameters,
 )
-from armid_ros.model.kinematics import point_motion, points_motion
+from armid_ros.model.kinematics import LinkFrames, point_motion, points_motion
 from armid_ros.model.rigid_body import (
     gravity_sensitivity,
     inverse_dynamics,
@@ -23,6 +23,7 @@ from armid_ros.model.rigid_body import (
 __all__ = [
     'BaseParameters',
     'LINK_PARAMETERS',
+    'LinkFrames',
     'gravity_composites',
     'gravity_sensitivity',
     'group_columns',

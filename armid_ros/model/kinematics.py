@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from armid_ros.motion import FloatArray
@@ -69,45 +69,129 @@ def points_motion(
         Derivatives by the joint positions.
 
     """
-    frames = _frames(robot, q, {robot.joints.index(joint) for joint in joints})
-    positions = np.empty((len(q), len(joints), 3))
-    jacobians = np.zeros((len(q), len(joints), 3, robot.n_joints))
-    for k, (joint, offset) in enumerate(zip(joints, offsets, strict=True)):
-        link = robot.joints.index(joint)
-        frame = frames[link]
-        positions[:, k] = frame.origin + frame.rotation @ offset
-        for moved_by in _ancestors(robot, link):
-            mover = frames[moved_by]
-            arm = positions[:, k] - mover.origin
-            jacobians[:, k, :, moved_by] = mover.slide + np.cross(mover.turn, arm)
-    return positions, jacobians
+    return LinkFrames.of(robot, q, joints).points(joints, offsets)
 
 
 @dataclass(frozen=True)
 class _Frame:
-    """Where a joint is: rotation (N, 3, 3), origin, and what it does per unit, (N, 3)."""
+    """A link: rotation (3, 3, N), origin (3, N), and the joints that move it."""
 
     rotation: FloatArray
     origin: FloatArray
-    slide: FloatArray
-    turn: FloatArray
+    movers: list[int]
+
+    def turned(self, vectors: FloatArray) -> FloatArray:
+        """Return what vectors of the link, (3,), (3, N) or (3, m, N), are in the base frame."""
+        columns = self.rotation.swapaxes(0, 1)
+        if vectors.ndim == 3:
+            columns = columns[:, :, np.newaxis]
+        return np.asarray(sum(column * v for column, v in zip(columns, vectors, strict=True)))
 
 
-def _frames(robot: Robot, q: FloatArray, links: set[int]) -> dict[int, _Frame]:
-    """Return the frames of links and of all that carry them."""
-    frames: dict[int, _Frame] = {}
-    for link in sorted({above for end in links for above in _ancestors(robot, end)}):
-        placement = robot.model.jointPlacements[link + 1]
-        slide, turn = _axis(robot, link)
-        way = placement.translation + np.outer(q[:, link], placement.rotation @ slide)
-        rotation = placement.rotation @ _rotations(turn, q[:, link])
-        parent = int(robot.model.parents[link + 1]) - 1
-        if parent >= 0:
-            base = frames[parent]
-            way = base.origin + np.einsum('nxy,ny->nx', base.rotation, way)
-            rotation = base.rotation @ rotation
-        frames[link] = _Frame(rotation, way, rotation @ slide, rotation @ turn)
-    return frames
+@dataclass(frozen=True)
+class LinkFrames:
+    """
+    Where links are along a motion, for any of their points.
+
+    Samples are the last axis of what is kept, and the fastest one of what is returned.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        All joints of the robot.
+    frames : dict
+        The links that can be asked for, by the number of their joint.
+    lines, turns : ndarray, shape (n, 3, N)
+        What each joint does to what it moves, per unit: velocity of the body at the origin of the
+        base frame [m/rad, or m/m] and angular velocity.
+
+    """
+
+    joints: tuple[str, ...]
+    frames: Mapping[int, _Frame]
+    lines: FloatArray
+    turns: FloatArray
+
+    @classmethod
+    def of(cls, robot: Robot, q: FloatArray, joints: Sequence[str] | None = None) -> LinkFrames:
+        """
+        Follow the links that some joints move, all by default.
+
+        Parameters
+        ----------
+        robot : Robot
+            The arm.
+        q : ndarray, shape (N, n)
+            Joint positions.
+        joints : sequence of str, optional
+            The joints.
+
+        """
+        ends = [robot.joints.index(joint) for joint in joints or robot.joints]
+        frames: dict[int, _Frame] = {}
+        lines, turns = np.zeros((2, robot.n_joints, 3, len(q)))
+        for link in sorted({above for end in ends for above in _ancestors(robot, end)}):
+            placement = robot.model.jointPlacements[link + 1]
+            slide, turn = _axis(robot, link)
+            origin = placement.translation[:, np.newaxis] + np.outer(
+                placement.rotation @ slide, q[:, link]
+            )
+            rotation = _rotations(placement.rotation, turn, q[:, link])
+            parent = int(robot.model.parents[link + 1]) - 1
+            if parent >= 0:
+                base = frames[parent]
+                origin = base.origin + base.turned(origin)
+                rotation = base.turned(rotation)
+            frames[link] = frame = _Frame(rotation, origin, _ancestors(robot, link))
+            turns[link] = frame.turned(turn)
+            lines[link] = frame.turned(slide) + _cross(origin, turns[link])
+        return cls(robot.joints, frames, lines, turns)
+
+    def places(self, joint: str, offset: FloatArray) -> FloatArray:
+        """Return where a point (3,) of the link that a joint moves is, shape (N, 3) [m]."""
+        frame = self.frames[self.joints.index(joint)]
+        return np.asarray((frame.origin + frame.turned(offset)).T)
+
+    def points(self, joints: Sequence[str], offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return positions (N, k, 3) and Jacobians (N, k, 3, n) as `points_motion` does."""
+        positions = np.empty((len(joints), 3, self.lines.shape[2]))
+        jacobians = np.zeros((len(joints), *self.lines.shape))
+        for k, (joint, offset) in enumerate(zip(joints, offsets, strict=True)):
+            positions[k] = self.places(joint, offset).T
+            for mover in self.frames[self.joints.index(joint)].movers:
+                jacobians[k, mover] = self.lines[mover] + _cross(self.turns[mover], positions[k])
+        return positions.transpose(2, 0, 1), jacobians.transpose(3, 0, 2, 1)
+
+    def torques(self, joint: str, places: FloatArray, forces: FloatArray) -> FloatArray:
+        """
+        Return J^T f of forces on a link.
+
+        Parameters
+        ----------
+        joint : str
+            The joint that moves the link.
+        places, forces : ndarray, shape (N, 3)
+            Where each force acts [m], and the force [N], in the base frame.
+
+        Returns
+        -------
+        ndarray, shape (N, n)
+
+        """
+        moments = _cross(places.T, forces.T)
+        result = np.einsum('jxn,xn->nj', self.lines, forces.T)
+        result += np.einsum('jxn,xn->nj', self.turns, moments)
+        movers = self.frames[self.joints.index(joint)].movers
+        result[:, [k for k in range(len(self.joints)) if k not in movers]] = 0.0
+        return np.asarray(result)
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the vector products of columns, (3, N)."""
+    result = np.empty(b.shape)
+    for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        result[x] = a[y] * b[z] - a[z] * b[y]
+    return result
 
 
 def _ancestors(robot: Robot, link: int) -> list[int]:
@@ -117,15 +201,16 @@ def _ancestors(robot: Robot, link: int) -> list[int]:
 
 def _axis(robot: Robot, link: int) -> tuple[FloatArray, FloatArray]:
     """Return what a joint does to its link per unit: translation and rotation, each (3,)."""
-    model = robot.model
-    motion = pin.computeJointJacobian(
-        model, model.createData(), pin.neutral(model), link + 1
-    ).reshape(6, -1)[:, link]
+    joint = robot.model.joints[link + 1]
+    data = joint.createData()
+    joint.calc(data, np.zeros(joint.nq))
+    motion = np.asarray(data.S).ravel()
     return motion[:3], motion[3:]
 
 
-def _rotations(axis: FloatArray, angles: FloatArray) -> FloatArray:
-    """Return rotations about an axis, the identity where it is zero, shape (N, 3, 3)."""
+def _rotations(placement: FloatArray, axis: FloatArray, angles: FloatArray) -> FloatArray:
+    """Return a rotation followed by those about an axis, none where it is zero, (3, 3, N)."""
     cross = pin.skew(axis)
-    sine, rest = np.sin(angles)[:, np.newaxis, np.newaxis], 1.0 - np.cos(angles)
-    return np.asarray(np.eye(3) + sine * cross + rest[:, np.newaxis, np.newaxis] * cross @ cross)
+    parts = np.stack([placement, placement @ cross, placement @ cross @ cross], axis=2)
+    by = np.stack([np.ones_like(angles), np.sin(angles), 1.0 - np.cos(angles)])
+    return np.asarray(parts @ by)

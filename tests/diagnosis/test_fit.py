@@ -4,9 +4,10 @@
 
 from armid_ros.diagnosis.fit import fit
 from armid_ros.diagnosis.floor import noise_floor
-from armid_ros.diagnosis.patch import Named
+from armid_ros.diagnosis.patch import Named, Patch, patch_columns
 from armid_ros.effects import CATALOGUE
 import numpy as np
+import pytest
 
 from tests.diagnosis.test_floor import cut
 
@@ -20,3 +21,29 @@ def test_what_does_nothing_along_the_motion_is_not_told(bench):
     shape[:, -1] = 5.0
     fitted = fit(bench.arm, [Named(strap.with_shape(shape), (0,))], data, sigma, None)
     assert np.all(np.isinf(fitted.estimate.std))
+
+
+@pytest.mark.parametrize(
+    ('name', 'shape', 'values'),
+    [
+        ('interface_slack', [0.05, 0.0, 0.1, 0.3, 0.1, 0.2, 0.05], [300.0]),
+        ('stribeck_friction', [0.3, 1.5], [0.4]),
+        ('actuator_saturation', [1.5], [0.3, 0.1]),
+        ('joint_elasticity', [0.002], [1e-3]),
+    ],
+)
+def test_columns_of_a_shape_are_the_derivative_of_the_torque(bench, name, shape, values):
+    (part,) = cut(bench.recordings()[:1])
+    effect = CATALOGUE[name].on(bench.robot, ('elbow',)).with_shape(shape)
+    kept = tuple(range(len(values)))
+    state = Patch(bench.arm, (Named(effect, kept),), (np.array(values),), np.zeros(0))
+    columns = patch_columns(state, part, None)[:, :, len(values) :]
+    for index in range(len(shape)):
+        step = 1e-3 * max(abs(shape[index]), 0.01) * np.eye(len(shape))[index]
+        ahead, behind = (
+            part.residual(bench.arm.with_effect(effect.with_shape(shape + change), values))
+            for change in (step, -step)
+        )
+        slope = (behind - ahead) / (2.0 * step[index])
+        np.testing.assert_allclose(columns[:, :, index], slope, atol=2e-3 * np.abs(slope).max())
+        assert np.any(slope)
