@@ -154,9 +154,18 @@ class ArmModel:
         """Return where all links are along a recorded motion, for any of their points."""
         return LinkFrames.of(self.robot, self.link_motion(motion).q)
 
+    @cached_property
+    def middle_frames(self) -> LinkFrames:
+        """Where all links are in the middle of the range of motion."""
+        return LinkFrames.in_the_middle(self.robot)
+
     def load(self, motion: Motion) -> FloatArray:
         """Return what the rigid body takes along a motion of the links, shape (N, n) [N m]."""
         return inverse_dynamics(self.body, self.felt(motion))
+
+    def body_columns(self, motion: Motion) -> FloatArray:
+        """Return the regressor of the load along a recorded motion, shape (N, n, 10 n)."""
+        return regressor(self.body, self.felt(self.link_motion(motion)))
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
@@ -211,8 +220,7 @@ class ArmModel:
 
     def rigid_columns(self, motion: Motion) -> FloatArray:
         """Return the sensitivities to the rigid parameters, shape (N, n, 10 n)."""
-        link = self.link_motion(motion)
-        columns = regressor(self.body, self.felt(link))
+        columns = self.body_columns(motion)
         return self._as_read(motion, self.with_load_friction(motion, columns))
 
     def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:

@@ -43,6 +43,11 @@ class _Remembering(ArmModel):
         """Return what the rigid body takes, shape (N, n) [N m]."""
         return np.array(self._once('load', motion, super().load))
 
+    def body_columns(self, motion: Motion) -> FloatArray:
+        """Return the regressor of the load along a recorded motion, shape (N, n, 10 n)."""
+        columns: FloatArray = self._once('body', motion, super().body_columns)
+        return columns
+
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
         by_q, by_dq, by_ddq = self._once('derivatives', motion, super().load_derivatives)

@@ -141,6 +141,8 @@ def _only_part(sizes: FloatArray) -> int | None:
 def solve_products(own: FloatArray, aim: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Solve normal equations; directions that the data do not tell stay at zero."""
     diagonal = np.diag(own)
+    if len(aim) == 1 and diagonal[0] > 0.0:
+        return aim / diagonal, 1.0 / np.sqrt(diagonal)
     seen = diagonal > 1e-9 * max(float(diagonal.max()), 1e-300)
     scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, diagonal, 1.0)), 0.0)
     values, vectors = np.linalg.eigh(own * np.outer(scale, scale))

@@ -149,10 +149,7 @@ def _proposals(places: FloatArray) -> tuple[FloatArray, FloatArray]:
     ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     around = [middle + d * spread * ways for d in _DISTANCES if d]
-    anchors, slacks = [], []
-    for anchor in np.concatenate([middle[np.newaxis], *around]):
-        lengths = np.linalg.norm(places - anchor, axis=1)
-        for share in _SLACKS:
-            anchors.append(anchor)
-            slacks.append(float(np.quantile(lengths, share)) if share else 0.0)
-    return np.array(anchors), np.array(slacks)
+    anchors = np.concatenate([middle[np.newaxis], *around])
+    lengths = np.linalg.norm(places - anchors[:, np.newaxis], axis=2)
+    slacks = np.quantile(lengths, _SLACKS, axis=1).T * (np.array(_SLACKS) > 0.0)
+    return np.repeat(anchors, len(_SLACKS), axis=0), slacks.ravel()

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Effect, Quantity, Shape
-from armid_ros.model import LinkFrames, point_motion, points_motion
+from armid_ros.model import LinkFrames, point_motion
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -109,13 +109,13 @@ class Attached(Effect):
         position, velocity = self.anchor(t)
         return position.reshape(len(t), -1, 3), velocity.reshape(len(t), -1, 3)
 
-    def _reference(self, robot: Robot) -> FloatArray:
+    def _reference(self, middle: LinkFrames) -> FloatArray:
         """Return the fixed points that the anchors are taken from, shape (k, 3) [m]."""
         return np.zeros((len(self.joints), 3))
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the torque against the springs."""
-        robot, reference = arm.robot, self._reference(arm.robot)
+        robot, reference = arm.robot, self._reference(arm.middle_frames)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
             times = np.broadcast_to(np.atleast_1d(t), (len(np.atleast_2d(q)),))
@@ -128,8 +128,8 @@ class Attached(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return the torque per quantity of every spring, shape (N, n, P)."""
-        link, reference = arm.link_motion(motion), self._reference(arm.robot)
-        anchors = self._anchors(reference, link.t)
+        link = arm.link_motion(motion)
+        anchors = self._anchors(self._reference(arm.middle_frames), link.t)
         return self._columns(arm.link_frames(motion), link.dq, *anchors)
 
     @abstractmethod
@@ -179,12 +179,13 @@ class HumanInteraction(Attached):
             k [N/m] and d [N s/m].
 
         """
-        forces = stiffness * (np.asarray(point, dtype=float) - self._reference(robot))
+        reference = self._reference(LinkFrames.in_the_middle(robot))
+        forces = stiffness * (np.asarray(point, dtype=float) - reference)
         return np.concatenate([[stiffness, damping, *force] for force in forces])
 
-    def _reference(self, robot: Robot) -> FloatArray:
-        middle = points_motion(robot, self.joints, self._attachments, _middle(robot))
-        return np.asarray(middle[0][0])
+    def _reference(self, middle: LinkFrames) -> FloatArray:
+        points = zip(self.joints, self._attachments, strict=True)
+        return np.concatenate([middle.places(joint, point) for joint, point in points])
 
     def _columns(
         self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
@@ -227,8 +228,9 @@ class InterfaceSlack(Attached):
         """Anchor each attachment where it is in the middle of the range of motion."""
         values = super()._default_shape(robot)
         if self.anchor is None:
-            placed = points_motion(robot, self.joints, values[:, :3], _middle(robot))
-            values[:, 3:6] = placed[0][0]
+            middle = LinkFrames.in_the_middle(robot)
+            for row, joint in zip(values, self.joints, strict=True):
+                row[3:6] = middle.places(joint, row[:3])[0]
         return values
 
     @property
@@ -276,10 +278,3 @@ def _pulls(ways: FloatArray, slack: float) -> FloatArray:
     """Return the force, over stiffness, of a strap that reaches over ways, shape (N, 3) [m]."""
     length = np.sqrt(np.einsum('nx,nx->n', ways, ways))[:, np.newaxis]
     return np.asarray(ways * np.maximum(1.0 - slack / np.maximum(length, _SHORTEST), 0.0))
-
-
-def _middle(robot: Robot) -> FloatArray:
-    """Return the middle of the range of motion, 0 where there is none, shape (1, n)."""
-    limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-    ends = np.where(limited, robot.lower, 0.0), np.where(limited, robot.upper, 0.0)
-    return np.asarray((ends[0] + ends[1]) / 2)[np.newaxis]

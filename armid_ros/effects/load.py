@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Effect, Quantity
-from armid_ros.model import LINK_PARAMETERS, regressor
+from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -30,8 +30,7 @@ class _LinkBody(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return the links' own columns of the regressor, shape (N, n, P)."""
-        felt = arm.felt(arm.link_motion(motion))
-        return regressor(arm.body, felt)[:, :, self._rows(arm.robot)]
+        return arm.body_columns(motion)[:, :, self._rows(arm.robot)]
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the robot with the parameters added to its links."""

@@ -18,6 +18,7 @@ from typing import ClassVar, Self, TYPE_CHECKING
 from armid_ros.effects.base import Effect
 from armid_ros.effects.interaction import Attached, HumanInteraction, InterfaceSlack
 from armid_ros.errors import ModelError
+from armid_ros.model import LinkFrames
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -97,7 +98,7 @@ class Tied(Attached):
             )
         return Attached._anchors(self, reference, t)
 
-    def _reference(self, robot: Robot) -> FloatArray:
+    def _reference(self, middle: LinkFrames) -> FloatArray:
         return np.zeros((len(self.ties), 3))
 
     def _default_shape(self, robot: Robot) -> FloatArray:

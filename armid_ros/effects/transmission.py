@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 #: Inertia about a joint that is taken as some, of a link whose description gives none [kg m^2].
 _LIGHTEST = 1e-9
+#: Samples of a flight through a gap that are computed at first: most are over sooner.
+_LOOK_AHEAD = 32
 
 
 @dataclass(frozen=True)
@@ -123,15 +125,19 @@ def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
     speed = cumulative_trapezoid(pull, t, initial=0.0)
     way = cumulative_trapezoid(speed, t, initial=0.0)
     side = 1.0 if pull[0] >= 0.0 else -1.0
+    backwards, forwards = (np.append(np.flatnonzero(p < 0.0), len(t)) for p in (pull, -pull))
     place, start = np.empty(len(t)), 0
     while start < len(t):
-        free = np.flatnonzero(pull[start:] * side < 0.0)
-        leave = start + int(free[0]) if len(free) else len(t)
+        away = backwards if side > 0.0 else forwards
+        leave = int(away[np.searchsorted(away, start)])
         place[start:leave] = 0.5 * side * width
         if leave == len(t):
             break
-        flown = way[leave:] - way[leave] - speed[leave] * (t[leave:] - t[leave])
-        flight = 0.5 * side * width + flown
+        ahead, flight = _LOOK_AHEAD, np.empty(0)
+        while not np.any(np.abs(flight) > 0.5 * width) and leave + len(flight) < len(t):
+            seen = slice(leave, leave + ahead)
+            flown = way[seen] - way[leave] - speed[leave] * (t[seen] - t[leave])
+            flight, ahead = 0.5 * side * width + flown, 2 * ahead
         landed = np.flatnonzero(np.abs(flight) > 0.5 * width)
         length = max(int(landed[0]), 1) if len(landed) else len(flight)
         place[leave : leave + length] = flight[:length]

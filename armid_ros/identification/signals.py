@@ -14,10 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from armid_ros.errors import IdentificationError
 from armid_ros.model import points_motion
-from armid_ros.motion import FloatArray, Motion, MovingPoints
+from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.recording import Beside, Recording
 import numpy as np
 import numpy.typing as npt
@@ -92,10 +93,14 @@ class Conditioning:
 
     def taps(self) -> FloatArray:
         """Return the symmetric decimation filter; a single 1 where nothing is decimated."""
+        return self._taps
+
+    @cached_property
+    def _taps(self) -> FloatArray:
         if self.decimation == 1:
-            return np.ones(1)
+            return read_only(np.ones(1))
         count = 2 * _HALF_TAPS * self.decimation + 1
-        return np.asarray(signal.firwin(count, 0.8 / self.decimation, window=('kaiser', 5.0)))
+        return read_only(signal.firwin(count, 0.8 / self.decimation, window=('kaiser', 5.0)))
 
     @property
     def smooth_stride(self) -> int:

@@ -82,10 +82,10 @@ class _Frame:
 
     def turned(self, vectors: FloatArray) -> FloatArray:
         """Return what vectors of the link, (3,), (3, N) or (3, m, N), are in the base frame."""
-        columns = self.rotation.swapaxes(0, 1)
+        x, y, z = (self.rotation[:, axis] for axis in range(3))
         if vectors.ndim == 3:
-            columns = columns[:, :, np.newaxis]
-        return np.asarray(sum(column * v for column, v in zip(columns, vectors, strict=True)))
+            x, y, z = x[:, np.newaxis], y[:, np.newaxis], z[:, np.newaxis]
+        return np.asarray(x * vectors[0] + y * vectors[1] + z * vectors[2])
 
 
 @dataclass(frozen=True)
@@ -146,6 +146,13 @@ class LinkFrames:
             turns[link] = frame.turned(turn)
             lines[link] = frame.turned(slide) + _cross(origin, turns[link])
         return cls(robot.joints, frames, lines, turns)
+
+    @classmethod
+    def in_the_middle(cls, robot: Robot) -> LinkFrames:
+        """Follow no motion: all joints in the middle of their range, at 0 where there is none."""
+        limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
+        middle = np.where(limited, (robot.lower + robot.upper) / 2, 0.0)
+        return cls.of(robot, middle[np.newaxis])
 
     def places(self, joint: str, offset: FloatArray) -> FloatArray:
         """Return where a point (3,) of the link that a joint moves is, shape (N, 3) [m]."""
