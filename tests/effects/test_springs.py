@@ -5,7 +5,7 @@
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.effects.interaction import RecordedPoint
-from armid_ros.model import point_motion
+from armid_ros.model import LinkFrames, point_motion
 from armid_ros.motion import Motion
 import numpy as np
 import pytest
@@ -133,6 +133,17 @@ def test_without_slack_an_interface_is_a_spring(robot, motion):
         ArmModel(robot).with_effect(strap, [400.0]),
     )
     np.testing.assert_allclose(arms[0].torque(motion), arms[1].torque(motion), atol=1e-9)
+
+
+def test_many_straps_from_one_point_pull_as_each_of_them_does(robot, motion):
+    strap = make_effect('interface_slack@elbow_pitch', robot)
+    anchors, slacks = np.array([[0.3, 0.2, 0.4], [-0.5, 0.1, 0.2]]), np.array([0.0, 0.6])
+    together = strap.columns_of_straps(LinkFrames.of(robot, motion.q), anchors, slacks)
+    for k, (anchor, slack) in enumerate(zip(anchors, slacks, strict=True)):
+        own = strap.with_shape([*strap.shape[:3], *anchor, slack])
+        column = ArmModel(robot).columns_of(own, motion)[:, :, 0]
+        np.testing.assert_allclose(together[:, :, k], column, atol=1e-12)
+        assert np.any(column)
 
 
 def test_a_slack_strap_does_not_pull(robot, added, motion):
