@@ -89,7 +89,7 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> Floor:
     first = np.arange(max(where.start, half), min(where.stop, len(motion) - lag - half))
     rows = first[:: trajectory.used.decimation]
     sigma, structure, growth = np.empty((3, motion.n_joints))
-    kept = 0.4 * trajectory.used.rate_hz / trajectory.used.decimation
+    kept = trajectory.used.kept_hz
     for joint in range(motion.n_joints):
         rest, used = _difference(trajectory, smooth, rows, lag, joint)
         freedom = max(1.0, used.sum() - 4.0)

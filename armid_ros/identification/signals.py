@@ -39,6 +39,8 @@ EDGE_PERIODS = 4.0
 SMOOTH_SAMPLES = 5.0
 #: Half length of the decimation filter in output samples; its edges are cut off.
 _HALF_TAPS = 4
+#: Share of their rate up to which rows keep what is there, where the decimation filter ends.
+_KEPT = 0.4
 #: Second derivatives of torques, fourth of positions, are taken below this many bands of the
 #: motion: between two and five, elasticity is found all the same; at ten there is but noise.
 _CURVATURE_BANDS = 2.0
@@ -91,6 +93,11 @@ class Conditioning:
     cutoff_hz: float
     decimation: int
 
+    @property
+    def kept_hz(self) -> float:
+        """Frequency up to which rows keep what is there [Hz]."""
+        return _KEPT * self.rate_hz / self.decimation
+
     def taps(self) -> FloatArray:
         """Return the symmetric decimation filter; a single 1 where nothing is decimated."""
         return self._taps
@@ -100,7 +107,8 @@ class Conditioning:
         if self.decimation == 1:
             return read_only(np.ones(1))
         count = 2 * _HALF_TAPS * self.decimation + 1
-        return read_only(signal.firwin(count, 0.8 / self.decimation, window=('kaiser', 5.0)))
+        window = 'kaiser', 5.0
+        return read_only(signal.firwin(count, self.kept_hz, window=window, fs=self.rate_hz))
 
     @property
     def smooth_stride(self) -> int:
