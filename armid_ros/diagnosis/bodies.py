@@ -16,6 +16,7 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.model_search import Explanation, joint_losses_of, no_worse
+from armid_ros.diagnosis.problem import weighted_rows
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.physical import physical_program, PhysicalSettings
@@ -82,15 +83,15 @@ def _triangle(
     sigma: Sequence[FloatArray],
 ) -> tuple[FloatArray, float]:
     """Return the triangular factor of base columns and what they are to make, and its rows."""
-    fitted, rank, count = explanation.fitted, len(values), 0
-    factors = []
-    for columns, left, part, s in zip(fitted.columns, fitted.residual, data, sigma, strict=True):
-        weight = part.told / s
+    fitted, rank = explanation.fitted, len(values)
+    blocks = []
+    for columns, left in zip(fitted.columns, fitted.residual, strict=True):
         own = columns[:, :, :rank]
         target = left + own @ values
-        stacked = np.concatenate([own, target[:, :, np.newaxis]], axis=2)
-        rows = (stacked * weight[:, :, np.newaxis]).reshape(-1, rank + 1)
-        factors.append(scipy.linalg.qr(rows, mode='r')[0][: rank + 1])
-        count += int(part.told.sum())
+        blocks.append(np.concatenate([own, target[:, :, np.newaxis]], axis=2))
+    factors = [
+        scipy.linalg.qr(rows.reshape(-1, rank + 1), mode='r')[0][: rank + 1]
+        for rows in weighted_rows(blocks, data, sigma)
+    ]
     whole = scipy.linalg.qr(np.concatenate(factors), mode='r')[0][: rank + 1]
-    return np.asarray(whole), float(count)
+    return np.asarray(whole), float(sum(part.told.sum() for part in data))

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.patch import Named, Patch, patch_columns
+from armid_ros.diagnosis.problem import weighted_rows
 from armid_ros.effects.load import described_spread
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
@@ -146,8 +147,7 @@ def _residuals(model: ArmModel, data: Sequence[Trajectory]) -> list[FloatArray]:
 def _loss(
     residual: Sequence[FloatArray], data: Sequence[Trajectory], sigma: Sequence[FloatArray]
 ) -> float:
-    parts = zip(residual, data, sigma, strict=True)
-    return float(sum(np.sum((left * part.told / s) ** 2) for left, part, s in parts))
+    return float(sum(np.sum(left**2) for left in weighted_rows(residual, data, sigma)))
 
 
 def _described(base: BaseParameters, arm: ArmModel) -> FloatArray:
@@ -183,11 +183,11 @@ def _step(
     """Solve with weights, the description pulling; what nothing tells gets no step."""
     size = columns[0].shape[2]
     own, aim = np.zeros((size, size)), np.zeros(size)
-    for block, left, part, s in zip(columns, residual, data, sigma, strict=True):
-        weight = part.told / s
-        flat = (block * weight[:, :, np.newaxis]).reshape(-1, size)
+    lefts = weighted_rows(residual, data, sigma)
+    for block, left in zip(weighted_rows(columns, data, sigma), lefts, strict=True):
+        flat = block.reshape(-1, size)
         own += flat.T @ flat
-        aim += flat.T @ (left * weight).ravel()
+        aim += flat.T @ left.ravel()
     known = len(change)
     own[:known, :known] += pull
     aim[:known] -= pull @ change
@@ -206,21 +206,19 @@ def _covariance(
 ) -> FloatArray:
     """Return the covariance, colour of the residual included; infinite where others make it."""
     size = columns[0].shape[2]
-    weighted = [
-        c * (part.told / s)[:, :, np.newaxis]
-        for c, part, s in zip(columns, data, sigma, strict=True)
-    ]
+    weighted = list(weighted_rows(columns, data, sigma))
     stacked = np.concatenate([block.reshape(-1, size) for block in weighted])
     names = tuple(ParameterName(str(k), '', '') for k in range(size))
     kept = group_columns(stacked, names, tolerance=1e-5).independent
+    lefts = weighted_rows(residual, data, sigma)
     problem = [
         Regression(
-            part.motion.select(part.rows).with_torque(left * (part.told / s)),
+            part.motion.select(part.rows).with_torque(left),
             block[:, :, kept],
             part.told,
             part.source,
         )
-        for part, block, left, s in zip(data, weighted, residual, sigma, strict=True)
+        for part, block, left in zip(data, weighted, lefts, strict=True)
     ]
     covariance = np.diag(np.full(size, np.inf))
     if not len(kept):

@@ -12,7 +12,13 @@ from armid_ros.diagnosis.candidates import Candidates, candidates, effect_rows
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.fit import fit, Fitted
 from armid_ros.diagnosis.patch import Named
-from armid_ros.diagnosis.problem import make_problem, Problem, project, Projection
+from armid_ros.diagnosis.problem import (
+    make_problem,
+    Problem,
+    project,
+    Projection,
+    weighted_rows,
+)
 from armid_ros.diagnosis.refine import Workspace
 from armid_ros.diagnosis.remembering import remembering
 from armid_ros.diagnosis.rivals import imitates, not_beaten
@@ -173,18 +179,16 @@ def _start(named: Sequence[Named], steps: Sequence[Step], arm: ArmModel) -> list
 def joint_losses_of(
     fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
 ) -> FloatArray:
-    total = np.zeros(data[0].told.shape[1])
-    count = np.zeros_like(total)
-    for left, part, s in zip(fitted.residual, data, sigma, strict=True):
-        total += np.sum((left * part.told / s) ** 2, axis=0)
-        count += part.told.sum(axis=0)
-    return np.asarray(total / np.maximum(count, 1))
+    lefts = weighted_rows(fitted.residual, data, sigma)
+    squares = np.sum([np.sum(left**2, axis=0) for left in lefts], axis=0)
+    count = np.sum([part.told.sum(axis=0) for part in data], axis=0)
+    return np.asarray(squares / np.maximum(count, 1))
 
 
 def _excess(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> float:
     """Return the sum of squares beyond the noise."""
-    parts = zip(fitted.residual, data, sigma, strict=True)
-    squares = sum(float(np.sum((left * part.told / s) ** 2)) for left, part, s in parts)
+    lefts = weighted_rows(fitted.residual, data, sigma)
+    squares = sum(float(np.sum(left**2)) for left in lefts)
     return max(squares - sum(float(part.told.sum()) for part in data), 0.0)
 
 

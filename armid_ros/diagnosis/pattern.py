@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.model_search import Explanation
+from armid_ros.diagnosis.problem import weighted_rows
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -88,9 +89,9 @@ def find_pattern(
     known = len(arm.parameters)
     change = base.values(fitted.arm.theta[:known]) - base.values(arm.theta)
     precision = np.zeros((base.rank, base.rank))
-    for columns, part, s in zip(fitted.columns, data, sigma, strict=True):
-        weighted = columns[:, :, : base.rank] * (part.told / s)[:, :, np.newaxis]
-        flat = weighted.reshape(-1, base.rank)
+    free = [columns[:, :, : base.rank] for columns in fitted.columns]
+    for columns in weighted_rows(free, data, sigma):
+        flat = columns.reshape(-1, base.rank)
         precision += flat.T @ flat
     total = float(change @ precision @ change)
     rigid = arm.theta.copy()

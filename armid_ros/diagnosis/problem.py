@@ -10,7 +10,7 @@ factorisation of the free columns, whatever the number of rows.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.evidence import Trajectory
@@ -116,6 +116,15 @@ def make_problem(
 def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
     """Return one over the noise of all rows, zero where they tell nothing, (R, n) [1/(N m)]."""
     return np.concatenate([part.told / s for part, s in zip(data, sigma, strict=True)])
+
+
+def weighted_rows(
+    rows: Sequence[FloatArray], data: Sequence[Trajectory], sigma: Sequence[FloatArray]
+) -> Iterator[FloatArray]:
+    """Yield rows (M, n) or (M, n, P) of each trajectory with the weights of `row_weights`."""
+    for own, part, s in zip(rows, data, sigma, strict=True):
+        weight = row_weights([part], [s])
+        yield own * (weight[:, :, np.newaxis] if own.ndim > 2 else weight)
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:

@@ -18,6 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.fit import Fitted
 from armid_ros.diagnosis.model_search import Explanation, joint_losses_of
+from armid_ros.diagnosis.problem import weighted_rows
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.tied import Tied, TiedInteraction
 from armid_ros.errors import IdentificationError
@@ -208,11 +209,8 @@ def _with_springs(
     theta[[_place(spring, fitted.arm.parameters) for spring in springs]] = stiffness
     if base is not None:
         known, rank = len(base.standard), base.rank
-        weighted = [
-            (columns * (part.told / s)[:, :, np.newaxis]).reshape(-1, columns.shape[2])
-            for columns, part, s in zip(fitted.columns, data, sigma, strict=True)
-        ]
-        rows = np.concatenate(weighted)
+        weighted = np.concatenate(list(weighted_rows(fitted.columns, data, sigma)))
+        rows = weighted.reshape(-1, weighted.shape[2])
         away = rows[:, rank:][:, where] @ change
         moved = np.linalg.lstsq(rows[:, :rank], -away, rcond=None)[0]
         theta[:known] = base.lift(base.values(theta[:known]) + moved, theta[:known])
