@@ -20,8 +20,6 @@ import numpy as np
 
 #: A joint that had no gap counts when it has this much more than passes as noise.
 _WORSE = 1.2
-#: Of recordings that nothing was fitted to.
-_PREDICTED = 'held-out'
 
 
 @dataclass(frozen=True)
@@ -64,8 +62,9 @@ class Gap:
     closed : float
         Share of the excess over the noise that is gone, 0 to 1, in the joints that had a gap or
         have one.
-    data : str
-        What it was measured on.
+    predicted : bool
+        Whether it was measured on recordings that nothing was fitted to; else on each part of the
+        data, with values from the others.
     overlays : tuple of Overlay
         The curves.
 
@@ -77,13 +76,13 @@ class Gap:
     loss_before: FloatArray
     loss_after: FloatArray
     closed: float
-    data: str
+    predicted: bool
     overlays: tuple[Overlay, ...]
 
     @property
-    def predicted(self) -> bool:
-        """Whether it was measured on recordings that nothing was fitted to."""
-        return self.data == _PREDICTED
+    def data(self) -> str:
+        """What it was measured on, for a reader."""
+        return 'held-out' if self.predicted else 'held-out, each part of the data in turn'
 
 
 def measure_gap(
@@ -103,11 +102,11 @@ def measure_gap(
             _overlay(part, s, before, after) for part, s in zip(unseen, sigma, strict=True)
         ]
         pairs = [(o.measured - o.before, o.measured - o.after) for o in overlays]
-        return _gap(unseen, sigma, pairs, _PREDICTED, lowest, overlays)
+        return _gap(unseen, sigma, pairs, lowest, overlays, predicted=True)
     sigma = [floor.sigma for floor in floors]
     overlays = [_overlay(part, s, before, after) for part, s in zip(data, sigma, strict=True)]
     pairs = _left_out(explanation, data, sigma)
-    return _gap(data, sigma, pairs, 'held-out, each part of the data in turn', lowest, overlays)
+    return _gap(data, sigma, pairs, lowest, overlays, predicted=False)
 
 
 def _overlay(part: Trajectory, sigma: FloatArray, before: ArmModel, after: ArmModel) -> Overlay:
@@ -121,9 +120,10 @@ def _gap(
     data: Sequence[Trajectory],
     sigma: Sequence[FloatArray],
     pairs: Sequence[tuple[FloatArray, FloatArray]],
-    what: str,
     lowest: float,
     overlays: Sequence[Overlay],
+    *,
+    predicted: bool,
 ) -> Gap:
     told = np.concatenate([part.told for part in data])
     noise = np.concatenate(
@@ -146,7 +146,7 @@ def _gap(
         losses[0],
         losses[1],
         float(np.clip(closed, 0.0, 1.0)),
-        what,
+        predicted,
         tuple(overlays),
     )
 

@@ -265,5 +265,5 @@ def _as_sure(value: float, std: float) -> str:
 
 
 def _closes(gap: Gap) -> str:
-    where = 'held-out data' if gap.data == 'held-out' else 'data left out of the fit'
+    where = 'held-out data' if gap.predicted else 'data left out of the fit'
     return f'closes {100 * gap.closed:.0f} % of the gap on {where}'
