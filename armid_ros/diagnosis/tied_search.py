@@ -21,7 +21,7 @@ from armid_ros.diagnosis.search import next_step, Step, Survey
 from armid_ros.diagnosis.selection import Score, Trial, try_group
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.tied import Ties
-from armid_ros.diagnosis.tied_values import TieRegression
+from armid_ros.diagnosis.tied_values import rightly_described, TieRegression, without_bias
 from armid_ros.effects.tied import Partner, Tied
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -80,10 +80,13 @@ def explain_tied(
             return None
         if len(fitted.named) < len(found.fitted.named):
             found = _without(found, fitted, ties)
-    if regression.described(found):
+    springs = regression.springs(found, 'free')
+    if rightly_described(regression.springs(found, 'known'), springs):
         described = explain(arm, data, noise, None, settings, 0)
         found = as_described(found, described, arm, data, noise, settings)
-    return regression.without_bias(found, data, noise), noise
+        if found.base is None:
+            springs = regression.springs(found, 'known')
+    return without_bias(found, springs, data, noise), noise
 
 
 def within_its_noise(

@@ -38,7 +38,6 @@ _DOUBTFUL = 1.0
 #: Squares over noise that each inertia has to take for its description to be wrong: one by chance,
 #: two where filters make neighbours alike.
 _TOLD = 5.0
-_KINDS: tuple[Inertias, ...] = ('known', 'free')
 
 
 @dataclass(frozen=True)
@@ -85,38 +84,7 @@ class TieRegression:
         sure = {joint for k, joint in enumerate(problem.spring_joints) if z[k] > LEAST_Z}
         return frozenset(sure - _tied_joints(self.arm))
 
-    def described(self, explanation: Explanation) -> bool:
-        """Return whether inertias as described explain the torques as well as fitted ones do."""
-        known, free = (self._identified(explanation, kind) for kind in _KINDS)
-        if known is None or free is None:
-            return True
-        freed = len(free.estimate.values) - len(free.segments)
-        noise = max(1.0, free.misfit / free.residual.size)
-        return known.misfit - free.misfit < _TOLD * freed * noise
-
-    def without_bias(
-        self, explanation: Explanation, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
-    ) -> Explanation:
-        """
-        Return an explanation whose springs are without what noisy angles take away from them.
-
-        Parameters
-        ----------
-        explanation : Explanation
-            What was found; as it is if no springs are among it, or straps with slack are.
-        data : sequence of Trajectory
-            The data.
-        sigma : sequence of ndarray, each (n,)
-            Noise [N m].
-
-        """
-        found = self._identified(explanation, 'known' if explanation.base is None else 'free')
-        if found is None:
-            return explanation
-        fitted = _with_springs(explanation, found, data, sigma)
-        return replace(explanation, fitted=fitted, losses=joint_losses_of(fitted, data, sigma))
-
-    def _identified(self, explanation: Explanation, inertias: Inertias) -> Interaction | None:
+    def springs(self, explanation: Explanation, inertias: Inertias) -> Interaction | None:
         """
         Identify springs that were named, if all ties among the names are such and data tell them.
 
@@ -169,6 +137,43 @@ class TieRegression:
                 for recording in self.recordings
             ]
         )
+
+
+def rightly_described(known: Interaction | None, free: Interaction | None) -> bool:
+    """Return whether inertias as described explain the torques as well as fitted ones do."""
+    if known is None or free is None:
+        return True
+    freed = len(free.estimate.values) - len(free.segments)
+    noise = max(1.0, free.misfit / free.residual.size)
+    return known.misfit - free.misfit < _TOLD * freed * noise
+
+
+def without_bias(
+    explanation: Explanation,
+    springs: Interaction | None,
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+) -> Explanation:
+    """
+    Return an explanation whose springs are without what noisy angles take away from them.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        What was found.
+    springs : Interaction or None
+        Its springs as `TieRegression.springs` finds them, inertias free as in the explanation;
+        None leaves it as it is.
+    data : sequence of Trajectory
+        The data.
+    sigma : sequence of ndarray, each (n,)
+        Noise [N m].
+
+    """
+    if springs is None:
+        return explanation
+    fitted = _with_springs(explanation, springs, data, sigma)
+    return replace(explanation, fitted=fitted, losses=joint_losses_of(fitted, data, sigma))
 
 
 def _tied_joints(arm: ArmModel) -> set[str]:
