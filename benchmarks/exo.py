@@ -36,7 +36,7 @@ import numpy as np
 
 from benchmarks.exo_deviations import deviations
 from benchmarks.exo_diagnosis import cases, diagnosed
-from benchmarks.exo_noise import find_springs, measured, recorded, TORQUE_NOISE
+from benchmarks.exo_noise import find_springs, measured, recorded, TORQUE_NOISE, with_torques
 from benchmarks.leg_pair_in_mujoco import drive_in_mujoco
 
 SECONDS = 6.0
@@ -114,14 +114,16 @@ def stiffness(draws: int) -> None:
         for inertias in ('known', 'free'):
             for separate in (False, True):
                 for data, motions in sets.items():
-                    tau = pair_torques(pair, *motions).tau
+                    exact = with_torques(pair, motions)
                     found = [
-                        find_springs(pair, motions, tau, degrees, draw, inertias, separate)
+                        find_springs(
+                            pair, exact, degrees, draw, inertias=inertias, separate=separate
+                        )
                         for draw in range(draws)
                     ]
                     least = None
                     if motions is not seconds:
-                        least = _bound(pair, motions, degrees, inertias, separate)
+                        least = _bound(pair, exact, degrees, inertias, separate)
                     line = f'  {data:10s} {degrees:4.2f} deg  {inertias:5s}  '
                     print(line + _judged(found, degrees, inertias, least), flush=True)
 
@@ -131,7 +133,8 @@ def chosen_poses(pair: TiedPair) -> PairMotion:
     gait = read_gait()
     parts = [stepping(pair, gait, np.linspace(0.0, period, 601)[:-1], period) for period in SPEEDS]
     own, other = (_joined([part[side] for part in parts]) for side in (0, 1))
-    problem, theta = _planned(pair, PairMotion(own, other), 0.05, 'free', True)
+    exact = with_torques(pair, PairMotion(own, other))
+    problem, theta = _planned(pair, exact, 0.05, 'free', True)
     rows = choose_poses(problem, theta, TORQUE_NOISE, 200)
     return PairMotion(own.select(rows), other.select(rows))
 
@@ -144,10 +147,10 @@ def _joined(motions: list[Motion]) -> Motion:
 def _planned(
     pair: TiedPair, motions: PairMotion, degrees: float, inertias: Inertias, separate: bool
 ) -> tuple[InteractionProblem, FloatArray]:
-    """Return the regression on poses without noise, and its solution."""
+    """Return the regression on poses with exact torques, and its solution."""
     problem = interaction_problem(
         pair.robot,
-        motions.own.with_torque(pair_torques(pair, *motions).tau),
+        motions.own,
         pair.other,
         motions.other,
         pair.ties,
@@ -212,8 +215,8 @@ def hidden(sets: int) -> None:
 
 def _search(every: TiedPair, real: TiedPair, motions: PairMotion, seed: int) -> InteractionFinding:
     rng = np.random.default_rng(seed)
-    tau = pair_torques(real, *motions).tau
-    runs = [tuple(map(recorded, measured(motions, tau, 0.05, rng))) for _ in range(2)]
+    exact = with_torques(real, motions)
+    runs = [tuple(map(recorded, measured(exact, 0.05, rng))) for _ in range(2)]
     return find_interaction(every.robot, every.other, every.ties, runs[0], runs[1])
 
 

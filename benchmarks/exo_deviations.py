@@ -14,10 +14,10 @@ import argparse
 from armid_ros.identification.interaction_problem import Inertias
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.gait import read_gait
-from armid_ros.simulation.leg_pair import leg_pair, pair_torques, PairMotion, stepping
+from armid_ros.simulation.leg_pair import leg_pair, PairMotion, stepping
 import numpy as np
 
-from benchmarks.exo_noise import find_springs
+from benchmarks.exo_noise import find_springs, with_torques
 
 STIFFNESS = 1e4
 #: Repeats of a recording for each of poses: they take ten times as long.
@@ -52,9 +52,10 @@ def stated(
 ) -> tuple[float, float, float]:
     """Return the ratio, its own deviation, and the per cent of intervals; means of all springs."""
     pair = leg_pair(STIFFNESS)
-    tau = pair_torques(pair, *motions).tau
+    exact = with_torques(pair, motions)
     found = [
-        find_springs(pair, motions, tau, 0.05, seed, inertias, separate) for seed in range(repeats)
+        find_springs(pair, exact, 0.05, seed, inertias=inertias, separate=separate)
+        for seed in range(repeats)
     ]
     values = np.array([part.stiffness for part in found])
     variance = np.mean([part.std**2 for part in found], axis=0)

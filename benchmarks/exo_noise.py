@@ -9,9 +9,9 @@ from dataclasses import replace
 from armid_ros.identification.interaction import identify_interaction, Interaction
 from armid_ros.identification.interaction_problem import Inertias, interaction_problem
 from armid_ros.identification.interaction_recording import recorded_interaction_problem
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import Motion
 from armid_ros.recording import Recording
-from armid_ros.simulation.leg_pair import PairMotion, TiedPair
+from armid_ros.simulation.leg_pair import pair_torques, PairMotion, TiedPair
 import numpy as np
 
 TORQUE_NOISE = 0.5
@@ -20,14 +20,14 @@ TORQUE_NOISE = 0.5
 def find_springs(
     pair: TiedPair,
     motions: PairMotion,
-    tau: FloatArray,
     degrees: float,
     seed: int,
-    inertias: Inertias,
-    separate: bool,
+    *,
+    inertias: Inertias = 'known',
+    separate: bool = False,
 ) -> Interaction:
     """Draw noise, and find the springs of poses or, where there are many, of a recording."""
-    own, other = measured(motions, tau, degrees, np.random.default_rng(seed))
+    own, other = measured(motions, degrees, np.random.default_rng(seed))
     if len(own) < 1000:
         problem = interaction_problem(
             pair.robot,
@@ -40,13 +40,12 @@ def find_springs(
             separate=separate,
         )
         return identify_interaction(problem, TORQUE_NOISE)
-    recordings = recorded(own), recorded(other)
     return identify_interaction(
         recorded_interaction_problem(
             pair.robot,
-            recordings[0],
+            recorded(own),
             pair.other,
-            recordings[1],
+            recorded(other),
             pair.ties,
             inertias=inertias,
             separate=separate,
@@ -54,16 +53,23 @@ def find_springs(
     )
 
 
-def measured(
-    motions: PairMotion, tau: FloatArray, degrees: float, rng: np.random.Generator
-) -> PairMotion:
-    """Return a motion with noisy angles and torques."""
+def with_torques(pair: TiedPair, motions: PairMotion) -> PairMotion:
+    """Return a motion with exact torques of the machine."""
+    return PairMotion(motions.own.with_torque(pair_torques(pair, *motions).tau), motions.other)
+
+
+def measured(motions: PairMotion, degrees: float, rng: np.random.Generator) -> PairMotion:
+    """Return a motion with exact torques as noisy sensors show it."""
     own, other = (
         replace(m, q=m.q + np.radians(degrees) * rng.normal(size=m.q.shape)) for m in motions
     )
-    return PairMotion(own.with_torque(tau + TORQUE_NOISE * rng.normal(size=tau.shape)), other)
+    assert own.tau is not None
+    tau = own.tau + TORQUE_NOISE * rng.normal(size=own.tau.shape)
+    return PairMotion(own.with_torque(tau), other)
 
 
-def recorded(motion: Motion) -> Recording:
+def recorded(motion: Motion, start_ns: int = 0) -> Recording:
     """Return a motion as a sensor records it."""
-    return Recording(joints=motion.joints, t=motion.t, q=motion.q, tau=motion.tau)
+    return Recording(
+        joints=motion.joints, t=motion.t, q=motion.q, tau=motion.tau, start_ns=start_ns
+    )

@@ -15,14 +15,15 @@ from armid_ros.identification.interaction_search import find_interaction
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.simulation.gait import read_gait
-from armid_ros.simulation.leg_pair import leg_pair, pair_torques, PairMotion, stepping, TiedPair
+from armid_ros.simulation.leg_pair import leg_pair, PairMotion, stepping, TiedPair
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from benchmarks.exo_noise import find_springs, measured, recorded, TORQUE_NOISE, with_torques
+
 STATE = ('q', 'dq', 'ddq')
 STIFFNESS = 1.0e4
-TORQUE_NOISE = 0.5
 
 
 @pytest.fixture(scope='module')
@@ -34,59 +35,13 @@ def pair() -> TiedPair:
 def poses(pair) -> PairMotion:
     """Return 200 poses, with exact torques."""
     motions = stepping(pair, read_gait(), np.linspace(0.0, 1.8, 201)[:-1])
-    return measured(pair, motions)
+    return with_torques(pair, motions)
 
 
 @pytest.fixture(scope='module')
 def seconds(pair) -> PairMotion:
     """Return 6 s at 1 kHz, with exact torques."""
-    return measured(pair, stepping(pair, read_gait(), np.arange(0.0, 6.0, 1e-3)))
-
-
-def measured(pair: TiedPair, motions: PairMotion) -> PairMotion:
-    tau = pair_torques(pair, *motions).tau
-    return PairMotion(motions.own.with_torque(tau), motions.other)
-
-
-def noisy(motion: Motion, degrees: float, rng: np.random.Generator) -> Motion:
-    q = motion.q + np.radians(degrees) * rng.normal(size=motion.q.shape)
-    if motion.tau is None:
-        return replace(motion, q=q)
-    return replace(motion, q=q, tau=motion.tau + TORQUE_NOISE * rng.normal(size=q.shape))
-
-
-def from_poses(pair, poses, degrees, seed, **options) -> Interaction:
-    rng = np.random.default_rng(seed)
-    own, other = (noisy(motion, degrees, rng) for motion in poses)
-    problem = interaction_problem(
-        pair.robot,
-        own,
-        pair.other,
-        other,
-        pair.ties,
-        position_noise=np.radians(degrees),
-        **options,
-    )
-    return identify_interaction(problem, TORQUE_NOISE)
-
-
-def from_recording(pair, seconds, degrees, seed, shift_ns=0, **options) -> Interaction:
-    rng = np.random.default_rng(seed)
-    own, other = (noisy(motion, degrees, rng) for motion in seconds)
-    recordings = [
-        Recording(
-            joints=m.joints, t=m.t[rows] - m.t[rows][0], q=m.q[rows], tau=tau, start_ns=start
-        )
-        for m, rows, tau, start in (
-            (own, slice(0, None), own.tau, 10**9),
-            (other, slice(shift_ns // 10**6, None), None, 10**9 + shift_ns),
-        )
-    ]
-    return identify_interaction(
-        recorded_interaction_problem(
-            pair.robot, recordings[0], pair.other, recordings[1], pair.ties, **options
-        )
-    )
+    return with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 6.0, 1e-3)))
 
 
 def percent(found: Interaction) -> np.ndarray:
@@ -111,7 +66,7 @@ def test_exact_data_give_exact_stiffness(pair, poses, inertias, separate) -> Non
 
 def test_noise_of_a_tenth_of_a_degree_leaves_no_bias_in_200_poses(pair, poses) -> None:
     """The mean over draws, to the error of that mean; plain least squares is off by much more."""
-    found = [from_poses(pair, poses, 0.1, seed) for seed in range(8)]
+    found = [find_springs(pair, poses, 0.1, seed) for seed in range(8)]
     biased = np.mean([100.0 * part.bias[0] / STIFFNESS for part in found])
     mean, scatter = np.mean([percent(f) for f in found]), np.std([percent(f) for f in found])
     assert biased < -3.0
@@ -120,7 +75,7 @@ def test_noise_of_a_tenth_of_a_degree_leaves_no_bias_in_200_poses(pair, poses) -
 
 
 def test_intervals_hold(pair, poses) -> None:
-    found = [from_poses(pair, poses, 0.05, seed, separate=True) for seed in range(8)]
+    found = [find_springs(pair, poses, 0.05, seed, separate=True) for seed in range(8)]
     inside = [
         (part.interval()[:, 0] <= STIFFNESS) & (part.interval()[:, 1] >= STIFFNESS)
         for part in found
@@ -130,30 +85,35 @@ def test_intervals_hold(pair, poses) -> None:
 
 @pytest.mark.parametrize(('inertias', 'one', 'each'), [('known', 0.5, 5.0), ('free', 1.0, 5.0)])
 def test_a_recording_gives_them_within_per_cent(pair, seconds, inertias, one, each) -> None:
-    overall = from_recording(pair, seconds, 0.05, 0, inertias=inertias)
+    overall = find_springs(pair, seconds, 0.05, 0, inertias=inertias)
     assert abs(percent(overall)[0]) < one
-    apart = from_recording(pair, seconds, 0.05, 0, inertias=inertias, separate=True)
+    apart = find_springs(pair, seconds, 0.05, 0, inertias=inertias, separate=True)
     assert np.abs(percent(apart)).max() < each
 
 
 def test_a_recording_with_a_tenth_of_a_degree(pair, seconds) -> None:
-    assert abs(percent(from_recording(pair, seconds, 0.1, 1))[0]) < 1.0
+    assert abs(percent(find_springs(pair, seconds, 0.1, 1))[0]) < 1.0
 
 
 def test_recordings_need_not_begin_together(pair, seconds) -> None:
-    late = from_recording(pair, seconds, 0.05, 0, shift_ns=700 * 10**6)
-    assert abs(percent(late)[0]) < 0.5
+    own, other = measured(seconds, 0.05, np.random.default_rng(0))
+    late = other.select(slice(700, None))
+    late = recorded(replace(late, t=late.t - late.t[0]), start_ns=700 * 10**6)
+    found = identify_interaction(
+        recorded_interaction_problem(pair.robot, recorded(own), pair.other, late, pair.ties)
+    )
+    assert abs(percent(found)[0]) < 0.5
 
 
 def test_the_noise_of_the_angles_is_measured(pair, seconds) -> None:
-    found = [from_recording(pair, seconds, d, 0).position_noise for d in (0.05, 0.1)]
+    found = [find_springs(pair, seconds, d, 0).position_noise for d in (0.05, 0.1)]
     np.testing.assert_allclose(found[1] / found[0], 2.0, rtol=0.2)
 
 
 def test_without_springs_none_are_found(pair) -> None:
     loose = pair.with_stiffness(0.0)
-    still = measured(loose, stepping(loose, read_gait(), np.linspace(0.0, 1.8, 200)))
-    found = from_poses(loose, still, 0.05, 0)
+    still = with_torques(loose, stepping(loose, read_gait(), np.linspace(0.0, 1.8, 200)))
+    found = find_springs(loose, still, 0.05, 0)
     lower, upper = found.interval(0.999)[0]
     assert lower < 0.0 < upper
     assert upper < 100.0
@@ -173,20 +133,16 @@ def test_data_that_cannot_tell_are_refused(pair, poses) -> None:
         interaction_problem(pair.robot, poses.own, pair.other, shifted, pair.ties)
 
 
-def recorded(pair: TiedPair, seed: int, degrees: float = 0.05) -> tuple[Recording, Recording]:
-    rng = np.random.default_rng(seed)
-    motions = measured(pair, stepping(pair, read_gait(), np.arange(0.0, 4.0, 1e-3)))
-    own, other = (noisy(motion, degrees, rng) for motion in motions)
-    return (
-        Recording(joints=own.joints, t=own.t, q=own.q, tau=own.tau),
-        Recording(joints=other.joints, t=other.t, q=other.q),
-    )
+def two_sides(pair: TiedPair, seed: int) -> tuple[Recording, Recording]:
+    motions = with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 4.0, 1e-3)))
+    own, other = measured(motions, 0.05, np.random.default_rng(seed))
+    return recorded(own), recorded(other)
 
 
 def test_hidden_springs_are_found_where_they_are(pair) -> None:
     real = leg_pair(3e3, ('swing_thigh', 'stance_shank'))
     found = find_interaction(
-        pair.robot, pair.other, pair.ties, recorded(real, 0), recorded(real, 1)
+        pair.robot, pair.other, pair.ties, two_sides(real, 0), two_sides(real, 1)
     )
     assert set(found.segments) == {'swing_thigh', 'stance_shank'}
     assert found.interaction is not None
@@ -197,7 +153,7 @@ def test_hidden_springs_are_found_where_they_are(pair) -> None:
 def test_no_springs_no_name(pair) -> None:
     loose = pair.with_stiffness(0.0)
     found = find_interaction(
-        pair.robot, pair.other, pair.ties, recorded(loose, 2), recorded(loose, 3)
+        pair.robot, pair.other, pair.ties, two_sides(loose, 2), two_sides(loose, 3)
     )
     assert found.segments == ()
     assert found.interaction is None
@@ -205,8 +161,8 @@ def test_no_springs_no_name(pair) -> None:
 
 def test_deviations_that_are_stated_are_those_of_repeats(pair) -> None:
     """The scatter of one stiffness over 150 draws, within what so many draws can tell."""
-    poses = stepping(pair, read_gait(), np.linspace(0.0, 1.8, 101)[:-1])
-    found = [from_poses(pair, measured(pair, poses), 0.05, seed) for seed in range(150)]
+    poses = with_torques(pair, stepping(pair, read_gait(), np.linspace(0.0, 1.8, 101)[:-1]))
+    found = [find_springs(pair, poses, 0.05, seed) for seed in range(150)]
     values = np.array([part.stiffness[0] for part in found])
     stated = np.mean([part.std[0] ** 2 for part in found])
     ratio = values.var(ddof=1) / stated
@@ -216,8 +172,8 @@ def test_deviations_that_are_stated_are_those_of_repeats(pair) -> None:
 
 def test_deviations_of_a_recording_allow_for_samples_that_filters_make_alike(pair) -> None:
     """As if rows were independent they would be a third too small, half of the variance."""
-    short = measured(pair, stepping(pair, read_gait(), np.arange(0.0, 3.0, 1e-3)))
-    found = [from_recording(pair, short, 0.05, seed) for seed in range(60)]
+    short = with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 3.0, 1e-3)))
+    found = [find_springs(pair, short, 0.05, seed) for seed in range(60)]
     values = np.array([part.stiffness[0] for part in found])
     stated = np.mean([part.std[0] ** 2 for part in found])
     low, high = chi2.ppf([0.0005, 0.9995], len(found) - 1) / (len(found) - 1)
@@ -227,7 +183,7 @@ def test_deviations_of_a_recording_allow_for_samples_that_filters_make_alike(pai
 def test_inertias_of_links_that_hardly_turn_stay_near_their_description(pair) -> None:
     """The trunk's inertia is a column of noise: without a belief its best value is infinite."""
     real = leg_pair(3e3, ('stance_thigh',))
-    own, other = recorded(real, 9)
+    own, other = two_sides(real, 9)
     problem = recorded_interaction_problem(
         pair.robot, own, pair.other, other, pair.ties, inertias='free', separate=True
     )
@@ -267,7 +223,7 @@ def test_no_estimate_is_better_than_the_bound_and_chosen_poses_lower_it(pair) ->
 
 def exact(pair: TiedPair, motions: PairMotion) -> tuple[InteractionProblem, np.ndarray]:
     """Return the regression of four springs and free inertias, and its exact solution."""
-    own, other = measured(pair, motions)
+    own, other = with_torques(pair, motions)
     problem = interaction_problem(
         pair.robot,
         own,
