@@ -5,21 +5,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.causal import (
-    CausalFilter,
-    CausalMotion,
-    ROW_RATE_RATIO,
-    TripleLag,
-)
+from armid_ros.identification.causal import CausalFilter, CausalMotion, TripleLag
 from armid_ros.identification.change import Change, change_candidates
-from armid_ros.identification.change_watch import ChangeSettings, ChangeWatch
+from armid_ros.identification.change_watch import ChangeWatch
 from armid_ros.identification.friction_beside import by_joint, FrictionBeside
+from armid_ros.identification.online_settings import OnlineSettings
 from armid_ros.identification.recursive import RecursiveLeastSquares
+from armid_ros.identification.row_noise import RowNoise, sensor_noise
 from armid_ros.identification.score_variance import ScoreVariance
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
@@ -27,63 +24,12 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-#: Noise of a torque sensor relative to the torque limit of its joint, when nobody gives it; only
-#: the ratios between joints matter, as the residuals then say how large it is.
-_NOISE_OF_LIMIT = 0.01
+__all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
+
 #: Time constants of the row filter until its start, or a joint's rest, is forgotten, to 3e-3.
 _FORGOTTEN = 10.0
 #: Windows of which the colour of the noise is learned [s]: longer than what it lasts.
 _WINDOW = 4.0
-
-
-@dataclass(frozen=True)
-class OnlineSettings:
-    """
-    How parameters are estimated online.
-
-    Attributes
-    ----------
-    cutoff : float
-        Frequency of the low-pass on torque and regressor rows [Hz]. Well above the motion, as
-        the inertial torque is in the motion's fastest part; below what shakes the torque signal.
-    row_rate : float or None
-        Rows used per second [1/s]; 40 times the cut-off frequency by default. The rows between
-        them are nearly the same once filtered, so they would cost time and teach nothing.
-    forgetting : float
-        Forgetting factor per row used, 0.9 to 1. A memory of T seconds is 1 - 1 / (T row_rate).
-    torque_noise : tuple of float or None
-        Standard deviation of the noise in single torque samples, per joint [N m]. Without it the
-        noise is proportional to the torque limits and its size is taken from the residuals.
-    prior : Estimate or None
-        What is known of the base parameters; by default nothing, with the arm's values to start
-        from.
-    rest_velocity : float
-        A joint that is slower [rad/s or m/s] for longer than `rest_time` [s] is at rest: where
-        dry friction may hold it, its torque says nothing and is not used.
-    rest_time : float
-        See `rest_velocity`; longer than a reversal takes.
-    period : float or None
-        Sampling period [s], learned from the stamps by default.
-    max_gap : int
-        Missing samples that are interpolated across; a longer gap restarts the filters.
-    measured_velocity : bool
-        Differentiate the measured velocity instead of the position.
-    changes : ChangeSettings or None
-        How readily a change of the arm is believed; None does not look for any.
-
-    """
-
-    cutoff: float = 5.0
-    row_rate: float | None = None
-    forgetting: float = 1.0
-    torque_noise: tuple[float, ...] | None = None
-    prior: Estimate | None = None
-    rest_velocity: float = 0.01
-    rest_time: float = 0.1
-    period: float | None = None
-    max_gap: int = 10
-    measured_velocity: bool = False
-    changes: ChangeSettings | None = field(default_factory=ChangeSettings)
 
 
 @dataclass(frozen=True)
@@ -167,10 +113,10 @@ class OnlineIdentifier:
             prismatic=robot.prismatic,
         )
         self._row_filter = TripleLag(settings.cutoff)
-        self._row_period = 1.0 / _row_rate(settings)
+        self._row_period = 1.0 / settings.rows_per_second()
         self._estimator = RecursiveLeastSquares(
             self.base.parameters,
-            _noise(arm, settings),
+            sensor_noise(robot, settings.torque_noise),
             forgetting=settings.forgetting,
             prior=settings.prior,
             start=self.base.values(arm.theta),
@@ -194,7 +140,7 @@ class OnlineIdentifier:
         self._last_row: float | None = None
         self._last_moving = np.full(robot.n_joints, -np.inf)
         self._last_useless: FloatArray | None = None
-        self._bandwidth: float | None = None
+        self._noise: RowNoise | None = None
 
     def reset(self) -> None:
         """Forget everything that was learned, and set the counters to zero."""
@@ -289,7 +235,7 @@ class OnlineIdentifier:
         self._last_row = None
         self._last_moving[:] = -np.inf
         self._last_useless = None
-        self._bandwidth = None
+        self._noise = None
 
     def _watch_rest(self, motion: CausalMotion) -> FloatArray:
         """Return when each joint was last at rest, or the row filter started, shape (n,) [s]."""
@@ -308,7 +254,8 @@ class OnlineIdentifier:
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
         measured, rows, beside = np.split(filtered, [1, 1 + self.base.rank], axis=1)
         measured = measured[:, 0]
-        gain, independent = self._noise_of_row(step)
+        noise = self._row_noise()
+        gain, independent = noise.gain, noise.independent(min(step, self._row_period))
         stamp = motion.t - (self.delay or 0.0)
         weights = np.asarray(used * independent)
         sample = measured / gain, weights
@@ -339,58 +286,15 @@ class OnlineIdentifier:
             return np.empty((motion.n_joints, 0))
         return self._beside.torques(motion)
 
-    def _noise_of_row(self, step: float) -> tuple[float, float]:
-        """
-        Return what filtering leaves of white noise, and the independent samples in one row.
-
-        The noise of a sample, of standard deviation s and density s^2 T, leaves a filter H with
-        the variance s^2 T B, where B is the integral of |H|^2 over all frequencies; rows that
-        are `step` apart hold step B independent observations each.
-
-        """
-        period, pole = self._filter.period, self._filter.pole
-        assert period is not None and pole is not None
-        if self._bandwidth is None:
-            self._bandwidth = _bandwidth(pole, self._row_filter.pole, 0.5 / period)
-        independent = min(1.0, self._bandwidth * min(step, self._row_period))
-        return float(np.sqrt(period * self._bandwidth)), independent
-
-
-def _row_rate(settings: OnlineSettings) -> float:
-    rate = ROW_RATE_RATIO * settings.cutoff if settings.row_rate is None else settings.row_rate
-    if not (np.isfinite(rate) and rate >= 2.0 * settings.cutoff):
-        raise IdentificationError(
-            f'{rate} rows per second: a cut-off frequency of {settings.cutoff:g} Hz needs at '
-            f'least {2.0 * settings.cutoff:g}'
-        )
-    return rate
-
-
-def _noise(arm: ArmModel, settings: OnlineSettings) -> FloatArray:
-    robot = arm.robot
-    if settings.torque_noise is not None:
-        noise = np.array(settings.torque_noise, dtype=np.float64)
-        if noise.shape != (robot.n_joints,):
-            raise IdentificationError(
-                f'torque_noise has {noise.size} values, but {robot.name} has {robot.n_joints} '
-                f'driven joints: {", ".join(robot.joints)}'
-            )
-        return noise
-    limit = robot.torque_limit
-    known = np.isfinite(limit) & (limit > 0.0)
-    if not known.any():
-        return np.ones(robot.n_joints)
-    return _NOISE_OF_LIMIT * np.where(known, limit, np.median(limit[known]))
+    def _row_noise(self) -> RowNoise:
+        """Return the noise of the rows since the filters were started."""
+        if self._noise is None:
+            period, pole = self._filter.period, self._filter.pole
+            assert period is not None and pole is not None
+            self._noise = RowNoise.of(period, pole, self._row_filter.pole)
+        return self._noise
 
 
 def _one_sample(arm: ArmModel, motion: CausalMotion) -> Motion:
     state = (motion.q[None], motion.dq[None], motion.ddq[None])
     return Motion(arm.robot.joints, np.array([motion.t]), *state)
-
-
-def _bandwidth(motion_pole: float, row_pole: float, nyquist: float) -> float:
-    """Integrate the squared gain of both filters over frequency, both signs [Hz]."""
-    f = np.linspace(0.0, min(nyquist, 20.0 * row_pole / (2.0 * np.pi)), 4001)
-    w = 2.0 * np.pi * f
-    gain = 1.0 / ((1.0 + (w / motion_pole) ** 2) * (1.0 + (w / row_pole) ** 2)) ** 3
-    return float(2.0 * np.trapezoid(gain, f))

@@ -1,0 +1,77 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Noise of torque sensors, what filters leave of it, and how much a filtered row tells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.errors import IdentificationError
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
+import numpy as np
+
+#: Noise of a torque sensor relative to the torque limit of its joint, when nobody gives it; only
+#: the ratios between joints matter, as the residuals then say how large it is.
+_NOISE_OF_LIMIT = 0.01
+
+
+@dataclass(frozen=True)
+class RowNoise:
+    """
+    What filters leave of white noise.
+
+    The noise of a sample, of standard deviation s and density s^2 T, leaves a filter H with the
+    variance s^2 T B, where B is the integral of |H|^2 over all frequencies; rows that are `step`
+    apart hold step B independent observations each.
+
+    Attributes
+    ----------
+    period : float
+        Sampling period T [s].
+    bandwidth : float
+        B [Hz].
+
+    """
+
+    period: float
+    bandwidth: float
+
+    @classmethod
+    def of(cls, period: float, motion_pole: float, row_pole: float) -> RowNoise:
+        """Return what the motion filter and the row filter leave, of these poles [rad/s]."""
+        return cls(period, _bandwidth(motion_pole, row_pole, 0.5 / period))
+
+    @property
+    def gain(self) -> float:
+        """Standard deviation of the noise of a row over that of a sample."""
+        return float(np.sqrt(self.period * self.bandwidth))
+
+    def independent(self, step: float) -> float:
+        """Return how many independent observations a row holds, `step` [s] after the last."""
+        return min(1.0, self.bandwidth * step)
+
+
+def sensor_noise(robot: Robot, given: tuple[float, ...] | None) -> FloatArray:
+    """Return the noise of the torque of each joint, a share of its limit if not given, (n,)."""
+    if given is not None:
+        noise = np.array(given, dtype=np.float64)
+        if noise.shape != (robot.n_joints,):
+            raise IdentificationError(
+                f'torque_noise has {noise.size} values, but {robot.name} has {robot.n_joints} '
+                f'driven joints: {", ".join(robot.joints)}'
+            )
+        return noise
+    limit = robot.torque_limit
+    known = np.isfinite(limit) & (limit > 0.0)
+    if not known.any():
+        return np.ones(robot.n_joints)
+    return _NOISE_OF_LIMIT * np.where(known, limit, np.median(limit[known]))
+
+
+def _bandwidth(motion_pole: float, row_pole: float, nyquist: float) -> float:
+    """Integrate the squared gain of both filters over frequency, both signs [Hz]."""
+    f = np.linspace(0.0, min(nyquist, 20.0 * row_pole / (2.0 * np.pi)), 4001)
+    w = 2.0 * np.pi * f
+    gain = 1.0 / ((1.0 + (w / motion_pole) ** 2) * (1.0 + (w / row_pole) ** 2)) ** 3
+    return float(2.0 * np.trapezoid(gain, f))
