@@ -21,24 +21,14 @@ from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification import square_root
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
-from scipy.linalg import lapack
 
-#: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
-#: parameters of 1e-4 to 1e3; what the data leave unknown shows by this value.
-PRIOR_STD = 1e6
 #: A smaller forgetting factor forgets within ten samples, which is not identification.
 SMALLEST_FORGETTING = 0.9
-#: Losses are this many times those of exponential forgetting, as samples that bring less than
-#: that lose less. So a step of a Coulomb friction of a 7-joint arm in motion is followed as with
-#: exponential forgetting, 63 % in 8 s and 90 % in 28 s with a memory of 10 s.
-_LOSS_RATIO = 2.0
-#: The most that one sample may take away from the old information in any direction.
-_LARGEST_LOSS = 0.5
-_BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +112,7 @@ class RecursiveLeastSquares:
         self._forgetting = float(forgetting)
         self._noise = None if noise is None else _checked_noise(noise)
         self._scale = noise is None if scale_covariance is None else scale_covariance
-        self._prior = _prior_root(parameters, prior, start)
+        self._prior = square_root.prior_root(parameters, prior, start)
         # without a prior the first P observations fit exactly and say nothing of the noise
         self._initial_freedom = -float(len(parameters)) if prior is None else 0.0
         self.reset()
@@ -133,7 +123,7 @@ class RecursiveLeastSquares:
         wider = copy(self)
         wider.parameters = self.parameters + parameters
         wider._prior = (
-            scipy.linalg.block_diag(root, np.eye(more) / PRIOR_STD),
+            scipy.linalg.block_diag(root, np.eye(more) / square_root.PRIOR_STD),
             np.concatenate([right, np.zeros((more, 1))]),
         )
         wider._initial_freedom = self._initial_freedom - float(more)
@@ -146,7 +136,7 @@ class RecursiveLeastSquares:
         self._root, self._right = (np.array(part, order='F') for part in self._prior)
         self._squares = 0.0
         self._freedom = self._initial_freedom
-        self._values = self._solve()
+        self._values = square_root.solved(self._root, self._right)
 
     def update(
         self,
@@ -186,9 +176,17 @@ class RecursiveLeastSquares:
         scale = self.scale(counts)
         rows = rows * scale[:, np.newaxis]
         if self._forgetting < 1.0:
-            self._replace(rows, innovation * scale)
+            self._root = square_root.replaced(self._root, rows, self._forgetting)
+            self._values = self._values + square_root.step_along(
+                self._root, rows.T @ (innovation * scale)
+            )
+            self._squares *= self._forgetting
+            self._freedom *= self._forgetting
         else:
-            self._absorb(rows, tau * scale)
+            self._root, self._right = square_root.absorbed(
+                self._root, self._right, rows, tau * scale
+            )
+            self._values = square_root.solved(self._root, self._right)
         after = tau * scale - rows @ self._values
         self._squares += float(innovation * scale @ after)
         self._freedom += used
@@ -216,23 +214,14 @@ class RecursiveLeastSquares:
         """
         Forget the values along some directions, and nothing else.
 
-        The parameters become theta + directions delta, where nothing is known of delta: beside
-        R theta = z stands delta = 0 within PRIOR_STD, and delta is eliminated by reflections.
-
         Parameters
         ----------
         directions : ndarray, shape (P, k)
             Independent combinations of parameters that may have changed.
 
         """
-        size, count = directions.shape
-        unit = directions / np.linalg.norm(directions, axis=0)
-        stacked = np.zeros((size + count, count + size))
-        stacked[:size, :count], stacked[:size, count:] = -self._root @ unit, self._root
-        stacked[size:, :count] = np.eye(count) / PRIOR_STD
-        root = np.asarray(np.linalg.qr(stacked, mode='r'))[count:, count:]
-        self._take(np.asfortranarray(root), self._values)
-        self._freedom -= count
+        self._take(square_root.reopened(self._root, directions), self._values)
+        self._freedom -= directions.shape[1]
 
     @property
     def values(self) -> FloatArray:
@@ -242,8 +231,7 @@ class RecursiveLeastSquares:
     @property
     def covariance(self) -> FloatArray:
         """Covariance of the values, shape (P, P)."""
-        inverse, _ = lapack.dtrtri(self._root)
-        return np.asarray(inverse @ inverse.T * self.covariance_factor)
+        return square_root.inverse_products(self._root) * self.covariance_factor
 
     @property
     def noise_is_relative(self) -> bool:
@@ -276,53 +264,9 @@ class RecursiveLeastSquares:
         """Values and covariance with their names."""
         return Estimate(self.parameters, self._values.copy(), self.covariance)
 
-    def _absorb(self, rows: FloatArray, tau: FloatArray) -> None:
-        """Annihilate the new rows against the triangle by Householder reflections."""
-        root, reflectors, factors, _ = lapack.dtpqrt(
-            0, min(_BLOCK, len(self._values)), self._root, rows, overwrite_a=1
-        )
-        right, _, _ = lapack.dtpmqrt(
-            0, reflectors, factors, self._right, tau[:, np.newaxis], trans='T', overwrite_a=1
-        )
-        self._root, self._right = root, right
-        self._values = self._solve()
-
-    def _replace(self, rows: FloatArray, innovation: FloatArray) -> None:
-        """
-        Take in new information and give up old information where it arrives.
-
-        In the directions b of U = rows R^-1 = A diag(s) B^T the old information, 1, becomes
-        1 - f + s^2 with f = min(s^2, level). It never falls, so the new triangle is the old one
-        with rows A^T rows, shortened, annihilated. The level is such that the losses add up to
-        what exponential forgetting takes from all P directions, if the sample brings that much.
-
-        """
-        whitened, _ = lapack.dtrtrs(self._root, rows.T, trans=1)
-        gains, directions = np.linalg.eigh(whitened.T @ whitened)
-        budget = _LOSS_RATIO * (1.0 - self._forgetting) * len(self._values)
-        level = min(_level(np.maximum(gains, 0.0), budget), _LARGEST_LOSS)
-        kept = np.sqrt(np.maximum(1.0 - level / np.maximum(gains, level), 0.0))
-        if np.any(kept > 0.0):
-            self._root, *_ = lapack.dtpqrt(
-                0,
-                min(_BLOCK, len(self._values)),
-                self._root,
-                (directions * kept).T @ rows,
-                overwrite_a=1,
-            )
-        gradient = (rows.T @ innovation)[:, np.newaxis]
-        half, _ = lapack.dtrtrs(self._root, gradient, trans=1)
-        step, _ = lapack.dtrtrs(self._root, half)
-        self._values = self._values + step[:, 0]
-        self._squares *= self._forgetting
-        self._freedom *= self._forgetting
-
     def _take(self, root: FloatArray, values: FloatArray) -> None:
         self._root, self._values = root, values
         self._right = np.asfortranarray((root @ values)[:, np.newaxis])
-
-    def _solve(self) -> FloatArray:
-        return np.asarray(lapack.dtrtrs(self._root, self._right)[0][:, 0])
 
     def _checked(
         self, rows: FloatArray, tau: FloatArray, weights: npt.ArrayLike | None
@@ -345,15 +289,6 @@ class RecursiveLeastSquares:
         return rows, tau, counts
 
 
-def _level(gains: FloatArray, budget: float) -> float:
-    """Return the level for which the gains cut off at it, ascending, add up to the budget."""
-    count = len(gains)
-    smaller = np.cumsum(gains) - gains
-    levels = (budget - smaller) / np.arange(count, 0, -1)
-    above = gains >= levels
-    return float(levels[np.argmax(above)]) if above.any() else np.inf
-
-
 def _checked_noise(noise: npt.ArrayLike) -> FloatArray:
     values = np.array(noise, dtype=np.float64)
     if values.ndim != 1 or not np.all(np.isfinite(values)) or not np.all(values > 0.0):
@@ -361,28 +296,3 @@ def _checked_noise(noise: npt.ArrayLike) -> FloatArray:
             f'noise {values}: has to be one finite standard deviation > 0 for each joint'
         )
     return values
-
-
-def _prior_root(
-    parameters: tuple[ParameterName, ...], prior: Estimate | None, start: npt.ArrayLike | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return the triangle R, shape (P, P), and R theta, shape (P, 1), of the prior."""
-    if prior is None:
-        count = len(parameters)
-        values = np.zeros(count) if start is None else np.asarray(start, dtype=np.float64)
-        if values.shape != (count,) or not np.all(np.isfinite(values)):
-            raise IdentificationError(f'start {values}: has to be {count} finite values')
-        return np.eye(count) / PRIOR_STD, values[:, np.newaxis] / PRIOR_STD
-    if prior.parameters != parameters:
-        unknown = [p for p in prior.parameters if p not in parameters] or 'the order'
-        raise IdentificationError(f'the prior is of other parameters; different: {unknown}')
-    try:
-        factor = np.linalg.cholesky(prior.covariance)
-    except np.linalg.LinAlgError:
-        raise IdentificationError(
-            'the covariance of the prior is not positive definite: it has to give every '
-            'parameter an uncertainty'
-        ) from None
-    inverse = scipy.linalg.solve_triangular(factor, np.eye(len(parameters)), lower=True)
-    root: FloatArray = np.linalg.qr(inverse).R
-    return root, root @ prior.values[:, np.newaxis]

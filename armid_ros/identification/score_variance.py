@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from armid_ros.identification.least_squares import LEAST_LEFT
-from armid_ros.identification.recursive import PRIOR_STD
+from armid_ros.identification.square_root import PRIOR_STD
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import linalg, stats

@@ -3,9 +3,10 @@
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.least_squares import solve
-from armid_ros.identification.recursive import PRIOR_STD, RecursiveLeastSquares
+from armid_ros.identification.recursive import RecursiveLeastSquares
 from armid_ros.identification.regression import regressions
 from armid_ros.identification.signals import conditioning, SignalSettings
+from armid_ros.identification.square_root import PRIOR_STD
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 import numpy as np

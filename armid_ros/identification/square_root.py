@@ -1,0 +1,151 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Information as a triangle: R theta = z stands for all weighted rows so far.
+
+Reflections take rows in and leave R^T R exactly what the rows make (Bierman 1977, chapter V).
+
+"""
+
+from __future__ import annotations
+
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+from scipy.linalg import lapack
+
+#: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
+#: parameters of 1e-4 to 1e3; what the data leave unknown shows by this value.
+PRIOR_STD = 1e6
+#: Losses are this many times those of exponential forgetting, as samples that bring less than
+#: that lose less. So a step of a Coulomb friction of a 7-joint arm in motion is followed as with
+#: exponential forgetting, 63 % in 8 s and 90 % in 28 s with a memory of 10 s.
+_LOSS_RATIO = 2.0
+#: The most that one sample may take away from the old information in any direction.
+_LARGEST_LOSS = 0.5
+_BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
+
+
+def prior_root(
+    parameters: tuple[ParameterName, ...], prior: Estimate | None, start: npt.ArrayLike | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return the triangle R, shape (P, P), and R theta, shape (P, 1), of the prior."""
+    if prior is None:
+        count = len(parameters)
+        values = np.zeros(count) if start is None else np.asarray(start, dtype=np.float64)
+        if values.shape != (count,) or not np.all(np.isfinite(values)):
+            raise IdentificationError(f'start {values}: has to be {count} finite values')
+        return np.eye(count) / PRIOR_STD, values[:, np.newaxis] / PRIOR_STD
+    if prior.parameters != parameters:
+        unknown = [p for p in prior.parameters if p not in parameters] or 'the order'
+        raise IdentificationError(f'the prior is of other parameters; different: {unknown}')
+    try:
+        factor = np.linalg.cholesky(prior.covariance)
+    except np.linalg.LinAlgError:
+        raise IdentificationError(
+            'the covariance of the prior is not positive definite: it has to give every '
+            'parameter an uncertainty'
+        ) from None
+    inverse = scipy.linalg.solve_triangular(factor, np.eye(len(parameters)), lower=True)
+    root: FloatArray = np.linalg.qr(inverse).R
+    return root, root @ prior.values[:, np.newaxis]
+
+
+def solved(root: FloatArray, right: FloatArray) -> FloatArray:
+    """Return theta of R theta = z, shape (P,)."""
+    return np.asarray(lapack.dtrtrs(root, right)[0][:, 0])
+
+
+def absorbed(
+    root: FloatArray, right: FloatArray, rows: FloatArray, tau: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Return R and z with new rows in them, annihilated by Householder reflections.
+
+    Parameters
+    ----------
+    root, right : ndarray, shapes (P, P) and (P, 1)
+        R and z in Fortran order; they are overwritten.
+    rows, tau : ndarray, shapes (m, P) and (m,)
+        What is taken in, with noise of variance 1.
+
+    """
+    root, reflectors, factors, _ = lapack.dtpqrt(
+        0, min(_BLOCK, len(root)), root, rows, overwrite_a=1
+    )
+    right, _, _ = lapack.dtpmqrt(
+        0, reflectors, factors, right, tau[:, np.newaxis], trans='T', overwrite_a=1
+    )
+    return root, right
+
+
+def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArray:
+    """
+    Return R with new information in it, old information given up where it arrives.
+
+    In the directions b of U = rows R^-1 = A diag(s) B^T the old information, 1, becomes
+    1 - f + s^2 with f = min(s^2, level). It never falls, so the new triangle is the old one
+    with rows A^T rows, shortened, annihilated. The level is such that the losses add up to
+    what exponential forgetting takes from all P directions, if the sample brings that much.
+
+    Parameters
+    ----------
+    root : ndarray, shape (P, P)
+        R in Fortran order; it is overwritten.
+    rows : ndarray, shape (m, P)
+        What is taken in, with noise of variance 1.
+    forgetting : float
+        Forgetting factor, below 1.
+
+    """
+    whitened, _ = lapack.dtrtrs(root, rows.T, trans=1)
+    gains, directions = np.linalg.eigh(whitened.T @ whitened)
+    budget = _LOSS_RATIO * (1.0 - forgetting) * len(root)
+    level = min(_level(np.maximum(gains, 0.0), budget), _LARGEST_LOSS)
+    kept = np.sqrt(np.maximum(1.0 - level / np.maximum(gains, level), 0.0))
+    if np.any(kept > 0.0):
+        root, *_ = lapack.dtpqrt(
+            0, min(_BLOCK, len(root)), root, (directions * kept).T @ rows, overwrite_a=1
+        )
+    return root
+
+
+def step_along(root: FloatArray, gradient: FloatArray) -> FloatArray:
+    """Return R^-1 R^-T times a gradient (P,)."""
+    half, _ = lapack.dtrtrs(root, gradient[:, np.newaxis], trans=1)
+    step, _ = lapack.dtrtrs(root, half)
+    return np.asarray(step[:, 0])
+
+
+def reopened(root: FloatArray, directions: FloatArray) -> FloatArray:
+    """
+    Return R without what it tells of the values along some directions (P, k).
+
+    The parameters become theta + directions delta, where nothing is known of delta: beside
+    R theta = z stands delta = 0 within PRIOR_STD, and delta is eliminated by reflections.
+
+    """
+    size, count = directions.shape
+    unit = directions / np.linalg.norm(directions, axis=0)
+    stacked = np.zeros((size + count, count + size))
+    stacked[:size, :count], stacked[:size, count:] = -root @ unit, root
+    stacked[size:, :count] = np.eye(count) / PRIOR_STD
+    return np.asfortranarray(np.asarray(np.linalg.qr(stacked, mode='r'))[count:, count:])
+
+
+def inverse_products(root: FloatArray) -> FloatArray:
+    """Return R^-1 R^-T, the covariance for noise of variance 1, shape (P, P)."""
+    inverse, _ = lapack.dtrtri(root)
+    return np.asarray(inverse @ inverse.T)
+
+
+def _level(gains: FloatArray, budget: float) -> float:
+    """Return the level for which the gains cut off at it, ascending, add up to the budget."""
+    count = len(gains)
+    smaller = np.cumsum(gains) - gains
+    levels = (budget - smaller) / np.arange(count, 0, -1)
+    above = gains >= levels
+    return float(levels[np.argmax(above)]) if above.any() else np.inf
