@@ -16,10 +16,12 @@ from armid_ros.effects import (
     merge_actions,
     TorqueReading,
 )
+from armid_ros.effects.timing import smoothed
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.model import (
     BaseParameters,
+    gravity_sensitivity,
     group_columns,
     inverse_dynamics,
     inverse_dynamics_derivatives,
@@ -166,6 +168,14 @@ class ArmModel:
     def body_columns(self, motion: Motion) -> FloatArray:
         """Return the regressor of the load along a recorded motion, shape (N, n, 10 n)."""
         return regressor(self.body, self.felt(self.link_motion(motion)))
+
+    def gravity_columns(self, motion: Motion) -> FloatArray:
+        """Differentiate the load along a recorded motion by gravity, shape (N, n, 3)."""
+        return gravity_sensitivity(self.body, self.link_motion(motion).q)
+
+    def smoothed(self, motion: Motion) -> Motion:
+        """Return a recorded motion without what is beyond its band."""
+        return smoothed(motion)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""

@@ -110,8 +110,8 @@ def fit(
     residual = _residuals(state.model, data)
     loss = _loss(residual, data, sigma)
     rounds = _MOST_ROUNDS if named else int(base is not None)
+    columns = [patch_columns(state, part, base) for part in data]
     for _ in range(rounds):
-        columns = [patch_columns(state, part, base) for part in data]
         step = _step(columns, residual, data, sigma, pull, state.change)
         moved, after = state, residual
         for share in (1.0, 0.5, 0.2):
@@ -122,10 +122,11 @@ def fit(
                 break
         new = _loss(after, data, sigma)
         settled = loss - new < 1e-4 * max(new, 1e-12)
+        if moved is not state:
+            columns = [patch_columns(moved, part, base) for part in data]
         state, residual, loss = moved, after, new
         if settled:
             break
-    columns = [patch_columns(state, part, base) for part in data]
     size = 0 if base is None else base.rank
     names, numbers = state.parameters()
     covariance = np.zeros((size, size))

@@ -48,6 +48,16 @@ class _Remembering(ArmModel):
         columns: FloatArray = self._once('body', motion, super().body_columns)
         return columns
 
+    def gravity_columns(self, motion: Motion) -> FloatArray:
+        """Differentiate the load along a recorded motion by gravity, shape (N, n, 3)."""
+        columns: FloatArray = self._once('gravity', motion, super().gravity_columns)
+        return columns
+
+    def smoothed(self, motion: Motion) -> Motion:
+        """Return a recorded motion without what is beyond its band."""
+        smooth: Motion = self._once('smooth', motion, super().smoothed)
+        return smooth
+
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
         by_q, by_dq, by_ddq = self._once('derivatives', motion, super().load_derivatives)

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Effect, Quantity
 from armid_ros.errors import ModelError
-from armid_ros.model import gravity_sensitivity
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -61,7 +60,7 @@ class GravityMagnitude(_GravityEffect):
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/dg along gravity [N m per m/s^2], shape (N, n, 1)."""
         direction = _unit(arm.robot.gravity)[:, np.newaxis]
-        return np.asarray(gravity_sensitivity(arm.body, arm.link_motion(motion).q) @ direction)
+        return np.asarray(arm.gravity_columns(motion) @ direction)
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the robot under the changed gravity."""
@@ -96,9 +95,7 @@ class BaseTilt(_GravityEffect):
             / (2.0 * _STEP)
             for step in _STEP * np.eye(2)
         ]
-        return np.asarray(
-            gravity_sensitivity(arm.body, arm.link_motion(motion).q) @ np.transpose(turned)
-        )
+        return np.asarray(arm.gravity_columns(motion) @ np.transpose(turned))
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the robot under gravity as the tilted base sees it."""

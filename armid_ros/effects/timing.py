@@ -38,7 +38,7 @@ class Late(TorqueReading):
         third derivative of them, and noise in columns makes the values too small.
 
         """
-        return super().columns(smoothed(motion), arm)
+        return super().columns(arm.smoothed(motion), arm)
 
 
 @dataclass(frozen=True)
