@@ -121,18 +121,18 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
 def patch_columns(state: Patch, part: Trajectory, base: BaseParameters | None) -> FloatArray:
     """Return the columns of base parameters, values and shapes in rows, shape (M, n, f)."""
     model, motion = remembering(state.model), part.motion
-    blocks = [np.empty((len(motion), motion.n_joints, 0))]
+    blocks = [np.empty((len(part.rows), motion.n_joints, 0))]
     if base is not None:
-        known = len(state.arm.parameters)
         own = [model.rigid_columns(motion)]
         own += [model.columns_of(effect, motion) for effect in state.arm.effects]
-        blocks.append(np.concatenate(own, axis=2)[:, :, :known][:, :, base.independent])
+        blocks.append(part.reduce(np.concatenate(own, axis=2)[:, :, base.independent]))
     first = len(state.arm.effects)
     for position, named in enumerate(state.named):
-        blocks.append(model.columns_of(named.effect, motion)[:, :, list(named.kept)])
+        columns = model.columns_of(named.effect, motion)[:, :, list(named.kept)]
+        blocks.append(part.reduce(columns))
         if named.effect.shape:
-            blocks.append(_shape_columns(model, first + position, motion))
-    return part.reduce(np.concatenate(blocks, axis=2))
+            blocks.append(part.reduce(_shape_columns(model, first + position, motion)))
+    return np.concatenate(blocks, axis=2)
 
 
 def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray:

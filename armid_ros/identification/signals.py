@@ -45,7 +45,7 @@ _KEPT = 0.4
 #: motion: between two and five, elasticity is found all the same; at ten there is but noise.
 _CURVATURE_BANDS = 2.0
 #: Output samples that one matrix product makes; larger ones multiply more zeros of the band.
-_BLOCK = 8
+_BLOCK = 16
 
 
 @dataclass(frozen=True)
