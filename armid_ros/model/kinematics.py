@@ -151,8 +151,8 @@ class LinkFrames:
     def in_the_middle(cls, robot: Robot) -> LinkFrames:
         """Follow no motion: all joints in the middle of their range, at 0 where there is none."""
         limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-        middle = np.where(limited, (robot.lower + robot.upper) / 2, 0.0)
-        return cls.of(robot, middle[np.newaxis])
+        lower, upper = (np.where(limited, end, 0.0) for end in (robot.lower, robot.upper))
+        return cls.of(robot, (lower + upper)[np.newaxis] / 2)
 
     def places(self, joint: str, offset: FloatArray) -> FloatArray:
         """Return where a point (3,) of the link that a joint moves is, shape (N, 3) [m]."""
