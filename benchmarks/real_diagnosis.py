@@ -25,6 +25,7 @@ import time
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, Diagnosis
 from armid_ros.effects import CATALOGUE
+from armid_ros.identification import identify
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_recording, Recording
 from armid_ros.robots import load_robot
@@ -82,7 +83,8 @@ class Question:
     joint : str
         Where; empty for all joints that have it.
     size : float
-        Root mean square of what is added, over what the known model leaves there, or the noise.
+        Root mean square of what a fit of the known model leaves of what is added, over what it
+        leaves there without, or the noise.
 
     """
 
@@ -153,10 +155,23 @@ class Machines:
         q, tau = (signal.filtfilt(*low, x[:, joint]) for x in (recording.q, recording.tau))
         dq = np.gradient(q, recording.t)
         shape = LAWS[question.name](q, dq, np.gradient(dq, recording.t), tau)
-        size = question.size * self.left(question.machine)[joint] / np.sqrt(np.mean(shape**2))
-        torque = recording.tau.copy()
-        torque[:, joint] += size * shape
-        return replace(recording, tau=torque)
+        added = np.zeros_like(recording.tau)
+        added[:, joint] = shape * self.left(question.machine)[joint] / np.sqrt(np.mean(shape**2))
+        seen = self._seen(question.machine, added)[joint]
+        size = question.size * self.left(question.machine)[joint] / seen
+        return replace(recording, tau=recording.tau + size * added)
+
+    def _seen(self, machine: str, added: FloatArray) -> FloatArray:
+        """Return what a fit of the known model leaves of a torque that is added, rms (n,)."""
+        bare, recording = self.bare(machine)
+        with_it = replace(recording, tau=recording.tau + added)
+        known = known_arm(bare, machine, None)
+        without, fitted = (
+            identify(known, [one], rng=np.random.default_rng(0)).training[0]
+            for one in (recording, with_it)
+        )
+        rest = fitted.residual - without.residual
+        return np.sqrt(np.mean(rest**2, axis=0, where=without.informative))
 
     def left(self, machine: str) -> FloatArray:
         """Return what the known model leaves of each joint, or its noise if more [N m]."""

@@ -185,11 +185,10 @@ def joint_losses_of(
     return np.asarray(squares / np.maximum(count, 1))
 
 
-def _excess(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> float:
-    """Return the sum of squares beyond the noise."""
-    lefts = weighted_rows(fitted.residual, data, sigma)
-    squares = sum(float(np.sum(left**2)) for left in lefts)
-    return max(squares - sum(float(part.told.sum()) for part in data), 0.0)
+def _excess(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
+    """Return the sum of squares beyond the noise of each joint, shape (n,)."""
+    count = np.sum([part.told.sum(axis=0) for part in data], axis=0)
+    return np.asarray(np.maximum(joint_losses_of(fitted, data, sigma) - 1.0, 0.0) * count)
 
 
 def _prune(

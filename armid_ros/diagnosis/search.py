@@ -102,7 +102,7 @@ def next_step(
     free: Sequence[int],
     groups: Sequence[Group],
     work: Workspace,
-    total: float = 0.0,
+    total: FloatArray | None = None,
 ) -> tuple[Step | None, Survey, Problem]:
     """
     Look for the group that explains most of what is left.
@@ -117,8 +117,8 @@ def next_step(
         What may be named.
     work : Workspace
         What columns of other shapes are computed from.
-    total : float
-        Excess before anything was named.
+    total : ndarray, shape (n,), optional
+        Excess of each joint before anything was named.
 
     Returns
     -------

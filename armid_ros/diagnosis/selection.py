@@ -26,6 +26,8 @@ SPARSE_GAIN = 50.0
 #: Columns of which one part of the data has more than this share do nothing in the others, and
 #: nothing can be learned of them there: halves of that part are held out instead.
 _IN_ONE_PART = 0.999
+#: Parts of the data that count together as well, where all agree.
+_MANY = 4
 #: Values beyond a bound by this share of it are at the bound.
 _AT_BOUND = 0.1
 
@@ -252,8 +254,9 @@ def replicated(trial: Trial, settings: DiagnosisSettings) -> bool:
     Return whether a gain is there in more than one part of the data.
 
     In two parts clearly; or in one beyond all doubt, the fast one as a rule, with another that
-    agrees and none that disagrees; or beyond all doubt in the only one that can show it. The
-    values never come from the part that is judged.
+    agrees and none that disagrees; or beyond all doubt in the only one that can show it; or beyond
+    all doubt in many together of which each agrees, short ones as a rule. The values never come
+    from the part that is judged.
 
     """
     if trial.only is not None:
@@ -262,7 +265,18 @@ def replicated(trial: Trial, settings: DiagnosisSettings) -> bool:
     if len(order) < 2:
         return bool(order[0] >= settings.least_z)
     carried = order[0] >= 1.5 * settings.least_z and order[1] >= 0.5 * settings.least_z
-    return bool(order[1] >= settings.least_z or (carried and order[-1] > -settings.rival_z))
+    carried &= order[-1] > -settings.rival_z
+    together = len(order) >= _MANY and order.sum() >= 1.5 * settings.least_z * len(order) ** 0.5
+    agreed = together and order[-1] >= 0.5 * settings.least_z
+    return bool(order[1] >= settings.least_z or carried or agreed)
+
+
+def of_the_gap(trial: Trial, total: FloatArray, settings: DiagnosisSettings) -> bool:
+    """Return whether a gain is a part of the first gap, or of that of a joint that had much."""
+    if trial.gain > settings.least_of_all * total.sum():
+        return True
+    much = total >= settings.least_of_joint * total.sum()
+    return bool(np.any(much & (trial.gains.sum(axis=0) > settings.least_of_joint * total)))
 
 
 def acceptable(
@@ -270,20 +284,20 @@ def acceptable(
     problem: Problem,
     left: FloatArray,
     settings: DiagnosisSettings,
-    total: float = 0.0,
+    total: FloatArray | None = None,
 ) -> bool:
     """
     Return whether a group is possible, replicated, and closes a real share of the gap.
 
     Parameters
     ----------
-    total : float
-        Excess before anything was named.
+    total : ndarray, shape (n,), optional
+        Excess of each joint before anything was named.
 
     """
-    if not within_bounds(trial.score):
+    if trial.gain <= 0.0 or not within_bounds(trial.score) or not replicated(trial, settings):
         return False
-    if trial.gain <= max(0.0, settings.least_of_all * total) or not replicated(trial, settings):
+    if total is not None and not of_the_gap(trial, total, settings):
         return False
     single = len(trial.score.values) == 1
     if single and np.any(trial.fold_values[:, 0] * trial.score.values[0] < 0.0):

@@ -42,6 +42,8 @@ class DiagnosisSettings:
     least_of_all : float
         ... and this share of the excess at the beginning: what takes less than a thousandth or two
         of a gap is not what was missing.
+    least_of_joint : float
+        ... or this share of that of a joint which had this share of the whole.
     least_z : float
         Block z that a gain has to reach on a held-out trajectory to count as replicated.
     sure_z : float
@@ -73,6 +75,7 @@ class DiagnosisSettings:
     held_out_loss: float = 3.0
     least_share: float = 0.10
     least_of_all: float = 0.0015
+    least_of_joint: float = 0.01
     least_z: float = 3.0
     sure_z: float = 4.0
     tautology: float = 0.8

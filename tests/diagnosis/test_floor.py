@@ -50,6 +50,27 @@ def test_a_floor_without_repetition_is_assumed(bench):
     assert all(noise_floor(part, bench.arm).period is None for part in cut(recordings))
 
 
+def test_friction_at_reversals_is_not_taken_for_noise(bench):
+    """Where nothing repeats, jumps of friction that a model lacks are in all frequencies."""
+
+    def once(recordings):
+        return [r.select(slice(0, 700)) for r in recordings]
+
+    jump = 3.0
+    hidden = bench.recordings(lambda m, tau: jump * np.sign(m.dq), noise=0.1)
+    plain = [noise_floor(part, bench.arm) for part in cut(once(bench.recordings(noise=0.1)))]
+    jumping = [noise_floor(part, bench.arm) for part in cut(once(hidden))]
+    for a, b in zip(plain, jumping, strict=True):
+        assert a.period is b.period is None
+        assert np.all(b.sigma - a.sigma < 0.02 * jump)
+
+
+def test_no_torque_is_known_to_more_than_its_resolution(bench):
+    for part in cut(bench.recordings(noise=0.0)):
+        size = np.sqrt(np.mean(part.motion.tau**2, axis=0))
+        assert np.all(noise_floor(part, bench.arm).sigma >= 0.99e-4 * size)
+
+
 def test_each_trajectory_has_a_floor_of_its_own(bench):
     recordings = bench.recordings(noise=0.3)
     rng = np.random.default_rng(1)

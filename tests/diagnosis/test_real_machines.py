@@ -68,13 +68,15 @@ def test_a_term_taken_out_of_the_model_of_a_positioning_system_is_named(real_dat
     assert answered(question, machines.ask(question)) == 'first'
 
 
-def test_friction_of_a_tx40_bends_with_speed_in_both_halves_of_its_recording(real_data, tmp_path):
+def test_friction_of_a_tx40_goes_with_the_load_in_both_halves_of_its_recording(
+    real_data, tmp_path
+):
     """What is named beside the wrist is there: the second half agrees with the first."""
     bare, recording = Machines(real_data, tmp_path).bare('tx40')
     arm = known_arm(bare, 'tx40', None)
     settings = DiagnosisSettings()
     used = choose_filters([recording], settings)
-    bend = CATALOGUE['quadratic_friction'].on(arm.robot, ('joint_2',))
+    friction = CATALOGUE['load_dependent_friction'].on(arm.robot, ('joint_3',))
     middle = len(recording.t) // 2
     values, std = [], []
     for half in (slice(0, middle), slice(middle, None)):
@@ -83,10 +85,10 @@ def test_friction_of_a_tx40_bends_with_speed_in_both_halves_of_its_recording(rea
         rough = [noise_floor(part, arm).sigma for part in data]
         nearer = fit(arm, (), data, rough, base).arm
         sigma = [noise_floor(part, nearer).sigma for part in data]
-        fitted = fit(arm, [Named(bend, (0,))], data, sigma, base)
+        fitted = fit(arm, [Named(friction, (0,))], data, sigma, base)
         values.append(fitted.estimate.values[0])
         std.append(fitted.estimate.std[0])
-    assert np.all(np.array(values) < -3.0 * np.array(std))
+    assert np.all(np.array(values) > 4.0 * np.array(std))
     assert abs(values[0] - values[1]) < 3.0 * np.hypot(*std)
 
 
@@ -105,3 +107,18 @@ def test_the_twist_of_a_kr300_is_named(real_data, axis, names):
 def test_friction_of_a_ur10(real_data):
     found = look(ur10(real_data))
     assert {'viscous_friction', 'coulomb_friction'} <= set(names(found))
+
+
+@pytest.mark.parametrize(
+    ('name', 'joint'), [('rotor_inertia', 'elbow_joint'), ('joint_spring', 'wrist_2_joint')]
+)
+def test_a_torque_added_to_that_of_a_ur10_is_named(real_data, tmp_path, name, joint):
+    machines = Machines(real_data, tmp_path)
+    question = Question('ur10', 'with', name, joint, 3.0)
+    assert answered(question, machines.ask(question)) == 'first'
+
+
+def test_friction_taken_out_of_the_model_of_a_ur10_is_named_in_all_joints(real_data, tmp_path):
+    found = Machines(real_data, tmp_path).ask(Question('ur10', 'without', 'viscous_friction'))
+    assert found.findings[0].name == 'viscous_friction'
+    assert len(found.findings[0].joints) == 6

@@ -4,7 +4,7 @@
 
 from types import SimpleNamespace
 
-from armid_ros.diagnosis.selection import block_z, replicated, solve_products
+from armid_ros.diagnosis.selection import block_z, of_the_gap, replicated, solve_products
 from armid_ros.diagnosis.settings import DiagnosisSettings
 import numpy as np
 import pytest
@@ -18,11 +18,33 @@ import pytest
         ([8.0, 0.5, 0.1], False),  # one trajectory alone
         ([8.0, 2.0, -4.0], False),  # another one disagrees
         ([2.0, 2.0, 2.0], False),
+        ([2.5, 2.3, 2.4, 2.6], True),  # many short parts, of which each agrees
+        ([2.5, 2.3, 2.4, 1.0], False),
+        ([1.8, 1.9, 2.0, 1.8], False),
     ],
 )
 def test_a_gain_has_to_be_there_in_more_than_one_trajectory(z, counts):
     trial = SimpleNamespace(z=np.array(z), only=None)
     assert replicated(trial, DiagnosisSettings()) is counts
+
+
+@pytest.mark.parametrize(
+    ('gains', 'counts'),
+    [
+        ([2000.0, 0.0], True),
+        ([1000.0, 0.0], False),  # a thousandth of all
+        ([0.0, 700.0], True),  # a fiftieth of a joint that had a part of the gap
+        ([0.0, 300.0], False),
+    ],
+)
+def test_a_gain_has_to_be_a_part_of_the_first_gap(gains, counts):
+    trial = SimpleNamespace(gain=sum(gains), gains=np.array([gains]))
+    assert of_the_gap(trial, np.array([1e6, 4e4]), DiagnosisSettings()) is counts
+
+
+def test_a_joint_that_had_next_to_nothing_of_the_gap_does_not_count():
+    trial = SimpleNamespace(gain=50.0, gains=np.array([[0.0, 50.0]]))
+    assert not of_the_gap(trial, np.array([1e6, 100.0]), DiagnosisSettings())
 
 
 @pytest.mark.parametrize(('z', 'counts'), [(4.6, True), (3.2, False)])
