@@ -84,7 +84,7 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> Floor:
     half = (len(taps) - 1) // 2
     smooth = signal.fftconvolve(left, taps[:, np.newaxis], mode='same', axes=0)
     found = trajectory.period
-    least = 0.0 if trajectory.sensors is None else trajectory.sensors.floor(arm)
+    least = _least(trajectory, arm)
     if found is None:
         sigma = np.maximum(_assumed(trajectory, smooth), least)
         return Floor(sigma, None, *np.ones((2, motion.n_joints)))
@@ -101,7 +101,8 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> Floor:
         spectrum = _spectrum(np.where(used, rest, 0.0), trajectory.used.rate_hz)
         structure[joint] = _over(spectrum, (0.0, _SLOW_HZ), _FAST_HZ)
         growth[joint] = _over(spectrum, (2.0 * kept / 3.0, kept), (kept / 12.0, kept / 3.0))
-    sigma = np.maximum(np.maximum(sigma, _least(trajectory)), least)
+    structure[sigma < least] = growth[sigma < least] = 1.0
+    sigma = np.maximum(sigma, least)
     return Floor(sigma, lag * float(motion.t[1] - motion.t[0]), structure, growth)
 
 
@@ -171,12 +172,13 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
         rows[:, joint] /= np.sqrt(there.mean())
     frequency, power = signal.welch(rows, nperseg=min(len(rows), 256), axis=0)
     high = (frequency > 0.25) & (frequency < 0.36)
-    sigma = np.sqrt(np.median(power[high], axis=0) * 0.4)
-    return np.asarray(np.maximum(sigma, _least(trajectory)))
+    return np.asarray(np.sqrt(np.median(power[high], axis=0) * 0.4))
 
 
-def _least(trajectory: Trajectory) -> FloatArray:
+def _least(trajectory: Trajectory, arm: ArmModel) -> FloatArray:
     """Return what no torque is better known than, shape (n,) [N m]."""
     assert trajectory.motion.tau is not None
     size = np.sqrt(np.mean(trajectory.motion.tau**2, axis=0))
-    return np.asarray(np.maximum(_RESOLUTION * np.maximum(size, 1e-2 * size.max()), 1e-12))
+    least = np.maximum(_RESOLUTION * np.maximum(size, 1e-2 * size.max()), 1e-12)
+    sensors = trajectory.sensors
+    return np.asarray(least if sensors is None else np.maximum(least, sensors.floor(arm)))

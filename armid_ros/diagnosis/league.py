@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.model_search import Explanation
-from armid_ros.diagnosis.rivals import FAR, likelier_body, simplest
+from armid_ros.diagnosis.rivals import FAR, likelier_body, likeliest
 from armid_ros.diagnosis.selection import replicated, sure_of_few_rows, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -213,7 +213,7 @@ def _picked(
         beaten = surely | (lead.sum(axis=(1, 2)) > FAR * gains[best])
         tied = {id(pool[k]): k for k in able if k == best or not beaten[k]}
         trials = [pool[k] for k in tied.values()]
-        winner = likelier_body(simplest(trials), trials, arm)
+        winner = likelier_body(likeliest(trials, settings), trials, arm)
         picked[tied[id(winner)], sample] = 1.0
     return picked
 

@@ -12,7 +12,6 @@ from armid_ros.diagnosis.problem import Problem, Projection
 from armid_ros.diagnosis.selection import (
     block_z,
     excess,
-    joint_losses,
     Score,
     SPARSE_GAIN,
     Trial,
@@ -56,6 +55,18 @@ def own_causes_first(passing: Sequence[Trial], problem: Problem, left: FloatArra
     most = float(excess(problem, left).sum())
     outside = passing[0].score.group.effect.name in STRAPS
     return own if own and outside and passing[0].gain < _MOST * most else list(passing)
+
+
+def likeliest(tied: Sequence[Trial], settings: DiagnosisSettings) -> Trial:
+    """
+    Return the simplest one, or the simplest of those that bring a joint to its noise if it cannot.
+
+    A short motion hardly tells a preloaded spring from an offset; what the offset leaves does.
+
+    """
+    simple = simplest(tied)
+    able = [trial for trial in tied if _finishes(trial, simple, settings)]
+    return simplest(able) if able else simple
 
 
 def simplest(tied: Sequence[Trial]) -> Trial:
@@ -122,7 +133,6 @@ def is_rival(
     winner: Trial,
     problem: Problem,
     projection: Projection,
-    left: FloatArray,
     settings: DiagnosisSettings,
 ) -> bool:
     """
@@ -131,7 +141,7 @@ def is_rival(
     One that only imitates or contains it does not, unless it alone brings a joint to its noise.
 
     """
-    if _finishes(trial, winner, problem, left, settings):
+    if _finishes(trial, winner, settings):
         return True
     if imitates(trial, winner):
         return False
@@ -186,10 +196,7 @@ def _contains(big: Trial, small: Trial, problem: Problem, projection: Projection
     return bool(np.sum((target - columns @ fit) ** 2) < 0.02 * np.sum(target**2))
 
 
-def _finishes(
-    big: Trial, small: Trial, problem: Problem, left: FloatArray, settings: DiagnosisSettings
-) -> bool:
+def _finishes(big: Trial, small: Trial, settings: DiagnosisSettings) -> bool:
     """Return whether a larger group brings a joint to its noise that a smaller one does not."""
-    after, before = (joint_losses(problem, left - trial.torque) for trial in (big, small))
     limit = settings.consistent_loss
-    return bool(np.any((before > limit) & (after < limit)))
+    return bool(np.any((small.losses > limit) & (big.losses < limit)))

@@ -14,9 +14,9 @@ from armid_ros.diagnosis.rivals import (
     is_rival,
     likelier_body,
     likelier_links,
+    likeliest,
     not_beaten,
     own_causes_first,
-    simplest,
     STRAPS,
 )
 from armid_ros.diagnosis.selection import (
@@ -151,18 +151,17 @@ def next_step(
         return None, survey, problem
     passing = own_causes_first(passing, problem, left)
     tied = [passing[0], *not_beaten(passing, problem, left, settings)]
-    winner = likelier_body(simplest(tied), tied, work.arm)
+    winner = likelier_body(likeliest(tied, settings), tied, work.arm)
     if winner.score.group.effect.name in STRAPS:
         links = likelier_links(winner, scores, problem, projection, left, settings)
         winner, tied = (links[0], [*links, winner]) if links else (winner, tied)
     rivals = tuple(
         trial
         for trial in tied
-        if trial is not winner and is_rival(trial, winner, problem, projection, left, settings)
+        if trial is not winner and is_rival(trial, winner, problem, projection, settings)
     )
     before = joint_losses(problem, left)
-    after = joint_losses(problem, left - winner.torque)
-    return Step(winner, rivals, trials, before, after, tuple(passing)), survey, problem
+    return Step(winner, rivals, trials, before, winner.losses, tuple(passing)), survey, problem
 
 
 def _tried(
@@ -241,8 +240,9 @@ def made_of_noise(
     if smooth.gain < _NOT_NOISE * trial.gain:
         return True
     before = np.minimum(joint_losses(problem, left), 1.0)
-    after = joint_losses(problem, left - trial.torque)
-    return bool(np.any(after < settings.tautology * before)) and work.reads_torque(effect, kept)
+    return bool(np.any(trial.losses < settings.tautology * before)) and work.reads_torque(
+        effect, kept
+    )
 
 
 def _share(problem: Problem, columns: FloatArray) -> float:

@@ -83,6 +83,8 @@ class Trial:
     only : int or None
         The one part of the data in which the columns do something, if there is but one; then its
         halves are the parts that values are not taken from.
+    losses : ndarray, shape (n,)
+        Loss of each joint without what is explained.
 
     """
 
@@ -94,6 +96,7 @@ class Trial:
     blocks: FloatArray
     fold_values: FloatArray
     only: int | None
+    losses: FloatArray
 
     @property
     def gain(self) -> float:
@@ -181,7 +184,9 @@ def try_group(
     z = block_z(problem.fold, gain.sum(axis=1), settings.blocks)
     z = sure_of_few_rows(z, _lesser_half(problem.fold, gain.sum(axis=1)), settings)
     blocks = block_sums(problem.fold, gain.sum(axis=1), settings.blocks)
-    return Trial(scored, own_columns @ values, held_out, gains, z, blocks, fold_values, only)
+    torque = own_columns @ values
+    losses = joint_losses(problem, left - torque)
+    return Trial(scored, torque, held_out, gains, z, blocks, fold_values, only, losses)
 
 
 def _halves(where: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:

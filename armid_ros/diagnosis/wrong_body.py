@@ -25,7 +25,6 @@ from armid_ros.diagnosis.rivals import likelier_body
 from armid_ros.diagnosis.search import Step
 from armid_ros.diagnosis.selection import (
     excess,
-    joint_losses,
     replicated,
     screen,
     Trial,
@@ -79,9 +78,8 @@ def wrong_body(
     for score in screen(problem, projection, found.groups, settings.least_visible):
         columns = problem.x[:, :, score.group.columns]
         trial = try_group(problem, projection, score, columns, settings)
-        after = joint_losses(problem, left - trial.torque)
         real = trial.gain > _MOST * total and replicated(trial, settings)
-        if real and within_bounds(trial.score) and no_worse(after, fitted.losses, settings):
+        if real and within_bounds(trial.score) and no_worse(trial.losses, fitted.losses, settings):
             able.append(trial)
     if not able:
         return fitted

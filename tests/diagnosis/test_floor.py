@@ -68,7 +68,9 @@ def test_friction_at_reversals_is_not_taken_for_noise(bench):
 def test_no_torque_is_known_to_more_than_its_resolution(bench):
     for part in cut(bench.recordings(noise=0.0)):
         size = np.sqrt(np.mean(part.motion.tau**2, axis=0))
-        assert np.all(noise_floor(part, bench.arm).sigma >= 0.99e-4 * size)
+        floor = noise_floor(part, bench.arm)
+        assert np.all(floor.sigma >= 0.99e-4 * size)
+        assert np.all(floor.repeats)  # what two periods of it differ by is nothing to speak of
 
 
 def test_each_trajectory_has_a_floor_of_its_own(bench):

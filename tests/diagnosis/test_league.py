@@ -28,7 +28,8 @@ def trial(blocks, effect='viscous_friction', only=None):
     nothing = np.zeros((0, 1))
     gains = blocks.sum(axis=1, keepdims=True)
     z = blocks.mean(axis=1) / np.maximum(spread, 1e-300)
-    return Trial(score, nothing, nothing, gains, z, blocks, np.ones((len(blocks), 1)), only)
+    values = np.ones((len(blocks), 1))
+    return Trial(score, nothing, nothing, gains, z, blocks, values, only, np.zeros(1))
 
 
 def test_noise_seldom_makes_any_of_many_candidates_significant():
