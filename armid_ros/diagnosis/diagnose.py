@@ -160,8 +160,8 @@ def diagnose(
     sigma, as_told = prepared.sigma, prepared.as_told
     if any(floor.period is None for floor in floors):
         notes.append(
-            'nothing repeats in some recordings: their noise floor is assumed from the upper part '
-            'of the spectrum; two equal periods would measure it'
+            'nothing repeats in some recordings: their noise floor is assumed from what rows '
+            'differ by from their neighbours; two equal periods would measure it'
         )
     found = None
     if settings.partner is not None:

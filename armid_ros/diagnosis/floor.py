@@ -5,8 +5,8 @@ The noise floor: what two equal periods of one trajectory differ by.
 
 The difference is taken of what a model leaves over, evaluated in each period with its own measured
 positions: noise of the encoders is inside as it goes through the model, and whatever depends on
-the motion alone cancels. Where nothing repeats the floor is assumed, from the upper half of the
-spectrum, and said to be assumed.
+the motion alone cancels. Where nothing repeats the floor is assumed, from how rows differ from
+their neighbours, and said to be assumed.
 
 """
 
@@ -30,6 +30,9 @@ _STRUCTURED = 8.0
 _RESOLUTION = 1e-4
 #: Fewer rows than this are not enough to leave any out.
 _FEW = 20
+#: Noise of torques is coloured: white noise that bends rows as much is smaller by up to this
+#: factor in 95 % of the joints of 48 recordings of which two periods tell the noise.
+_COLOUR = 1.4
 #: What people, loose parts and machines nearby do is slow; noise of torques is as strong in the
 #: band above, and noise of positions stronger [Hz]. Window of the spectra [s].
 _SLOW_HZ, _FAST_HZ, _WINDOW = 4.0, (6.0, 12.0), 2.5
@@ -158,21 +161,20 @@ def _over(
 
 def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     """
-    Return the noise that the upper part of the spectrum suggests, taken as white.
+    Return at most what rows bend by from one to the next, as noise of the band that they keep.
 
-    Friction that a model lacks jumps where a joint turns round, which is in all frequencies: rows
-    that tell nothing are bridged by straight lines, which are in none of the upper ones.
+    What a model lacks is slower than rows. Friction that it lacks jumps where a joint turns round;
+    rows beside those do not count.
 
     """
-    rows, told = smooth[trajectory.rows].copy(), trajectory.told
-    place = np.arange(len(rows))
-    for joint in np.flatnonzero(told.sum(axis=0) >= _FEW):
-        there = told[:, joint]
-        rows[:, joint] = np.interp(place, place[there], rows[there, joint])
-        rows[:, joint] /= np.sqrt(there.mean())
-    frequency, power = signal.welch(rows, nperseg=min(len(rows), 256), axis=0)
-    high = (frequency > 0.25) & (frequency < 0.36)
-    return np.asarray(np.sqrt(np.median(power[high], axis=0) * 0.4))
+    rows, told = smooth[trajectory.rows], trajectory.told
+    bend = np.diff(rows, 2, axis=0)
+    between = told[:-2] & told[1:-1] & told[2:]
+    between[:, between.sum(axis=0) < _FEW] = True
+    power = np.sum(bend**2, axis=0, where=between) / np.maximum(between.sum(axis=0), 1)
+    used = trajectory.used
+    phase = 2.0 * np.pi * np.linspace(0.0, used.kept_hz * used.decimation / used.rate_hz, 100)
+    return np.asarray(_COLOUR * np.sqrt(power / np.mean((2.0 - 2.0 * np.cos(phase)) ** 2)))
 
 
 def _least(trajectory: Trajectory, arm: ArmModel) -> FloatArray:

@@ -50,6 +50,16 @@ def test_a_floor_without_repetition_is_assumed(bench):
     assert all(noise_floor(part, bench.arm).period is None for part in cut(recordings))
 
 
+def test_the_assumed_floor_is_that_of_the_periods_or_a_little_more(bench):
+    recordings = bench.recordings()
+    used = choose_filters(recordings, DiagnosisSettings())
+    whole = trajectories(recordings, used)
+    pieces = trajectories([r.select(slice(0, 700)) for r in recordings], used)
+    for known, assumed in zip(whole, pieces, strict=True):
+        ratio = noise_floor(assumed, bench.arm).sigma / noise_floor(known, bench.arm).sigma
+        assert np.all((ratio > 0.9) & (ratio < 2.0))
+
+
 def test_friction_at_reversals_is_not_taken_for_noise(bench):
     """Where nothing repeats, jumps of friction that a model lacks are in all frequencies."""
 
