@@ -7,7 +7,7 @@ The cases are those of tests/hidden, whose data come from code that has nothing 
 diagnosis; rates have 95 % intervals (Wilson). Reach and what counts: tests/hidden/README.md.
 
     python -m benchmarks.hidden_effects [development|locked] [--slice] [--only TEXT] [--baseline]
-        [--out DIR]
+        [--single] [--out DIR]
 
 """
 
@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 import json
 import multiprocessing
 import os
@@ -149,6 +149,16 @@ def judge(spec: CaseSpec) -> Judged:
         outcome = run_diagnosis(case)
     except Exception:
         outcome = Outcome(verdict='failed', error=traceback.format_exc(limit=-3))
+    return Judged(Truth.of(case), outcome)
+
+
+def judge_single(spec: CaseSpec) -> Judged:
+    """Make a case and diagnose one period of its fastest recording: its noise is assumed."""
+    case = make_case(spec)
+    fastest = case.bags[-1]
+    end = int(np.searchsorted(fastest.recording.t, fastest.periods[0][1]))
+    alone = replace(fastest, recording=fastest.recording.select(slice(0, end)))
+    outcome = run_diagnosis(replace(case, bags=(alone,), validation=()))
     return Judged(Truth.of(case), outcome)
 
 
@@ -286,6 +296,7 @@ def main() -> None:
     parser.add_argument('--slice', action='store_true', help='a few cases of every kind')
     parser.add_argument('--only', nargs='+', default=[], metavar='TEXT', help='keys that have it')
     parser.add_argument('--baseline', action='store_true', help='pooled BIC on the same cases')
+    parser.add_argument('--single', action='store_true', help='one period of one recording each')
     parser.add_argument('--out', type=Path, help='folder for outcomes.json and confusion.svg')
     parser.add_argument('--processes', type=int, default=2)
     options = parser.parse_args()
@@ -293,7 +304,7 @@ def main() -> None:
         os.environ.setdefault(variable, '1')  # the processes share the cores as it is
     part = options.slice or options.set is None
     specs = select(options.set or 'development', options.only, part)
-    judged = run(specs, options.processes)
+    judged = run(specs, options.processes, judge_single if options.single else judge)
     report(judged)
     if options.baseline:
         compare(judged, run(specs, options.processes, judge_baseline))
