@@ -54,16 +54,16 @@ KNOWN: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
 #: Band in which a motion is differentiated to make an effect of it [Hz].
 _BAND = {'emps': 40.0, 'tx40': 20.0, 'ur10': 6.0}
 
-#: A torque from position, velocity, acceleration and measured torque of the joint, all (N,).
+#: A torque from position, velocity, acceleration and load of the joint, all (N,).
 Law = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 
 LAWS: dict[str, Law] = {
-    'quadratic_friction': lambda q, dq, ddq, tau: dq * np.abs(dq),
-    'torque_ripple': lambda q, dq, ddq, tau: np.sin(12.0 * q),
-    'joint_spring': lambda q, dq, ddq, tau: q - q.mean(),
-    'torque_offset': lambda q, dq, ddq, tau: np.ones_like(q),
-    'rotor_inertia': lambda q, dq, ddq, tau: ddq,
-    'load_dependent_friction': lambda q, dq, ddq, tau: np.abs(tau) * np.sign(dq),
+    'quadratic_friction': lambda q, dq, ddq, load: dq * np.abs(dq),
+    'torque_ripple': lambda q, dq, ddq, load: np.sin(12.0 * q),
+    'joint_spring': lambda q, dq, ddq, load: q - q.mean(),
+    'torque_offset': lambda q, dq, ddq, load: np.ones_like(q),
+    'rotor_inertia': lambda q, dq, ddq, load: ddq,
+    'load_dependent_friction': lambda q, dq, ddq, load: np.abs(load) * np.sign(dq),
 }
 
 
@@ -154,7 +154,9 @@ class Machines:
         low = signal.butter(4, _BAND[question.machine], fs=rate)
         q, tau = (signal.filtfilt(*low, x[:, joint]) for x in (recording.q, recording.tau))
         dq = np.gradient(q, recording.t)
-        shape = LAWS[question.name](q, dq, np.gradient(dq, recording.t), tau)
+        friction = np.column_stack([dq, np.sign(dq)])
+        load = tau - friction @ np.linalg.lstsq(friction, tau, rcond=None)[0]
+        shape = LAWS[question.name](q, dq, np.gradient(dq, recording.t), load)
         added = np.zeros_like(recording.tau)
         added[:, joint] = shape * self.left(question.machine)[joint] / np.sqrt(np.mean(shape**2))
         seen = self._seen(question.machine, added)[joint]
