@@ -38,6 +38,8 @@ EXPERIMENT_FILE = 'experiment.yaml'
 _SURE = 5.0
 #: ... and not at all below this many.
 _NOTHING = 1.0
+#: Pairs of names that a sentence has.
+_SAID = 3
 #: Rivals of a provisional name that has none: the next best of its league.
 _RUNNERS_UP = 3
 #: A search for a better motion than the templates: few steps, as each costs as much as a template.
@@ -74,13 +76,15 @@ class NextRun:
 
     @property
     def sentence(self) -> str:
-        """What to do and what it would show, for a person."""
-        told = [one for one in self.separations if one.z >= _NOTHING]
+        """What to do and what it would show, the least sure first, for a person."""
+        told = sorted((s for s in self.separations if s.z >= _NOTHING), key=lambda one: one.z)
         alike = [one for one in self.separations if one.z < _NOTHING]
         parts = [
             f'it should tell {one.name} from {one.rival} by {one.z:.0f} standard deviations'
-            for one in told
+            for one in told[:_SAID]
         ]
+        if len(told) > _SAID:
+            parts.append(f'and {len(told) - _SAID} more pairs of names by more')
         parts += [
             f'no motion alone tells {one.name} from {one.rival} (this one by {one.z:.1f} standard '
             'deviations)'

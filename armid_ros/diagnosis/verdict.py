@@ -29,6 +29,8 @@ Word = Literal[
 #: Several recordings whose periods differ slowly, each a little, tell as well: of 60 sets of
 #: recordings in which nothing happened, none had a geometric mean of the structure above 2.4.
 _SEVERAL, _ON_AVERAGE = 3, 3.5
+#: A sentence with more joints than this only counts them; tables have the rest.
+_JOINTS_SAID = 3
 
 
 @dataclass(frozen=True)
@@ -160,13 +162,15 @@ def _findings(explanation: Explanation, arm: ArmModel) -> tuple[Finding, ...]:
         rows = [row for row in rows if np.isfinite(std[row])]  # others the data do not tell
         joints = tuple(joint for k in indices for joint in fitted.named[k].effect.joints)
         order = [j for j in arm.robot.joints if j in joints]
+        parameters = fitted.estimate.parameters
+        rows.sort(key=lambda row: [*order, parameters[row].joint].index(parameters[row].joint))
         pairs = any(len(fitted.named[k].effect.joints) > 1 for k in indices)
         rivals = _rivals([steps[k] for k in indices], set(merged))
         result.append(
             Finding(
                 name,
                 tuple(dict.fromkeys(joints)) if pairs else tuple(order),
-                tuple(fitted.estimate.parameters[row] for row in rows),
+                tuple(parameters[row] for row in rows),
                 tuple(float(fitted.estimate.values[row]) for row in rows),
                 tuple(float(std[row]) for row in rows),
                 rivals,
@@ -238,6 +242,8 @@ def _name(finding: Finding) -> str:
     words = finding.name.replace('_', ' ')
     if finding.ties:
         return f'{words} at {", ".join(_tie(finding, tie) for tie in finding.ties)}'
+    if len(finding.joints) > _JOINTS_SAID:
+        return f'{words} in {len(finding.joints)} joints'
     where = f'{", ".join(finding.joints)}: ' if finding.joints else ''
     shown = [
         f'{p.name.replace("_", " ")} {value:.3g} +- {std:.1g} {p.unit}'.strip()

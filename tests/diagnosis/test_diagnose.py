@@ -70,6 +70,16 @@ def test_drag_is_named_with_its_coefficient_and_joint(bench):
     assert found.gap.closed > 0.9
 
 
+def test_parameters_of_a_name_are_in_the_order_of_the_joints(bench):
+    """The elbow lacks more and is found first."""
+    hidden = bench.recordings(lambda m, tau: [0.02, 0.1] * m.dq * np.abs(m.dq))
+    (finding,) = look(bench, hidden).findings
+    assert finding.name == 'quadratic_friction'
+    assert finding.joints == tuple(p.joint for p in finding.parameters) == ('shoulder', 'elbow')
+    errors = np.abs(np.array(finding.values) - [0.02, 0.1])
+    assert np.all(errors < 4 * np.array(finding.std))
+
+
 def test_a_name_that_does_not_hold_where_the_motion_is_new_is_provisional(bench):
     def drag(size):
         return lambda m, tau: on_elbow(size * m.dq[:, 1] * np.abs(m.dq[:, 1]))
