@@ -127,6 +127,7 @@ def outcome_of(document: dict[str, Any], closed: float, seconds: float) -> Outco
                 name=effect['name'],
                 joints=tuple(effect['joints']),
                 ambiguous_with=tuple(effect.get('ambiguous_with', ())),
+                rivals=tuple((r['name'], tuple(r['joints'])) for r in effect.get('rivals', ())),
                 parameters=tuple(
                     (p['name'], p.get('joint') or '', _number(p['value']), _number(p['std']))
                     for p in effect.get('parameters', ())

@@ -14,6 +14,7 @@ from armid_ros.diagnosis.floor import Floor
 from armid_ros.diagnosis.gap import Gap
 from armid_ros.diagnosis.model_search import Explanation
 from armid_ros.diagnosis.search import Step
+from armid_ros.diagnosis.selection import Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
 from armid_ros.effects.tied import Tied
@@ -34,6 +35,14 @@ _JOINTS_SAID = 3
 
 
 @dataclass(frozen=True)
+class Rival:
+    """A name that the data do not exclude in the place of another, and the joints it is on."""
+
+    name: str
+    joints: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Finding:
     """
     One named effect.
@@ -48,8 +57,8 @@ class Finding:
         Its parameters, shapes included.
     values, std : tuple of float
         Their values and standard deviations; nan where the data do not tell.
-    ambiguous_with : tuple of str
-        Names that the data do not exclude in its place.
+    rivals : tuple of Rival
+        What the data do not exclude in its place, the likeliest first.
     experiment : str
         What would separate them; empty if there is nothing to separate.
     gain : float
@@ -64,10 +73,15 @@ class Finding:
     parameters: tuple[ParameterName, ...]
     values: tuple[float, ...]
     std: tuple[float, ...]
-    ambiguous_with: tuple[str, ...]
+    rivals: tuple[Rival, ...]
     experiment: str
     gain: float
     ties: tuple[Tie, ...] = ()
+
+    @property
+    def ambiguous_with(self) -> tuple[str, ...]:
+        """Names that the data do not exclude in its place."""
+        return tuple(rival.name for rival in self.rivals)
 
     def place_of(self, joint: str) -> str:
         """Return where a joint's parameters act: at a segment that is tied, or the joint."""
@@ -137,10 +151,10 @@ def decide(
             'the noise: it is not this, or not only this.'
         )
         return Verdict('partial', text, findings)
-    doubtful = [f for f in findings if f.ambiguous_with]
+    doubtful = [f for f in findings if f.rivals]
     if doubtful:
         first = doubtful[0]
-        others = ' or '.join(first.ambiguous_with)
+        others = ' or '.join(_elsewhere(rival, first.joints) for rival in first.rivals)
         text = (
             f'{_names(findings)} {_closes(gap)}. These data cannot tell {first.name} from '
             f'{others}. {first.experiment}'
@@ -160,21 +174,20 @@ def _findings(explanation: Explanation, arm: ArmModel) -> tuple[Finding, ...]:
     for name, indices in merged.items():
         rows = [row for k in indices for row in range(starts[k], starts[k + 1])]
         rows = [row for row in rows if np.isfinite(std[row])]  # others the data do not tell
-        joints = tuple(joint for k in indices for joint in fitted.named[k].effect.joints)
-        order = [j for j in arm.robot.joints if j in joints]
+        joints = _joints([fitted.named[k].effect.joints for k in indices], arm)
+        order = [joint for joint in arm.robot.joints if joint in joints]
         parameters = fitted.estimate.parameters
         rows.sort(key=lambda row: [*order, parameters[row].joint].index(parameters[row].joint))
-        pairs = any(len(fitted.named[k].effect.joints) > 1 for k in indices)
-        rivals = _rivals([steps[k] for k in indices], set(merged))
+        rivals = _rivals([steps[k] for k in indices], set(merged), arm)
         result.append(
             Finding(
                 name,
-                tuple(dict.fromkeys(joints)) if pairs else tuple(order),
+                joints,
                 tuple(parameters[row] for row in rows),
                 tuple(float(fitted.estimate.values[row]) for row in rows),
                 tuple(float(std[row]) for row in rows),
                 rivals,
-                separating(name, rivals[0], order) if rivals else '',
+                separating(name, rivals[0].name, order) if rivals else '',
                 float(sum(steps[k].trial.gain for k in indices)),
                 _ties([fitted.named[k].effect for k in indices], order),
             )
@@ -187,15 +200,34 @@ def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
     return tuple(ties[joint] for joint in joints if joint in ties)
 
 
-def _rivals(steps: Sequence[Step], named: set[str]) -> tuple[str, ...]:
-    """Return the other names that are possible, the likeliest first."""
-    best: dict[str, float] = {}
+def _rivals(steps: Sequence[Step], named: set[str], arm: ArmModel) -> tuple[Rival, ...]:
+    """Return the other names that are possible, the likeliest first, and where."""
+    best: dict[str, list[Trial]] = {}
     for step in steps:
-        for rival in step.rivals:
-            name = rival.score.group.effect.name
-            if name not in named:
-                best[name] = max(best.get(name, 0.0), rival.gain)
-    return tuple(sorted(best, key=lambda name: -best[name]))
+        here: dict[str, Trial] = {}
+        for trial in sorted(step.rivals, key=lambda trial: -trial.gain):
+            here.setdefault(trial.score.group.effect.name, trial)
+        for name in here.keys() - named:
+            best.setdefault(name, []).append(here[name])
+    order = sorted(best, key=lambda name: -max(trial.gain for trial in best[name]))
+    return tuple(
+        Rival(name, _joints([trial.score.group.effect.joints for trial in best[name]], arm))
+        for name in order
+    )
+
+
+def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]:
+    """Return the joints of several effects of a name, in order but for those of pairs."""
+    joints = [joint for group in groups for joint in group]
+    if any(len(group) > 1 for group in groups):
+        return tuple(dict.fromkeys(joints))
+    return tuple(joint for joint in arm.robot.joints if joint in joints)
+
+
+def _elsewhere(rival: Rival, joints: Sequence[str]) -> str:
+    """Return a name, and the joints where they are others than those."""
+    there = '' if set(rival.joints) == set(joints) else f' of {", ".join(rival.joints)}'
+    return rival.name + (there if rival.joints else '')
 
 
 def _not_repeating(floors: Sequence[Floor], arm: ArmModel) -> list[str]:

@@ -59,6 +59,11 @@ def test_a_link_that_is_too_heavy_is_named_instead_of_all_values(bench):
     names = {n for f in found.findings for n in (f.name, *f.ambiguous_with)}
     assert not found.refitted
     assert names & {'payload', 'link_inertia'}
+    (effect,) = diagnosis_document(found)['effects']
+    rivals = {rival['name']: rival['joints'] for rival in effect['rivals']}
+    assert list(rivals) == effect['ambiguous_with']
+    there = {effect['name']: effect['joints'], **rivals}
+    assert there['link_inertia'] == there['payload'] == ['elbow']
 
 
 def test_drag_is_named_with_its_coefficient_and_joint(bench):

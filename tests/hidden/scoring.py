@@ -33,6 +33,8 @@ class Finding:
         Other names that the data cannot exclude.
     parameters : tuple of (name, joint, value, std)
         What was estimated.
+    rivals : tuple of (name, joints)
+        Where those other names would be.
 
     """
 
@@ -40,6 +42,11 @@ class Finding:
     joints: tuple[str, ...] = ()
     ambiguous_with: tuple[str, ...] = ()
     parameters: tuple[tuple[str, str, float, float], ...] = ()
+    rivals: tuple[tuple[str, tuple[str, ...]], ...] = ()
+
+    def joints_of(self, name: str) -> tuple[str, ...]:
+        """Return where it is if it is a name."""
+        return self.joints if name == self.name else dict(self.rivals).get(name, self.joints)
 
     @property
     def names(self) -> set[str]:
@@ -152,9 +159,9 @@ class Judged:
 
     @property
     def localised(self) -> bool:
-        """Whether the truth was found in the joints that it is in."""
-        found = self.found
-        return found is not None and set(found.joints) == set(self.truth.joints[0])
+        """Whether the truth was found in the joints that it is in, named first or as a rival."""
+        found, (name, *_) = self.found, self.truth.names
+        return found is not None and set(found.joints_of(name)) == set(self.truth.joints[0])
 
     @property
     def exact(self) -> bool:

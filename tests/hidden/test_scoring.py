@@ -71,6 +71,15 @@ def test_joint_counts_where_the_name_is_right():
     assert metric([Judged(whole, found)], 'joint right').count == 0
 
 
+def test_the_joint_of_a_rival_is_where_the_rival_is():
+    other = ('panda_joint1',)
+    for there, right in ((ELBOW, 1.0), (other, 0.0)):
+        rivals = (('coulomb_friction', there),)
+        found = Finding('torque_offset', other, ('coulomb_friction',), rivals=rivals)
+        judged = [Judged(truth(), said('ambiguous', found))]
+        assert metric(judged, 'joint right').value == right
+
+
 def test_false_alarm_is_anything_but_silence():
     clean = truth('free', (), joints=(), parameters=(), visible=False)
     off = truth('free', (), joints=(), parameters=(), visible=False, exact=False)
