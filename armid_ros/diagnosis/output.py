@@ -56,7 +56,7 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
                     )
                 ],
                 'ambiguous_with': list(finding.ambiguous_with),
-                'rivals': [asdict(rival) for rival in finding.rivals],
+                'rivals': [{'name': r.name, 'joints': list(r.joints)} for r in finding.rivals],
                 'experiment': finding.experiment,
                 **_ties(finding),
                 **_sureness(diagnosis.league.of(finding.name)),
