@@ -101,8 +101,8 @@ class Question:
         return f'{self.machine} {self.what} {self.name}{where}'.strip()
 
 
-def questions() -> Iterator[Question]:
-    """Yield all questions."""
+def questions(machines: Machines) -> Iterator[Question]:
+    """Yield all questions; what is added is added where most of it can be seen."""
     for machine in KNOWN:
         yield Question(machine, 'from rigid')
     for machine, terms in KNOWN.items():
@@ -113,10 +113,10 @@ def questions() -> Iterator[Question]:
         ('ur10', ('shoulder_lift_joint', 'elbow_joint', 'wrist_2_joint')),
         ('tx40', ('joint_1', 'joint_3', 'joint_5')),
     ):
-        for position, name in enumerate(LAWS):
-            held = name in {known for known, _ in KNOWN[machine]}
-            if not held:
-                yield Question(machine, 'with', name, joints[position % len(joints)], 3.0)
+        for name in LAWS:
+            if name not in {known for known, _ in KNOWN[machine]}:
+                asked = [Question(machine, 'with', name, joint, 3.0) for joint in joints]
+                yield max(asked, key=machines.visible)
 
 
 class Machines:
@@ -148,6 +148,19 @@ class Machines:
 
     def with_effect(self, question: Question) -> Recording:
         """Return the recording with a torque added to what was measured in one joint."""
+        _, recording = self.bare(question.machine)
+        size = question.size / self.visible(question)
+        return replace(recording, tau=recording.tau + size * self._added(question))
+
+    def visible(self, question: Question) -> float:
+        """Return which share of a torque a fit of the known model leaves, rms over rms."""
+        arm, _ = self.bare(question.machine)
+        joint = arm.robot.joints.index(question.joint)
+        seen = self._seen(question.machine, self._added(question))[joint]
+        return float(seen / self.left(question.machine)[joint])
+
+    def _added(self, question: Question) -> FloatArray:
+        """Return a torque as large as what the known model leaves of its joint, rms, (N, n)."""
         arm, recording = self.bare(question.machine)
         joint = arm.robot.joints.index(question.joint)
         rate = 1.0 / float(np.median(np.diff(recording.t)))
@@ -159,9 +172,7 @@ class Machines:
         shape = LAWS[question.name](q, dq, np.gradient(dq, recording.t), load)
         added = np.zeros_like(recording.tau)
         added[:, joint] = shape * self.left(question.machine)[joint] / np.sqrt(np.mean(shape**2))
-        seen = self._seen(question.machine, added)[joint]
-        size = question.size * self.left(question.machine)[joint] / seen
-        return replace(recording, tau=recording.tau + size * added)
+        return added
 
     def _seen(self, machine: str, added: FloatArray) -> FloatArray:
         """Return what a fit of the known model leaves of a torque that is added, rms (n,)."""
@@ -228,7 +239,7 @@ def main() -> int:
     texts = sys.argv[1:]
     with tempfile.TemporaryDirectory() as out:
         machines = Machines(Path(folder), Path(out))
-        for question in questions():
+        for question in questions(machines):
             if texts and not any(text in question.label for text in texts):
                 continue
             begin = time.process_time()
