@@ -302,14 +302,14 @@ def acceptable(
     """
     if trial.gain <= 0.0 or not within_bounds(trial.score) or not replicated(trial, settings):
         return False
-    if total is not None and not of_the_gap(trial, total, settings):
+    gap = joint_losses(problem, left) > settings.consistent_loss
+    beyond, gains = excess(problem, left).sum(axis=0), trial.gains.sum(axis=0)
+    rest = bool(np.any(gap & (gains >= settings.most_of_rest * beyond)))
+    if total is not None and not rest and not of_the_gap(trial, total, settings):
         return False
     single = len(trial.score.values) == 1
     if single and np.any(trial.fold_values[:, 0] * trial.score.values[0] < 0.0):
         return False
-    beyond = excess(problem, left).sum(axis=0)
-    gap = joint_losses(problem, left) > settings.consistent_loss
-    gains = trial.gains.sum(axis=0)
     whole = trial.gain >= settings.least_share * beyond[gap].sum() and gains[gap].sum() > 0.0
     one = bool(np.any(gap & (gains >= 0.3 * beyond)))
     everywhere = len(trial.z) >= 3 and bool(np.all(trial.z >= settings.sure_z))

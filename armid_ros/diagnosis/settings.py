@@ -43,7 +43,10 @@ class DiagnosisSettings:
         ... and this share of the excess at the beginning: what takes less than a thousandth or two
         of a gap is not what was missing.
     least_of_joint : float
-        ... or this share of that of a joint which had this share of the whole.
+        ... or this share of that of a joint which had this share of the whole,
+    most_of_rest : float
+        ... or this share of what is left of a joint: leftovers of what was named already are not
+        of one kind.
     least_z : float
         Block z that a gain has to reach on a held-out trajectory to count as replicated.
     sure_z : float
@@ -76,6 +79,7 @@ class DiagnosisSettings:
     least_share: float = 0.10
     least_of_all: float = 0.0015
     least_of_joint: float = 0.01
+    most_of_rest: float = 0.8
     least_z: float = 3.0
     sure_z: float = 4.0
     tautology: float = 0.8

@@ -5,6 +5,7 @@
 from dataclasses import dataclass
 import json
 
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
 from armid_ros.effects import Action, CATALOGUE, Effect, Quantity
 from armid_ros.model import inverse_dynamics
@@ -83,6 +84,25 @@ def test_parameters_of_a_name_are_in_the_order_of_the_joints(bench):
     assert finding.joints == tuple(p.joint for p in finding.parameters) == ('shoulder', 'elbow')
     errors = np.abs(np.array(finding.values) - [0.02, 0.1])
     assert np.all(errors < 4 * np.array(finding.std))
+
+
+def test_all_friction_is_named_of_an_arm_of_which_only_bodies_are_known(bench):
+    """Drag that is a thousandth of the gap of all friction brings a joint to its noise, too."""
+    hidden = bench.recordings(lambda m, tau: [15.0, 0.0] * np.sign(m.dq))
+    found = look(bench, hidden, ArmModel(bench.robot))
+    assert found.verdict in ('named', 'ambiguous')
+    values = {
+        (p.name, p.joint): v
+        for f in found.findings
+        for p, v in zip(f.parameters, f.values, strict=True)
+    }
+    wanted = {
+        ('coulomb_torque', 'shoulder'): 15.5,
+        ('coulomb_torque', 'elbow'): 0.3,
+        ('viscous_coefficient', 'shoulder'): 0.3,
+        ('viscous_coefficient', 'elbow'): 0.2,
+    }
+    assert {name: pytest.approx(value, rel=0.1) for name, value in wanted.items()} == values
 
 
 def test_a_name_that_does_not_hold_where_the_motion_is_new_is_provisional(bench):
