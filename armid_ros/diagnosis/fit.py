@@ -214,7 +214,7 @@ def _covariance(
     lefts = weighted_rows(residual, data, sigma)
     problem = [
         Regression(
-            part.motion.select(part.rows).with_torque(left),
+            part.at_rows.with_torque(left),
             block[:, :, kept],
             part.told,
             part.source,

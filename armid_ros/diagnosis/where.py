@@ -110,7 +110,7 @@ def locate(
 
 
 def _quantities(arm: ArmModel, part: Trajectory) -> list[tuple[str, str, FloatArray]]:
-    motion = part.motion.select(part.rows)
+    motion = part.at_rows
     load = arm.load(arm.link_motion(motion))
     time = np.repeat(motion.t[:, np.newaxis], motion.n_joints, axis=1)
     return [
