@@ -15,9 +15,8 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
-from armid_ros.diagnosis.model_search import Explanation, joint_losses_of, no_worse
+from armid_ros.diagnosis.model_search import Explanation
 from armid_ros.diagnosis.problem import weighted_rows
-from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.physical import physical_program, PhysicalSettings
 from armid_ros.motion import FloatArray
@@ -26,15 +25,11 @@ import scipy.linalg
 
 #: Weights of the description that are tried, the heaviest that costs nothing is taken.
 _WEIGHTS = (1e-3, 1e-5, 1e-7)
+#: Bodies that leave this much of what the fit leaves explain as much.
+_ALIKE = 1.05
 
 
-def as_bodies(
-    explanation: Explanation,
-    arm: ArmModel,
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
-    settings: DiagnosisSettings,
-) -> tuple[Explanation, tuple[str, ...]]:
+def as_bodies(explanation: Explanation, arm: ArmModel) -> tuple[Explanation, tuple[str, ...]]:
     """
     Return an explanation whose links are bodies, if some explain the data as well, and a note.
 
@@ -44,17 +39,14 @@ def as_bodies(
         What was found.
     arm : ArmModel
         The arm as described.
-    data : sequence of Trajectory
-        The data.
-    sigma : sequence of ndarray, shape (n,)
-        Noise of each trajectory [N m].
-    settings : DiagnosisSettings
-        Thresholds.
 
     """
     base, fitted = explanation.base, explanation.fitted
-    if base is None:
+    rigid = len(arm.robot.rigid_parameters)
+    if base is None or not base.rank or base.independent.min() >= rigid:
         return explanation, ()
+    evidence = explanation.evidence
+    data, sigma = evidence.data, evidence.sigma
     known = len(arm.parameters)
     values = base.values(fitted.arm.theta[:known])
     triangle, count = _triangle(explanation, values, data, sigma)
@@ -67,9 +59,9 @@ def as_bodies(
         changed = fitted.arm.with_theta(np.concatenate([theta, fitted.arm.theta[known:]]))
         residual = tuple(part.residual(changed) for part in data)
         bodily = replace(fitted, arm=changed, residual=residual)
-        losses = joint_losses_of(bodily, data, sigma)
-        if no_worse(losses, explanation.losses, settings):
-            return replace(explanation, fitted=bodily, losses=losses), ()
+        allowed = np.maximum(_ALIKE * explanation.losses, 1.0)
+        if np.all(evidence.losses(residual) <= allowed):
+            return replace(explanation, fitted=bodily), ()
     return explanation, (
         'no links that are bodies explain the data as well: what was named, or not found, is in '
         'the inertias; the patched model may not be simulable',

@@ -11,35 +11,22 @@ once and shared out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise, permutations, product
+from itertools import product
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.fit import Fitted
-from armid_ros.diagnosis.remembering import remembering
+from armid_ros.diagnosis.memoized_arm import memoized_arm
 from armid_ros.diagnosis.shapes import shape_starts
 from armid_ros.effects import Effect, Kind
+from armid_ros.effects.gravity import with_exact_vector
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Effects whose joints are pairs, and which pairs are likely enough to be looked at.
-_PAIRS: dict[str, Callable[[Sequence[str]], Iterable[tuple[str, str]]]] = {
-    'coupled_joint_friction': lambda joints: pairwise(joints),
-    'joint_coupling': lambda joints: combinations(joints, 2),
-    'torque_crosstalk': lambda joints: permutations(joints, 2),
-}
-#: Effects of the whole arm that can be of single joints as well.
-_ALSO_JOINTS = ('time_delay',)
-#: Effects whose quantities stand for causes of their own. Together, the two of a saturation are
-#: the measured torque minus the model's: they would explain anything.
-_ALONE = {'actuator_saturation': ((0,), (1,)), 'soft_limit': ((0,), (1,))}
-#: Effects that cost much and depend on position and velocity smoothly: their columns are computed
-#: at the rows.
-_SMOOTH = ('human_interaction', 'interface_slack')
 #: Most combinations of shape values that a search starts from.
 _MOST_SHAPES = 12
 
@@ -83,36 +70,20 @@ class Group:
         return int(self.columns.stop) - int(self.columns.start)
 
 
-def group_effects(arm: ArmModel, kinds: Sequence[Kind]) -> Iterator[tuple[Effect, list[Effect]]]:
-    """
-    Yield effects whose columns are computed together, with the groups they are shared out to.
-
-    Effects that the arm has already, on the same joints, are left out.
-
-    """
-    robot = arm.robot
-    there = {(e.name, joint) for e in arm.effects for joint in e.joints or ('',)}
-    for kind in kinds:
-        name = kind.name
-        if name in _PAIRS:
-            for pair in _PAIRS[name](robot.joints):
-                if (name, pair[0]) not in there:
-                    effect = kind.on(robot, pair)
-                    yield effect, [effect]
-            continue
+def group_effects(robot: Robot, kinds: Sequence[Kind]) -> Iterator[tuple[Effect, list[Effect]]]:
+    """Yield effects whose columns are computed together, with the groups they belong to."""
+    for kind in with_exact_vector(kinds):
         try:
-            whole = kind.on(robot)
+            places = kind.places(robot)
         except ModelError:
             continue
-        if not whole.joints:
-            if (name, '') not in there:
-                yield whole, [whole]
-            if name not in _ALSO_JOINTS:
-                continue
-        joints = robot.joints[-1:] if name == 'payload' else whole.joints or robot.joints
-        free = tuple(joint for joint in joints if (name, joint) not in there)
-        if free:
-            yield kind.on(robot, free), [kind.on(robot, (joint,)) for joint in free]
+        single = tuple(place[0] for place in places if len(place) == 1)
+        for place in places:
+            if len(place) != 1:
+                effect = kind.on(robot, place)
+                yield effect, [effect]
+        if single:
+            yield kind.on(robot, single), [kind.on(robot, (joint,)) for joint in single]
 
 
 def shaped(
@@ -168,27 +139,36 @@ def candidates(
     sigma: Sequence[FloatArray],
     kinds: Sequence[Kind],
 ) -> Candidates:
-    """Compute the columns of every effect that a fitted arm does not have."""
-    fitted = replace(fitted, arm=remembering(fitted.arm))
+    """Compute the columns of every effect that was not named yet."""
+    fitted = replace(fitted, arm=memoized_arm(fitted.arm))
     arm = fitted.arm
+    taken = {(own.effect.name, own.effect.joints) for own in fitted.named}
     groups: list[Group] = []
     blocks: list[list[FloatArray]] = [[] for _ in data]
     start = 0
-    for effect, members in group_effects(arm, kinds):
+    for effect, members in group_effects(arm.robot, kinds):
         for whole, singles in shaped(effect, members, fitted, data, sigma):
             for block, part in zip(blocks, data, strict=True):
                 block.append(effect_rows(arm, whole, part))
             for single in singles:
                 size = len(single.parameters(arm.robot))
-                for kept in _ALONE.get(single.name, (tuple(range(size)),)):
-                    span = slice(start + kept[0], start + kept[-1] + 1)
-                    groups.append(Group.of(single, span, kept, arm.robot))
+                if (single.name, single.joints) not in taken:
+                    for kept in single.separate or (tuple(range(size)),):
+                        span = slice(start + kept[0], start + kept[-1] + 1)
+                        groups.append(Group.of(single, span, kept, arm.robot))
                 start += size
     return Candidates(tuple(groups), tuple(np.concatenate(block, axis=2) for block in blocks))
 
 
 def effect_rows(arm: ArmModel, effect: Effect, part: Trajectory) -> FloatArray:
-    """Return the columns of an effect in the rows of a trajectory, shape (M, n, P)."""
-    if effect.name in _SMOOTH:
+    """Return the columns of an effect in the rows of a trajectory, shape (M, n, P), as it acts."""
+    if part.before:
+        return np.zeros((len(part.rows), arm.robot.n_joints, len(effect.parameters(arm.robot))))
+    return sensitivity_rows(arm, effect, part)
+
+
+def sensitivity_rows(arm: ArmModel, effect: Effect, part: Trajectory) -> FloatArray:
+    """Return the same, whether it acts in that trajectory or not."""
+    if effect.smooth:
         return arm.columns_of(effect, part.at_rows)
     return part.reduce(arm.columns_of(effect, part.motion))

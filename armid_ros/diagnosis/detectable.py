@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from armid_ros.diagnosis.held_out import Trial
 from armid_ros.diagnosis.model_search import Explanation
-from armid_ros.diagnosis.selection import Score
 from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import ParameterName
 from armid_ros.robots import Robot
@@ -44,12 +44,12 @@ class Detectable:
     visible: float
 
 
-def smallest_size(score: Score) -> tuple[int, float]:
+def smallest_size(trial: Trial) -> tuple[int, float]:
     """Return which parameter of a candidate is told, and from which size on; the first of them."""
-    for index, std in zip(score.group.kept, score.std, strict=True):
+    for index, std in zip(trial.group.kept, trial.std, strict=True):
         if std > 0.0:  # zero: in a direction that the data do not tell
             return index, _SHOWS * float(std)
-    return score.group.kept[0], float('inf')
+    return trial.group.kept[0], float('inf')
 
 
 def detectable(explanation: Explanation | None, robot: Robot) -> tuple[Detectable, ...]:
@@ -58,11 +58,11 @@ def detectable(explanation: Explanation | None, robot: Robot) -> tuple[Detectabl
     if survey is None:
         return ()
     rows = []
-    for score in survey.scores:
-        effect = score.group.effect
-        index, size = smallest_size(score)
+    for trial in survey.ranking:
+        effect = trial.group.effect
+        index, size = smallest_size(trial)
         parameter = effect.parameters(robot)[index]
-        rows.append(Detectable(effect.name, effect.joints, parameter, size, score.visible))
+        rows.append(Detectable(effect.name, effect.joints, parameter, size, trial.visible))
     rows += [Detectable(name, joints, None, float('inf'), 0.0) for name, joints in survey.unseen]
     order = {name: position for position, name in enumerate(CATALOGUE)}
     return tuple(sorted(rows, key=lambda row: order.get(row.name, len(order))))

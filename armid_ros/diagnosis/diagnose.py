@@ -14,33 +14,30 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.attribution import attribute, Attribution
+from armid_ros.diagnosis.baseline import Baseline
 from armid_ros.diagnosis.bodies import as_bodies
-from armid_ros.diagnosis.evidence import trajectories, Trajectory
+from armid_ros.diagnosis.choice import Chosen, explained, OWN_MISFIT
+from armid_ros.diagnosis.evidence import Evidence, trajectories, Trajectory
+from armid_ros.diagnosis.finding import Finding, findings, small_print
 from armid_ros.diagnosis.floor import Floor, noise_floor
 from armid_ros.diagnosis.gap import Gap, measure_gap
 from armid_ros.diagnosis.gate import check_data, Gate
-from armid_ros.diagnosis.league import League, make_league
-from armid_ros.diagnosis.model_search import as_described, explain, Explanation, no_worse
+from armid_ros.diagnosis.model_search import Explanation
 from armid_ros.diagnosis.pattern import find_pattern, Pattern
-from armid_ros.diagnosis.prepare import choose_filters, prepare
+from armid_ros.diagnosis.prepare import choose_filters, prepare, Prepared
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.tied_search import explain_tied, within_its_noise
-from armid_ros.diagnosis.tied_values import TieRegression
-from armid_ros.diagnosis.verdict import decide, Finding, Verdict
+from armid_ros.diagnosis.tied_search import diagnose_ties
+from armid_ros.diagnosis.unharmed import harmed
+from armid_ros.diagnosis.verdict import decide, Left
 from armid_ros.diagnosis.where import locate, Where
-from armid_ros.diagnosis.wrong_body import wrong_body
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.checks import check_motion
-from armid_ros.model import BaseParameters
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
 #: Told the share that is done and what is being done.
 Progress = Callable[[float, str], None]
-
-#: Causes that a model as described may lack before a fit of everything is the better explanation.
-_FIXED_STEPS = 3
 
 
 @dataclass(frozen=True)
@@ -55,19 +52,20 @@ class Diagnosis:
     summary : str
         The same in a sentence or two.
     findings : tuple of Finding
-        What was named, with parameters, rivals and the experiment that would separate them.
+        The headline: what was named, with share, parameters, rivals and the experiment that would
+        separate them.
+    minor : tuple of Finding
+        What is statistically there and does not matter.
     where : tuple of Where
         Where the gap was before anything was named, or is where nothing was.
     left : tuple of Where
         Where what remains lives.
     gap : Gap or None
-        Errors before and after beside the noise; None where the data are bad.
+        Errors before and after beside the floor; None where the data are bad.
     explanation : Explanation or None
         How it was found.
-    league : League
-        How sure each candidate is.
     arm : ArmModel
-        The patched model.
+        The patched model; as given where nothing was named or a patch would harm.
     gate : Gate or None
         What the data are like.
     data : tuple of Trajectory
@@ -82,17 +80,19 @@ class Diagnosis:
         What all values that are off have in common, where nothing was named.
     notes : tuple of str
         What a reader should know.
+    baseline : str
+        What the floor of the gap is: the noise, the model's own misfit, or an estimate of it.
 
     """
 
     verdict: str
     summary: str
     findings: tuple[Finding, ...]
+    minor: tuple[Finding, ...]
     where: tuple[Where, ...]
     left: tuple[Where, ...]
     gap: Gap | None
     explanation: Explanation | None
-    league: League
     arm: ArmModel
     gate: Gate | None
     data: tuple[Trajectory, ...]
@@ -101,6 +101,7 @@ class Diagnosis:
     refitted: bool
     pattern: Pattern | None
     notes: tuple[str, ...]
+    baseline: str
 
 
 def diagnose(
@@ -108,6 +109,7 @@ def diagnose(
     recordings: Sequence[Recording],
     *,
     validate: Sequence[Recording] = (),
+    baseline: Sequence[Recording] = (),
     settings: DiagnosisSettings | None = None,
     rng: np.random.Generator,
     progress: Progress | None = None,
@@ -120,11 +122,14 @@ def diagnose(
     arm : ArmModel
         The model as it is believed to be: rigid body, gravity, known effects with values.
     recordings : sequence of Recording
-        Data with torques; three speeds or more with two equal periods each are best.
+        Data with torques; several motions are best.
     validate : sequence of Recording
         Data that are only predicted.
+    baseline : sequence of Recording
+        Data from when nothing was wrong, such as those the model was identified from: what it
+        leaves of them is its own misfit, and what is asked is what has changed since.
     settings : DiagnosisSettings, optional
-        Thresholds and library.
+        Library and thresholds.
     rng : numpy.random.Generator
         Draws the states over which base parameters are found, and resamplings of the data.
     progress : callable, optional
@@ -144,7 +149,7 @@ def diagnose(
     settings = settings or DiagnosisSettings()
     tell = progress or _silent
     tell(0.02, 'filtering')
-    used = choose_filters(recordings, settings)
+    used = choose_filters([*recordings, *baseline], settings)
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
     gate = check_data(arm, recordings, data)
     faults, notes = list(gate.faults), [*gate.notes]
@@ -156,91 +161,133 @@ def diagnose(
         return _bad(arm, gate, data, tuple(faults))
     tell(0.1, 'noise floor')
     prepared = prepare(arm, recordings, used, data, settings, rng)
-    data, base, floors = prepared.data, prepared.base, prepared.floors
-    sigma, as_told = prepared.sigma, prepared.as_told
-    if any(floor.period is None for floor in floors):
+    if any(floor.period is None for floor in prepared.floors):
         notes.append(
-            'nothing repeats in some recordings: their noise floor is assumed from what rows '
-            'differ by from their neighbours; two equal periods would measure it'
+            'nothing repeats in some recordings: their noise is assumed from what rows differ by '
+            'from their neighbours; two equal periods would measure it'
         )
-    found = None
+    known = None
+    if baseline:
+        known = Baseline.of(arm, trajectories(baseline, prepared.used, arm), rng)
+    chosen = None
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
-        ties = TieRegression(arm, tuple(recordings), prepared.used, settings)
-        found = explain_tied(arm, settings.partner, data, sigma, base, settings, ties)
-        found = found or within_its_noise(arm, data, as_told, settings)
-    if found is None:
-        chosen = _explained(arm, data, (sigma, as_told), base, settings, tell)
-    else:
-        chosen, sigma = found
-    chosen, remarks = as_bodies(chosen, arm, data, sigma, settings)
-    notes += remarks
-    pattern = None if chosen.steps else find_pattern(chosen, arm, data, sigma)
+        chosen = diagnose_ties(arm, recordings, prepared, settings)
+    if chosen is None:
+        chosen = explained(arm, prepared, known, settings, rng, tell)
+    notes += chosen.notes
+    explanation, remarks = as_bodies(chosen.explanation, arm)
+    return _said(
+        replace(chosen, explanation=explanation, notes=(*notes, *remarks)),
+        (arm, gate, prepared, validate, settings, rng, tell),
+    )
+
+
+_Context = tuple[
+    ArmModel,
+    Gate,
+    Prepared,
+    Sequence[Recording],
+    DiagnosisSettings,
+    np.random.Generator,
+    Progress,
+]
+
+
+def _said(chosen: Chosen, context: _Context) -> Diagnosis:
+    """Measure what was found on held-out data, and say it."""
+    arm, gate, prepared, validate, settings, rng, tell = context
+    tell(0.85, 'held-out gap')
+    explanation, notes = chosen.explanation, list(chosen.notes)
+    evidence = explanation.evidence
+    unseen = _unseen(validate, explanation, prepared, chosen)
+    explanation, shares = _told_from_zero(explanation, unseen, rng)
+    found = findings(explanation, shares, arm, rng)
+    worse = harmed(explanation, unseen)
+    patched = explanation.fitted.arm
+    if worse:
+        names = ', '.join(one.name.replace('_', ' ') for one in found)
+        notes.append(f'{names} would make the model worse in {", ".join(worse)}: not patched')
+        found, patched = (), arm
+        explanation = explanation.withdrawn()
+    pattern = None
+    if not explanation.steps and explanation.base is not None:
+        pattern = find_pattern(explanation, arm, evidence.data, evidence.sigma)
     if pattern is not None:
         notes.append(pattern.sentence)
-    tell(0.85, 'held-out gap')
-    floors = tuple(noise_floor(part, chosen.fitted.arm) for part in data)
-    gap = measure_gap(chosen, data, floors, validate, prepared.used, settings.consistent_loss)
-    verdict: Verdict = decide(chosen, floors, gap, settings, arm)
-    where = locate(
-        chosen.reference.arm,
-        data,
-        chosen.reference.residual,
-        chosen.reference_losses,
-        settings.consistent_loss,
+    data = [part for part in evidence.data if not part.before]
+    floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
+    left = [_left(explanation, evidence, settings, 'the recordings')]
+    if unseen is not None:
+        left.append(_left(explanation, unseen, settings, 'recordings that were not used'))
+    repeated = floors if chosen.floor_in_words != OWN_MISFIT else ()
+    word = decide(
+        found, repeated, left, arm, chosen.floor_in_words, refitted=explanation.base is not None
     )
-    left = locate(
-        chosen.fitted.arm, data, chosen.fitted.residual, chosen.losses, settings.consistent_loss
-    )
-    tell(1.0, verdict.word)
+    floor = evidence.sigma if unseen is None else unseen.sigma
+    gap = measure_gap(explanation, unseen, floor)
+    total = max((s.total for s in explanation.steps), default=0.0)
+    if explanation.survey is not None:
+        total = explanation.survey.total
+    tried = 1 if explanation.survey is None else explanation.survey.tried
+    limits = evidence.limits(explanation.fitted.residual, settings)
+    tell(1.0, word.word)
     return Diagnosis(
-        verdict=verdict.word,
-        summary=verdict.summary,
-        findings=verdict.findings,
-        where=where,
-        left=left,
+        verdict=word.word,
+        summary=word.summary,
+        findings=found,
+        minor=small_print(explanation.minor, max(total, 1e-300), tried, arm),
+        where=locate(arm, evidence, explanation.reference.residual, limits),
+        left=locate(arm, evidence, explanation.fitted.residual, limits),
         gap=gap,
-        explanation=chosen,
-        league=make_league(chosen, arm, settings, rng),
-        arm=chosen.fitted.arm,
+        explanation=explanation,
+        arm=patched if found else arm,
         gate=gate,
         data=tuple(data),
         floors=floors,
-        not_visible=_not_visible(chosen, settings),
-        refitted=chosen.base is not None,
+        not_visible=_not_visible(explanation, settings),
+        refitted=explanation.base is not None,
         pattern=pattern,
         notes=tuple(notes),
+        baseline=chosen.floor_in_words,
     )
 
 
-def _explained(
-    arm: ArmModel,
-    data: Sequence[Trajectory],
-    sigmas: tuple[Sequence[FloatArray], Sequence[FloatArray]],
-    base: BaseParameters,
-    settings: DiagnosisSettings,
-    tell: Progress,
-) -> Explanation:
-    """Explain the gap of the arm as described or fitted anew, each at its own noise."""
-    sigma, as_told = sigmas
-    tell(0.25, 'model as described')
-    fixed = explain(arm, data, as_told, None, settings, _FIXED_STEPS)
-    explained = bool(np.all(fixed.losses < settings.consistent_loss))
-    if explained and len(fixed.steps) == 1:
-        return fixed
-    if explained and not fixed.steps:
-        refitted = explain(arm, data, sigma, base, settings, 1)
-        return replace(fixed, survey=refitted.survey)
-    tell(0.5, 'model fitted anew')
-    chosen = explain(arm, data, sigma, base, settings, settings.most_steps)
-    chosen = as_described(chosen, fixed, arm, data, as_told, settings)
-    names = len(fixed.steps)
-    fewer = 0 < names <= max(1, len(chosen.steps))
-    if fewer and no_worse(fixed.losses, chosen.losses, settings):
-        return fixed
-    if not chosen.steps and np.all(chosen.losses < settings.consistent_loss):
-        return wrong_body(chosen, fixed, arm, data, as_told, settings)
-    return chosen
+def _told_from_zero(
+    explanation: Explanation, unseen: Evidence | None, rng: np.random.Generator
+) -> tuple[Explanation, Attribution]:
+    """Drop names that take nothing of data they were not found in, and share out the gap."""
+    shares = attribute(explanation, unseen)
+    for k in reversed(shares.order):
+        if shares.interval([k], rng)[0] <= 0.0:
+            return _told_from_zero(explanation.without(k), unseen, rng)
+    return explanation, shares
+
+
+def _unseen(
+    validate: Sequence[Recording],
+    explanation: Explanation,
+    prepared: Prepared,
+    chosen: Chosen,
+) -> Evidence | None:
+    """Return recordings that are only predicted, in the unit of the gap."""
+    if not validate:
+        return None
+    data = trajectories(validate, prepared.used, explanation.fitted.arm)
+    noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]
+    sigma = [np.maximum(one, chosen.misfit) for one in noise]
+    return Evidence(tuple(data), tuple(sigma), tuple(noise))
+
+
+def _left(
+    explanation: Explanation, evidence: Evidence, settings: DiagnosisSettings, where: str
+) -> Left:
+    if evidence is explanation.evidence:
+        residual = explanation.fitted.residual
+    else:
+        residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
+    excess = evidence.losses(residual) / evidence.limits(residual, settings)
+    return Left(excess, f'in {where}')
 
 
 def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:
@@ -256,11 +303,11 @@ def _bad(
         verdict='bad_data',
         summary=f'The data cannot be diagnosed: {"; ".join(faults)}.',
         findings=(),
+        minor=(),
         where=(),
         left=(),
         gap=None,
         explanation=None,
-        league=League(),
         arm=arm,
         gate=gate,
         data=tuple(data),
@@ -269,6 +316,7 @@ def _bad(
         refitted=False,
         pattern=None,
         notes=gate.notes,
+        baseline='',
     )
 
 

@@ -16,6 +16,7 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.period import find_period
+from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.tied_noise import SensorNoise
 from armid_ros.effects.timing import smoothed
 from armid_ros.errors import IdentificationError
@@ -29,6 +30,7 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
 
 #: Columns are computed at this many times the rate of the rows: enough for signs and hysteresis.
 _OVERSAMPLING = 8
@@ -38,6 +40,8 @@ _REST_SPEED, _REST_TIME = 0.02, 0.2
 #: as many rows around as the filter rings over: beyond three rows the residuals of six-joint
 #: arms are at their noise again, in the third they can be at four times its power.
 _REVERSAL_SPEED, _REVERSAL_ROWS = 0.004, 3
+#: Rows apart that what is left may be alike.
+_LAGS = 20
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,8 @@ class Trajectory:
         False where a joint rests or turns round: friction is undetermined there.
     sensors : SensorNoise or None
         What their noise does beside another machine; None where there is none.
+    before : bool
+        Whether it was recorded when nothing was wrong: what is named does not act in it.
 
     """
 
@@ -71,6 +77,7 @@ class Trajectory:
     rows: npt.NDArray[np.intp]
     told: npt.NDArray[np.bool_]
     sensors: SensorNoise | None = None
+    before: bool = False
 
     def reduce(self, values: FloatArray) -> FloatArray:
         """Filter and decimate samples (N, ...) to rows (M, ...)."""
@@ -100,6 +107,97 @@ class Trajectory:
     def t(self) -> FloatArray:
         """Time of the rows [s]."""
         return self.motion.t[self.rows]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """
+    Data with the unit that a gap is measured in.
+
+    Attributes
+    ----------
+    data : tuple of Trajectory
+        The data.
+    sigma : tuple of ndarray, each (n,)
+        The unit of each trajectory: its noise, or the model's own misfit where that is more
+        [N m].
+    noise : tuple of ndarray, each (n,)
+        Its noise [N m].
+
+    """
+
+    data: tuple[Trajectory, ...]
+    sigma: tuple[FloatArray, ...]
+    noise: tuple[FloatArray, ...]
+
+    @cached_property
+    def count(self) -> FloatArray:
+        """Informative rows of each joint, shape (n,)."""
+        parts = [part.told.sum(axis=0) for part in self.data if not part.before]
+        return np.asarray(np.sum(parts, axis=0, dtype=float))
+
+    @cached_property
+    def torque_rms(self) -> FloatArray:
+        """Root mean square of the measured torque of each joint, shape (n,) [N m]."""
+        squares = np.zeros_like(self.count)
+        for part in self.data:
+            if part.before:
+                continue
+            assert part.motion.tau is not None
+            squares += np.sum(part.reduce(part.motion.tau) ** 2, axis=0, where=part.told)
+        return np.sqrt(squares / np.maximum(self.count, 1.0))
+
+    def losses(self, residual: Sequence[FloatArray]) -> FloatArray:
+        """Return the mean square over the unit of each joint, shape (n,)."""
+        squares = np.zeros_like(self.count)
+        for part, sigma, left in zip(self.data, self.sigma, residual, strict=True):
+            if not part.before:
+                squares += np.sum((left / sigma) ** 2, axis=0, where=part.told)
+        return np.asarray(squares / np.maximum(self.count, 1.0))
+
+    def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
+        """
+        Return the loss of each joint up to which what is left is no gap, shape (n,).
+
+        Two periods determine their noise as well as so many independent rows do, and so do the
+        rows that are compared with it: the ratio of the two has Fisher's distribution. Where the
+        unit is a misfit, another motion makes another one. And what is left may not matter.
+
+        """
+        thresholds = settings.thresholds
+        count = np.maximum(self.count, 2.0)
+        free = np.maximum(count / self._lasting(residual), 4.0)
+        noise = stats.f.ppf(thresholds.confidence, free, free)
+        parts = [k for k, part in enumerate(self.data) if not part.before]
+        sigma = np.mean([self.sigma[k] ** 2 for k in parts], axis=0)
+        own = np.mean([self.noise[k] ** 2 for k in parts], axis=0) / sigma
+        misfit = np.where(own < 1.0 / thresholds.same_fit, thresholds.same_fit, 1.0)
+        matters = (settings.material * self.torque_rms) ** 2 / sigma
+        return np.asarray(np.maximum(noise, misfit) + matters)
+
+    def _lasting(self, residual: Sequence[FloatArray]) -> FloatArray:
+        """Return for how many rows what is left lasts, as squares go, shape (n,)."""
+        products = np.zeros((_LAGS + 1, len(self.count)))
+        for part, left in zip(self.data, residual, strict=True):
+            if part.before:
+                continue
+            rows = np.where(part.told, left, 0.0)
+            for lag in range(min(_LAGS + 1, len(rows))):
+                products[lag] += np.sum(rows[lag:] * rows[: len(rows) - lag], axis=0)
+        correlation = products[1:] / np.maximum(products[0], 1e-300)
+        return np.asarray(1.0 + 2.0 * np.sum(correlation**2, axis=0))
+
+    def least_squares(self, settings: DiagnosisSettings) -> FloatArray:
+        """Return the squares over the unit that a cause takes of a joint if it matters, (n,)."""
+        share = settings.thresholds.misfit_share
+        wanted = (settings.material * self.torque_rms) ** 2
+        total = np.zeros_like(self.count)
+        for part, sigma, noise in zip(self.data, self.sigma, self.noise, strict=True):
+            if part.before:
+                continue
+            misfit = share * np.maximum(sigma**2 - noise**2, 0.0)
+            total += part.told.sum(axis=0) * np.maximum(wanted, misfit) / sigma**2
+        return np.maximum(total, 1e-12)
 
 
 def trajectories(

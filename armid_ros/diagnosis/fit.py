@@ -48,6 +48,12 @@ class Fitted:
         What is left, per trajectory [N m].
     columns : tuple of ndarray, each (M, n, f)
         Columns of all that was free.
+    bare : ArmModel
+        The arm without the named effects, as it was fitted with them.
+    values : tuple of ndarray
+        All values of each named effect.
+    hold : ndarray, shape (f, f)
+        Precision that what was free is held with, and ``pull``, shape (f,), what to, times that.
 
     """
 
@@ -56,6 +62,10 @@ class Fitted:
     estimate: Estimate
     residual: tuple[FloatArray, ...]
     columns: tuple[FloatArray, ...]
+    bare: ArmModel
+    values: tuple[FloatArray, ...]
+    hold: FloatArray
+    pull: FloatArray
 
 
 def excited(
@@ -107,7 +117,7 @@ def fit(
     values = list(start) or [np.zeros(len(n.effect.parameters(arm.robot))) for n in named]
     state = Patch(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
     pull = np.zeros((0, 0)) if base is None else _described(base, arm)
-    residual = _residuals(state.model, data)
+    residual = _residuals(state, data)
     loss = _loss(residual, data, sigma)
     rounds = _MOST_ROUNDS if named else int(base is not None)
     columns = [patch_columns(state, part, base) for part in data]
@@ -116,7 +126,7 @@ def fit(
         moved, after = state, residual
         for share in (1.0, 0.5, 0.2):
             trial = state.moved(share * step, base)
-            left = _residuals(trial.model, data)
+            left = _residuals(trial, data)
             if _loss(left, data, sigma) < loss:
                 moved, after = trial, left
                 break
@@ -132,17 +142,25 @@ def fit(
     covariance = np.zeros((size, size))
     if named:
         covariance = _covariance(columns, residual, data, sigma)
+    whole = columns[0].shape[2]
+    hold, held_to = np.zeros((whole, whole)), np.zeros(whole)
+    hold[:size, :size], held_to[:size] = pull, -pull @ state.change
     return Fitted(
         state.model,
         state.named,
         Estimate(names, numbers, covariance[size:, size:]),
         tuple(residual),
         tuple(columns),
+        state.arm,
+        state.values,
+        hold,
+        held_to,
     )
 
 
-def _residuals(model: ArmModel, data: Sequence[Trajectory]) -> list[FloatArray]:
-    return [part.residual(model) for part in data]
+def _residuals(state: Patch, data: Sequence[Trajectory]) -> list[FloatArray]:
+    model = state.model
+    return [part.residual(state.arm if part.before else model) for part in data]
 
 
 def _loss(

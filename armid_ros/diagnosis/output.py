@@ -4,15 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 import math
 from typing import Any
 
 from armid_ros.diagnosis.detectable import detectable, smallest_size
 from armid_ros.diagnosis.diagnose import Diagnosis
-from armid_ros.diagnosis.league import Standing
-from armid_ros.diagnosis.verdict import Finding
+from armid_ros.diagnosis.finding import Finding
+from armid_ros.diagnosis.held_out import Trial
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -39,40 +38,38 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
         'schema': SCHEMA,
         'verdict': diagnosis.verdict,
         'summary': diagnosis.summary,
-        'effects': [
-            {
-                'name': finding.name,
-                'joints': list(finding.joints),
-                'parameters': [
-                    {
-                        'name': p.name,
-                        'joint': p.joint,
-                        'value': value,
-                        'std': _finite(std),
-                        'unit': p.unit,
-                    }
-                    for p, value, std in zip(
-                        finding.parameters, finding.values, finding.std, strict=True
-                    )
-                ],
-                'ambiguous_with': list(finding.ambiguous_with),
-                'rivals': [{'name': r.name, 'joints': list(r.joints)} for r in finding.rivals],
-                'experiment': finding.experiment,
-                **_ties(finding),
-                **_sureness(diagnosis.league.of(finding.name)),
-            }
-            for finding in diagnosis.findings
-        ],
+        'effects': [_finding(finding) for finding in diagnosis.findings],
+        'minor': [_finding(finding) for finding in diagnosis.minor],
+        'baseline': diagnosis.baseline,
         'where': [
             {'joint': w.joint, 'share_of_gap': w.share_of_gap, 'signature': w.signature}
             for w in diagnosis.where
         ],
         'gap': _gap(diagnosis),
-        'candidates': [_candidate(s) for s in diagnosis.league.first[:_MOST_CANDIDATES]],
+        'candidates': _candidates(diagnosis),
         'not_visible': list(diagnosis.not_visible),
         'detectable': _detectable(diagnosis),
         'pattern': None if diagnosis.pattern is None else asdict(diagnosis.pattern),
         'model': model,
+    }
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    rows = zip(finding.parameters, finding.values, finding.std, strict=True)
+    return {
+        'name': finding.name,
+        'joints': list(finding.joints),
+        'share': finding.share,
+        'share_interval': list(finding.share_interval),
+        'p': finding.p,
+        'parameters': [
+            {'name': p.name, 'joint': p.joint, 'value': v, 'std': _finite(std), 'unit': p.unit}
+            for p, v, std in rows
+        ],
+        'ambiguous_with': list(finding.ambiguous_with),
+        'rivals': [{'name': r.name, 'joints': list(r.joints)} for r in finding.rivals],
+        'experiment': finding.experiment,
+        **_ties(finding),
     }
 
 
@@ -125,16 +122,28 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _candidate(standing: Standing) -> dict[str, Any]:
-    trial, score = standing.trial, standing.trial.score
+def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return what was looked at first, in the order in which it was decided."""
+    explanation = diagnosis.explanation
+    survey = None if explanation is None else explanation.survey
+    if survey is None:
+        return []
+    return [
+        _candidate(trial, survey.total, survey.tried)
+        for trial in survey.ranking[:_MOST_CANDIDATES]
+    ]
+
+
+def _candidate(trial: Trial, total: float, tried: int) -> dict[str, Any]:
     return {
-        'name': score.group.effect.name,
-        'joints': list(score.group.effect.joints),
+        'name': trial.group.effect.name,
+        'joints': list(trial.group.effect.joints),
+        'share': trial.gain / max(total, 1e-300),
         'held_out_gain': trial.gain,
-        'replicated_in': int(np.sum(trial.z >= 3.0)),
-        'visible_fraction': score.visible,
-        'min_detectable': _finite(smallest_size(score)[1]),
-        **_sureness([standing]),
+        'replicated_in': trial.replicated,
+        'visible_fraction': trial.visible,
+        'min_detectable': _finite(smallest_size(trial)[1]),
+        'adjusted_p': min(1.0, trial.p * tried),
     }
 
 
@@ -151,14 +160,6 @@ def _detectable(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         }
         for row in detectable(diagnosis.explanation, diagnosis.arm.robot)
     ]
-
-
-def _sureness(standings: Sequence[Standing]) -> dict[str, float]:
-    """Return how sure the least sure of some candidates is."""
-    return {
-        'adjusted_p': max((s.adjusted_p for s in standings), default=1.0),
-        'inclusion': min((s.inclusion for s in standings), default=0.0),
-    }
 
 
 def _finite(value: float) -> float | None:

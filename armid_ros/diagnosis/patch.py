@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
-from armid_ros.diagnosis.remembering import remembering
+from armid_ros.diagnosis.memoized_arm import memoized_arm
 from armid_ros.effects import Effect, TorqueReading
 from armid_ros.estimate import ParameterName
 from armid_ros.model import BaseParameters
@@ -67,7 +67,7 @@ class Patch:
         """The arm with what was named."""
         model = self.arm
         for own, values in zip(self.named, self.values, strict=True):
-            model = model.with_effect(own.effect, values)
+            model = with_named(model, own.effect, values)
         return model
 
     def moved(self, change: FloatArray, base: BaseParameters | None) -> Patch:
@@ -80,7 +80,7 @@ class Patch:
         named, values = [], []
         for own, old in zip(self.named, self.values, strict=True):
             effect, kept = own.effect, list(own.kept)
-            lower, upper = effect.bounds()
+            lower, upper = room(effect, arm)
             new = old.copy()
             new[kept] += change[start : start + len(kept)]
             values.append(np.clip(new, lower, upper))
@@ -109,6 +109,39 @@ class Patch:
         return tuple(names), np.array(numbers)
 
 
+def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
+    """Return by how much values may change that the arm has already in part, each (P,)."""
+    lower, upper = effect.bounds()
+    there = _there(arm, effect)
+    if there is None:
+        return lower, upper
+    position, rows = there
+    values = arm.values[position][rows]
+    return lower - values, upper - values
+
+
+def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
+    """Return an arm with an effect; what it has of the same changes instead."""
+    there = _there(arm, effect)
+    if there is None:
+        return arm.with_effect(effect, values)
+    position, rows = there
+    changed = arm.values[position].copy()
+    changed[rows] += values
+    return replace(arm, values=(*arm.values[:position], changed, *arm.values[position + 1 :]))
+
+
+def _there(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
+    """Return where an arm has the values of an effect already; None if it has not all of them."""
+    wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
+    for position, own in enumerate(arm.effects):
+        if type(own) is type(effect) and not own.shapes and not own.points:
+            names = [(p.name, p.joint) for p in own.parameters(arm.robot)]
+            if set(wanted) <= set(names):
+                return position, [names.index(name) for name in wanted]
+    return None
+
+
 def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return bounds of a shape and steps for differences, per value."""
     owners = len(effect.owners)
@@ -120,19 +153,40 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def patch_columns(state: Patch, part: Trajectory, base: BaseParameters | None) -> FloatArray:
     """Return the columns of base parameters, values and shapes in rows, shape (M, n, f)."""
-    model, motion = remembering(state.model), part.motion
+    if part.before:
+        return _columns_before(state, part, base)
+    model, motion = memoized_arm(state.model), part.motion
     blocks = [np.empty((len(part.rows), motion.n_joints, 0))]
     if base is not None:
-        own = [model.rigid_columns(motion)]
-        own += [model.columns_of(effect, motion) for effect in state.arm.effects]
-        blocks.append(part.reduce(np.concatenate(own, axis=2)[:, :, base.independent]))
-    first = len(state.arm.effects)
-    for position, named in enumerate(state.named):
+        blocks.append(part.reduce(_base_columns(state, model, motion, base)))
+    for named in state.named:
         columns = model.columns_of(named.effect, motion)[:, :, list(named.kept)]
         blocks.append(part.reduce(columns))
         if named.effect.shape:
-            blocks.append(part.reduce(_shape_columns(model, first + position, motion)))
+            position = len(model.effects) - 1 - model.effects[::-1].index(named.effect)
+            blocks.append(part.reduce(_shape_columns(model, position, motion)))
     return np.concatenate(blocks, axis=2)
+
+
+def _columns_before(state: Patch, part: Trajectory, base: BaseParameters | None) -> FloatArray:
+    """Return the columns where nothing that was named acts."""
+    sizes = [len(own.kept) + len(own.effect.shape) for own in state.named]
+    nothing = np.zeros((len(part.rows), part.motion.n_joints, sum(sizes)))
+    if base is None:
+        return nothing
+    own = part.reduce(_base_columns(state, memoized_arm(state.arm), part.motion, base))
+    return np.concatenate([own, nothing], axis=2)
+
+
+def _base_columns(
+    state: Patch, model: ArmModel, motion: Motion, base: BaseParameters
+) -> FloatArray:
+    """Return the columns of what is free of the arm, shape (N, n, r)."""
+    own = [model.columns_of(effect, motion) for effect in state.arm.effects]
+    rigid = len(state.arm.robot.rigid_parameters)
+    if base.rank and base.independent.min() >= rigid:
+        return np.asarray(np.concatenate(own, axis=2)[:, :, base.independent - rigid])
+    return np.concatenate([model.rigid_columns(motion), *own], axis=2)[:, :, base.independent]
 
 
 def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray:

@@ -1,12 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-The linear problem of a diagnosis: weighted rows, and their products per part of the data.
-
-A screening of all groups works on the products X'X of weighted columns, per fold: it costs a
-factorisation of the free columns, whatever the number of rows.
-
-"""
+"""The linear problem of a diagnosis: weighted rows, in parts that are held out, in blocks."""
 
 from __future__ import annotations
 
@@ -21,6 +15,9 @@ import scipy.linalg
 
 #: Recordings fewer than this are cut into parts.
 LEAST_FOLDS = 3
+#: Blocks of each part of the data, of a second or two, which is longer than any correlation of
+#: noise; a block has this many rows at the least.
+BLOCKS, _LEAST_ROWS = 12, 8
 #: Free columns of which others leave less than this share are dependent.
 _DEPENDENT = 1e-7
 
@@ -33,62 +30,39 @@ class Problem:
     Attributes
     ----------
     x : ndarray, shape (R, n, P)
-        Columns over noise; zero where a row tells nothing.
+        Columns over noise; zero where a row is not informative.
     y : ndarray, shape (R, n)
         Residual of the model over noise.
     weight : ndarray, shape (R, n)
-        One over the noise, zero where a row tells nothing [1/(N m)].
-    fold : ndarray of int, shape (R,)
-        Part of the data that a row belongs to.
-    products : ndarray, shape (F, P + 1, P + 1)
-        [x y]'[x y] of each fold.
+        One over the noise, zero where a row is not informative [1/(N m)].
+    block : ndarray of int, shape (R,)
+        Stretch of the data that a row belongs to; longer than any correlation.
+    fold_of_block, half_of_block : ndarray of int, shape (B,)
+        Part of the data that a block belongs to, and half of a part; -1 where nothing is held
+        out, as what was recorded when nothing was wrong.
 
     """
 
     x: FloatArray
     y: FloatArray
     weight: FloatArray
-    fold: npt.NDArray[np.intp]
-    products: FloatArray
-
-    @property
-    def folds(self) -> int:
-        """Number of parts."""
-        return len(self.products)
+    block: npt.NDArray[np.intp]
+    fold_of_block: npt.NDArray[np.intp]
+    half_of_block: npt.NDArray[np.intp]
 
     @property
     def used(self) -> npt.NDArray[np.bool_]:
         """Which entries count, shape (R, n)."""
         return np.asarray(self.weight > 0.0)
 
-    def count(self) -> FloatArray:
-        """Return how many entries each fold has of each joint, shape (F, n)."""
-        return np.array([self.used[self.fold == k].sum(axis=0) for k in range(self.folds)])
-
     def losses(self, residual: FloatArray) -> FloatArray:
-        """Return the mean square of a weighted residual in each fold and joint, shape (F, n)."""
-        parts = [residual[self.fold == k] for k in range(self.folds)]
-        total = np.array([np.sum(part**2, axis=0) for part in parts])
-        return np.asarray(total / np.maximum(self.count(), 1))
+        """Return the mean square of a weighted residual of each joint, shape (n,)."""
+        return np.asarray(np.sum(residual**2, axis=0) / np.maximum(self.used.sum(axis=0), 1))
 
     def with_columns(self, columns: FloatArray) -> Problem:
         """Return the problem with more columns (R, n, p), not weighted yet, after the others."""
         more = columns * self.weight[:, :, np.newaxis]
-        x = np.concatenate([self.x, more], axis=2)
-        size, added = self.x.shape[2], more.shape[2]
-        products = np.empty((self.folds, size + added + 1, size + added + 1))
-        old = [*range(size), size + added]
-        new = range(size, size + added)
-        in_fold = self.fold == np.arange(self.folds)[:, np.newaxis]
-        parts = (more * in_fold[:, :, np.newaxis, np.newaxis]).reshape(self.folds, -1, added)
-        parts = parts.transpose(0, 2, 1).reshape(self.folds * added, -1)
-        flat = x.reshape(-1, size + added)
-        borders = np.column_stack([parts @ flat, parts @ self.y.ravel()])
-        for k, border in enumerate(np.split(borders, self.folds)):
-            products[k][np.ix_(old, old)] = self.products[k]
-            products[k][new, :] = border
-            products[k][:, new] = border.T
-        return replace(self, x=x, products=products)
+        return replace(self, x=np.concatenate([self.x, more], axis=2))
 
 
 def make_problem(
@@ -102,15 +76,25 @@ def make_problem(
     x = np.concatenate(columns)
     x *= weight[:, :, np.newaxis]
     y = np.concatenate(residual) * weight
+    return Problem(x, y, weight, *block_rows(data))
+
+
+def block_rows(
+    data: Sequence[Trajectory],
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Return the block of every row, and the part and half of a part of every block."""
     fold = fold_rows(data)
-    size = x.shape[2] + 1
-    products = np.empty((int(fold.max()) + 1, size, size))
-    for k, product in enumerate(products):
-        rows = fold == k
-        stacked = np.concatenate([x[rows], y[rows][:, :, np.newaxis]], axis=2)
-        flat = stacked.reshape(-1, size)
-        product[:] = flat.T @ flat
-    return Problem(x, y, weight, fold, products)
+    block = np.empty(len(fold), dtype=np.intp)
+    owner: list[tuple[int, int]] = []
+    for k in np.unique(fold):
+        rows = np.flatnonzero(fold == k)
+        pieces = min(BLOCKS, max(2, len(rows) // _LEAST_ROWS))
+        for piece in np.array_split(rows, pieces):
+            block[piece] = len(owner)
+            half = 2 * k + int(2 * (piece[0] - rows[0]) >= len(rows))
+            owner.append((k, max(half, -1)))
+    fold_of, half_of = np.array(owner, dtype=np.intp).T
+    return block, fold_of, half_of
 
 
 def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
@@ -129,14 +113,18 @@ def weighted_rows(
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
     """Return the part of the data of every row: a recording, or a stretch of one if few."""
-    recordings = len({part.fold for part in data})
+    recordings = len({part.fold for part in data if not part.before})
     pieces = 1 if recordings >= LEAST_FOLDS else -(-(LEAST_FOLDS + 1) // recordings)
     rows = []
     for part in data:
+        if part.before:
+            rows.append(np.full(len(part.rows), -1))
+            continue
         span = np.linspace(0, pieces, len(part.rows), endpoint=False).astype(np.intp)
         rows.append(part.fold * pieces + span)
-    _, index = np.unique(np.concatenate(rows), return_inverse=True)
-    return np.asarray(index, dtype=np.intp)
+    whole = np.concatenate(rows)
+    known, index = np.unique(whole, return_inverse=True)
+    return np.asarray(index - int(known[0] < 0), dtype=np.intp)
 
 
 @dataclass(frozen=True)
@@ -168,20 +156,6 @@ class Projection:
         """Return the products (p, p) of what is left of weighted columns (R n, p)."""
         made = self.basis.T @ columns
         return np.asarray(columns.T @ columns - made.T @ made)
-
-    def sweep(self, products: FloatArray) -> FloatArray:
-        """Return the products (F, P, P) of what is left of all columns, in each fold."""
-        if not self.free:
-            return products
-        chosen = np.asarray(self.free)
-        total = products.sum(axis=0)
-        fit = self.fit @ (self.fit.T @ total[chosen])
-        result = np.empty_like(products)
-        for k, fold in enumerate(products):
-            cross = fit.T @ fold[chosen]
-            inner = fit.T @ fold[np.ix_(chosen, chosen)] @ fit
-            result[k] = fold - cross - cross.T + inner
-        return result
 
 
 def project(problem: Problem, free: Sequence[int]) -> Projection:

@@ -9,11 +9,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.candidates import effect_rows
+from armid_ros.diagnosis.candidates import effect_rows, Group
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.problem import Problem, Projection
-from armid_ros.diagnosis.selection import Score
-from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect, Shape
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
@@ -35,7 +33,6 @@ class Workspace:
 
     arm: ArmModel
     data: tuple[Trajectory, ...]
-    settings: DiagnosisSettings
 
     def columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
         """Return the columns of an effect in rows, shape (R, n, p)."""
@@ -60,17 +57,17 @@ class Workspace:
 def refine(
     problem: Problem,
     projection: Projection,
-    score: Score,
+    group: Group,
     left: FloatArray,
     work: Workspace,
-) -> tuple[Score, FloatArray]:
+) -> tuple[Group, FloatArray]:
     """
     Refine the shape of a group by variable projection; return it with its columns.
 
     What is left has nothing in it that the free columns could make.
 
     """
-    effect, kept = score.group.effect, score.group.kept
+    effect, kept = group.effect, group.kept
     lower, upper = (bound[list(kept)] for bound in effect.bounds())
     cache: dict[tuple[float, ...], tuple[float, FloatArray]] = {}
 
@@ -95,8 +92,7 @@ def refine(
         for index, kind in enumerate(effect.shapes):
             shape = _line_search(gain, shape, index, kind)
     best = max(cache, key=lambda key: cache[key][0])
-    group = replace(score.group, effect=effect.with_shape(best))
-    return replace(score, group=group), cache[best][1]
+    return replace(group, effect=effect.with_shape(best)), cache[best][1]
 
 
 def _line_search(

@@ -1,45 +1,96 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The forward search: name by name, until the noise is reached or nothing passes."""
+"""One round of the search: every cause alone beside what is free, and the one that is taken."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from armid_ros.diagnosis.baseline import Baseline
 from armid_ros.diagnosis.candidates import Group
+from armid_ros.diagnosis.evidence import Evidence
+from armid_ros.diagnosis.held_out import held_out, lead, Trial
+from armid_ros.diagnosis.patch import room
 from armid_ros.diagnosis.problem import Problem, project, Projection
 from armid_ros.diagnosis.refine import refine, Workspace
-from armid_ros.diagnosis.rivals import (
-    is_rival,
-    likelier_body,
-    likelier_links,
-    likeliest,
-    not_beaten,
-    own_causes_first,
-    STRAPS,
-)
-from armid_ros.diagnosis.selection import (
-    acceptable,
-    joint_losses,
-    Score,
-    screen,
-    Trial,
-    try_group,
-)
-from armid_ros.effects.interaction import HumanInteraction, InterfaceSlack
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.effects import CATALOGUE
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 
-#: Best groups that are looked at row by row; shapes of this many are refined.
-_LOOKED_AT, _REFINED = 30, 4
-#: What acts at peaks of the torque only; in more rows than this its column, which is made of the
-#: measured torque, stands for anything.
-_AT_PEAKS, _PEAK_SHARE = ('actuator_saturation',), 0.2
+#: Best groups that are looked at row by row; shapes of this many are refined, of groups that have
+#: this share of the best worth.
+_LOOKED_AT, _REFINED, _PROMISING = 30, 4, 0.4
+#: Causes in the small print.
+_SMALL_PRINT = 5
 #: Columns that take less than this share of their gain without the noise of positions beyond the
-#: band of the motion are made of that noise: backlash that encoders make takes nothing, of real
-#: backlash as wide as three counts a fifth is left.
+#: band of the motion are made of that noise.
 _NOT_NOISE = 0.1
+#: A group made of the measured torque that leaves less than this share of its noise explains noise
+#: with itself.
+_TAUTOLOGY = 0.8
+#: What contains a simpler cause makes all but this share of its torque; what differs from it by
+#: less is the same cause in other words.
+_CONTAINED, _SAME = 0.02, 1e-3
+
+
+@dataclass(frozen=True)
+class Beside:
+    """
+    What is fitted beside every cause.
+
+    Attributes
+    ----------
+    free : tuple of int
+        Columns of the problem.
+    hold : ndarray, shape (f, f)
+        Precision that they are held with.
+    pull : ndarray, shape (f,)
+        What they are held to, times that.
+
+    """
+
+    free: tuple[int, ...]
+    hold: FloatArray
+    pull: FloatArray
+
+    def and_columns(self, group: Group) -> Beside:
+        """Return the same with the columns of a group."""
+        span = range(group.columns.start, group.columns.stop)
+        size = len(self.free) + len(span)
+        hold = np.zeros((size, size))
+        hold[: len(self.free), : len(self.free)] = self.hold
+        hold[len(self.free) :, len(self.free) :] = np.diag(group.precision)
+        return Beside((*self.free, *span), hold, np.concatenate([self.pull, np.zeros(len(span))]))
+
+
+@dataclass(frozen=True)
+class Round:
+    """
+    What a round of the search needs to know.
+
+    Attributes
+    ----------
+    evidence : Evidence
+        The data.
+    work : Workspace
+        What columns of other shapes are computed from.
+    settings : DiagnosisSettings
+        Library and thresholds.
+    total : float or None
+        Held-out squares that shares are of; those of this round if None.
+    baseline : Baseline or None
+        Recordings in which nothing was wrong.
+
+    """
+
+    evidence: Evidence
+    work: Workspace
+    settings: DiagnosisSettings
+    total: float | None
+    baseline: Baseline | None = None
 
 
 @dataclass(frozen=True)
@@ -53,21 +104,20 @@ class Step:
         What it explains.
     rivals : tuple of Trial
         Groups that the data do not exclude in its place.
-    league : tuple of Trial
+    ranking : tuple of Trial
         The best groups of the round, one per name and joints, best first.
-    before, after : ndarray, shape (n,)
-        Loss of each joint.
-    passing : tuple of Trial
-        All groups of the round that could have been named.
+    total : float
+        Held-out squares that shares are of.
+    tried : int
+        Groups that were tried, every shape for itself.
 
     """
 
     trial: Trial
     rivals: tuple[Trial, ...]
-    league: tuple[Trial, ...]
-    before: FloatArray
-    after: FloatArray
-    passing: tuple[Trial, ...] = ()
+    ranking: tuple[Trial, ...]
+    total: float
+    tried: int
 
 
 @dataclass(frozen=True)
@@ -77,154 +127,271 @@ class Survey:
 
     Attributes
     ----------
-    league : tuple of Trial
-        The best groups, best first.
+    ranking : tuple of Trial
+        All visible groups in their best shape, best first.
     hidden : frozenset of str
-        Names of which the free parameters leave nothing to be seen.
-    scores : tuple of Score
-        All visible groups, best shape of each.
+        Names of which what is free leaves nothing to be seen.
+    total : float
+        Held-out squares that shares are of.
     tried : int
-        How many visible groups there are, every shape for itself.
+        Groups that were tried, every shape for itself.
     unseen : tuple of (str, tuple of str)
         Names and joints of the groups that are not visible.
+    there : tuple of Trial
+        Groups that are there beyond chance, best first.
 
     """
 
-    league: tuple[Trial, ...]
+    ranking: tuple[Trial, ...]
     hidden: frozenset[str]
-    scores: tuple[Score, ...]
+    total: float
     tried: int
     unseen: tuple[tuple[str, tuple[str, ...]], ...]
+    there: tuple[Trial, ...] = ()
 
 
 def next_step(
-    problem: Problem,
-    free: Sequence[int],
-    groups: Sequence[Group],
-    work: Workspace,
-    total: FloatArray | None = None,
+    problem: Problem, beside: Beside, groups: Sequence[Group], here: Round
 ) -> tuple[Step | None, Survey, Problem]:
     """
-    Look for the group that explains most of what is left.
-
-    Parameters
-    ----------
-    problem : Problem
-        The data; columns of the groups come first.
-    free : sequence of int
-        Columns that are not questioned.
-    groups : sequence of Group
-        What may be named.
-    work : Workspace
-        What columns of other shapes are computed from.
-    total : ndarray, shape (n,), optional
-        Excess of each joint before anything was named.
+    Look for the cause that takes most of what is left.
 
     Returns
     -------
     step : Step or None
-        The name, with its rivals; None if nothing passes.
+        The cause, with its rivals; None if nothing passes.
     survey : Survey
-        The best groups, accepted or not, and what cannot be seen.
+        All groups.
     problem : Problem
         With the columns of refined shapes behind the others.
 
     """
-    settings = work.settings
-    projection = project(problem, free)
-    left = projection.rest(problem.y)
-    screened = screen(problem, projection, groups, settings.least_visible)
-    scores = _best_per_key(screened)
-    visible = {score.group.effect.name for score in scores}
-    hidden = frozenset(group.effect.name for group in groups) - visible
-    seen = {score.group.key[:2] for score in scores}
-    unseen = tuple(dict.fromkeys(g.key[:2] for g in groups if g.key[:2] not in seen))
-    trials, problem = _tried(problem, projection, scores, left, work)
-    passing = [
-        trial
-        for trial in trials
-        if acceptable(trial, problem, left, settings, total)
-        and not made_of_noise(trial, problem, projection, left, work)
-    ]
-    survey = Survey(trials, hidden, tuple(scores), len(screened), unseen)
+    thresholds = here.settings.thresholds
+    trials, power = held_out(problem, beside.free, groups, beside.hold, beside.pull)
+    total = float(power.sum()) if here.total is None else here.total
+    here = replace(here, total=total)
+    seen = [trial for trial in trials if trial.visible >= thresholds.least_visible]
+    ranking = _best_per_key(seen, here)
+    survey = _survey(groups, ranking, total, len(seen))
+    ranking, problem = _with_refined_shapes(problem, beside, ranking, here)
+    ranking, gains = _examined(ranking, problem, beside, here, max(len(seen), 1))
+    there = [t for t in ranking if id(t) in gains and acceptable(t, here, max(len(seen), 1))]
+    survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
+    passing = _passing(ranking, gains, problem, beside, here, max(len(seen), 1))
     if not passing:
         return None, survey, problem
-    passing = own_causes_first(passing, problem, left)
-    tied = [passing[0], *not_beaten(passing, problem, left, settings)]
-    winner = likelier_body(likeliest(tied, settings), tied, work.arm)
-    if winner.score.group.effect.name in STRAPS:
-        links = likelier_links(winner, scores, problem, projection, left, settings)
-        winner, tied = (links[0], [*links, winner]) if links else (winner, tied)
+    first = passing[0]
+    tied = [first, *(t for t in passing[1:] if not beaten(t, first, here))]
+    winner = simplest(tied, here)
     rivals = tuple(
         trial
         for trial in tied
-        if trial is not winner and is_rival(trial, winner, problem, projection, settings)
+        if trial is not winner and not _contains(trial, winner, problem, beside, here)
     )
-    before = joint_losses(problem, left)
-    return Step(winner, rivals, trials, before, winner.losses, tuple(passing)), survey, problem
+    return Step(winner, rivals, tuple(ranking), total, len(seen)), survey, problem
 
 
-def _tried(
-    problem: Problem,
-    projection: Projection,
-    scores: Sequence[Score],
-    left: FloatArray,
-    work: Workspace,
-) -> tuple[tuple[Trial, ...], Problem]:
-    """Try the best groups, shapes refined, best first; return the problem with those shapes."""
-    trials: list[Trial] = []
-    refined = 0
-    best = max((s.gain for s in scores if s.group.effect.name not in STRAPS), default=0.0)
-    for score in scores[:_LOOKED_AT]:
-        columns = problem.x[:, :, score.group.columns]
-        if score.gain <= 0.0:
-            break
-        if score.group.effect.name in _AT_PEAKS and _share(problem, columns) > _PEAK_SHARE:
+def worth(trial: Trial, here: Round) -> float:
+    """Return the share of the held-out squares that a trial takes, its freedom paid for."""
+    assert here.total is not None
+    price = here.settings.thresholds.price * cost(trial, here.settings)
+    return trial.gain / max(here.total, 1e-300) - price
+
+
+def cost(trial: Trial, settings: DiagnosisSettings) -> float:
+    """Return how many values and shapes the data chose, those of what is outlandish more."""
+    effect = trial.group.effect
+    shapes = len(effect.shapes) / max(len(effect.separate), 1)
+    outside = settings.thresholds.outside if effect.external else 0.0
+    return trial.freedom + shapes + outside
+
+
+def beaten(other: Trial, first: Trial, here: Round) -> bool:
+    """Return whether one trial is so far behind another that it is no rival."""
+    assert here.total is not None
+    thresholds = here.settings.thresholds
+    squares, z = lead(first, other)
+    if squares <= thresholds.tie * here.total * 0.5 and squares <= thresholds.far * first.gain:
+        return False
+    return z >= thresholds.rival_z or squares > thresholds.far * first.gain
+
+
+def simplest(tied: Sequence[Trial], here: Round) -> Trial:
+    """
+    Return the cause with the least freedom.
+
+    Of causes as free as each other the one that takes more, and of those that take the same the
+    first in the catalogue, which goes from the common to the rare.
+
+    """
+    order = {name: position for position, name in enumerate(CATALOGUE)}
+    least = min(cost(trial, here.settings) for trial in tied)
+    simple = [t for t in tied if cost(t, here.settings) < least + 0.5]
+    most = max(trial.gain for trial in simple)
+    same = [t for t in simple if t.gain >= (1.0 - here.settings.thresholds.tie) * most]
+    return min(same, key=lambda t: order.get(t.group.effect.name, len(order)))
+
+
+def acceptable(trial: Trial, here: Round, tried: int) -> bool:
+    """Return whether a cause is there beyond chance, pays for its freedom, and is possible."""
+    surely = trial.p * tried <= here.settings.thresholds.error_rate
+    return surely and worth(trial, here) > 0.0 and possible(trial, here)
+
+
+def possible(trial: Trial, here: Round) -> bool:
+    """Return whether the values are what could be called by the name."""
+    group, arm = trial.group, here.work.arm
+    return bool(_inside(trial, here).all()) and group.effect.plausible(
+        trial.values, arm, described=here.baseline is None
+    )
+
+
+def _inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
+    """Return which values are physically possible, or differ from that by noise, shape (p,)."""
+    kept = list(trial.group.kept)
+    lower, upper = (bound[kept] for bound in room(trial.group.effect, here.work.arm))
+    slack = 3.0 * trial.std
+    return np.asarray((trial.values > lower - slack) & (trial.values < upper + slack))
+
+
+def material(gains: FloatArray, here: Round) -> bool:
+    """Return whether a cause that takes these squares of the joints takes as much as matters."""
+    return bool(np.any(gains >= here.evidence.least_squares(here.settings)))
+
+
+def _best_per_key(trials: Sequence[Trial], here: Round) -> list[Trial]:
+    best: dict[object, Trial] = {}
+    for trial in sorted(trials, key=lambda t: -worth(t, here)):
+        best.setdefault(trial.group.key, trial)
+    return list(best.values())
+
+
+def _part(group: Group, inside: Sequence[int], first: int) -> Group:
+    """Return a group with some of its values only, whose columns are elsewhere."""
+    return replace(
+        group,
+        columns=slice(first, first + len(inside)),
+        kept=tuple(group.kept[k] for k in inside),
+        precision=group.precision[list(inside)],
+    )
+
+
+def _survey(groups: Sequence[Group], ranking: Sequence[Trial], total: float, tried: int) -> Survey:
+    visible = {trial.group.effect.name for trial in ranking}
+    seen = {trial.group.key[:2] for trial in ranking}
+    return Survey(
+        tuple(ranking),
+        frozenset(group.effect.name for group in groups) - visible,
+        total,
+        tried,
+        tuple(dict.fromkeys(g.key[:2] for g in groups if g.key[:2] not in seen)),
+    )
+
+
+def _with_refined_shapes(
+    problem: Problem, beside: Beside, ranking: list[Trial], here: Round
+) -> tuple[list[Trial], Problem]:
+    """Refine the shapes of the best groups; return them in order, and their columns too."""
+    best = max((worth(t, here) for t in ranking if not t.group.effect.external), default=0.0)
+    projection: Projection | None = None
+    refined: list[Trial] = []
+    found: list[FloatArray] = []
+    first = problem.x.shape[2]
+    for trial in ranking[:_LOOKED_AT]:
+        effect = trial.group.effect
+        promising = worth(trial, here) > _PROMISING * best and len(refined) < _REFINED
+        if not (promising and trial.gain > 0.0):
             continue
-        promising = refined < _REFINED and score.gain > 0.4 * best
-        if score.group.effect.shapes and promising:
-            refined += 1
-            trial, problem = _refined(problem, projection, score, left, work)
-        else:
-            trial = try_group(problem, projection, score, columns, work.settings)
-        trials.append(trial)
-    trials.sort(key=lambda trial: -trial.gain)
-    taut = _taut(trials[0], scores) if trials else None
-    if taut is not None:
-        trial, problem = _refined(problem, projection, taut, left, work)
-        trials.append(trial)
-        trials.sort(key=lambda trial: -trial.gain)
-    return tuple(trials), problem
+        inside = [k for k, good in enumerate(_inside(trial, here)) if good]
+        if 0 < len(inside) < trial.group.size:
+            own = problem.x[:, :, trial.group.columns][:, :, inside]
+            group = _part(trial.group, inside, first)
+            first += len(inside)
+            found.append(own / np.where(problem.weight > 0.0, problem.weight, 1.0)[:, :, None])
+            bounded = _alone(problem, beside, group, own, here)
+            refined += [] if bounded is None else [bounded[0]]
+            continue
+        if not effect.shapes:
+            continue
+        projection = projection or project(problem, beside.free)
+        left = projection.rest(problem.y)
+        group, columns = refine(problem, projection, trial.group, left, here.work)
+        span = slice(first, first + columns.shape[2])
+        first = span.stop
+        found.append(columns)
+        weighted = columns * problem.weight[:, :, np.newaxis]
+        better = _alone(problem, beside, replace(group, columns=span), weighted, here)
+        refined += [] if better is None else [better[0]]
+    if found:
+        problem = problem.with_columns(np.concatenate(found, axis=2))
+    return _best_per_key([*ranking, *refined], here), problem
 
 
-def _refined(
-    problem: Problem, projection: Projection, score: Score, left: FloatArray, work: Workspace
-) -> tuple[Trial, Problem]:
-    """Try a group in a better shape; return the problem with its columns behind the others too."""
-    score, columns = refine(problem, projection, score, left, work)
-    start = problem.x.shape[2]
-    span = slice(start, start + columns.shape[2])
-    score = replace(score, group=replace(score.group, columns=span))
-    problem = problem.with_columns(columns)
-    columns = problem.x[:, :, span]
-    return try_group(problem, projection, score, columns, work.settings), problem
+def _examined(
+    ranking: list[Trial], problem: Problem, beside: Beside, here: Round, tried: int
+) -> tuple[list[Trial], dict[int, FloatArray]]:
+    """
+    Return the ranking, and what the causes that could be taken take of every joint.
+
+    Where there are recordings from before, what a cause explains with the values that it has in
+    those is not new.
+
+    """
+    result, gains = [], {}
+    for trial in ranking[:_LOOKED_AT]:
+        if acceptable(trial, here, tried):
+            group = trial.group
+            found = _alone(problem, beside, group, problem.x[:, :, group.columns], here)
+            if found is None:
+                continue
+            trial, taken = found
+            gains[id(trial)] = taken
+        result.append(trial)
+    return sorted(result, key=lambda t: -worth(t, here)), gains
 
 
-def _taut(best: Trial, scores: Sequence[Score]) -> Score | None:
-    """Return a spring from where the best is attached, if that is a strap to a point unknown."""
-    strap = best.score.group.effect
-    if not isinstance(strap, InterfaceSlack) or strap.anchored:
+def _alone(
+    problem: Problem, beside: Beside, group: Group, own: FloatArray, here: Round
+) -> tuple[Trial, FloatArray] | None:
+    """Try a group with weighted columns beside what is free."""
+    size = group.size
+    x = np.concatenate([own, problem.x[:, :, list(beside.free)]], axis=2)
+    alone, small = replace(group, columns=slice(0, size)), replace(problem, x=x)
+    free = range(size, x.shape[2])
+    before = None
+    if here.baseline is not None:
+        before = [here.baseline.values(here.work.arm, group.effect, group.kept, group.precision)]
+    trials, _ = held_out(small, free, [alone], beside.hold, beside.pull, before)
+    if not trials:
         return None
-    for score in scores:
-        group = score.group
-        if group.key[:2] == (HumanInteraction.name, strap.joints):
-            spring = group.effect.with_shape(strap.shape[: len(group.effect.shape)])
-            return replace(score, group=replace(group, effect=spring))
-    return None
+    return replace(trials[0], group=group), trials[0].joint_gains(small, free)
 
 
-def made_of_noise(
-    trial: Trial, problem: Problem, projection: Projection, left: FloatArray, work: Workspace
+def _passing(
+    ranking: Sequence[Trial],
+    gains: dict[int, FloatArray],
+    problem: Problem,
+    beside: Beside,
+    here: Round,
+    tried: int,
+) -> list[Trial]:
+    """Return the causes that could be taken, best first."""
+    projection: Projection | None = None
+    result: list[Trial] = []
+    for trial in ranking:
+        possible_name = id(trial) in gains and acceptable(trial, here, tried)
+        if not (possible_name and material(gains[id(trial)], here)):
+            continue
+        if result and beaten(trial, result[0], here):
+            continue
+        projection = projection or project(problem, beside.free)
+        if not _made_of_noise(trial, problem, projection, here.work):
+            result.append(trial)
+    return result
+
+
+def _made_of_noise(
+    trial: Trial, problem: Problem, projection: Projection, work: Workspace
 ) -> bool:
     """
     Return whether a group explains noise with that noise.
@@ -234,26 +401,35 @@ def made_of_noise(
     measured torque can leave less than its noise.
 
     """
-    effect, kept, settings = trial.score.group.effect, trial.score.group.kept, work.settings
-    columns = work.smooth_columns(effect, kept) * problem.weight[:, :, np.newaxis]
-    smooth = try_group(problem, projection, trial.score, columns, settings)
-    if smooth.gain < _NOT_NOISE * trial.gain:
+    effect, kept = trial.group.effect, trial.group.kept
+    left = projection.rest(problem.y)
+    smooth = work.smooth_columns(effect, kept) * problem.weight[:, :, np.newaxis]
+    rough = problem.x[:, :, trial.group.columns]
+    if _taken(smooth, projection, left) < _NOT_NOISE * _taken(rough, projection, left):
         return True
-    before = np.minimum(joint_losses(problem, left), 1.0)
-    return bool(np.any(trial.losses < settings.tautology * before)) and work.reads_torque(
-        effect, kept
-    )
+    after = problem.losses(left - projection.rest(rough) @ trial.values)
+    before = np.minimum(problem.losses(left), 1.0)
+    return bool(np.any(after < _TAUTOLOGY * before)) and work.reads_torque(effect, kept)
 
 
-def _share(problem: Problem, columns: FloatArray) -> float:
-    """Return in what share of the rows of the busiest joint a group does something."""
-    size = np.abs(columns).max(axis=2)
-    busy = size > 0.02 * max(float(size.max()), 1e-300)
-    return float(np.max(busy.sum(axis=0) / np.maximum(problem.used.sum(axis=0), 1)))
+def _taken(columns: FloatArray, projection: Projection, left: FloatArray) -> float:
+    """Return the squares that weighted columns (R, n, p) take of what is left."""
+    flat = columns.reshape(-1, columns.shape[2])
+    own, aim = projection.products(flat), flat.T @ left.ravel()
+    values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
+    return float(2.0 * values @ aim - values @ own @ values)
 
 
-def _best_per_key(scores: Sequence[Score]) -> list[Score]:
-    best: dict[object, Score] = {}
-    for score in scores:
-        best.setdefault(score.group.key, score)
-    return list(best.values())
+def _contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
+    """Return whether a cause says the same, or is freer and can make what another one makes."""
+    projection = project(problem, beside.free)
+    columns = projection.rest(problem.x[:, :, big.group.columns])
+    target = projection.rest(problem.x[:, :, small.group.columns]) @ small.values
+    squares = float(np.sum(target**2))
+    if np.sum((columns @ big.values - target) ** 2) < _SAME * squares:
+        return True
+    if cost(big, here.settings) <= cost(small, here.settings):
+        return False
+    flat = columns.reshape(-1, big.group.size)
+    fit = np.linalg.lstsq(flat, target.ravel(), rcond=1e-6)[0]
+    return bool(np.sum((target.ravel() - flat @ fit) ** 2) < _CONTAINED * squares)

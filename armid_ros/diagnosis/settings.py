@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The thresholds of a diagnosis, each with the reason for its value."""
+"""What a user may choose of a diagnosis, and every number that decides a name."""
 
 from __future__ import annotations
 
@@ -12,11 +12,57 @@ from armid_ros.identification import SignalSettings
 
 
 @dataclass(frozen=True)
+class Thresholds:
+    """
+    The numbers that decide a name. Shares are of the held-out squares over the unit of the gap.
+
+    Attributes
+    ----------
+    price : float
+        Share that each value or shape of a cause has to take before it counts: 50 values of a
+        rigid body, a tenth.
+    outside : float
+        Values that a cause from outside the arm counts for beside its own.
+    error_rate : float
+        Probability of a name where nothing is, over all groups that were tried.
+    rival_z : float
+        Deviations by which a name has to be ahead of another one to exclude it.
+    tie : float
+        Share by which it has to be ahead as well.
+    far : float
+        Lead over its own share that excludes another one however few blocks show it.
+    misfit_share : float
+        Power of a cause over that of the model's own misfit, below which it is small print.
+    same_fit : float
+        Factor between losses of two explanations that are as good as each other where the unit is
+        a misfit of other data.
+    least_visible : float
+        A group of which what is free leaves less than this share of its columns is not visible.
+    confidence : float
+        Level up to which what is left counts as noise that two periods tell so well.
+    few_causes, many_causes : int
+        Causes that are looked for in a model as given, and beside a body that is fitted anew.
+
+    """
+
+    price: float = 0.002
+    outside: float = 10.0
+    error_rate: float = 0.01
+    rival_z: float = 2.0
+    tie: float = 0.02
+    far: float = 0.25
+    misfit_share: float = 1.0
+    same_fit: float = 1.5
+    least_visible: float = 0.02
+    confidence: float = 0.99
+    few_causes: int = 4
+    many_causes: int = 16
+
+
+@dataclass(frozen=True)
 class DiagnosisSettings:
     """
-    When a gap is a gap, and when an effect may be named.
-
-    The excess of a joint is e - 1, where e is the mean of (residual / noise)^2.
+    What a user chooses.
 
     Attributes
     ----------
@@ -29,43 +75,12 @@ class DiagnosisSettings:
         arm is then looked for between the two, and not at unknown places.
     signals : SignalSettings
         Filters; chosen from the recordings by default.
-    consistent_loss : float
-        A joint with a loss e below this is at its noise: the floor itself is known to 10 or 20 %
-        from two periods of some ten seconds.
-    partial_loss : float
-        A model that leaves a joint above this is not the whole truth: names are provisional.
-    held_out_loss : float
-        A name is provisional while the patched model leaves a joint more than this on recordings
-        that are only predicted: of 72 right names 69 left 1.8 at the most, substitutes 6 and more.
-    least_share : float
-        A group has to close this share of the excess that is left, in the arm or in one joint.
-    least_of_all : float
-        ... and this share of the excess at the beginning: what takes less than a thousandth or two
-        of a gap is not what was missing.
-    least_of_joint : float
-        ... or this share of that of a joint which had this share of the whole,
-    most_of_rest : float
-        ... or this share of what is left of a joint: leftovers of what was named already are not
-        of one kind.
-    least_z : float
-        Block z that a gain has to reach on a held-out trajectory to count as replicated.
-    sure_z : float
-        Block z of a gain in every part of the data that counts although no joint has a gap of its
-        own: a little of all joints.
-    tautology : float
-        A group whose columns are made of the measured torque explains noise by noise where it
-        leaves a joint less than this share of its noise.
-    rival_z : float
-        Block z by which a name has to beat another one to exclude it.
-    same_cosine : float
-        Groups whose torques, as far as the rigid body cannot make them, have a cosine above this
-        are the same to these data.
-    least_visible : float
-        A group of which the rigid body's parameters leave less than this share cannot be seen.
-    most_steps : int
-        Groups that are looked for, one after the other.
-    blocks : int
-        Blocks per trajectory for the z: some hundred rows each, longer than any correlation.
+    material : float
+        Share of a joint's torque, root mean square, below which a cause does not matter [-].
+    everything : bool
+        Whether causes that do not matter are added to the patched model as well.
+    thresholds : Thresholds
+        The numbers that decide.
 
     """
 
@@ -73,21 +88,9 @@ class DiagnosisSettings:
     own: tuple[Kind, ...] = ()
     partner: Partner | None = None
     signals: SignalSettings = field(default_factory=SignalSettings)
-    consistent_loss: float = 1.2
-    partial_loss: float = 1.4
-    held_out_loss: float = 3.0
-    least_share: float = 0.10
-    least_of_all: float = 0.0015
-    least_of_joint: float = 0.01
-    most_of_rest: float = 0.8
-    least_z: float = 3.0
-    sure_z: float = 4.0
-    tautology: float = 0.8
-    rival_z: float = 2.0
-    same_cosine: float = 0.95
-    least_visible: float = 0.02
-    most_steps: int = 24
-    blocks: int = 12
+    material: float = 0.01
+    everything: bool = False
+    thresholds: Thresholds = field(default_factory=Thresholds)
 
     @property
     def kinds(self) -> tuple[Kind, ...]:

@@ -16,13 +16,12 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.candidates import effect_rows
-from armid_ros.diagnosis.evidence import Trajectory
+from armid_ros.diagnosis.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.fit import fit, Fitted
 from armid_ros.diagnosis.floor import noise_floor
-from armid_ros.diagnosis.model_search import joint_losses_of
+from armid_ros.diagnosis.memoized_arm import memoized_arm
 from armid_ros.diagnosis.patch import Named
 from armid_ros.diagnosis.problem import make_problem, project
-from armid_ros.diagnosis.remembering import remembering
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
 from armid_ros.identification.interaction_search import LEAST_Z
@@ -129,7 +128,7 @@ class Ties:
 
     def losses(self, fitted: Fitted) -> FloatArray:
         """Return the loss of each joint, shape (n,)."""
-        return joint_losses_of(fitted, self.data, self.sigma)
+        return Evidence(self.data, self.sigma, self.sigma).losses(fitted.residual)
 
     def surely(self, named: Sequence[Named]) -> Fitted:
         """Fit, and take ties away, the weakest first, until all are surely there."""
@@ -162,7 +161,7 @@ class Ties:
 
     def _common_slack(self, joints: Sequence[str]) -> tuple[float, FloatArray, FloatArray]:
         """Return the slack of all straps that takes most; stiffnesses and how sure they are."""
-        reference, arm = self.fitted(()), remembering(self.arm)
+        reference, arm = self.fitted(()), memoized_arm(self.arm)
         problem = make_problem(self.data, self.sigma, reference.residual, list(reference.columns))
         projection = project(problem, range(problem.x.shape[2]))
         left = projection.rest(problem.y).ravel()
@@ -189,7 +188,8 @@ class Ties:
 
     def _damped(self, fitted: Fitted) -> Fitted:
         """Return springs with dampers, where something is left that those surely take."""
-        if np.all(self.losses(fitted) < self.settings.consistent_loss):
+        evidence = Evidence(self.data, self.sigma, self.sigma)
+        if np.all(self.losses(fitted) < evidence.limits(fitted.residual, self.settings)):
             return fitted
         springs = [isinstance(own.effect, TiedInteraction) for own in fitted.named]
         both = [

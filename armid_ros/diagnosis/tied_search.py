@@ -10,91 +10,72 @@ from functools import cache
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.candidates import candidates, Group
-from armid_ros.diagnosis.evidence import Trajectory
-from armid_ros.diagnosis.fit import Fitted
-from armid_ros.diagnosis.model_search import as_described, explain, Explanation, View
-from armid_ros.diagnosis.problem import make_problem, Problem, project, Projection
+from armid_ros.diagnosis.choice import Chosen, NOISE
+from armid_ros.diagnosis.evidence import Evidence
+from armid_ros.diagnosis.fit import fit, Fitted
+from armid_ros.diagnosis.held_out import held_out, Trial
+from armid_ros.diagnosis.memoized_arm import memoized_arm
+from armid_ros.diagnosis.model_search import explain, Explanation, View
+from armid_ros.diagnosis.prepare import Prepared
+from armid_ros.diagnosis.problem import make_problem
+from armid_ros.diagnosis.question import Question
 from armid_ros.diagnosis.refine import Workspace
-from armid_ros.diagnosis.remembering import remembering
-from armid_ros.diagnosis.rivals import not_beaten
-from armid_ros.diagnosis.search import next_step, Step, Survey
-from armid_ros.diagnosis.selection import Score, Trial, try_group
+from armid_ros.diagnosis.search import Beside, next_step, Round, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.tied import Ties
 from armid_ros.diagnosis.tied_values import rightly_described, TieRegression, without_bias
-from armid_ros.effects.tied import Partner, Tied
+from armid_ros.effects.tied import Tied
 from armid_ros.model import BaseParameters
-from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
 import numpy as np
 
+#: Losses of two explanations that are as good as each other where masses are known or fitted.
+_ALIKE = 1.05
 
-def explain_tied(
-    arm: ArmModel,
-    partner: Partner,
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
-    base: BaseParameters,
-    settings: DiagnosisSettings,
-    regression: TieRegression,
-) -> tuple[Explanation, list[FloatArray]] | None:
+
+def diagnose_ties(
+    arm: ArmModel, recordings: Sequence[Recording], prepared: Prepared, settings: DiagnosisSettings
+) -> Chosen | None:
     """
     Explain a gap by ties to a machine beside the arm, and by what is named in what they leave.
 
-    Parameters
-    ----------
-    arm : ArmModel
-        The arm as described.
-    partner : Partner
-        The machine and where there may be ties.
-    data : sequence of Trajectory
-        The data, with what moved beside the arm.
-    sigma : sequence of ndarray, each (n,)
-        Noise beside the arm without ties [N m].
-    base : BaseParameters
-        What a fit frees, so that a wrong mass is not taken for a spring.
-    settings : DiagnosisSettings
-        Thresholds and library.
-    regression : TieRegression
-        The same recordings for the ties alone, with what noise of angles does to them.
-
     Returns
     -------
-    explanation : Explanation
-        With the ties as its first names.
-    sigma : list of ndarray
-        Noise beside the arm as it is tied.
-
-        None if there is no tie.
+    Chosen or None
+        With the ties as its first names, or the arm as given if that is within its noise; None if
+        there is no tie, and something else.
 
     """
+    assert settings.partner is not None
+    nothing = np.zeros(arm.robot.n_joints)
+    regression = TieRegression(arm, tuple(recordings), prepared.used, settings)
     sure = cache(regression.sure)
-    ties, fitted = Ties(arm, partner, tuple(data), tuple(sigma), base, settings, sure).find()
+    data, sigma = prepared.data, tuple(prepared.sigma)
+    start = Ties(arm, settings.partner, data, sigma, prepared.base, settings, sure)
+    ties, fitted = start.find()
     if not fitted.named:
-        return None
-    noise = list(ties.sigma)
+        return _within_its_noise(arm, prepared, settings)
     found = _explanation(ties, fitted)
-    if np.any(found.losses > settings.partial_loss):
-        found = explain(arm, data, noise, base, settings, settings.most_steps, start=found)
-        fitted = ties.surely(found.fitted.named)
+    if _open(found, settings):
+        most = settings.thresholds.many_causes
+        question = Question(arm, prepared.base, arm, prepared.base, (), most)
+        known = list(zip(fitted.named, found.steps, fitted.values, strict=True))
+        more = explain(question, found.evidence, settings, known)
+        fitted = ties.surely(more.fitted.named)
         if not any(isinstance(own.effect, Tied) for own in fitted.named):
             return None
-        if len(fitted.named) < len(found.fitted.named):
-            found = _without(found, fitted, ties)
+        found = _with_names_of(replace(more, survey=found.survey), fitted)
     springs = regression.springs(found, 'free')
     if rightly_described(regression.springs(found, 'known'), springs):
-        described = explain(arm, data, noise, None, settings, 0)
-        found = as_described(found, described, arm, data, noise, settings)
+        found = _as_described(found, arm, settings)
         if found.base is None:
             springs = regression.springs(found, 'known')
-    return without_bias(found, springs, data, noise), noise
+    return Chosen(without_bias(found, springs), nothing, NOISE)
 
 
-def within_its_noise(
-    arm: ArmModel,
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
-    settings: DiagnosisSettings,
-) -> tuple[Explanation, list[FloatArray]] | None:
+def _within_its_noise(
+    arm: ArmModel, prepared: Prepared, settings: DiagnosisSettings
+) -> Chosen | None:
     """
     Return the arm as described, if it leaves no more than the noise beside itself.
 
@@ -102,28 +83,54 @@ def within_its_noise(
     where there is less of it, the described one would seem to be wrong.
 
     """
-    described = explain(arm, data, sigma, None, settings, 0)
-    if np.any(described.losses > settings.partial_loss):
+    evidence = Evidence(prepared.data, prepared.as_told, prepared.as_told)
+    described = fit(arm, (), evidence.data, evidence.sigma, None)
+    found = Explanation(arm, None, described, described, (), None, evidence)
+    if _open(found, settings):
         return None
-    return described, list(sigma)
+    return Chosen(found, np.zeros(arm.robot.n_joints), NOISE)
+
+
+def _open(found: Explanation, settings: DiagnosisSettings) -> bool:
+    limits = found.evidence.limits(found.fitted.residual, replace(settings, material=0.0))
+    return bool(np.any(found.losses > np.maximum(limits, settings.thresholds.same_fit)))
+
+
+def _as_described(found: Explanation, arm: ArmModel, settings: DiagnosisSettings) -> Explanation:
+    """Return the same names in the arm as described, where that explains as much."""
+    evidence = found.evidence
+    own = found.fitted
+    fitted = fit(arm, own.named, evidence.data, evidence.sigma, None, own.values)
+    reference = fit(arm, (), evidence.data, evidence.sigma, None)
+    described = replace(found, base=None, fitted=fitted, reference=reference)
+    limits = evidence.limits(fitted.residual, settings)
+    if np.any(described.losses > np.maximum(limits, _ALIKE * found.losses)):
+        return found
+    return described
 
 
 def _explanation(ties: Ties, fitted: Fitted) -> Explanation:
     """Return what was fitted as steps, each tie judged beside the others, and its rivals."""
+    evidence = Evidence(ties.data, ties.sigma, ties.sigma)
     reference = ties.fitted(())
-    before, after = ties.losses(reference), ties.losses(fitted)
-    survey, rivals = _rivals(ties, reference, fitted)
-    view = View.of(fitted, ties.data, ties.sigma)
+    survey, rivals = _rivals(ties, reference, fitted, evidence)
+    view = View.of(fitted, evidence)
     steps = []
-    for k, own in enumerate(fitted.named):
-        problem, projection, columns = view.without(k, ())
-        group = Group.of(own.effect, slice(0, columns.shape[2]), own.kept, ties.arm.robot)
-        trial = _trial(group, problem, projection, columns, ties.settings)
-        steps.append(Step(trial, rivals, (trial,), before, after, (trial,)))
-    return Explanation(ties.base, fitted, reference, tuple(steps), survey, after, before)
+    for own, span in zip(fitted.named, view.spans, strict=True):
+        columns = range(span[0], span[0] + len(own.kept))
+        group = Group.of(own.effect, slice(0, len(columns)), own.kept, ties.arm.robot)
+        shape = tuple(range(columns.stop, span[1]))
+        values = [view.value(c) for c in columns]
+        trial, _, _, total = view.trial(group, tuple(columns), values, shape)
+        assert trial is not None
+        steps.append(Step(trial, rivals, (trial,), total, survey.tried))
+    base: BaseParameters | None = ties.base
+    return Explanation(ties.arm, base, fitted, reference, tuple(steps), survey, evidence)
 
 
-def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tuple[Trial, ...]]:
+def _rivals(
+    ties: Ties, reference: Fitted, fitted: Fitted, evidence: Evidence
+) -> tuple[Survey, tuple[Trial, ...]]:
     """Look at all of the library beside the ties as one cause; return what they do not beat."""
     data, sigma, settings = ties.data, ties.sigma, ties.settings
     found = candidates(reference, data, sigma, settings.kinds)
@@ -131,48 +138,35 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
     sizes = [len(own.kept) + len(own.effect.shape) for own in fitted.named]
     stiffness = rank + np.cumsum([0, *sizes[:-1]])
     blocks = [
-        np.concatenate([others, free, tied[:, :, stiffness]], axis=2)
+        np.concatenate([others, tied[:, :, stiffness], free], axis=2)
         for others, free, tied in zip(
             found.columns, reference.columns, fitted.columns, strict=True
         )
     ]
     problem = make_problem(data, sigma, reference.residual, blocks)
-    free, span = range(first, first + rank), slice(first + rank, problem.x.shape[2])
+    span = slice(first, first + len(stiffness))
+    free = tuple(range(span.stop, span.stop + rank))
     loose = any(own.effect.shapes for own in fitted.named)
     kind = ties.partner.slack if loose else ties.partner.interaction
     whole = kind.on(ties.arm.robot, [own.effect.joints[0] for own in fitted.named])
     each = len(whole.quantities)
     kept = tuple(range(0, each * len(whole.joints), each))
     group = Group.of(whole, span, kept, ties.arm.robot)
-    projection = project(problem, free)
-    trial = _trial(group, problem, projection, problem.x[:, :, span], settings)
-    work = Workspace(remembering(reference.arm), data, settings)
-    step, survey, problem = next_step(problem, free, found.groups, work)
-    survey = replace(survey, league=(trial, *survey.league), tried=survey.tried + 1)
-    if step is None:
+    beside = Beside(free, reference.hold, reference.pull)
+    trials, power = held_out(problem, free, [group], beside.hold, beside.pull)
+    work = Workspace(memoized_arm(reference.arm), data)
+    here = Round(evidence, work, settings, float(power.sum()))
+    step, survey, _ = next_step(problem, beside, found.groups, here)
+    survey = replace(survey, ranking=(*trials, *survey.ranking), tried=survey.tried + 1)
+    if step is None or not trials:
         return survey, ()
-    left = projection.rest(problem.y)
-    return survey, tuple(not_beaten([trial, *step.passing], problem, left, settings))
+    others = [step.trial, *step.rivals]
+    return survey, tuple(other for other in others if other.gain >= trials[0].gain)
 
 
-def _trial(
-    group: Group,
-    problem: Problem,
-    projection: Projection,
-    columns: FloatArray,
-    settings: DiagnosisSettings,
-) -> Trial:
-    """Judge weighted columns (R, n, p) beside those that are free."""
-    left = float(np.linalg.norm(projection.rest(columns)))
-    visible = left / max(float(np.linalg.norm(columns)), 1e-300)
-    nothing = np.zeros(columns.shape[2])
-    score = Score(group, nothing, nothing, 0.0, visible)
-    return try_group(problem, projection, score, columns, settings)
-
-
-def _without(found: Explanation, fitted: Fitted, ties: Ties) -> Explanation:
+def _with_names_of(found: Explanation, fitted: Fitted) -> Explanation:
     """Return an explanation with the names that a last fit kept."""
     kept = {(own.effect.name, own.effect.joints) for own in fitted.named}
     pairs = zip(found.fitted.named, found.steps, strict=True)
     steps = tuple(s for own, s in pairs if (own.effect.name, own.effect.joints) in kept)
-    return replace(found, fitted=fitted, steps=steps, losses=ties.losses(fitted))
+    return replace(found, fitted=fitted, steps=steps)

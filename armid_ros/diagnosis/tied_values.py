@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.evidence import Trajectory
 from armid_ros.diagnosis.fit import Fitted
-from armid_ros.diagnosis.model_search import Explanation, joint_losses_of
+from armid_ros.diagnosis.model_search import Explanation
 from armid_ros.diagnosis.problem import weighted_rows
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.tied import Tied, TiedInteraction
@@ -78,7 +78,7 @@ class TieRegression:
             found = identify_interaction(problem)
         except IdentificationError:
             return frozenset()
-        if found.misfit > self.settings.partial_loss * problem.tau.size:
+        if found.misfit > self.settings.thresholds.same_fit * problem.tau.size:
             return frozenset()
         z = found.stiffness / found.std
         sure = {joint for k, joint in enumerate(problem.spring_joints) if z[k] > LEAST_Z}
@@ -148,12 +148,7 @@ def rightly_described(known: Interaction | None, free: Interaction | None) -> bo
     return known.misfit - free.misfit < _TOLD * freed * noise
 
 
-def without_bias(
-    explanation: Explanation,
-    springs: Interaction | None,
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
-) -> Explanation:
+def without_bias(explanation: Explanation, springs: Interaction | None) -> Explanation:
     """
     Return an explanation whose springs are without what noisy angles take away from them.
 
@@ -164,16 +159,13 @@ def without_bias(
     springs : Interaction or None
         Its springs as `TieRegression.springs` finds them, inertias free as in the explanation;
         None leaves it as it is.
-    data : sequence of Trajectory
-        The data.
-    sigma : sequence of ndarray, each (n,)
-        Noise [N m].
 
     """
     if springs is None:
         return explanation
-    fitted = _with_springs(explanation, springs, data, sigma)
-    return replace(explanation, fitted=fitted, losses=joint_losses_of(fitted, data, sigma))
+    evidence = explanation.evidence
+    fitted = _with_springs(explanation, springs, evidence.data, evidence.sigma)
+    return replace(explanation, fitted=fitted)
 
 
 def _tied_joints(arm: ArmModel) -> set[str]:

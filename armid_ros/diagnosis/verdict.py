@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From an explanation to a verdict: names only where the data leave no other, or none at all."""
+"""From what was found to a word and a sentence that the evidence bears out."""
 
 from __future__ import annotations
 
@@ -9,94 +9,47 @@ from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.experiment import separating
+from armid_ros.diagnosis.finding import Finding, Rival
 from armid_ros.diagnosis.floor import Floor
-from armid_ros.diagnosis.gap import Gap
-from armid_ros.diagnosis.model_search import Explanation
-from armid_ros.diagnosis.search import Step
-from armid_ros.diagnosis.selection import Trial
-from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.effects import Effect
-from armid_ros.effects.tied import Tied
-from armid_ros.estimate import ParameterName
-from armid_ros.model.spring_ties import Tie
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
 import numpy as np
 
 Word = Literal[
     'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
 ]
 
-
 #: Several recordings whose periods differ slowly, each a little, tell as well: of 60 sets of
 #: recordings in which nothing happened, none had a geometric mean of the structure above 2.4.
 _SEVERAL, _ON_AVERAGE = 3, 3.5
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
+#: Standard deviations to either side of a 95 % interval.
+_NORMAL = 1.96
 
 
 @dataclass(frozen=True)
-class Rival:
-    """A name that the data do not exclude in the place of another, and the joints it is on."""
-
-    name: str
-    joints: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Finding:
+class Left:
     """
-    One named effect.
+    What is left in the joints.
 
     Attributes
     ----------
-    name : str
-        Its name in the catalogue.
-    joints : tuple of str
-        The joints it is on; none for the whole arm.
-    parameters : tuple of ParameterName
-        Its parameters, shapes included.
-    values, std : tuple of float
-        Their values and standard deviations; nan where the data do not tell.
-    rivals : tuple of Rival
-        What the data do not exclude in its place, the likeliest first.
-    experiment : str
-        What would separate them; empty if there is nothing to separate.
-    gain : float
-        Sum of squares over noise that it takes, held out.
-    ties : tuple of Tie
-        Where it holds the arm, in the order of its joints, if it ends at another machine.
+    excess : ndarray, shape (n,)
+        Loss over the loss up to which it is no gap; above one there is something.
+    where : str
+        The data that show it, for a sentence.
 
     """
 
-    name: str
-    joints: tuple[str, ...]
-    parameters: tuple[ParameterName, ...]
-    values: tuple[float, ...]
-    std: tuple[float, ...]
-    rivals: tuple[Rival, ...]
-    experiment: str
-    gain: float
-    ties: tuple[Tie, ...] = ()
-
-    @property
-    def ambiguous_with(self) -> tuple[str, ...]:
-        """Names that the data do not exclude in its place."""
-        return tuple(rival.name for rival in self.rivals)
-
-    def place_of(self, joint: str) -> str:
-        """Return where a joint's parameters act: at a segment that is tied, or the joint."""
-        return next((tie.name for tie in self.ties if tie.joint == joint), joint)
-
-    def of_joint(self, joint: str) -> list[tuple[ParameterName, float, float]]:
-        """Return name, value and standard deviation of the parameters of one joint."""
-        rows = zip(self.parameters, self.values, self.std, strict=True)
-        return [row for row in rows if row[0].joint == joint]
+    excess: FloatArray
+    where: str
 
 
 @dataclass(frozen=True)
 class Verdict:
     """
-    The word, the sentence, the names.
+    The word and the sentence.
 
     Attributes
     ----------
@@ -104,142 +57,111 @@ class Verdict:
         See ``Word``.
     summary : str
         A sentence or two.
-    findings : tuple of Finding
-        Effects by name, most of the gap first.
 
     """
 
     word: Word
     summary: str
-    findings: tuple[Finding, ...]
 
 
 def decide(
-    explanation: Explanation,
+    findings: Sequence[Finding],
     floors: Sequence[Floor],
-    gap: Gap,
-    settings: DiagnosisSettings,
+    left: Sequence[Left],
     arm: ArmModel,
+    floor_in_words: str,
+    *,
+    refitted: bool,
 ) -> Verdict:
-    """Decide what may be said."""
-    findings = _findings(explanation, arm)
-    worst = float(np.max(explanation.losses))
+    """
+    Decide what may be said.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+        What was named.
+    floors : sequence of Floor
+        Noise of the recordings.
+    left : sequence of Left
+        What the patched model leaves, of each set of data.
+    arm : ArmModel
+        Gives the joints.
+    floor_in_words : str
+        What was there before, or noise.
+    refitted : bool
+        Whether the body was fitted anew.
+
+    """
+    worst = max(left, key=lambda one: float(one.excess.max()))
+    open_gap = bool(worst.excess.max() > 1.0)
+    joint = arm.robot.joints[int(np.argmax(worst.excess))]
     strange = _not_repeating(floors, arm)
-    if strange and (not findings or worst > settings.partial_loss):
-        return Verdict('not_repeatable', _strange(strange, findings), findings)
+    if strange and (not findings or open_gap):
+        return Verdict('not_repeatable', _strange(strange, findings))
+    rest = (
+        f'{joint} is left with {np.sqrt(worst.excess.max()):.1f} times what '
+        f'{floor_in_words} explains {worst.where}'
+    )
     if not findings:
-        if worst <= settings.partial_loss:
-            return Verdict('consistent', _consistent(explanation, gap), ())
-        joint = arm.robot.joints[int(np.argmax(explanation.losses))]
-        text = (
-            f'Something is missing, most of it in {joint} ({worst:.2g} times the power of the '
-            'noise), and nothing in the catalogue explains it. No name is given.'
-        )
-        return Verdict('unknown', text, ())
-    if worst > settings.partial_loss:
-        joint = arm.robot.joints[int(np.argmax(explanation.losses))]
-        text = (
-            f'Provisional: {_names(findings)} {_closes(gap)}, but {joint} is left at '
-            f'{worst:.2g} times the power of the noise: there is more than this.'
-        )
-        return Verdict('partial', text, findings)
-    if gap.predicted and np.max(gap.loss_after) > settings.held_out_loss:
-        joint = arm.robot.joints[int(np.argmax(gap.loss_after))]
-        text = (
-            f'Provisional: {_names(findings)} explains the data it was found in, but where the '
-            f'motion is new {joint} is left at {np.max(gap.loss_after):.2g} times the power of '
-            'the noise: it is not this, or not only this.'
-        )
-        return Verdict('partial', text, findings)
-    doubtful = [f for f in findings if f.rivals]
+        if open_gap:
+            text = f'Something is missing: {rest}. Nothing in the catalogue explains it.'
+            return Verdict('unknown', text)
+        how = ' once its rigid body and friction are fitted' if refitted else ''
+        text = f'The model explains the recordings{how}: what is left is {floor_in_words}.'
+        return Verdict('consistent', text)
+    said = ' '.join(sentence(finding, arm.robot) for finding in findings)
+    if open_gap:
+        return Verdict('partial', f'{said} There is more: {rest}.')
+    doubtful = [finding for finding in findings if finding.rivals]
     if doubtful:
         first = doubtful[0]
         others = ' or '.join(_elsewhere(rival, first.joints) for rival in first.rivals)
-        text = (
-            f'{_names(findings)} {_closes(gap)}. These data cannot tell {first.name} from '
-            f'{others}. {first.experiment}'
-        )
-        return Verdict('ambiguous', text, findings)
-    return Verdict('named', f'{_names(findings)} {_closes(gap)}.', findings)
+        text = f'{said} These data cannot tell it from {others}. {first.experiment}'
+        return Verdict('ambiguous', text)
+    return Verdict('named', f'{said} The rest is {floor_in_words}.')
 
 
-def _findings(explanation: Explanation, arm: ArmModel) -> tuple[Finding, ...]:
-    fitted, steps = explanation.fitted, explanation.steps
-    merged: dict[str, list[int]] = {}
-    for index, named in enumerate(fitted.named):
-        merged.setdefault(named.effect.name, []).append(index)
-    starts = np.cumsum([0, *(len(named.kept) + len(named.effect.shape) for named in fitted.named)])
-    std = fitted.estimate.std
-    result = []
-    for name, indices in merged.items():
-        rows = [row for k in indices for row in range(starts[k], starts[k + 1])]
-        rows = [row for row in rows if np.isfinite(std[row])]  # others the data do not tell
-        joints = _joints([fitted.named[k].effect.joints for k in indices], arm)
-        order = [joint for joint in arm.robot.joints if joint in joints]
-        parameters = fitted.estimate.parameters
-        rows.sort(key=lambda row: [*order, parameters[row].joint].index(parameters[row].joint))
-        rivals = _rivals([steps[k] for k in indices], set(merged), arm)
-        result.append(
-            Finding(
-                name,
-                joints,
-                tuple(parameters[row] for row in rows),
-                tuple(float(fitted.estimate.values[row]) for row in rows),
-                tuple(float(std[row]) for row in rows),
-                rivals,
-                separating(name, rivals[0].name, order) if rivals else '',
-                float(sum(steps[k].trial.gain for k in indices)),
-                _ties([fitted.named[k].effect for k in indices], order),
-            )
-        )
-    return tuple(result)
+def sentence(finding: Finding, robot: Robot) -> str:
+    """Say what a cause is and how much it explains, as a person would."""
+    words = finding.name.replace('_', ' ')
+    article = 'An' if words[0] in 'aeiou' else 'A'
+    share = f'{100.0 * min(max(finding.share, 0.0), 1.0):.0f} %'
+    explains = f'explains {share} of the gap'
+    if finding.ties:
+        where = ', '.join(_tie(finding, tie.joint, tie.name) for tie in finding.ties)
+        return f'{words.capitalize()} at {where} {explains}.'
+    if finding.name == 'payload' and finding.values:
+        mass = _as_sure(finding.values[0], finding.std[0])
+        return f'A payload of {mass} kg on {finding.joints[0]} {explains}.'
+    if len(finding.joints) > _JOINTS_SAID:
+        return f'{words.capitalize()} in {len(finding.joints)} joints {explains}.'
+    where = f' in {", ".join(finding.joints)}' if finding.joints else ''
+    shown = [
+        f'{p.name.replace("_", " ")} {_with_degrees(value, std, p.unit)}'
+        for p, value, std in zip(finding.parameters, finding.values, finding.std, strict=True)
+    ]
+    if len(shown) > 3:
+        shown = [*shown[:2], f'and {len(shown) - 2} more']
+    numbers = f' ({", ".join(shown)})' if shown else ''
+    return f'{article} {words}{where}{numbers} {explains}.'
 
 
-def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
-    ties = {t.joint: t for effect in effects if isinstance(effect, Tied) for t in effect.ties}
-    return tuple(ties[joint] for joint in joints if joint in ties)
-
-
-def _rivals(steps: Sequence[Step], named: set[str], arm: ArmModel) -> tuple[Rival, ...]:
-    """Return the other names that are possible, the likeliest first, and where."""
-    best: dict[str, list[Trial]] = {}
-    for step in steps:
-        here: dict[str, Trial] = {}
-        for trial in sorted(step.rivals, key=lambda trial: -trial.gain):
-            here.setdefault(trial.score.group.effect.name, trial)
-        for name in here.keys() - named:
-            best.setdefault(name, []).append(here[name])
-    order = sorted(best, key=lambda name: -max(trial.gain for trial in best[name]))
-    return tuple(
-        Rival(name, _joints([trial.score.group.effect.joints for trial in best[name]], arm))
-        for name in order
-    )
-
-
-def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]:
-    """Return the joints of several effects of a name, in order but for those of pairs."""
-    joints = [joint for group in groups for joint in group]
-    if any(len(group) > 1 for group in groups):
-        return tuple(dict.fromkeys(joints))
-    return tuple(joint for joint in arm.robot.joints if joint in joints)
-
-
-def _elsewhere(rival: Rival, joints: Sequence[str]) -> str:
-    """Return a name, and the joints where they are others than those."""
-    there = '' if set(rival.joints) == set(joints) else f' of {", ".join(rival.joints)}'
-    return rival.name + (there if rival.joints else '')
+def _with_degrees(value: float, std: float, unit: str) -> str:
+    text = f'{_as_sure(value, std)} {unit}'.strip()
+    if unit == 'rad':
+        return f'{text}, {np.rad2deg(value):.1f} degrees'
+    return text
 
 
 def _not_repeating(floors: Sequence[Floor], arm: ArmModel) -> list[str]:
     """Return the joints that did not do the same in equal periods."""
-    measured = [floor for floor in floors if floor.period is not None]
-    if not measured:
+    known = [floor for floor in floors if floor.period is not None]
+    if not known:
         return []
-    strange = np.array([~floor.repeats for floor in measured])
-    often = strange.sum(axis=0) >= min(2, len(measured))
-    if len(measured) >= _SEVERAL:
-        structure = np.array([floor.structure for floor in measured])
-        often |= np.exp(np.mean(np.log(np.maximum(structure, 1e-3)), axis=0)) > _ON_AVERAGE
+    often = np.sum([~floor.repeats for floor in known], axis=0) >= max(1, len(known) / 2)
+    if len(known) >= _SEVERAL:
+        mean = np.exp(np.mean([np.log(floor.structure) for floor in known], axis=0))
+        often = often | (mean > _ON_AVERAGE)
     return [joint for joint, odd in zip(arm.robot.joints, often, strict=True) if odd]
 
 
@@ -249,59 +171,29 @@ def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
         'velocity: something acts that does not repeat, such as contact or a person. '
     )
     if findings:
-        return text + f'{_names(findings)} is provisional.'
+        names = ', '.join(finding.name.replace('_', ' ') for finding in findings)
+        return text + f'{names} is provisional.'
     return text + 'No effect of the arm is named.'
 
 
-def _consistent(explanation: Explanation, gap: Gap) -> str:
-    worst = float(np.max(explanation.losses))
-    how = (
-        'as it is described'
-        if explanation.base is None
-        else 'once its rigid parameters and known effects are fitted; the described values are off'
-    )
-    return (
-        f'The model explains the data {how}: every joint is within {worst:.2f} times the power '
-        'of the noise.'
-    )
-
-
-def _names(findings: Sequence[Finding]) -> str:
-    return '; '.join(_name(finding) for finding in findings)
-
-
-def _name(finding: Finding) -> str:
-    words = finding.name.replace('_', ' ')
-    if finding.ties:
-        return f'{words} at {", ".join(_tie(finding, tie) for tie in finding.ties)}'
-    if len(finding.joints) > _JOINTS_SAID:
-        return f'{words} in {len(finding.joints)} joints'
-    where = f'{", ".join(finding.joints)}: ' if finding.joints else ''
-    shown = [
-        f'{p.name.replace("_", " ")} {value:.3g} +- {std:.1g} {p.unit}'.strip()
-        for p, value, std in zip(finding.parameters, finding.values, finding.std, strict=True)
-    ]
-    if len(shown) > 3:
-        shown = [*shown[:2], f'and {len(shown) - 2} more']
-    return f'{where}{words} ({", ".join(shown)})'
-
-
-def _tie(finding: Finding, tie: Tie) -> str:
+def _tie(finding: Finding, joint: str, segment: str) -> str:
     shown = [
         f'{p.name.replace("_", " ")} {_as_sure(value, std)} {p.unit}'
-        for p, value, std in finding.of_joint(tie.joint)
+        for p, value, std in finding.of_joint(joint)
     ]
-    return f'{tie.name} ({", ".join(shown)})'
+    return f'{segment} ({", ".join(shown)})'
+
+
+def _elsewhere(rival: Rival, joints: Sequence[str]) -> str:
+    """Return a name, and the joints where they are others than those."""
+    there = '' if set(rival.joints) == set(joints) else f' of {", ".join(rival.joints)}'
+    return rival.name.replace('_', ' ') + (there if rival.joints else '')
 
 
 def _as_sure(value: float, std: float) -> str:
-    """Return a value to the second digit of its deviation, and that."""
-    if not 0.0 < std < np.inf:
+    """Return a value to the second digit of its 95 % interval, and that."""
+    wide = _NORMAL * std
+    if not 0.0 < wide < np.inf:
         return f'{value:.4g}'
-    decimals = max(0, 1 - int(np.floor(np.log10(std))))
-    return f'{value:.{decimals}f} +- {std:.{decimals}f}'
-
-
-def _closes(gap: Gap) -> str:
-    where = 'held-out data' if gap.predicted else 'data left out of the fit'
-    return f'closes {100 * gap.closed:.0f} % of the gap on {where}'
+    decimals = max(0, 1 - int(np.floor(np.log10(wide))))
+    return f'{value:.{decimals}f} +- {wide:.{decimals}f}'

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.evidence import Trajectory
+from armid_ros.diagnosis.evidence import Evidence, Trajectory
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
@@ -65,11 +65,7 @@ class Where:
 
 
 def locate(
-    arm: ArmModel,
-    data: Sequence[Trajectory],
-    residual: Sequence[FloatArray],
-    losses: FloatArray,
-    lowest: float,
+    arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], limits: FloatArray
 ) -> tuple[Where, ...]:
     """
     Describe the residual of every joint that is beyond its noise, the worst first.
@@ -78,17 +74,19 @@ def locate(
     ----------
     arm : ArmModel
         Gives the load.
-    data : sequence of Trajectory
-        Motion.
+    evidence : Evidence
+        Motion, and the unit of the gap.
     residual : sequence of ndarray, shape (M, n)
         What is left [N m].
-    losses : ndarray, shape (n,)
-        Mean square over noise.
-    lowest : float
-        Joints below this loss are at their noise.
+    limits : ndarray, shape (n,)
+        Joints below this loss have no gap.
 
     """
-    beyond = np.where(losses > lowest, losses - 1.0, 0.0)
+    losses = evidence.losses(residual)
+    beyond = np.where(losses > limits, losses - 1.0, 0.0)
+    pairs = zip(evidence.data, residual, strict=True)
+    now = [(part, rows) for part, rows in pairs if not part.before]
+    data, residual = [part for part, _ in now], [rows for _, rows in now]
     total = max(float(beyond.sum()), 1e-300)
     rows = [_quantities(arm, part) for part in data]
     told = np.concatenate([part.told for part in data])

@@ -127,6 +127,14 @@ class Effect(ABC):
     instantaneous: ClassVar[bool] = True
     #: Whether it acts by changing the rigid body or its gravity.
     changes_body: ClassVar[bool] = False
+    #: Whether every joint may be taken to have it.
+    everywhere: ClassVar[bool] = False
+    #: Whether it comes from outside the arm: a person, another machine.
+    external: ClassVar[bool] = False
+    #: Whether its torque changes smoothly with position and velocity.
+    smooth: ClassVar[bool] = False
+    #: Quantities that stand for causes of their own, if not all of them stand for one together.
+    separate: ClassVar[tuple[tuple[int, ...], ...]] = ()
 
     def __post_init__(self) -> None:
         """Fill in the default shape and check what was given."""
@@ -170,6 +178,24 @@ class Effect(ABC):
     @classmethod
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         return robot.joints
+
+    @classmethod
+    def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
+        """
+        Return the sets of joints on which it is one cause: single joints, pairs, the whole arm.
+
+        Raises
+        ------
+        ModelError
+            If the robot has no place for it.
+
+        """
+        joints = cls._default_joints(robot)
+        return tuple((joint,) for joint in joints) or ((),)
+
+    def named_as(self, values: FloatArray, arm: ArmModel) -> tuple[tuple[Effect, FloatArray], ...]:
+        """Return the effects, with values, that say the same in the words of the catalogue."""
+        return ((self, values),)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
         """Return a shape to begin with on this robot, shape (number of owners, S)."""
@@ -304,6 +330,22 @@ class Effect(ABC):
 
         """
 
+    def plausible(self, values: FloatArray, arm: ArmModel, *, described: bool) -> bool:
+        """
+        Return whether values within the bounds are what one would call by this name.
+
+        Parameters
+        ----------
+        values : ndarray, shape (P,)
+            Parameter values.
+        arm : ArmModel
+            The arm without them.
+        described : bool
+            Whether its body is as somebody described it, not as it was identified.
+
+        """
+        return True
+
     def indices(self, motion_joints: tuple[str, ...]) -> list[int]:
         """Return the columns of the effect's joints among the joints of a motion or robot."""
         return [motion_joints.index(joint) for joint in self.joints]
@@ -322,6 +364,9 @@ class Kind(Protocol):
 
     def on(self, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
         """Make the effect for a robot."""
+
+    def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
+        """Return the sets of joints on which it is one cause."""
 
 
 def joint_unit(unit: str, joint: str, robot: Robot) -> str:

@@ -29,6 +29,7 @@ class ViscousFriction(Effect):
 
     name = 'viscous_friction'
     summary = 'torque proportional to joint velocity'
+    everywhere = True
     quantities = (Quantity('viscous_coefficient', 'N m s/rad', lower=0.0, typical=(0.004, 10.0)),)
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
@@ -54,6 +55,7 @@ class CoulombFriction(Effect):
 
     name = 'coulomb_friction'
     summary = 'constant torque against the direction of motion; holds at rest'
+    everywhere = True
     quantities = (Quantity('coulomb_torque', 'N m', lower=0.0, typical=(0.005, 10.0)),)
     holds_at_rest = True
 

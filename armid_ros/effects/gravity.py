@@ -9,11 +9,12 @@ Joint torques are linear in the gravity vector, so both read off the same three 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Effect, Quantity
+from armid_ros.effects.base import Effect, Kind, Quantity
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -82,7 +83,7 @@ class BaseTilt(_GravityEffect):
     name = 'base_tilt'
     summary = 'base mounted at an angle to gravity that the model does not have'
     quantities = tuple(
-        Quantity(name, 'rad', lower=-1.6, upper=1.6, typical=(0.003, 0.1))
+        Quantity(name, 'rad', lower=-np.pi, upper=np.pi, typical=(0.003, 0.1))
         for name in ('tilt_x', 'tilt_y')
     )
     linear = False
@@ -100,6 +101,55 @@ class BaseTilt(_GravityEffect):
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the robot under gravity as the tilted base sees it."""
         return Action(robot=arm.robot.with_gravity(_turned(arm.robot.gravity, values)))
+
+
+@dataclass(frozen=True)
+class GravityVector(_GravityEffect):
+    """
+    Difference of the gravity vector from the model's: any mounting on any planet.
+
+    The torque is linear in it, exactly, at any angle; a search looks for this one and says what it
+    finds as base_tilt and gravity_magnitude.
+
+    """
+
+    name = 'gravity_vector'
+    summary = 'gravity of another direction or size than in the model'
+    quantities = tuple(Quantity(f'gravity_difference_{axis}', 'm/s^2') for axis in 'xyz')
+
+    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+        """Return dtau/dg of the base's axes [N m per m/s^2], shape (N, n, 3)."""
+        return arm.gravity_columns(motion)
+
+    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+        """Return the robot under the other gravity."""
+        return Action(robot=arm.robot.with_gravity(arm.robot.gravity + values))
+
+    def named_as(self, values: FloatArray, arm: ArmModel) -> tuple[tuple[Effect, FloatArray], ...]:
+        """Return the tilt of the base, and the magnitude of gravity."""
+        before = np.array(arm.robot.gravity)
+        after = before + values
+        magnitude = np.linalg.norm(after) - np.linalg.norm(before)
+        return (
+            (BaseTilt(), _tilt(before, after)),
+            (GravityMagnitude(), np.array([magnitude])),
+        )
+
+
+def with_exact_vector(kinds: Sequence[Kind]) -> list[Kind]:
+    """Return kinds to look for: where tilt and size may both be named, the vector for the tilt."""
+    both = BaseTilt in kinds and GravityMagnitude in kinds
+    return [GravityVector if both and kind is BaseTilt else kind for kind in kinds]
+
+
+def _tilt(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return the rotation vector, (2,) [rad], by which a base is turned that sees gravity so."""
+    axes = _horizontal_axes(before)
+    axis = np.cross(after, before)
+    sine, cosine = float(np.linalg.norm(axis)), float(after @ before)
+    if sine <= 1e-12 * max(float(np.linalg.norm(after) * np.linalg.norm(before)), 1e-300):
+        return np.array([0.0 if cosine >= 0.0 else np.pi, 0.0])
+    return np.asarray(np.arctan2(sine, cosine) * (axes @ axis) / sine)
 
 
 def _turned(gravity: FloatArray, tilt: FloatArray) -> FloatArray:

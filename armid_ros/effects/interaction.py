@@ -156,6 +156,8 @@ class HumanInteraction(Attached):
 
     name = 'human_interaction'
     summary = 'spring and damper from a link to a person, another machine or the world'
+    external = True
+    smooth = True
     quantities = (
         Quantity('interaction_stiffness', 'N/m', lower=0.0, typical=(50.0, 50000.0)),
         Quantity('interaction_damping', 'N s/m', lower=0.0, typical=(0.5, 500.0)),
@@ -214,6 +216,8 @@ class InterfaceSlack(Attached):
 
     name = 'interface_slack'
     summary = 'spring from a link to an anchor that pulls beyond a slack only'
+    external = True
+    smooth = True
     quantities = (Quantity('slack_stiffness', 'N/m', lower=0.0, typical=(50.0, 50000.0)),)
     shapes = (
         *_ATTACHMENT,

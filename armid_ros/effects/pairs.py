@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise, permutations
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, DryFriction
@@ -49,6 +50,15 @@ class _Pairs(Effect):
     @classmethod
     def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
         return joints[-2:]
+
+    @classmethod
+    def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
+        """Return the pairs of joints that may be tied to each other."""
+        return tuple(cls._likely_pairs(robot.joints))
+
+    @staticmethod
+    def _likely_pairs(joints: tuple[str, ...]) -> Iterable[tuple[str, str]]:
+        return pairwise(joints)
 
     @property
     def owners(self) -> tuple[str, ...]:
@@ -144,6 +154,10 @@ class JointCoupling(_Pairs):
     def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(joint for pair in pairwise(joints) for joint in pair)
 
+    @staticmethod
+    def _likely_pairs(joints: tuple[str, ...]) -> Iterable[tuple[str, str]]:
+        return combinations(joints, 2)
+
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/dK [rad], shape (N, n, P)."""
         q = arm.link_motion(motion).q
@@ -185,6 +199,10 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
     @classmethod
     def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(joint for i in joints for k in joints if i != k for joint in (i, k))
+
+    @staticmethod
+    def _likely_pairs(joints: tuple[str, ...]) -> Iterable[tuple[str, str]]:
+        return permutations(joints, 2)
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
         """Name the shares: whose reading, and from which joint."""

@@ -31,6 +31,7 @@ class TorqueOffset(Effect):
 
     name = 'torque_offset'
     summary = 'constant torque, in motion and at rest'
+    everywhere = True
     quantities = (Quantity('torque_offset', 'N m', typical=(0.004, 2.0)),)
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:

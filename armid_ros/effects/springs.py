@@ -68,6 +68,7 @@ class SoftLimit(Effect):
 
     name = 'soft_limit'
     summary = 'bumper or end stop that gives way'
+    separate = ((0,), (1,))
     quantities = (
         Quantity('lower_stiffness', 'N m/rad', lower=0.0, typical=(2.0, 2000.0)),
         Quantity('upper_stiffness', 'N m/rad', lower=0.0, typical=(2.0, 2000.0)),

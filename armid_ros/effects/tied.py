@@ -160,6 +160,10 @@ class TiedKind:
         """Name in the catalogue."""
         return self.effect.name
 
+    def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
+        """Return the joints that have a tie, one by one."""
+        return tuple((tie.joint,) for tie in self.ties)
+
     def on(self, robot: Robot, joints: Sequence[str] | None = None) -> Effect:
         """
         Make the effect on the joints named, or on all that have a tie.

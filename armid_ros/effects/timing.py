@@ -64,6 +64,11 @@ class TimeDelay(Late):
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         return ()
 
+    @classmethod
+    def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
+        """Return the whole arm, and every joint."""
+        return ((), *((joint,) for joint in robot.joints))
+
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return the torque of earlier, shape (N, n) [N m]."""
         return self._shifted(values, motion, tau)

@@ -16,7 +16,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class _Remembering(ArmModel):
+class _Memoized(ArmModel):
     """An arm that computes the torques of a motion once, for all effects that ask."""
 
     @cached_property
@@ -74,6 +74,6 @@ class _Remembering(ArmModel):
         return np.array(self._once('torque', motion, super().joint_torque))
 
 
-def remembering(arm: ArmModel) -> ArmModel:
+def memoized_arm(arm: ArmModel) -> ArmModel:
     """Return the arm, made to compute the torques of each motion once."""
-    return _Remembering(arm.robot, arm.effects, arm.values, arm.quasi_static)
+    return _Memoized(arm.robot, arm.effects, arm.values, arm.quasi_static)
