@@ -14,11 +14,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.candidates import candidates, Group
-from armid_ros.diagnosis.evidence import trajectories
-from armid_ros.diagnosis.fit import excited, fit
-from armid_ros.diagnosis.prepare import choose_filters
-from armid_ros.diagnosis.problem import make_problem, project
+from armid_ros.diagnosis.data.evidence import trajectories
+from armid_ros.diagnosis.data.prepare import choose_filters
+from armid_ros.diagnosis.data.rows import make_problem, project
+from armid_ros.diagnosis.search.candidates import candidates, Group
+from armid_ros.diagnosis.search.fit import excited, fit
 from armid_ros.diagnosis.selection import solve_products
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray

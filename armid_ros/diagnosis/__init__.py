@@ -9,10 +9,10 @@ to tell two names apart.
 """
 
 from armid_ros.diagnosis.diagnose import diagnose, Diagnosis
-from armid_ros.diagnosis.finding import Finding
-from armid_ros.diagnosis.next_run import EXPERIMENT_FILE, next_run, NextRun
-from armid_ros.diagnosis.output import diagnosis_document
+from armid_ros.diagnosis.next_run.plan import EXPERIMENT_FILE, next_run, NextRun
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.verdict.document import diagnosis_document
+from armid_ros.diagnosis.verdict.finding import Finding
 
 __all__ = [
     'Diagnosis',

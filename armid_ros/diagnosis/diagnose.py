@@ -14,23 +14,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.attribution import attribute, Attribution
-from armid_ros.diagnosis.baseline import Baseline
-from armid_ros.diagnosis.bodies import as_bodies
-from armid_ros.diagnosis.choice import Chosen, explained, OWN_MISFIT
-from armid_ros.diagnosis.evidence import Evidence, trajectories, Trajectory
-from armid_ros.diagnosis.finding import Finding, findings, small_print
-from armid_ros.diagnosis.floor import Floor, noise_floor
-from armid_ros.diagnosis.gap import Gap, measure_gap
-from armid_ros.diagnosis.gate import check_data, Gate
-from armid_ros.diagnosis.model_search import Explanation
-from armid_ros.diagnosis.pattern import find_pattern, Pattern
-from armid_ros.diagnosis.prepare import choose_filters, prepare, Prepared
+from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Trajectory
+from armid_ros.diagnosis.data.floor import Floor, noise_floor
+from armid_ros.diagnosis.data.gate import check_data, Gate
+from armid_ros.diagnosis.data.prepare import choose_filters, prepare, Prepared
+from armid_ros.diagnosis.search.bodies import as_bodies
+from armid_ros.diagnosis.search.choice import Chosen, explained, OWN_MISFIT
+from armid_ros.diagnosis.search.explain import Explanation
+from armid_ros.diagnosis.search.unharmed import harmed
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.tied_search import diagnose_ties
-from armid_ros.diagnosis.unharmed import harmed
-from armid_ros.diagnosis.verdict import decide, Left
-from armid_ros.diagnosis.where import locate, Where
+from armid_ros.diagnosis.ties.explain_ties import diagnose_ties
+from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
+from armid_ros.diagnosis.verdict.finding import Finding, findings, small_print
+from armid_ros.diagnosis.verdict.gap import Gap, measure_gap
+from armid_ros.diagnosis.verdict.pattern import find_pattern, Pattern
+from armid_ros.diagnosis.verdict.where import locate, Where
+from armid_ros.diagnosis.verdict.words import decide, Left
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.checks import check_motion
 from armid_ros.recording import Recording

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.diagnosis import Diagnosis, NextRun
-from armid_ros.diagnosis.detectable import detectable
+from armid_ros.diagnosis.verdict.detectable import detectable
 from armid_ros.identification.verification import ForwardValidation
 from armid_ros.recording import Recording
 from armid_ros.report.notation import counted

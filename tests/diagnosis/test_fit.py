@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fit of what was named."""
 
-from armid_ros.diagnosis.fit import fit
-from armid_ros.diagnosis.floor import noise_floor
-from armid_ros.diagnosis.patch import Named, Patch, patch_columns
+from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest

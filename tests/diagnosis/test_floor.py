@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The noise floor comes from repeated periods, encoder noise included, of each trajectory."""
 
-from armid_ros.diagnosis.evidence import trajectories
-from armid_ros.diagnosis.floor import noise_floor
-from armid_ros.diagnosis.prepare import choose_filters
+from armid_ros.diagnosis.data.evidence import trajectories
+from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.settings import DiagnosisSettings
 import numpy as np
 import pytest

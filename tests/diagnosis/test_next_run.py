@@ -8,12 +8,12 @@ from types import SimpleNamespace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, next_run
-from armid_ros.diagnosis.fit import fit
-from armid_ros.diagnosis.floor import noise_floor
-from armid_ros.diagnosis.model_search import joint_losses_of
-from armid_ros.diagnosis.patch import Named
-from armid_ros.diagnosis.separation import Doubt, Load, Separation
-from armid_ros.diagnosis.templates import CLEARANCE, templates
+from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
+from armid_ros.diagnosis.next_run.templates import CLEARANCE, templates
+from armid_ros.diagnosis.search.explain import joint_losses_of
+from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.patch import Named
 from armid_ros.effects import CATALOGUE
 from armid_ros.excitation import (
     ClearanceModel,

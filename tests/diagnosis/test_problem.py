@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The weighted rows and their products."""
 
-from armid_ros.diagnosis.problem import Problem, project
+from armid_ros.diagnosis.data.rows import Problem, project
 import numpy as np
 import pytest
 

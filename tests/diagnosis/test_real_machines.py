@@ -4,11 +4,11 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.evidence import trajectories
-from armid_ros.diagnosis.fit import excited, fit
-from armid_ros.diagnosis.floor import noise_floor
-from armid_ros.diagnosis.patch import Named
-from armid_ros.diagnosis.prepare import choose_filters
+from armid_ros.diagnosis.data.evidence import trajectories
+from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.data.prepare import choose_filters
+from armid_ros.diagnosis.search.fit import excited, fit
+from armid_ros.diagnosis.search.patch import Named
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.identification.two_inertia.transmission import fit_transmission
 from armid_ros.recording import read_recording

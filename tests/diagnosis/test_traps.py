@@ -10,11 +10,11 @@ The data and the library are the same for both; what differs is the one step tha
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.candidates import candidates
-from armid_ros.diagnosis.fit import excited, fit
-from armid_ros.diagnosis.floor import noise_floor
-from armid_ros.diagnosis.model_search import explain
-from armid_ros.diagnosis.problem import make_problem, project
+from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.data.rows import make_problem, project
+from armid_ros.diagnosis.search.candidates import candidates
+from armid_ros.diagnosis.search.explain import explain
+from armid_ros.diagnosis.search.fit import excited, fit
 from armid_ros.diagnosis.selection import replicated, Score, solve_products, try_group
 from armid_ros.effects import Action, CATALOGUE, Effect, Quantity
 from armid_ros.model import inverse_dynamics

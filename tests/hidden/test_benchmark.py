@@ -4,9 +4,9 @@
 
 import json
 
-from armid_ros.diagnosis.evidence import trajectories
-from armid_ros.diagnosis.floor import noise_floor
-from armid_ros.diagnosis.gap import Overlay
+from armid_ros.diagnosis.data.evidence import trajectories
+from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.verdict.gap import Overlay
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.signals import conditioning

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis
-from armid_ros.diagnosis.detectable import smallest_size
 from armid_ros.diagnosis.league import Standing
+from armid_ros.diagnosis.verdict.detectable import smallest_size
 from armid_ros.report.notation import digits
 from armid_ros.report.page import Section
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import math
 from typing import ClassVar
 
-from armid_ros.diagnosis.detectable import Detectable
+from armid_ros.diagnosis.verdict.detectable import Detectable
 from armid_ros.report.notation import digits, pretty
 from armid_ros.report.page import Section
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.diagnosis.where import Where
+from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.report.charts import Chart, Series
 from armid_ros.report.page import Section
 

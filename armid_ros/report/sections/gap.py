@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.diagnosis.gap import Gap, Overlay
+from armid_ros.diagnosis.verdict.gap import Gap, Overlay
 from armid_ros.motion import FloatArray
 from armid_ros.report.bars import Bar, BarChart
 from armid_ros.report.charts import Chart, Series, thinned

@@ -1,0 +1,81 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The model's own misfit: what it leaves of recordings in which nothing was wrong.
+
+No real arm is as its model to the noise. What the model leaves of recordings that it was
+identified from is smaller than what it leaves of others, so each of them is predicted with
+parameters that the others have.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.data.rows import fold_rows
+from armid_ros.diagnosis.search.candidates import sensitivity_rows
+from armid_ros.diagnosis.search.fit import excited
+from armid_ros.effects import Effect
+from armid_ros.motion import FloatArray
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """
+    Recordings in which nothing was wrong.
+
+    Attributes
+    ----------
+    data : tuple of Trajectory
+        The recordings.
+    residual : tuple of ndarray, each (M, n)
+        What the model leaves of them [N m].
+    misfit : ndarray, shape (n,)
+        Root mean square that it leaves of recordings it was not identified from [N m].
+
+    """
+
+    data: tuple[Trajectory, ...]
+    residual: tuple[FloatArray, ...]
+    misfit: FloatArray
+
+    @classmethod
+    def of(cls, arm: ArmModel, data: Sequence[Trajectory], rng: np.random.Generator) -> Baseline:
+        """Measure the misfit of a model."""
+        residual = [part.residual(arm) for part in data]
+        _, columns = excited(arm, arm.base_parameters(rng), data)
+        informative = np.concatenate([part.told for part in data])
+        left = np.concatenate(residual)
+        w = np.concatenate(columns)
+        scale = np.sqrt(np.mean(left**2, axis=0, where=informative))
+        weight = informative / np.maximum(scale, 1e-12)
+        rows = w * weight[:, :, np.newaxis]
+        aim = left * weight
+        fold = fold_rows(data)
+        folds = range(int(fold.max()) + 1)
+        own = [np.einsum('rnp,rnq->pq', rows[fold == k], rows[fold == k]) for k in folds]
+        to = [np.einsum('rnp,rn->p', rows[fold == k], aim[fold == k]) for k in folds]
+        whole = np.linalg.lstsq(sum(own), sum(to), rcond=1e-10)[0]
+        for k in folds:
+            others = np.linalg.lstsq(sum(own) - own[k], sum(to) - to[k], rcond=1e-10)[0]
+            left[fold == k] += w[fold == k] @ (whole - others)
+        others = np.sqrt(np.mean(left**2, axis=0, where=informative))
+        return cls(tuple(data), tuple(residual), np.sqrt(scale * others))
+
+    def values(
+        self, arm: ArmModel, effect: Effect, kept: Sequence[int], precision: FloatArray
+    ) -> FloatArray:
+        """Return the values of an effect that explain most of these recordings, shape (p,)."""
+        own, aim = np.diag(precision), np.zeros(len(kept))
+        for part, left in zip(self.data, self.residual, strict=True):
+            weight = part.told / self.misfit
+            columns = sensitivity_rows(arm, effect, part)[:, :, list(kept)]
+            columns = columns * weight[:, :, np.newaxis]
+            own = own + np.einsum('rnp,rnq->pq', columns, columns)
+            aim = aim + np.einsum('rnp,rn->p', columns, left * weight)
+        return np.asarray(np.linalg.lstsq(own, aim, rcond=1e-8)[0])

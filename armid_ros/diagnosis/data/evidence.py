@@ -1,0 +1,267 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What recordings show beside a model: torques and columns, filtered alike and decimated.
+
+A trajectory is one unbroken stretch of a recording. Its motion stays at the full rate, where
+columns are computed; its rows are decimated, which is where everything is compared.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.period import find_period
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.ties.sensor_noise import SensorNoise
+from armid_ros.effects.timing import smoothed
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.signals import (
+    Conditioning,
+    decimate,
+    decimated_samples,
+    segments,
+)
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+#: Columns are computed at this many times the rate of the rows: enough for signs and hysteresis.
+_OVERSAMPLING = 8
+#: A joint slower than this share of its top speed for this long [s] is at rest.
+_REST_SPEED, _REST_TIME = 0.02, 0.2
+#: Below this share of the top speed the sign of a velocity is uncertain, and so is dry friction in
+#: as many rows around as the filter rings over: beyond three rows the residuals of six-joint
+#: arms are at their noise again, in the third they can be at four times its power.
+_REVERSAL_SPEED, _REVERSAL_ROWS = 0.004, 3
+#: Rows apart that what is left may be alike.
+_LAGS = 20
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """
+    One unbroken stretch of a recording.
+
+    Attributes
+    ----------
+    source : str
+        The recording.
+    fold : int
+        Which part of the data it belongs to when parts are held out.
+    motion : Motion
+        Filtered motion with the measured torque, N samples.
+    used : Conditioning
+        From motion to rows.
+    rows : ndarray of int, shape (M,)
+        Samples of the motion that the rows sit on.
+    told : ndarray of bool, shape (M, n)
+        False where a joint rests or turns round: friction is undetermined there.
+    sensors : SensorNoise or None
+        What their noise does beside another machine; None where there is none.
+    before : bool
+        Whether it was recorded when nothing was wrong: what is named does not act in it.
+
+    """
+
+    source: str
+    fold: int
+    motion: Motion
+    used: Conditioning
+    rows: npt.NDArray[np.intp]
+    told: npt.NDArray[np.bool_]
+    sensors: SensorNoise | None = None
+    before: bool = False
+
+    def reduce(self, values: FloatArray) -> FloatArray:
+        """Filter and decimate samples (N, ...) to rows (M, ...)."""
+        return decimate(values, self.used)
+
+    @cached_property
+    def smooth(self) -> Trajectory:
+        """The same with positions that have nothing beyond the band of the motion."""
+        return replace(self, motion=smoothed(self.motion))
+
+    @cached_property
+    def at_rows(self) -> Motion:
+        """The motion at the samples that the rows sit on."""
+        return self.motion.select(self.rows)
+
+    @cached_property
+    def period(self) -> tuple[int, slice] | None:
+        """The repeated period of the motion; see `find_period`."""
+        return find_period(self.motion)
+
+    def residual(self, arm: ArmModel) -> FloatArray:
+        """Return measured torque minus that of a model, in rows, shape (M, n) [N m]."""
+        assert self.motion.tau is not None
+        return self.reduce(self.motion.tau - arm.torque(self.motion))
+
+    @property
+    def t(self) -> FloatArray:
+        """Time of the rows [s]."""
+        return self.motion.t[self.rows]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """
+    Data with the unit that a gap is measured in.
+
+    Attributes
+    ----------
+    data : tuple of Trajectory
+        The data.
+    sigma : tuple of ndarray, each (n,)
+        The unit of each trajectory: its noise, or the model's own misfit where that is more
+        [N m].
+    noise : tuple of ndarray, each (n,)
+        Its noise [N m].
+
+    """
+
+    data: tuple[Trajectory, ...]
+    sigma: tuple[FloatArray, ...]
+    noise: tuple[FloatArray, ...]
+
+    @cached_property
+    def count(self) -> FloatArray:
+        """Informative rows of each joint, shape (n,)."""
+        parts = [part.told.sum(axis=0) for part in self.data if not part.before]
+        return np.asarray(np.sum(parts, axis=0, dtype=float))
+
+    @cached_property
+    def torque_rms(self) -> FloatArray:
+        """Root mean square of the measured torque of each joint, shape (n,) [N m]."""
+        squares = np.zeros_like(self.count)
+        for part in self.data:
+            if part.before:
+                continue
+            assert part.motion.tau is not None
+            squares += np.sum(part.reduce(part.motion.tau) ** 2, axis=0, where=part.told)
+        return np.sqrt(squares / np.maximum(self.count, 1.0))
+
+    def losses(self, residual: Sequence[FloatArray]) -> FloatArray:
+        """Return the mean square over the unit of each joint, shape (n,)."""
+        squares = np.zeros_like(self.count)
+        for part, sigma, left in zip(self.data, self.sigma, residual, strict=True):
+            if not part.before:
+                squares += np.sum((left / sigma) ** 2, axis=0, where=part.told)
+        return np.asarray(squares / np.maximum(self.count, 1.0))
+
+    def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
+        """
+        Return the loss of each joint up to which what is left is no gap, shape (n,).
+
+        Two periods determine their noise as well as so many independent rows do, and so do the
+        rows that are compared with it: the ratio of the two has Fisher's distribution. Where the
+        unit is a misfit, another motion makes another one. And what is left may not matter.
+
+        """
+        thresholds = settings.thresholds
+        count = np.maximum(self.count, 2.0)
+        free = np.maximum(count / self._lasting(residual), 4.0)
+        noise = stats.f.ppf(thresholds.confidence, free, free)
+        parts = [k for k, part in enumerate(self.data) if not part.before]
+        sigma = np.mean([self.sigma[k] ** 2 for k in parts], axis=0)
+        own = np.mean([self.noise[k] ** 2 for k in parts], axis=0) / sigma
+        misfit = np.where(own < 1.0 / thresholds.same_fit, thresholds.same_fit, 1.0)
+        matters = (settings.material * self.torque_rms) ** 2 / sigma
+        return np.asarray(np.maximum(noise, misfit) + matters)
+
+    def _lasting(self, residual: Sequence[FloatArray]) -> FloatArray:
+        """Return for how many rows what is left lasts, as squares go, shape (n,)."""
+        products = np.zeros((_LAGS + 1, len(self.count)))
+        for part, left in zip(self.data, residual, strict=True):
+            if part.before:
+                continue
+            rows = np.where(part.told, left, 0.0)
+            for lag in range(min(_LAGS + 1, len(rows))):
+                products[lag] += np.sum(rows[lag:] * rows[: len(rows) - lag], axis=0)
+        correlation = products[1:] / np.maximum(products[0], 1e-300)
+        return np.asarray(1.0 + 2.0 * np.sum(correlation**2, axis=0))
+
+    def least_squares(self, settings: DiagnosisSettings) -> FloatArray:
+        """Return the squares over the unit that a cause takes of a joint if it matters, (n,)."""
+        share = settings.thresholds.misfit_share
+        wanted = (settings.material * self.torque_rms) ** 2
+        total = np.zeros_like(self.count)
+        for part, sigma, noise in zip(self.data, self.sigma, self.noise, strict=True):
+            if part.before:
+                continue
+            misfit = share * np.maximum(sigma**2 - noise**2, 0.0)
+            total += part.told.sum(axis=0) * np.maximum(wanted, misfit) / sigma**2
+        return np.maximum(total, 1e-12)
+
+
+def trajectories(
+    recordings: Sequence[Recording], used: Conditioning, arm: ArmModel | None = None
+) -> list[Trajectory]:
+    """
+    Cut recordings into unbroken stretches, conditioned alike.
+
+    Where another machine was recorded beside the arm, what noise of the angles does to it is
+    measured as well.
+
+    Raises
+    ------
+    IdentificationError
+        If a recording has no stretch that is long enough.
+
+    """
+    result = []
+    for fold, recording in enumerate(recordings):
+        found = [_trajectory(recording.source, fold, m, used) for m in segments(recording, used)]
+        if not found:
+            raise IdentificationError(
+                f'{recording.source}: no stretch is long enough to be filtered at '
+                f'{used.cutoff_hz:g} Hz'
+            )
+        if recording.beside is not None and arm is not None:
+            sensors = SensorNoise(arm.robot, recording, used)
+            found = [replace(part, sensors=sensors) for part in found]
+        result += found
+    return result
+
+
+def _trajectory(source: str, fold: int, motion: Motion, used: Conditioning) -> Trajectory:
+    thin = max(1, used.decimation // _OVERSAMPLING)
+    while used.decimation % thin:
+        thin -= 1
+    if thin > 1:
+        first = replace(used, decimation=thin)
+        assert motion.tau is not None
+        kept = np.array(decimated_samples(len(motion), first), dtype=np.intp)
+        motion = motion.select(kept).with_torque(decimate(motion.tau, first))
+        used = Conditioning(used.rate_hz / thin, used.cutoff_hz, used.decimation // thin)
+    rows = np.array(decimated_samples(len(motion), used), dtype=np.intp)
+    told = ~(_at_rest(motion) | _turning(motion, used))[rows]
+    return Trajectory(source, fold, motion, used, rows, told)
+
+
+def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
+    """Return where joints stand still, shape (N, n)."""
+    rest = np.zeros(motion.q.shape, dtype=bool)
+    shortest = _REST_TIME / float(motion.t[1] - motion.t[0])
+    for joint in range(motion.n_joints):
+        speed = np.abs(motion.dq[:, joint])
+        slow = np.concatenate([[False], speed <= _REST_SPEED * speed.max(), [False]])
+        edges = np.flatnonzero(np.diff(slow.astype(int))).reshape(-1, 2)
+        for start, stop in edges[np.diff(edges, axis=1)[:, 0] >= shortest]:
+            rest[start:stop, joint] = True
+    return rest
+
+
+def _turning(motion: Motion, used: Conditioning) -> npt.NDArray[np.bool_]:
+    """Return where joints are too slow for the sign of their velocity, rows around included."""
+    slow = np.abs(motion.dq) < _REVERSAL_SPEED * np.abs(motion.dq).max(axis=0)
+    slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
+    reach = _REVERSAL_ROWS * used.decimation
+    wide = np.cumsum(np.pad(slow, ((reach + 1, reach), (0, 0))), axis=0)
+    return np.asarray(wide[2 * reach + 1 :] - wide[: -2 * reach - 1] > 0)

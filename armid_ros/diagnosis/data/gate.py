@@ -1,0 +1,156 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Data first: time base, units, signs, order of joints, delay and clipped readings.
+
+A fault of the data explains any gap and no physics should be blamed for it. Every test compares
+torques with those of the model, joint by joint, with friction and offset taken out.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+import numpy as np
+
+#: A torque follows the model of its own joint when this much of it is the model's ...
+_FOLLOWS = 0.9
+#: Two joints are exchanged when each one's torque is this near to the other's model, and less than
+#: half as far from it as from its own.
+_ALIKE = 0.6
+_UNITS = (
+    (57.2958, 'a gain of 57.3: degrees against radians'),
+    (1000.0, 'N mm instead of N m'),
+    (0.001, 'kN m instead of N m'),
+)
+#: Share of samples at the very extreme of a reading, above which it is clipped.
+_CLIPPED = 0.02
+#: Share of steps in time that differ from the median by more than half of it.
+_UNEVEN = 0.05
+
+
+@dataclass(frozen=True)
+class Gate:
+    """
+    What the data are like before any physics.
+
+    Attributes
+    ----------
+    faults : tuple of str
+        What makes a diagnosis meaningless, in words, with the remedy.
+    notes : tuple of str
+        What a reader should know.
+    slopes : ndarray, shape (n, n)
+        Measured torque of each joint (row) on the model's of each (column).
+    correlation : ndarray, shape (n, n)
+        The correlations that go with them.
+
+    """
+
+    faults: tuple[str, ...]
+    notes: tuple[str, ...]
+    slopes: FloatArray
+    correlation: FloatArray
+
+
+def check_data(arm: ArmModel, recordings: Sequence[Recording], data: Sequence[Trajectory]) -> Gate:
+    """Look for faults of the data."""
+    slopes, correlation = _compare(arm, data)
+    faults = [*_time_base(recordings), *_torques(arm, slopes, correlation)]
+    return Gate(tuple(faults), tuple(_clipped(recordings)), slopes, correlation)
+
+
+def _time_base(recordings: Sequence[Recording]) -> list[str]:
+    faults = []
+    for recording in recordings:
+        steps = np.diff(recording.t)
+        median = float(np.median(steps))
+        uneven = float(np.mean(np.abs(steps - median) > 0.5 * median))
+        if uneven > _UNEVEN:
+            faults.append(
+                f'{recording.source or "recording"}: {100 * uneven:.0f} % of the time stamps are '
+                'uneven by more than half a period; record with the stamps of the driver'
+            )
+    return faults
+
+
+def _torques(arm: ArmModel, slopes: FloatArray, correlation: FloatArray) -> list[str]:
+    joints = arm.robot.joints
+    faults = []
+    own = np.diag(correlation)
+    error = _unlike(slopes, correlation)
+    for j, joint in enumerate(joints):
+        best = int(np.argmin(error[j]))
+        pair = error[j, best], error[best, j]
+        nearer = pair[0] < error[j, j] / 2 and pair[1] < error[best, best] / 2
+        if best != j and max(pair) < _ALIKE and nearer:
+            faults.append(
+                f'the torque of {joint} follows what the model has for {joints[best]}: are the '
+                'joints in the right order?'
+            )
+        elif own[j] < -_FOLLOWS:
+            faults.append(
+                f'the torque of {joint} has the opposite sign of what the model takes; effort has '
+                'to be positive along the URDF joint axis: negate it'
+            )
+        elif own[j] > _FOLLOWS:
+            for factor, unit in _UNITS:
+                if factor / 1.5 < slopes[j, j] < factor * 1.5:
+                    faults.append(
+                        f'the torque of {joint} is {slopes[j, j]:.3g} times what the model '
+                        f'takes, {unit}: convert it'
+                    )
+    return faults
+
+
+def _unlike(slopes: FloatArray, correlation: FloatArray) -> FloatArray:
+    """Return |tau_i - model_j| / |tau_i| of all joints, shape (n, n); 1 for no likeness."""
+    safe = np.where(slopes == 0.0, np.inf, slopes)
+    square = 1.0 - 2.0 * correlation**2 / safe + (correlation / safe) ** 2
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+
+
+def _clipped(recordings: Sequence[Recording]) -> list[str]:
+    notes = []
+    for recording in recordings:
+        if recording.tau is None:
+            continue
+        for j, joint in enumerate(recording.joints):
+            reading = recording.tau[:, j]
+            top = np.abs(reading).max()
+            share = float(np.mean(np.abs(reading) >= top * (1.0 - 1e-9)))
+            if top > 0.0 and share > _CLIPPED and len(np.unique(reading)) > 10:
+                notes.append(
+                    f'{recording.source or "recording"}: {100 * share:.0f} % of the torque of '
+                    f'{joint} is at {top:.4g}, its highest value: a limit'
+                )
+    return notes
+
+
+def _compare(arm: ArmModel, data: Sequence[Trajectory]) -> tuple[FloatArray, FloatArray]:
+    """Regress torques on the model's, with constant, velocity and its sign taken out."""
+    n = arm.robot.n_joints
+    slopes, correlation = np.zeros((2, n, n))
+    bare = ArmModel(arm.robot, quasi_static=arm.quasi_static)
+    measured = np.concatenate([part.residual(bare) for part in data])
+    load = np.concatenate([part.reduce(bare.torque(part.motion)) for part in data])
+    measured = measured + load
+    dq = np.concatenate([part.motion.dq[part.rows] for part in data])
+    for i in range(n):
+        nuisance = np.column_stack([np.ones(len(dq)), dq[:, i], np.sign(dq[:, i])])
+        both = np.column_stack([load, measured[:, i]])
+        rest = both - nuisance @ np.linalg.lstsq(nuisance, both, rcond=None)[0]
+        target = rest[:, n]
+        for j in range(n):
+            size = float(rest[:, j] @ rest[:, j])
+            product = float(rest[:, j] @ target)
+            norm = np.sqrt(size * float(target @ target))
+            if norm > 0.0:
+                slopes[i, j], correlation[i, j] = product / size, product / norm
+    return slopes, correlation

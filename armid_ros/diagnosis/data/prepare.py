@@ -1,0 +1,113 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From recordings to rows and their noise: how wide a band a diagnosis looks at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import trajectories, Trajectory
+from armid_ros.diagnosis.data.floor import Floor, noise_floor
+from armid_ros.diagnosis.search.fit import excited, fit
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.identification.interaction_recording import band_of_motion
+from armid_ros.identification.signals import Conditioning, conditioning, MODEL_BANDS
+from armid_ros.model import BaseParameters
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+import numpy as np
+
+#: A diagnosis keeps six times the band of the motion where an identification keeps ten: what is
+#: beyond is mostly noise, which a gap has to stand out of.
+_BANDS = 6.0
+#: Where noise of positions makes the upper third of that this many times as noisy as the lower
+#: one, in any joint, the upper third is cut off: there is less in it than it hides.
+_GROWTH = 4.0
+#: Wider rows hide more of the motion beside reversals: at least this share of it has to stay.
+_MOVING = 0.7
+#: Beside a partner, noise of angles is all there is: the pass band is so much wider than where the
+#: motion sinks into it, or a fit takes inertia away to get rid of the noise of accelerations.
+_NARROW = 1.25
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """
+    What is looked at.
+
+    Attributes
+    ----------
+    used : Conditioning
+        Filters.
+    data : tuple of Trajectory
+        Stretches of the recordings in rows.
+    base : BaseParameters
+        What the motion excites of the arm.
+    floors : tuple of Floor
+        Noise of each trajectory beside the arm that is fitted to it.
+    as_told : tuple of ndarray, shape (n,)
+        Noise beside the arm as it is described [N m].
+
+    """
+
+    used: Conditioning
+    data: tuple[Trajectory, ...]
+    base: BaseParameters
+    floors: tuple[Floor, ...]
+    as_told: tuple[FloatArray, ...]
+
+    @property
+    def sigma(self) -> list[FloatArray]:
+        """Noise of each trajectory, shape (n,) [N m]."""
+        return [floor.sigma for floor in self.floors]
+
+
+def choose_filters(recordings: Sequence[Recording], settings: DiagnosisSettings) -> Conditioning:
+    """Return the filters of an identification, narrowed to what a diagnosis needs."""
+    used = conditioning(list(recordings), settings.signals)
+    if settings.partner is not None:
+        return band_of_motion(recordings, used, settings.signals, _NARROW)
+    if settings.signals.decimation is not None:
+        return used
+    band = used.rate_hz / (2.5 * MODEL_BANDS * used.decimation)
+    return replace(used, decimation=max(1, int(used.rate_hz / (2.5 * _BANDS * band))))
+
+
+def prepare(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    data: Sequence[Trajectory],
+    settings: DiagnosisSettings,
+    rng: np.random.Generator,
+) -> Prepared:
+    """Measure the noise of data, and once more without the upper third of the band if it is it."""
+    whole = arm.base_parameters(rng)
+    prepared = _measured(arm, used, data, whole)
+    growth = [floor.growth for floor in prepared.floors if floor.period is not None]
+    free = settings.partner is None and settings.signals.decimation is None
+    if not (free and growth and np.max(np.mean(growth, axis=0)) > _GROWTH):
+        return prepared
+    narrower = replace(used, decimation=round(1.5 * used.decimation + 0.1))
+    fewer = trajectories(recordings, narrower)
+    if np.any(_told(fewer) < _MOVING * _told(data)):
+        return prepared
+    return _measured(arm, narrower, fewer, whole)
+
+
+def _told(data: Sequence[Trajectory]) -> FloatArray:
+    """Return in what share of the rows each joint moves, shape (n,)."""
+    return np.asarray(np.concatenate([part.told for part in data]).mean(axis=0))
+
+
+def _measured(
+    arm: ArmModel, used: Conditioning, data: Sequence[Trajectory], whole: BaseParameters
+) -> Prepared:
+    base, _ = excited(arm, whole, data)
+    told = [noise_floor(part, arm) for part in data]
+    refit = fit(arm, (), data, [floor.sigma for floor in told], base)
+    floors = tuple(noise_floor(part, refit.arm) for part in data)
+    as_told = tuple((a if a.period else b).sigma for a, b in zip(told, floors, strict=True))
+    return Prepared(used, tuple(data), base, floors, as_told)

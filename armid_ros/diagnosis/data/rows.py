@@ -1,0 +1,171 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The linear problem of a diagnosis: weighted rows, in parts that are held out, in blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+
+#: Recordings fewer than this are cut into parts.
+LEAST_FOLDS = 3
+#: Blocks of each part of the data, of a second or two, which is longer than any correlation of
+#: noise; a block has this many rows at the least.
+BLOCKS, _LEAST_ROWS = 12, 8
+#: Free columns of which others leave less than this share are dependent.
+_DEPENDENT = 1e-7
+
+
+@dataclass(frozen=True)
+class Problem:
+    """
+    Weighted rows of all trajectories.
+
+    Attributes
+    ----------
+    x : ndarray, shape (R, n, P)
+        Columns over noise; zero where a row is not informative.
+    y : ndarray, shape (R, n)
+        Residual of the model over noise.
+    weight : ndarray, shape (R, n)
+        One over the noise, zero where a row is not informative [1/(N m)].
+    block : ndarray of int, shape (R,)
+        Stretch of the data that a row belongs to; longer than any correlation.
+    fold_of_block, half_of_block : ndarray of int, shape (B,)
+        Part of the data that a block belongs to, and half of a part; -1 where nothing is held
+        out, as what was recorded when nothing was wrong.
+
+    """
+
+    x: FloatArray
+    y: FloatArray
+    weight: FloatArray
+    block: npt.NDArray[np.intp]
+    fold_of_block: npt.NDArray[np.intp]
+    half_of_block: npt.NDArray[np.intp]
+
+    @property
+    def used(self) -> npt.NDArray[np.bool_]:
+        """Which entries count, shape (R, n)."""
+        return np.asarray(self.weight > 0.0)
+
+    def losses(self, residual: FloatArray) -> FloatArray:
+        """Return the mean square of a weighted residual of each joint, shape (n,)."""
+        return np.asarray(np.sum(residual**2, axis=0) / np.maximum(self.used.sum(axis=0), 1))
+
+    def with_columns(self, columns: FloatArray) -> Problem:
+        """Return the problem with more columns (R, n, p), not weighted yet, after the others."""
+        more = columns * self.weight[:, :, np.newaxis]
+        return replace(self, x=np.concatenate([self.x, more], axis=2))
+
+
+def make_problem(
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+    residual: Sequence[FloatArray],
+    columns: Sequence[FloatArray],
+) -> Problem:
+    """Stack and weight rows; arguments are per trajectory: (n,), (M, n), (M, n, P)."""
+    weight = row_weights(data, sigma)
+    x = np.concatenate(columns)
+    x *= weight[:, :, np.newaxis]
+    y = np.concatenate(residual) * weight
+    return Problem(x, y, weight, *block_rows(data))
+
+
+def block_rows(
+    data: Sequence[Trajectory],
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Return the block of every row, and the part and half of a part of every block."""
+    fold = fold_rows(data)
+    block = np.empty(len(fold), dtype=np.intp)
+    owner: list[tuple[int, int]] = []
+    for k in np.unique(fold):
+        rows = np.flatnonzero(fold == k)
+        pieces = min(BLOCKS, max(2, len(rows) // _LEAST_ROWS))
+        for piece in np.array_split(rows, pieces):
+            block[piece] = len(owner)
+            half = 2 * k + int(2 * (piece[0] - rows[0]) >= len(rows))
+            owner.append((k, max(half, -1)))
+    fold_of, half_of = np.array(owner, dtype=np.intp).T
+    return block, fold_of, half_of
+
+
+def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
+    """Return one over the noise of all rows, zero where they tell nothing, (R, n) [1/(N m)]."""
+    return np.concatenate([part.told / s for part, s in zip(data, sigma, strict=True)])
+
+
+def weighted_rows(
+    rows: Sequence[FloatArray], data: Sequence[Trajectory], sigma: Sequence[FloatArray]
+) -> Iterator[FloatArray]:
+    """Yield rows (M, n) or (M, n, P) of each trajectory with the weights of `row_weights`."""
+    for own, part, s in zip(rows, data, sigma, strict=True):
+        weight = row_weights([part], [s])
+        yield own * (weight[:, :, np.newaxis] if own.ndim > 2 else weight)
+
+
+def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
+    """Return the part of the data of every row: a recording, or a stretch of one if few."""
+    recordings = len({part.fold for part in data if not part.before})
+    pieces = 1 if recordings >= LEAST_FOLDS else -(-(LEAST_FOLDS + 1) // recordings)
+    rows = []
+    for part in data:
+        if part.before:
+            rows.append(np.full(len(part.rows), -1))
+            continue
+        span = np.linspace(0, pieces, len(part.rows), endpoint=False).astype(np.intp)
+        rows.append(part.fold * pieces + span)
+    whole = np.concatenate(rows)
+    known, index = np.unique(whole, return_inverse=True)
+    return np.asarray(index - int(known[0] < 0), dtype=np.intp)
+
+
+@dataclass(frozen=True)
+class Projection:
+    """
+    What free columns leave of others; they are fitted to all folds together.
+
+    Attributes
+    ----------
+    basis : ndarray, shape (R n, f)
+        Orthonormal basis of the free columns.
+    fit : ndarray, shape (f, f')
+        basis = free columns @ fit.
+    free : tuple of int
+        The columns that are free.
+
+    """
+
+    basis: FloatArray
+    fit: FloatArray
+    free: tuple[int, ...]
+
+    def rest(self, values: FloatArray) -> FloatArray:
+        """Return what is left of weighted rows (R, n) or (R, n, p)."""
+        flat = values.reshape(len(self.basis), -1)
+        return np.asarray((flat - self.basis @ (self.basis.T @ flat)).reshape(values.shape))
+
+    def products(self, columns: FloatArray) -> FloatArray:
+        """Return the products (p, p) of what is left of weighted columns (R n, p)."""
+        made = self.basis.T @ columns
+        return np.asarray(columns.T @ columns - made.T @ made)
+
+
+def project(problem: Problem, free: Sequence[int]) -> Projection:
+    """Find what the free columns can make."""
+    if not len(free):
+        return Projection(np.empty((problem.y.size, 0)), np.empty((0, 0)), ())
+    rows = problem.x[:, :, list(free)].reshape(-1, len(free))
+    scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    own = (rows / scale).T @ (rows / scale)
+    values, vectors = scipy.linalg.eigh(own)
+    good = values > _DEPENDENT * values[-1]
+    fit = vectors[:, good] / np.sqrt(values[good]) / scale[:, np.newaxis]
+    return Projection(rows @ fit, fit, tuple(free))

@@ -1,0 +1,269 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The next run: of many motions that the arm can make, the one that separates names best.
+
+T-optimality (Atkinson and Fedorov 1975): with the named effect in the arm, a motion is worth what
+the rival, with everything that is free fitted to it, cannot explain of its torque, over noise.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from armid_ros.diagnosis.diagnose import Diagnosis
+from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
+from armid_ros.diagnosis.next_run.templates import CLEARANCE, Template, templates
+from armid_ros.effects.tied import Tied
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation import (
+    ClearanceModel,
+    design,
+    DesignSettings,
+    Excitation,
+    FourierTrajectory,
+    Problem,
+)
+from armid_ros.excitation.placing import placed
+from armid_ros.robots import collision_model, CollisionModel
+import numpy as np
+
+#: The file that a run is written to.
+EXPERIMENT_FILE = 'experiment.yaml'
+#: Names are told apart beyond doubt at this many standard deviations: a payload is not asked for
+#: where a motion alone does it.
+_SURE = 5.0
+#: ... and not at all below this many.
+_NOTHING = 1.0
+#: Pairs of names that a sentence has.
+_SAID = 3
+#: Rivals of a provisional name that has none: the next best of its league.
+_RUNNERS_UP = 3
+#: A search for a better motion than the templates: few steps, as each costs as much as a template.
+_STARTS, _CANDIDATES, _ITERATIONS = 1, 4, 25
+
+
+@dataclass(frozen=True)
+class NextRun:
+    """
+    A motion to run next.
+
+    Attributes
+    ----------
+    excitation : Excitation
+        From rest to rest within all limits, clear of the arm itself; two equal periods.
+    template : str
+        What kind of motion it is, in words.
+    load : Load or None
+        What is to be fixed to the last link in a second run of the same motion; None: one run.
+    separations : tuple of Separation
+        How far it tells each pair of names apart.
+
+    """
+
+    excitation: Excitation
+    template: str
+    load: Load | None
+    separations: tuple[Separation, ...]
+
+    @property
+    def expected_z(self) -> float:
+        """Standard deviations between the two names that are nearest to each other."""
+        return min(pair.z for pair in self.separations)
+
+    @property
+    def sentence(self) -> str:
+        """What to do and what it would show, the least sure first, for a person."""
+        told = sorted((s for s in self.separations if s.z >= _NOTHING), key=lambda one: one.z)
+        alike = [one for one in self.separations if one.z < _NOTHING]
+        parts = [
+            f'it should tell {one.name} from {one.rival} by {one.z:.0f} standard deviations'
+            for one in told[:_SAID]
+        ]
+        if len(told) > _SAID:
+            parts.append(f'and {len(told) - _SAID} more pairs of names by more')
+        parts += [
+            f'no motion alone tells {one.name} from {one.rival} (this one by {one.z:.1f} standard '
+            'deviations)'
+            for one in alike
+        ]
+        again = ''
+        if self.load is not None:
+            again = f', then again with {self.load.mass:g} kg fixed to {self.load.frame}'
+        return (
+            f'Run {EXPERIMENT_FILE} ({self.template}, {self.excitation.duration:.0f} s){again}, '
+            f'and diagnose all recordings together: {"; ".join(parts).replace("_", " ")}.'
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return the run as diagnosis.json holds it."""
+        return {
+            'file': EXPERIMENT_FILE,
+            'motion': self.template,
+            'duration': self.excitation.duration,
+            'payload': 0.0 if self.load is None else self.load.mass,
+            'separates': [
+                {'name': one.name, 'rival': one.rival, 'expected_z': one.z}
+                for one in self.separations
+            ],
+            'expected_z': self.expected_z,
+        }
+
+
+def next_run(
+    diagnosis: Diagnosis,
+    rng: np.random.Generator,
+    *,
+    collision: CollisionModel | None = None,
+) -> NextRun | None:
+    """
+    Choose a motion that tells a doubtful name from its rivals.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What was found.
+    rng : numpy.random.Generator
+        Draws the motions.
+    collision : CollisionModel, optional
+        Bodies to keep apart; those of the description by default.
+
+    Returns
+    -------
+    NextRun or None
+        None if no name is in doubt, or the arm is tied to a machine whose motion nobody plans.
+
+    Raises
+    ------
+    TrajectoryError
+        If the arm cannot make any of the motions; says what stands in the way.
+
+    """
+    doubts = _doubts(diagnosis)
+    arm = diagnosis.arm
+    if not doubts or any(isinstance(effect, Tied) for effect in arm.effects):
+        return None
+    clearance = ClearanceModel.of(collision or collision_model(arm.robot))
+    joints = dict.fromkeys(joint for doubt in doubts for joint in doubt.joints)
+    whole_arm = any(not doubt.joints for doubt in doubts)
+    runs: list[_Run] = []
+    refused: list[str] = []
+    for template in templates(() if whole_arm else tuple(joints)):
+        try:
+            trajectory = template.draw(arm, clearance, rng)
+        except TrajectoryError as error:
+            refused.append(str(error))
+            continue
+        runs.append(_run(diagnosis, doubts, template, trajectory))
+    plain = [run for run in runs if not run.template.loaded]
+    if plain:
+        best = max(plain, key=lambda run: run.worth)
+        runs += _designed(diagnosis, doubts, best, collision, rng)
+    for run in _in_order(runs):
+        settings = _settings(run.template)
+        problem = Problem.of(arm, settings, rng)
+        try:
+            excitation = placed(problem, run.trajectory, clearance)
+        except TrajectoryError as error:
+            refused.append(str(error))
+            continue
+        return NextRun(excitation, run.template.name, run.load, run.separations)
+    raise TrajectoryError(f'no motion for the next run: {refused[-1]}')
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A motion and what it would show."""
+
+    template: Template
+    trajectory: FourierTrajectory
+    load: Load | None
+    separations: tuple[Separation, ...]
+
+    @property
+    def worth(self) -> float:
+        """All pairs count, and one that no motion separates does not decide."""
+        return float(sum(np.log1p(pair.power) for pair in self.separations))
+
+
+def _in_order(runs: Sequence[_Run]) -> list[_Run]:
+    """Return runs, best first; with a payload only where that tells apart what no motion does."""
+    most = np.max([[pair.z for pair in run.separations] for run in runs], axis=0, initial=0.0)
+    wanted = np.where(most < _NOTHING, 0.0, np.minimum(most, _SURE))
+    plain = [run for run in runs if not run.template.loaded]
+    enough = any(all(p.z >= z for p, z in zip(r.separations, wanted, strict=True)) for r in plain)
+    return sorted(runs, key=lambda run: (enough and run.template.loaded, -run.worth))
+
+
+def _run(
+    diagnosis: Diagnosis,
+    doubts: Sequence[Doubt],
+    template: Template,
+    trajectory: FourierTrajectory,
+) -> _Run:
+    load = Load.along(diagnosis.arm, trajectory) if template.loaded else None
+    pairs = tuple(Separation.of(diagnosis, doubt, trajectory, load) for doubt in doubts)
+    return _Run(template, trajectory, load, pairs)
+
+
+def _doubts(diagnosis: Diagnosis) -> tuple[Doubt, ...]:
+    """Return the names that may be others: with rivals, or provisional."""
+    explanation = diagnosis.explanation
+    if explanation is None:
+        return ()
+    pairs = zip(explanation.fitted.named, explanation.steps, strict=True)
+    found = {own.effect.name for own in explanation.fitted.named}
+    doubts: dict[tuple[str, str], Doubt] = {}
+    for named, step in pairs:
+        others = [t.group.effect for t in step.rivals]
+        if not others and diagnosis.verdict == 'partial':
+            others = [t.group.effect for t in step.ranking if t.gain > 0.0]
+            others = [effect for effect in others if effect.name not in found][:_RUNNERS_UP]
+        for other in others:
+            if other.name in found:
+                continue
+            doubt = Doubt(named, other)
+            doubts.setdefault((doubt.named.effect.name, doubt.rival.name), doubt)
+    return tuple(doubts.values())
+
+
+def _designed(
+    diagnosis: Diagnosis,
+    doubts: Sequence[Doubt],
+    best: _Run,
+    collision: CollisionModel | None,
+    rng: np.random.Generator,
+) -> list[_Run]:
+    """Return a motion like the best template, made for the nearest of the pairs that it tells."""
+    told = [k for k, pair in enumerate(best.separations) if pair.z >= _NOTHING]
+    if not told:
+        return []
+    nearest = min(told, key=lambda k: best.separations[k].power)
+    arm, rival = doubts[nearest].models(diagnosis)
+    settings = _settings(best.template, 'T', 'all' if diagnosis.refitted else 'effects')
+    bodies = collision or collision_model(arm.robot)
+    try:
+        found = design(arm, settings, rng, collision=bodies, rival=rival)
+    except TrajectoryError:
+        return []
+    made = replace(best.template, name='designed motion of all joints')
+    return [_run(diagnosis, doubts, made, found.excitation.trajectory)]
+
+
+def _settings(template: Template, criterion: str = 'D', target: str = 'all') -> DesignSettings:
+    return DesignSettings(
+        period=template.period,
+        harmonics=template.harmonics,
+        speed=template.speed,
+        clearance=CLEARANCE,
+        criterion=criterion,
+        target=target,
+        samples=max(100, 10 * template.harmonics),
+        starts=_STARTS,
+        candidates=_CANDIDATES,
+        iterations=_ITERATIONS,
+        processes=1,
+    )

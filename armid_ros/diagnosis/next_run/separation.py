@@ -1,0 +1,250 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+How far a motion tells two names apart.
+
+    D_T = min over the rival's values of |f_A - f_B|^2 / sigma^2
+
+with f_A the torque of the arm as it was patched and f_B that of the rival, all that is free being
+fitted with it. The square root is the number of standard deviations between the two.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.diagnose import Diagnosis
+from armid_ros.diagnosis.search.patch import Named
+from armid_ros.effects import Effect
+from armid_ros.errors import ModelError
+from armid_ros.excitation import FourierTrajectory
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+import pinocchio as pin
+
+#: Samples per second at which a motion is looked at [Hz]; its noise is that of the rows.
+_RATE = 50.0
+#: Periods that are recorded.
+_PERIODS = 2
+#: A joint slower than this share of its top speed tells nothing: its dry friction is undetermined.
+_SLOW = 0.02
+#: Shapes of a rival that are tried.
+_MOST_SHAPES = 12
+#: Share of the torque that a joint can give, or gives, that a known payload takes.
+_LOAD = 0.15
+#: A frame nearer than this to the last joint is at it [m].
+_NEAR = 0.01
+#: Directions of columns shorter than this share of the longest are made of others.
+_DEPENDENT = 1e-7
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """
+    A name and one that is possible in its place.
+
+    Attributes
+    ----------
+    named : Named
+        What was named, as it was fitted.
+    rival : Effect
+        The other one.
+
+    """
+
+    named: Named
+    rival: Effect
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints that either acts on; none if one of them acts on the whole arm."""
+        if not self.named.effect.joints or not self.rival.joints:
+            return ()
+        return tuple(dict.fromkeys((*self.named.effect.joints, *self.rival.joints)))
+
+    def models(self, diagnosis: Diagnosis) -> tuple[ArmModel, ArmModel]:
+        """Return the patched arm, and the same with the rival in place of the name."""
+        arm, own = diagnosis.arm, self.named.effect
+        kept = [k for k, effect in enumerate(arm.effects) if effect != own]
+        effects = tuple(arm.effects[k] for k in kept)
+        values = tuple(arm.values[k] for k in kept)
+        without = replace(arm, effects=effects, values=values)
+        return arm, without.with_effect(self.rival)
+
+
+@dataclass(frozen=True)
+class Separation:
+    """
+    How far a motion tells a name from a rival.
+
+    Attributes
+    ----------
+    name, rival : str
+        The two.
+    power : float
+        D_T of the run.
+
+    """
+
+    name: str
+    rival: str
+    power: float
+
+    @property
+    def z(self) -> float:
+        """Standard deviations between the two."""
+        return float(np.sqrt(self.power))
+
+    @staticmethod
+    def of(
+        diagnosis: Diagnosis, doubt: Doubt, trajectory: FourierTrajectory, load: Load | None = None
+    ) -> Separation:
+        """
+        Predict what a run separates.
+
+        Parameters
+        ----------
+        diagnosis : Diagnosis
+            Gives the arm, what is free of it, and the noise.
+        doubt : Doubt
+            The two names.
+        trajectory : FourierTrajectory
+            The motion; two periods of it are recorded.
+        load : Load, optional
+            What the arm carries in a second run.
+
+        """
+        motion = trajectory.motion(np.arange(_PERIODS * trajectory.period * _RATE) / _RATE)
+        arms = [diagnosis.arm]
+        if load is not None:
+            arms.append(load.on(diagnosis.arm))
+        weight = _weight(diagnosis, motion)
+        named = doubt.named.effect
+        target = _stack([a.columns_of(named, motion) for a in arms], weight)
+        target = target @ diagnosis.arm.values_of(named)
+        free = _stack([_free(diagnosis, a, named, motion) for a in arms], weight)
+        basis = _basis(free)
+        rest = target - basis @ (basis.T @ target)
+        powers = []
+        for rival in _shapes(doubt.rival, motion, diagnosis.arm):
+            columns = _stack([a.columns_of(rival, motion) for a in arms], weight)
+            left = columns - basis @ (basis.T @ columns)
+            scale = np.linalg.norm(columns, axis=0)
+            visible = np.linalg.norm(left, axis=0) > 1e-6 * np.maximum(scale, 1e-300)
+            own = _basis(left[:, visible])
+            powers.append(float(np.sum((rest - own @ (own.T @ rest)) ** 2)))
+        return Separation(named.name, doubt.rival.name, min(powers))
+
+
+@dataclass(frozen=True)
+class Load:
+    """
+    A known mass, for a second run of the same motion.
+
+    Attributes
+    ----------
+    mass : float
+        [kg].
+    frame : str
+        Frame of the last link that it is fixed to, the one farthest out.
+
+    """
+
+    mass: float
+    frame: str
+
+    @staticmethod
+    def along(arm: ArmModel, trajectory: FourierTrajectory) -> Load:
+        """Return a load that takes a fair share of the torque of some joint along a motion."""
+        motion = trajectory.one_period(int(trajectory.period * _RATE))
+        frame = _tip(arm.robot)
+        unit = np.abs(arm.rigid_columns(motion)[:, :, -10:] @ _point(arm.robot, frame)).max(axis=0)
+        able = np.minimum(arm.robot.torque_limit, 2.0 * np.abs(arm.joint_torque(motion)).max(0))
+        felt = unit > 1e-3 * unit.max()
+        mass = float(np.min(_LOAD * able[felt] / unit[felt]))
+        digit = 10.0 ** np.floor(np.log10(max(mass, 1e-3)))
+        return Load(float(np.floor(mass / digit) * digit), frame)
+
+    def on(self, arm: ArmModel) -> ArmModel:
+        """Return the arm with the load."""
+        parameters = arm.robot.rigid_parameters.copy()
+        parameters[-10:] += self.mass * _point(arm.robot, self.frame)
+        return replace(arm, robot=arm.robot.with_inertias(parameters))
+
+
+def _tip(robot: Robot) -> str:
+    """Return the frame of the last link that is farthest from its joint."""
+    frames = [f for f in robot.model.frames if f.parentJoint == robot.model.njoints - 1]
+    return str(max(frames, key=lambda f: float(np.linalg.norm(f.placement.translation))).name)
+
+
+def _point(robot: Robot, frame: str) -> FloatArray:
+    """Return the ten parameters of 1 kg at a frame; at the link's middle if that is the joint."""
+    place = robot.model.frames[robot.model.getFrameId(frame)].placement.translation
+    if np.linalg.norm(place) < _NEAR:
+        place = robot.model.inertias[robot.model.njoints - 1].lever
+    body = pin.Inertia(1.0, place, np.zeros((3, 3)))
+    return np.array(body.toDynamicParameters())
+
+
+def _weight(diagnosis: Diagnosis, motion: Motion) -> FloatArray:
+    """
+    Return the square root of the rows that a sample stands for over their noise, shape (N, n).
+
+    Noise that is white over the rows has their rate in it: more samples tell no more.
+
+    """
+    used = diagnosis.data[0].used
+    rows = used.rate_hz / used.decimation / _RATE
+    sigma = np.sqrt(np.mean([floor.sigma**2 for floor in diagnosis.floors], axis=0))
+    moving = np.abs(motion.dq) > _SLOW * np.abs(motion.dq).max(axis=0)
+    return np.asarray(np.where(moving, np.sqrt(rows) / sigma, 0.0))
+
+
+def _stack(columns: list[FloatArray], weight: FloatArray) -> FloatArray:
+    """Return columns of one run or two (N, n, p) over noise, shape (rows, p)."""
+    blocks = [block * weight[:, :, np.newaxis] for block in columns]
+    return np.concatenate(
+        [block.reshape(block.shape[0] * block.shape[1], block.shape[2]) for block in blocks]
+    )
+
+
+def _free(diagnosis: Diagnosis, arm: ArmModel, named: Effect, motion: Motion) -> FloatArray:
+    """Return the columns of all that is fitted whichever name is right, shape (N, n, f)."""
+    assert diagnosis.explanation is not None
+    found = [own.effect for own in diagnosis.explanation.fitted.named]
+    effects = arm.effects if diagnosis.refitted else found
+    blocks = [arm.columns_of(effect, motion) for effect in effects if effect != named]
+    if diagnosis.refitted:
+        blocks.append(arm.rigid_columns(motion))
+    return np.concatenate([np.empty((*motion.q.shape, 0)), *blocks], axis=2)
+
+
+def _basis(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of columns (R, p), each of the same worth."""
+    length = np.linalg.norm(columns, axis=0)
+    columns = columns[:, length > 0.0] / length[length > 0.0]
+    if not columns.shape[1]:
+        return columns
+    left, size, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(left[:, size > _DEPENDENT * size[0]])
+
+
+def _shapes(rival: Effect, motion: Motion, arm: ArmModel) -> Iterator[Effect]:
+    """Yield the rival with the shape it was found with and others it might have."""
+    yield rival
+    if not rival.shapes:
+        return
+    grids = rival.shape_grids(motion, arm)
+    chosen = list(product(*(range(grid.shape[1]) for grid in grids)))[:_MOST_SHAPES]
+    for index in chosen:
+        values = np.column_stack([grid[:, k] for grid, k in zip(grids, index, strict=True)])
+        try:
+            yield rival.with_shape(values)
+        except ModelError:
+            continue

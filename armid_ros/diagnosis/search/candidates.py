@@ -1,0 +1,174 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The groups that may be named: every effect of the catalogue, per joint, pair or whole arm.
+
+A group is an effect on its joints with one shape; an effect with shape parameters is a family of
+groups on a grid, of which the best is refined later. The columns of all joints are computed at
+once and shared out.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.search.fit import Fitted
+from armid_ros.diagnosis.search.memoized_arm import memoized_arm
+from armid_ros.diagnosis.search.shapes import shape_starts
+from armid_ros.effects import Effect, Kind
+from armid_ros.effects.gravity import with_exact_vector
+from armid_ros.errors import ModelError
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
+import numpy as np
+
+#: Most combinations of shape values that a search starts from.
+_MOST_SHAPES = 12
+
+
+@dataclass(frozen=True)
+class Group:
+    """
+    An effect on certain joints, with a shape, and where its columns are.
+
+    Attributes
+    ----------
+    effect : Effect
+        Joints and shape included.
+    columns : slice
+        Its columns among those of all groups.
+    kept : tuple of int
+        Parameters of the effect that the columns belong to; the others are zero.
+    precision : ndarray, shape (p,)
+        How strongly their values are held to what may be expected of them.
+
+    """
+
+    effect: Effect
+    columns: slice
+    kept: tuple[int, ...]
+    precision: FloatArray
+
+    @classmethod
+    def of(cls, effect: Effect, columns: slice, kept: tuple[int, ...], robot: Robot) -> Group:
+        """Make a group that is held to what may be expected of the effect on a robot."""
+        return cls(effect, columns, kept, effect.spread(robot)[list(kept)] ** -2.0)
+
+    @property
+    def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
+        """Name, joints and quantities: groups of one key differ in their shape."""
+        return self.effect.name, self.effect.joints, self.kept
+
+    @property
+    def size(self) -> int:
+        """Number of its columns."""
+        return int(self.columns.stop) - int(self.columns.start)
+
+
+def group_effects(robot: Robot, kinds: Sequence[Kind]) -> Iterator[tuple[Effect, list[Effect]]]:
+    """Yield effects whose columns are computed together, with the groups they belong to."""
+    for kind in with_exact_vector(kinds):
+        try:
+            places = kind.places(robot)
+        except ModelError:
+            continue
+        single = tuple(place[0] for place in places if len(place) == 1)
+        for place in places:
+            if len(place) != 1:
+                effect = kind.on(robot, place)
+                yield effect, [effect]
+        if single:
+            yield kind.on(robot, single), [kind.on(robot, (joint,)) for joint in single]
+
+
+def shaped(
+    effect: Effect,
+    members: list[Effect],
+    fitted: Fitted,
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+) -> Iterator[tuple[Effect, list[Effect]]]:
+    """Yield an effect and its groups with every shape that a search starts from."""
+    if not effect.shapes:
+        yield effect, members
+        return
+    grids = shape_starts(effect, fitted, data, sigma)
+    counts = [grid.shape[1] for grid in grids]
+    together = len(set(counts)) == 1 and int(np.prod(counts)) > _MOST_SHAPES
+    chosen = (
+        [(k,) * len(counts) for k in range(counts[0])]
+        if together
+        else list(product(*(range(count) for count in counts)))
+    )
+    for index in chosen:
+        values = np.column_stack([grid[:, k] for grid, k in zip(grids, index, strict=True)])
+        lower = np.array([s.lower for s in effect.shapes])
+        upper = np.array([s.upper for s in effect.shapes])
+        values = np.clip(values, lower, upper)
+        rows = values if len(members) > 1 else [values.ravel()]
+        whole = effect.with_shape(values)
+        yield whole, [m.with_shape(row) for m, row in zip(members, rows, strict=True)]
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """
+    All groups with their columns in rows.
+
+    Attributes
+    ----------
+    groups : tuple of Group
+        What may be named.
+    columns : tuple of ndarray, each (M, n, C)
+        Columns of all groups, per trajectory, filtered and decimated.
+
+    """
+
+    groups: tuple[Group, ...]
+    columns: tuple[FloatArray, ...]
+
+
+def candidates(
+    fitted: Fitted,
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+    kinds: Sequence[Kind],
+) -> Candidates:
+    """Compute the columns of every effect that was not named yet."""
+    fitted = replace(fitted, arm=memoized_arm(fitted.arm))
+    arm = fitted.arm
+    taken = {(own.effect.name, own.effect.joints) for own in fitted.named}
+    groups: list[Group] = []
+    blocks: list[list[FloatArray]] = [[] for _ in data]
+    start = 0
+    for effect, members in group_effects(arm.robot, kinds):
+        for whole, singles in shaped(effect, members, fitted, data, sigma):
+            for block, part in zip(blocks, data, strict=True):
+                block.append(effect_rows(arm, whole, part))
+            for single in singles:
+                size = len(single.parameters(arm.robot))
+                if (single.name, single.joints) not in taken:
+                    for kept in single.separate or (tuple(range(size)),):
+                        span = slice(start + kept[0], start + kept[-1] + 1)
+                        groups.append(Group.of(single, span, kept, arm.robot))
+                start += size
+    return Candidates(tuple(groups), tuple(np.concatenate(block, axis=2) for block in blocks))
+
+
+def effect_rows(arm: ArmModel, effect: Effect, part: Trajectory) -> FloatArray:
+    """Return the columns of an effect in the rows of a trajectory, shape (M, n, P), as it acts."""
+    if part.before:
+        return np.zeros((len(part.rows), arm.robot.n_joints, len(effect.parameters(arm.robot))))
+    return sensitivity_rows(arm, effect, part)
+
+
+def sensitivity_rows(arm: ArmModel, effect: Effect, part: Trajectory) -> FloatArray:
+    """Return the same, whether it acts in that trajectory or not."""
+    if effect.smooth:
+        return arm.columns_of(effect, part.at_rows)
+    return part.reduce(arm.columns_of(effect, part.motion))

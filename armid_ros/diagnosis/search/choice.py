@@ -1,0 +1,167 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which explanation is given: of the model as given, or of a body that is fitted anew.
+
+A fit of the whole body has fifty values, and explains a little more of anything. It is the rival
+of last resort: a few causes in the model as given go before it where they explain as much, and
+where there are recordings from before, no cause is named that a body common to both days explains.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.prepare import Prepared
+from armid_ros.diagnosis.search.explain import explain, Explanation, View
+from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.held_out import held_out
+from armid_ros.diagnosis.search.question import as_given, fitted_anew
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.motion import FloatArray
+import numpy as np
+
+Progress = Callable[[float, str], None]
+
+NOISE, ESTIMATED = 'noise', 'an estimate of the misfit that such a model has'
+OWN_MISFIT = 'the misfit that the model had before'
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """
+    The explanation that is given.
+
+    Attributes
+    ----------
+    explanation : Explanation
+        The explanation.
+    misfit : ndarray, shape (n,)
+        Misfit that the gap is measured beside; zero where noise is all [N m].
+    floor_in_words : str
+        What the floor of the gap is.
+    notes : tuple of str
+        What a reader should know.
+
+    """
+
+    explanation: Explanation
+    misfit: FloatArray
+    floor_in_words: str
+    notes: tuple[str, ...] = ()
+
+
+def explained(
+    arm: ArmModel,
+    prepared: Prepared,
+    baseline: Baseline | None,
+    settings: DiagnosisSettings,
+    rng: np.random.Generator,
+    tell: Progress,
+) -> Chosen:
+    """Explain the gap of an arm."""
+    if baseline is not None:
+        return _since(arm, prepared, baseline, settings, rng, tell)
+    few, many = settings.thresholds.few_causes, settings.thresholds.many_causes
+    given = as_given(arm, prepared.data, few)
+    told = Evidence(prepared.data, prepared.as_told, prepared.as_told)
+    tell(0.2, 'the model as given')
+    first = explain(given, told, settings)
+    nothing = np.zeros(arm.robot.n_joints)
+    if _at_floor(first, settings):
+        return Chosen(first, nothing, NOISE)
+    tell(0.4, 'the model fitted anew')
+    noise = Evidence(prepared.data, tuple(prepared.sigma), tuple(prepared.sigma))
+    anew = explain(fitted_anew(arm, prepared.data, many, rng), noise, settings)
+    misfit = _left_by(anew)
+    if _at_floor(anew, settings):
+        misfit, words = nothing, NOISE
+    else:
+        tell(0.7, 'the model as given')
+        sigma = tuple(np.maximum(one, misfit) for one in prepared.as_told)
+        first = explain(given, replace(told, sigma=sigma), settings)
+        words = ESTIMATED
+    if _as_good(first, anew, settings):
+        return Chosen(first, misfit, words)
+    return Chosen(anew, nothing, words)
+
+
+def _since(
+    arm: ArmModel,
+    prepared: Prepared,
+    baseline: Baseline,
+    settings: DiagnosisSettings,
+    rng: np.random.Generator,
+    tell: Progress,
+) -> Chosen:
+    """Explain what has changed since the baseline."""
+    tell(0.2, 'what has changed')
+    noise = prepared.as_told
+    sigma = tuple(np.maximum(one, baseline.misfit) for one in noise)
+    evidence = Evidence(prepared.data, sigma, noise)
+    given = as_given(arm, prepared.data, 2 * settings.thresholds.few_causes)
+    found = explain(given, evidence, settings, baseline=baseline)
+    if not found.steps:
+        return Chosen(found, baseline.misfit, OWN_MISFIT)
+    tell(0.7, 'a body common to both')
+    whole, common = _common_body(arm, evidence, baseline, rng)
+    first = found.steps[0].trial.gains
+    ahead = first - (whole - common)
+    if ahead.sum() > settings.thresholds.tie * whole.sum():
+        return Chosen(found, baseline.misfit, OWN_MISFIT)
+    note = (
+        'a rigid body and friction common to these recordings and the baseline explain as much as '
+        'any cause: the baseline did not determine them for this motion; identify with both'
+    )
+    quiet = found.withdrawn()
+    return Chosen(quiet, _wider(quiet, baseline), OWN_MISFIT, (note,))
+
+
+def _common_body(
+    arm: ArmModel, evidence: Evidence, baseline: Baseline, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Return the held-out squares of the model as given, and of one fitted to both, (B,)."""
+    data = (*evidence.data, *(replace(part, before=True) for part in baseline.data))
+    sigma = (*evidence.sigma, *[baseline.misfit] * len(baseline.data))
+    question = fitted_anew(arm, data, 0, rng)
+    both = fit(arm, (), data, sigma, question.base)
+    problem = View.of(both, Evidence(data, sigma, sigma)).problem
+    free = tuple(range(problem.x.shape[2]))
+    _, common = held_out(problem, free, [], both.hold, both.pull)
+    alone = fit(arm, (), evidence.data, evidence.sigma, None)
+    _, whole = held_out(View.of(alone, evidence).problem, (), [], np.zeros((0, 0)), np.zeros(0))
+    return whole, common
+
+
+def _wider(found: Explanation, baseline: Baseline) -> FloatArray:
+    """Return the misfit of a model that the baseline did not determine for this motion."""
+    return np.asarray(baseline.misfit * np.sqrt(np.maximum(found.losses, 1.0)))
+
+
+def _at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
+    evidence = explanation.evidence
+    limits = evidence.limits(explanation.fitted.residual, settings)
+    return bool(np.all(explanation.losses <= limits))
+
+
+def _left_by(explanation: Explanation) -> FloatArray:
+    """Return the root mean square that an explanation leaves of each joint, (n,) [N m]."""
+    evidence = explanation.evidence
+    squares = np.zeros_like(evidence.count)
+    for part, left in zip(evidence.data, explanation.fitted.residual, strict=True):
+        squares += np.sum(left**2, axis=0, where=part.told)
+    return np.sqrt(squares / np.maximum(evidence.count, 1.0))
+
+
+def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings) -> bool:
+    """Return whether causes in the model as given explain as much as a body fitted anew."""
+    evidence = first.evidence
+    left, fitted = first.fitted.residual, anew.fitted.residual
+    limits = evidence.limits(left, settings)
+    same = settings.thresholds.same_fit * evidence.losses(fitted)
+    return bool(np.all(evidence.losses(left) <= np.maximum(limits, same)))

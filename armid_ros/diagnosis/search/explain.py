@@ -1,0 +1,375 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+One explanation of a gap: causes taken one after the other, in an arm as given or fitted anew.
+
+The cause that takes most of the held-out squares is taken first, and the rest is asked again.
+Friction and offsets that nobody gave values of are fitted beside every cause, and those that
+matter are named in the end.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.rows import make_problem, Problem
+from armid_ros.diagnosis.search.candidates import Candidates, candidates, Group
+from armid_ros.diagnosis.search.fit import fit, Fitted
+from armid_ros.diagnosis.search.held_out import held_out, Trial
+from armid_ros.diagnosis.search.memoized_arm import memoized_arm
+from armid_ros.diagnosis.search.patch import Named
+from armid_ros.diagnosis.search.question import Question
+from armid_ros.diagnosis.search.refine import Workspace
+from armid_ros.diagnosis.search.step import (
+    acceptable,
+    Beside,
+    material,
+    next_step,
+    Round,
+    Step,
+    Survey,
+)
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.model import BaseParameters
+from armid_ros.motion import FloatArray
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """
+    What a search came to.
+
+    Attributes
+    ----------
+    given : ArmModel
+        The arm as given.
+    base : BaseParameters or None
+        What was free of it; None where nothing was.
+    fitted : Fitted
+        The arm with all that was named.
+    reference : Fitted
+        The same without.
+    steps : tuple of Step
+        The names, in the order of those in ``fitted``.
+    survey : Survey or None
+        The first look at all groups.
+    evidence : Evidence
+        The data.
+    minor : tuple of Trial
+        Causes of the last look that are there beyond chance and do not matter.
+
+    """
+
+    given: ArmModel
+    base: BaseParameters | None
+    fitted: Fitted
+    reference: Fitted
+    steps: tuple[Step, ...]
+    survey: Survey | None
+    evidence: Evidence
+    minor: tuple[Trial, ...] = ()
+
+    def without(self, name: int) -> Explanation:
+        """Return the explanation without one of its names, the others fitted anew."""
+        keep = [k for k in range(len(self.steps)) if k != name]
+        fitted = fit(
+            self.given,
+            [self.fitted.named[k] for k in keep],
+            self.evidence.data,
+            self.evidence.sigma,
+            self.base,
+            [self.fitted.values[k] for k in keep],
+        )
+        return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
+
+    def withdrawn(self) -> Explanation:
+        """Return the explanation without any name."""
+        return replace(self, fitted=self.reference, steps=())
+
+    @property
+    def losses(self) -> FloatArray:
+        """Loss of each joint with the patched arm, shape (n,)."""
+        return self.evidence.losses(self.fitted.residual)
+
+    @property
+    def reference_losses(self) -> FloatArray:
+        """Loss of each joint before, shape (n,)."""
+        return self.evidence.losses(self.reference.residual)
+
+
+def explain(
+    question: Question,
+    evidence: Evidence,
+    settings: DiagnosisSettings,
+    start: Sequence[tuple[Named, Step, FloatArray]] = (),
+    baseline: Baseline | None = None,
+) -> Explanation:
+    """Take causes as long as any passes, then name the friction that matters, and prune."""
+    found = _forward(question, evidence, settings, start, baseline)
+    named, steps, values, survey, minor = found
+    kept = _friction(question, named, values, evidence, settings)
+    named = [*named, *(own for own, _, _ in kept)]
+    steps = [*steps, *(step for _, step, _ in kept)]
+    values = [*values, *(value for _, _, value in kept)]
+    reference = fit(question.arm, (), evidence.data, evidence.sigma, question.base)
+    named, steps, fitted = _pruned(question, named, steps, values, evidence, settings)
+    taken = {own.effect.name for own in named}
+    small = tuple(trial for trial in minor if trial.group.effect.name not in taken)
+    return Explanation(
+        question.arm, question.base, fitted, reference, tuple(steps), survey, evidence, small
+    )
+
+
+_Found = tuple[list[Named], list[Step], list[FloatArray], Survey | None, tuple[Trial, ...]]
+
+
+def _forward(
+    question: Question,
+    evidence: Evidence,
+    settings: DiagnosisSettings,
+    start: Sequence[tuple[Named, Step, FloatArray]],
+    baseline: Baseline | None,
+) -> _Found:
+    """Take the cause that explains most, and ask again, until none passes."""
+    data, sigma = evidence.data, evidence.sigma
+    named = [row[0] for row in start]
+    steps = [row[1] for row in start]
+    values = [row[2] for row in start]
+    arm, base = question.beside, question.beside_base
+    current = fit(arm, named, data, sigma, base, values)
+    total: float | None = None
+    survey: Survey | None = None
+    minor: tuple[Trial, ...] = ()
+    found: Candidates | None = None
+    problem, beside = None, None
+    for _ in range(question.most):
+        if found is None:
+            found = candidates(current, data, sigma, settings.kinds)
+            problem, beside = _problem(found, current, evidence)
+        assert problem is not None and beside is not None
+        work = Workspace(memoized_arm(current.arm), data)
+        here = Round(evidence, work, settings, total, baseline)
+        step, look, problem = next_step(problem, beside, found.groups, here)
+        total, survey, minor = look.total, survey or look, look.there
+        if step is None:
+            break
+        group = step.trial.group
+        starts = np.zeros(len(group.effect.parameters(arm.robot)))
+        starts[list(group.kept)] = step.trial.values
+        named.append(Named(group.effect, group.kept))
+        values.append(starts)
+        steps.append(step)
+        if group.effect.linear and not group.effect.shapes:
+            beside = beside.and_columns(group)
+        else:
+            current = fit(arm, named, data, sigma, base, values)
+            named, values = list(current.named), list(current.values)
+            found = None
+    return named, steps, values, survey, minor
+
+
+def _problem(found: Candidates, current: Fitted, evidence: Evidence) -> tuple[Problem, Beside]:
+    """Stack the columns of all groups, and behind them those of what is free."""
+    pairs = zip(found.columns, current.columns, strict=True)
+    columns = [np.concatenate(pair, axis=2) for pair in pairs]
+    problem = make_problem(evidence.data, evidence.sigma, current.residual, columns)
+    size = problem.x.shape[2]
+    free = tuple(range(size - current.columns[0].shape[2], size))
+    return problem, Beside(free, current.hold, current.pull)
+
+
+@dataclass(frozen=True)
+class View:
+    """
+    A fitted arm as a linear problem, from which names and free values can be taken away again.
+
+    Attributes
+    ----------
+    problem : Problem
+        All columns that were free, those of the base parameters first.
+    fitted : Fitted
+        The arm.
+    spans : tuple of (int, int)
+        Columns of each name.
+
+    """
+
+    problem: Problem
+    fitted: Fitted
+    spans: tuple[tuple[int, int], ...]
+
+    @classmethod
+    def of(cls, fitted: Fitted, evidence: Evidence) -> View:
+        """Make the problem of a fitted arm."""
+        problem = make_problem(
+            evidence.data, evidence.sigma, fitted.residual, list(fitted.columns)
+        )
+        first, spans = problem.x.shape[2] - len(fitted.estimate.values), []
+        for own in fitted.named:
+            spans.append((first, first + len(own.kept) + len(own.effect.shape)))
+            first = spans[-1][1]
+        return cls(problem, fitted, tuple(spans))
+
+    def value(self, column: int) -> float:
+        """Return the value of a column of a name."""
+        size = self.problem.x.shape[2] - len(self.fitted.estimate.values)
+        return float(self.fitted.estimate.values[column - size])
+
+    def without(
+        self, columns: Sequence[int], values: Sequence[float], gone: Sequence[int] = ()
+    ) -> tuple[Problem, tuple[int, ...], FloatArray, FloatArray]:
+        """
+        Return the problem as if some columns had a value of zero.
+
+        Parameters
+        ----------
+        columns : sequence of int
+            Columns to be put first, and their values given back to the residual.
+        values : sequence of float
+            Their values.
+        gone : sequence of int
+            Columns that are not there at all; their values were zero.
+
+        Returns
+        -------
+        problem : Problem
+        free : tuple of int
+            The other columns.
+        hold, pull : ndarray
+            How these are held.
+
+        """
+        size = self.problem.x.shape[2]
+        away = {*columns, *gone}
+        others = [c for c in range(size) if c not in away]
+        x = self.problem.x
+        y = self.problem.y + x[:, :, list(columns)] @ np.asarray(values, dtype=float)
+        moved = replace(self.problem, x=x[:, :, [*columns, *others]], y=y)
+        hold = self.fitted.hold[np.ix_(others, others)]
+        free = tuple(range(len(columns), len(columns) + len(others)))
+        return moved, free, hold, self.fitted.pull[others]
+
+    def dropped(self, column: int, value: float) -> View:
+        """Return the view as if a column had a value of zero."""
+        y = self.problem.y + self.problem.x[:, :, column] * value
+        return replace(self, problem=replace(self.problem, y=y))
+
+    def trial(
+        self,
+        group: Group,
+        columns: Sequence[int],
+        values: Sequence[float],
+        gone: Sequence[int] = (),
+    ) -> tuple[Trial | None, Problem, Beside, float]:
+        """Judge what is there already as if it were asked for now."""
+        problem, free, hold, pull = self.without(columns, values, gone)
+        moved = replace(group, columns=slice(0, len(columns)))
+        trials, power = held_out(problem, free, [moved], hold, pull)
+        beside = Beside(free, hold, pull)
+        return (trials[0] if trials else None), problem, beside, float(power.sum())
+
+
+def _friction(
+    question: Question,
+    named: Sequence[Named],
+    values: Sequence[FloatArray],
+    evidence: Evidence,
+    settings: DiagnosisSettings,
+) -> list[tuple[Named, Step, FloatArray]]:
+    """
+    Return the friction of unknown value that is there, beside what was named.
+
+    All of it was free beside every cause. What takes least goes first, until each that is left
+    takes what a cause has to.
+
+    """
+    if not question.unknown:
+        return []
+    arm, base = question.beside, question.beside_base
+    assert base is not None
+    fitted = fit(arm, named, evidence.data, evidence.sigma, base, values)
+    view = View.of(fitted, evidence)
+    where = {int(column): k for k, column in enumerate(base.independent)}
+    names = [(p.name, p.joint) for p in arm.parameters]
+    theta, left = fitted.arm.theta, []
+    for effect in question.unknown:
+        parameter = effect.parameters(arm.robot)[0]
+        column = names.index((parameter.name, parameter.joint))
+        if column in where:
+            left.append((effect, where[column], float(theta[column])))
+    work = Workspace(memoized_arm(fitted.arm), evidence.data)
+    gone: list[int] = []
+    alive = dict(enumerate(left))
+    judged: dict[int, tuple[Trial, float]] = {}
+    while alive:
+        weakest: tuple[float, int] | None = None
+        judged = {}
+        for k, (effect, column, value) in alive.items():
+            group = Group.of(effect, slice(0, 1), (0,), arm.robot)
+            trial, problem, beside, total = view.trial(group, [column], [value], gone)
+            good = False
+            if trial is not None:
+                here = Round(evidence, work, settings, total)
+                gains = trial.joint_gains(problem, beside.free)
+                good = acceptable(trial, here, len(question.unknown)) and material(gains, here)
+                judged[k] = trial, total
+            gain = trial.gain if trial is not None else -np.inf
+            if not good and (weakest is None or gain < weakest[0]):
+                weakest = gain, k
+        if weakest is None:
+            break
+        _, column, value = alive.pop(weakest[1])
+        view = view.dropped(column, value)
+        gone.append(column)
+    result = []
+    for k, (effect, _, value) in alive.items():
+        trial, total = judged[k]
+        step = Step(trial, (), (trial,), total, 1)
+        result.append((Named(effect, (0,)), step, np.array([value])))
+    return result
+
+
+def _pruned(
+    question: Question,
+    named: Sequence[Named],
+    steps: Sequence[Step],
+    values: Sequence[FloatArray],
+    evidence: Evidence,
+    settings: DiagnosisSettings,
+) -> tuple[list[Named], list[Step], Fitted]:
+    """Fit all names together, and drop those that the others make needless."""
+    data, sigma = evidence.data, evidence.sigma
+    named, steps, values = list(named), list(steps), list(values)
+    while True:
+        fitted = fit(question.arm, named, data, sigma, question.base, values)
+        if not named:
+            return named, steps, fitted
+        view = View.of(fitted, evidence)
+        work = Workspace(memoized_arm(fitted.arm), data)
+        needless: list[tuple[float, int]] = []
+        for k, (own, span, step) in enumerate(zip(fitted.named, view.spans, steps, strict=True)):
+            columns = range(span[0], span[0] + len(own.kept))
+            group = Group.of(own.effect, slice(0, len(columns)), own.kept, question.arm.robot)
+            shape = tuple(range(span[0] + len(own.kept), span[1]))
+            trial, problem, beside, _ = view.trial(
+                group, tuple(columns), [view.value(c) for c in columns], shape
+            )
+            if trial is None:
+                needless.append((-np.inf, k))
+                continue
+            here = Round(evidence, work, settings, step.total)
+            gains = trial.joint_gains(problem, beside.free)
+            if not (acceptable(trial, here, step.tried) and material(gains, here)):
+                needless.append((trial.gain, k))
+        if not needless:
+            return list(fitted.named), steps, fitted
+        gone = min(needless)[1]
+        named = [own for k, own in enumerate(fitted.named) if k != gone]
+        values = [own for k, own in enumerate(fitted.values) if k != gone]
+        steps.pop(gone)

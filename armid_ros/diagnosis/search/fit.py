@@ -1,0 +1,249 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The joint fit of a patched arm: rigid body, known effects, and what was named, shapes included.
+
+Gauss-Newton on the filtered residual, as encoder offsets, delays and elasticities are linear to
+the first order only. Values stay within what is physically possible.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.data.rows import weighted_rows
+from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
+from armid_ros.effects.load import described_spread
+from armid_ros.errors import ModelError
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.least_squares import solve
+from armid_ros.identification.regression import Regression
+from armid_ros.model import BaseParameters, group_columns
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Free columns of which the others leave less than this share of their length are grouped.
+_EXCITED = 1e-4
+_MOST_ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """
+    An arm fitted to the data.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        The arm; the named effects are its last ones.
+    named : tuple of Named
+        With their shapes as fitted.
+    estimate : Estimate
+        Of the parameters of the named effects, shapes included.
+    residual : tuple of ndarray, each (M, n)
+        What is left, per trajectory [N m].
+    columns : tuple of ndarray, each (M, n, f)
+        Columns of all that was free.
+    bare : ArmModel
+        The arm without the named effects, as it was fitted with them.
+    values : tuple of ndarray
+        All values of each named effect.
+    hold : ndarray, shape (f, f)
+        Precision that what was free is held with, and ``pull``, shape (f,), what to, times that.
+
+    """
+
+    arm: ArmModel
+    named: tuple[Named, ...]
+    estimate: Estimate
+    residual: tuple[FloatArray, ...]
+    columns: tuple[FloatArray, ...]
+    bare: ArmModel
+    values: tuple[FloatArray, ...]
+    hold: FloatArray
+    pull: FloatArray
+
+
+def excited(
+    arm: ArmModel, theory: BaseParameters, data: Sequence[Trajectory]
+) -> tuple[BaseParameters, list[FloatArray]]:
+    """Return what the motion can tell of rigid body and known effects, and its columns."""
+    columns = [part.reduce(arm.columns(part.motion)[:, :, theory.independent]) for part in data]
+    stacked = np.concatenate([block.reshape(-1, theory.rank) for block in columns])
+    names = tuple(theory.standard[column] for column in theory.independent)
+    kept = group_columns(stacked, names, tolerance=_EXCITED)
+    if kept.rank == theory.rank:
+        return theory, columns
+    base = replace(
+        theory,
+        parameters=tuple(theory.parameters[k] for k in kept.independent),
+        independent=theory.independent[kept.independent],
+        grouping=kept.grouping @ theory.grouping,
+    )
+    return base, [block[:, :, kept.independent] for block in columns]
+
+
+def fit(
+    arm: ArmModel,
+    named: Sequence[Named],
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+    base: BaseParameters | None,
+    start: Sequence[FloatArray] = (),
+) -> Fitted:
+    """
+    Fit what is free.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The arm without the named effects.
+    named : sequence of Named
+        What was named.
+    data : sequence of Trajectory
+        The data.
+    sigma : sequence of ndarray, shape (n,)
+        Noise of each trajectory [N m].
+    base : BaseParameters or None
+        What is free of the arm; None keeps it as it is.
+    start : sequence of ndarray
+        Values of the named effects to start from; zero by default.
+
+    """
+    values = list(start) or [np.zeros(len(n.effect.parameters(arm.robot))) for n in named]
+    state = Patch(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
+    pull = np.zeros((0, 0)) if base is None else _described(base, arm)
+    residual = _residuals(state, data)
+    loss = _loss(residual, data, sigma)
+    rounds = _MOST_ROUNDS if named else int(base is not None)
+    columns = [patch_columns(state, part, base) for part in data]
+    for _ in range(rounds):
+        step = _step(columns, residual, data, sigma, pull, state.change)
+        moved, after = state, residual
+        for share in (1.0, 0.5, 0.2):
+            trial = state.moved(share * step, base)
+            left = _residuals(trial, data)
+            if _loss(left, data, sigma) < loss:
+                moved, after = trial, left
+                break
+        new = _loss(after, data, sigma)
+        settled = loss - new < 1e-4 * max(new, 1e-12)
+        if moved is not state:
+            columns = [patch_columns(moved, part, base) for part in data]
+        state, residual, loss = moved, after, new
+        if settled:
+            break
+    size = 0 if base is None else base.rank
+    names, numbers = state.parameters()
+    covariance = np.zeros((size, size))
+    if named:
+        covariance = _covariance(columns, residual, data, sigma)
+    whole = columns[0].shape[2]
+    hold, held_to = np.zeros((whole, whole)), np.zeros(whole)
+    hold[:size, :size], held_to[:size] = pull, -pull @ state.change
+    return Fitted(
+        state.model,
+        state.named,
+        Estimate(names, numbers, covariance[size:, size:]),
+        tuple(residual),
+        tuple(columns),
+        state.arm,
+        state.values,
+        hold,
+        held_to,
+    )
+
+
+def _residuals(state: Patch, data: Sequence[Trajectory]) -> list[FloatArray]:
+    model = state.model
+    return [part.residual(state.arm if part.before else model) for part in data]
+
+
+def _loss(
+    residual: Sequence[FloatArray], data: Sequence[Trajectory], sigma: Sequence[FloatArray]
+) -> float:
+    return float(sum(np.sum(left**2) for left in weighted_rows(residual, data, sigma)))
+
+
+def _described(base: BaseParameters, arm: ArmModel) -> FloatArray:
+    """
+    Return how strongly the description holds the base parameters, as a precision (r, r).
+
+    It is believed to a factor or so: data decide whatever they tell, and what they tell hardly
+    stays where it predicts other motions well. A value of zero of an effect is no description.
+
+    """
+    size = len(arm.robot.rigid_parameters)
+    spread = np.full(len(base.standard), np.inf)
+    spread[:size] = described_spread(arm.robot).ravel()
+    known = np.abs(arm.theta[size:])
+    spread[size:] = np.where(known > 0.0, known, np.inf)
+    told = ~np.any((base.grouping != 0.0) & np.isinf(spread), axis=1)
+    finite = np.where(np.isfinite(spread), spread, 0.0)
+    grouped = base.grouping[told] * finite
+    covariance = grouped @ grouped.T
+    precision = np.zeros((base.rank, base.rank))
+    precision[np.ix_(told, told)] = np.linalg.pinv(covariance, hermitian=True)
+    return precision
+
+
+def _step(
+    columns: Sequence[FloatArray],
+    residual: Sequence[FloatArray],
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+    pull: FloatArray,
+    change: FloatArray,
+) -> FloatArray:
+    """Solve with weights, the description pulling; what nothing tells gets no step."""
+    size = columns[0].shape[2]
+    own, aim = np.zeros((size, size)), np.zeros(size)
+    lefts = weighted_rows(residual, data, sigma)
+    for block, left in zip(weighted_rows(columns, data, sigma), lefts, strict=True):
+        flat = block.reshape(-1, size)
+        own += flat.T @ flat
+        aim += flat.T @ left.ravel()
+    known = len(change)
+    own[:known, :known] += pull
+    aim[:known] -= pull @ change
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-300))
+    values, vectors = np.linalg.eigh(own * np.outer(scale, scale))
+    good = values > 1e-10 * max(float(values[-1]), 1e-300) if size else values > 0.0
+    basis = scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good])
+    return np.asarray(basis @ (basis.T @ aim))
+
+
+def _covariance(
+    columns: Sequence[FloatArray],
+    residual: Sequence[FloatArray],
+    data: Sequence[Trajectory],
+    sigma: Sequence[FloatArray],
+) -> FloatArray:
+    """Return the covariance, colour of the residual included; infinite where others make it."""
+    size = columns[0].shape[2]
+    weighted = list(weighted_rows(columns, data, sigma))
+    stacked = np.concatenate([block.reshape(-1, size) for block in weighted])
+    names = tuple(ParameterName(str(k), '', '') for k in range(size))
+    kept = group_columns(stacked, names, tolerance=1e-5).independent
+    lefts = weighted_rows(residual, data, sigma)
+    problem = [
+        Regression(
+            part.at_rows.with_torque(left),
+            block[:, :, kept],
+            part.told,
+            part.source,
+        )
+        for part, block, left in zip(data, weighted, lefts, strict=True)
+    ]
+    covariance = np.diag(np.full(size, np.inf))
+    if not len(kept):
+        return covariance
+    try:
+        covariance[np.ix_(kept, kept)] = solve(problem, 'ols').covariance
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise ModelError(f'the patched model cannot be fitted: {error}') from error
+    return covariance

@@ -1,0 +1,377 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What every group explains of data that its values were not fitted to.
+
+All that is free is fitted together with a group to all parts of the data but one, and both
+predict the part that was left out. What the group adds to that prediction, x, is compared with
+what is left without it, r: the squares that go are 2 x'r - x'x, and the slope of r on x is one for
+a cause and zero for what follows noise. Both are known block by block, so that their intervals
+hold whatever the colour of the residual.
+
+All of it is algebra on products of columns, a small matrix for each block.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from armid_ros.diagnosis.data.rows import Problem
+from armid_ros.diagnosis.search.candidates import Group
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+#: Columns of which one part of the data has more than this share do nothing in the others, and
+#: nothing can be learned of them there: halves of that part are left out instead.
+_IN_ONE_PART = 0.999
+#: Directions of which the free columns leave less than this share of their squares are not seen.
+_UNSEEN = 1e-10
+
+
+@dataclass(frozen=True)
+class Trial:
+    """
+    A group and how it predicts what it was not fitted to.
+
+    Attributes
+    ----------
+    group : Group
+        The group.
+    values, std : ndarray, shape (p,)
+        Its values fitted to all of the data, and their deviations as far as white noise goes.
+    visible : float
+        Share of the columns that the free ones cannot make.
+    freedom : float
+        Values that the data choose; those held by what is expected of them count in part.
+    cross, square : ndarray, shape (B,)
+        x'r and x'x of every block.
+    held_values : ndarray, shape (K, p)
+        Values without each part.
+    held_free : ndarray, shape (K, f)
+        The free values without each part, changed by the group, and ``held_alone`` without it.
+    piece : ndarray of int, shape (B,)
+        The part that each block is left out with.
+    before : ndarray, shape (p,), or None
+        Values that it had before, of which what they explain is not new.
+
+    """
+
+    group: Group
+    values: FloatArray
+    std: FloatArray
+    visible: float
+    freedom: float
+    cross: FloatArray
+    square: FloatArray
+    held_values: FloatArray
+    held_free: FloatArray
+    held_alone: FloatArray
+    piece: npt.NDArray[np.intp]
+    before: FloatArray | None = None
+
+    @property
+    def gains(self) -> FloatArray:
+        """Squares that go in every block, shape (B,)."""
+        return np.asarray(2.0 * self.cross - self.square)
+
+    @cached_property
+    def gain(self) -> float:
+        """Squares over noise that go in all of the data."""
+        return float(self.gains.sum())
+
+    @cached_property
+    def slope(self) -> float:
+        """Slope of what is left on what is predicted: one for a cause, zero for noise."""
+        return float(self.cross.sum() / max(float(self.square.sum()), 1e-300))
+
+    @cached_property
+    def z(self) -> float:
+        """The slope over its deviation."""
+        scatter = self.cross - self.slope * self.square
+        count = len(scatter)
+        deviation = np.sqrt(np.sum(scatter**2) * count / (count - 1))
+        return float(self.cross.sum() / max(float(deviation), 1e-300))
+
+    @property
+    def p(self) -> float:
+        """Probability of such a slope if the group did nothing."""
+        return float(stats.t.sf(self.z, len(self.cross) - 1))
+
+    @property
+    def replicated(self) -> int:
+        """Parts of the data that lose squares."""
+        return int(np.sum(np.bincount(self.piece, self.gains) > 0.0))
+
+    def joint_gains(self, problem: Problem, free: Sequence[int]) -> FloatArray:
+        """Return the squares that go in every joint, shape (n,)."""
+        piece = np.where(problem.fold_of_block < 0, -1, 0)
+        piece[problem.fold_of_block >= 0] = self.piece
+        piece = piece[problem.block]
+        own = problem.x[:, :, self.group.columns]
+        left = problem.y.copy()
+        torque = np.einsum('rnp,rp->rn', own, self.held_values[piece])
+        if len(free):
+            beside = problem.x[:, :, list(free)]
+            left -= np.einsum('rnf,rf->rn', beside, self.held_alone[piece])
+            change = self.held_free - self.held_alone
+            torque += np.einsum('rnf,rf->rn', beside, change[piece])
+        if self.before is not None:
+            known = own @ self.before
+            left, torque = left - known, torque - known
+        return np.asarray(np.sum((2.0 * torque * left - torque**2)[piece >= 0], axis=0))
+
+
+def lead(first: Trial, other: Trial) -> tuple[float, float]:
+    """Return by how many squares one trial is ahead of another, and that over its deviation."""
+    difference = first.gains - other.gains
+    spread = float(difference.std(ddof=1)) * np.sqrt(len(difference))
+    return float(difference.sum()), float(difference.sum()) / max(spread, 1e-300)
+
+
+@dataclass(frozen=True)
+class Products:
+    """
+    Products of the columns of a problem, block by block.
+
+    Attributes
+    ----------
+    free : ndarray, shape (B, f, f)
+        Of the free columns with each other.
+    aim : ndarray, shape (B, f)
+        Of the free columns with the residual.
+    border : ndarray, shape (B, f, C)
+        Of the free columns with those of the groups.
+    target : ndarray, shape (B, C)
+        Of the columns of the groups with the residual.
+    diagonal : ndarray, shape (B, C)
+        Squares of the columns of the groups.
+    own : tuple of ndarray, each (B, p, p)
+        Of the columns of each group with each other.
+    power : ndarray, shape (B,)
+        Squares of the residual.
+
+    """
+
+    free: FloatArray
+    aim: FloatArray
+    border: FloatArray
+    target: FloatArray
+    diagonal: FloatArray
+    own: tuple[FloatArray, ...]
+    power: FloatArray
+
+
+def products(problem: Problem, free: Sequence[int], groups: Sequence[Group]) -> Products:
+    """Multiply columns; those of the groups are the first of the problem."""
+    chosen = list(free)
+    size = max((group.columns.stop for group in groups), default=0)
+    blocks = int(problem.block.max()) + 1
+    parts: list[list[FloatArray]] = [[] for _ in range(6)]
+    own: list[list[FloatArray]] = [[] for _ in groups]
+    for block in range(blocks):
+        rows = problem.block == block
+        y = problem.y[rows].ravel()
+        x = problem.x[rows].reshape(len(y), problem.x.shape[2])
+        f, c = x[:, chosen], x[:, :size]
+        values = f.T @ f, f.T @ y, f.T @ c, c.T @ y, np.einsum('ij,ij->j', c, c), y @ y
+        for part, value in zip(parts, values, strict=True):
+            part.append(value)
+        for products_of, group in zip(own, groups, strict=True):
+            span = group.columns
+            inner = c[:, span]
+            one = group.size == 1
+            products_of.append(values[4][span][:, np.newaxis] if one else inner.T @ inner)
+    stacked = [np.array(part) for part in parts]
+    return Products(
+        stacked[0],
+        stacked[1].reshape(blocks, -1),
+        stacked[2].reshape(blocks, len(chosen), size),
+        stacked[3].reshape(blocks, -1),
+        stacked[4].reshape(blocks, -1),
+        tuple(np.array(part) for part in own),
+        stacked[5],
+    )
+
+
+@dataclass(frozen=True)
+class _Base:
+    """What is free, fitted to some blocks."""
+
+    inverse: FloatArray
+    theta: FloatArray
+    border: FloatArray
+    solved: FloatArray
+
+    @classmethod
+    def of(
+        cls, known: Products, train: npt.NDArray[np.bool_], hold: FloatArray, pull: FloatArray
+    ) -> _Base:
+        own = known.free[train].sum(axis=0) + hold
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-300))
+        values, vectors = np.linalg.eigh(own * np.outer(scale, scale))
+        good = values > _UNSEEN * max(float(values.max(initial=0.0)), 1e-300)
+        basis = scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good])
+        inverse = basis @ basis.T
+        border = known.border[train].sum(axis=0)
+        return cls(
+            inverse, inverse @ (known.aim[train].sum(axis=0) + pull), border, inverse @ border
+        )
+
+
+def held_out(
+    problem: Problem,
+    free: Sequence[int],
+    groups: Sequence[Group],
+    hold: FloatArray,
+    pull: FloatArray,
+    before: Sequence[FloatArray] | None = None,
+) -> tuple[list[Trial], FloatArray]:
+    """
+    Try every group beside what is free.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows; columns of the groups come first.
+    free : sequence of int
+        Columns that are fitted beside.
+    groups : sequence of Group
+        What is tried.
+    hold : ndarray, shape (f, f)
+        Precision that free values are held with.
+    pull : ndarray, shape (f,)
+        What they are held to, times that.
+    before : sequence of ndarray, optional
+        Values that the groups had before; what they explain with those is not new.
+
+    Returns
+    -------
+    trials : list of Trial
+        In the order of the groups; those of which nothing is visible are left out.
+    power : ndarray, shape (B,)
+        Held-out squares without any of them.
+
+    """
+    known = products(problem, free, groups)
+    whole = np.ones(len(known.power), dtype=bool)
+    foldings = problem.fold_of_block, problem.half_of_block
+    everything = _Base.of(known, whole, hold, pull)
+    lone = [_in_one_part(values, problem.fold_of_block) for values in known.own]
+    trials: list[Trial | None] = [None] * len(groups)
+    power = np.zeros(len(known.power))
+    for number, folding in enumerate(foldings):
+        members = [k for k, alone in enumerate(lone) if alone == bool(number)]
+        if number and not members:
+            continue
+        bases = [_Base.of(known, folding != part, hold, pull) for part in range(folding.max() + 1)]
+        if not number:
+            power = _left(known, bases, folding)
+        for k in members:
+            old = None if before is None else before[k]
+            trials[k] = _tried(known, groups[k], k, everything, bases, folding, old)
+    asked = problem.fold_of_block >= 0
+    return [
+        replace(t, cross=t.cross[asked], square=t.square[asked], piece=t.piece[asked])
+        for t in trials
+        if t is not None
+    ], power[asked]
+
+
+def _in_one_part(own: FloatArray, fold: npt.NDArray[np.intp]) -> bool:
+    sizes = np.bincount(fold + 1, np.trace(own, axis1=1, axis2=2))[1:]
+    return bool(len(sizes) > 1 and sizes.max() > _IN_ONE_PART * sizes.sum())
+
+
+def _left(known: Products, bases: Sequence[_Base], folding: npt.NDArray[np.intp]) -> FloatArray:
+    """Return the held-out squares of every block beside what is free alone."""
+    theta = np.array([base.theta for base in bases])[folding]  # of what is not held out: unused
+    return np.asarray(
+        known.power
+        - 2.0 * np.einsum('bf,bf->b', theta, known.aim)
+        + np.einsum('bf,bfg,bg->b', theta, known.free, theta)
+    )
+
+
+def _tried(
+    known: Products,
+    group: Group,
+    position: int,
+    everything: _Base,
+    bases: Sequence[_Base],
+    folding: npt.NDArray[np.intp],
+    old: FloatArray | None = None,
+) -> Trial | None:
+    span, own = group.columns, known.own[position]
+    hold = np.diag(group.precision)
+    border, target = known.border[:, :, span], known.target[:, span]
+    whole = own.sum(axis=0)
+    rest = whole - everything.border[:, span].T @ everything.solved[:, span]
+    size = float(np.trace(whole))
+    visible = float(np.sqrt(max(np.trace(rest), 0.0) / size)) if size > 0.0 else 0.0
+    if visible < 1e-5:
+        return None
+    aim = target.sum(axis=0) - everything.border[:, span].T @ everything.theta
+    inverse = _inverse(rest + hold, whole)
+    values = inverse @ aim
+    cross, square, was_cross, was_square, both = np.zeros((5, len(folding)))
+    held_values, held_free = [], []
+    for part, base in enumerate(bases):
+        test = folding == part
+        train = ~test
+        inside = own[train].sum(axis=0)
+        seen = inside - base.border[:, span].T @ base.solved[:, span] + hold
+        v = _inverse(seen, whole) @ (
+            target[train].sum(axis=0) - base.border[:, span].T @ base.theta
+        )
+        change = -base.solved[:, span] @ v
+        left = known.aim[test] - known.free[test] @ base.theta
+        own_left = target[test] - np.einsum('bfp,f->bp', border[test], base.theta)
+        cross[test] = own_left @ v + left @ change
+        square[test] = (
+            np.einsum('p,bpq,q->b', v, own[test], v)
+            + 2.0 * np.einsum('f,bfp,p->b', change, border[test], v)
+            + np.einsum('f,bfg,g->b', change, known.free[test], change)
+        )
+        if old is not None:
+            was_cross[test] = own_left @ old
+            was_square[test] = np.einsum('p,bpq,q->b', old, own[test], old)
+            both[test] = np.einsum('p,bpq,q->b', v, own[test], old)
+            both[test] += np.einsum('f,bfp,p->b', change, border[test], old)
+        held_values.append(v)
+        held_free.append(base.theta + change)
+    old = old if np.sum(2.0 * was_cross - was_square) > 0.0 else None
+    if old is not None:
+        cross += was_square - both - was_cross
+        square += was_square - 2.0 * both
+    return Trial(
+        group,
+        values,
+        np.sqrt(np.maximum(np.diag(inverse), 0.0)),
+        visible,
+        float(np.trace(rest @ inverse)),
+        cross,
+        square,
+        np.array(held_values),
+        np.array(held_free),
+        np.array([base.theta for base in bases]),
+        folding,
+        old,
+    )
+
+
+def _inverse(own: FloatArray, whole: FloatArray) -> FloatArray:
+    """Invert products; directions that the data do not tell stay at zero."""
+    diagonal = np.diag(whole)
+    if len(own) == 1:
+        return np.array([[1.0 / own[0, 0]]]) if own[0, 0] > _UNSEEN * whole[0, 0] else 0.0 * own
+    seen = diagonal > 1e-9 * max(float(diagonal.max()), 1e-300)
+    scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, diagonal, 1.0)), 0.0)
+    values, vectors = np.linalg.eigh(own * np.outer(scale, scale))
+    good = values > 1e-6 * max(float(values[-1]), 1e-300)
+    basis = scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good])
+    return np.asarray(basis @ basis.T)

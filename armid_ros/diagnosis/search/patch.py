@@ -1,0 +1,213 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""An arm with what was named, as a point that a fit moves through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.search.memoized_arm import memoized_arm
+from armid_ros.effects import Effect, TorqueReading
+from armid_ros.estimate import ParameterName
+from armid_ros.model import BaseParameters
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+
+#: Largest relative step of a shape in a round: the search has refined it already.
+_SHAPE_STEP = 0.1
+#: Relative step of the differences by a shape.
+_STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class Named:
+    """
+    An effect that was named, as it is fitted.
+
+    Attributes
+    ----------
+    effect : Effect
+        Joints and shape.
+    kept : tuple of int
+        Its parameters that are free; the others are zero.
+
+    """
+
+    effect: Effect
+    kept: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Patch:
+    """
+    An arm, what was named, and the values so far.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        The arm without what was named, its own parameters as they are by now.
+    named : tuple of Named
+        Effects, with their shapes by now.
+    values : tuple of ndarray
+        All parameters of each effect.
+    change : ndarray, shape (r,)
+        What was added to the base parameters that are free.
+
+    """
+
+    arm: ArmModel
+    named: tuple[Named, ...]
+    values: tuple[FloatArray, ...]
+    change: FloatArray
+
+    @property
+    def model(self) -> ArmModel:
+        """The arm with what was named."""
+        model = self.arm
+        for own, values in zip(self.named, self.values, strict=True):
+            model = with_named(model, own.effect, values)
+        return model
+
+    def moved(self, change: FloatArray, base: BaseParameters | None) -> Patch:
+        """Return the state after a step of all that is free, within bounds."""
+        arm, start = self.arm, 0
+        if base is not None:
+            theta = arm.theta
+            lifted = base.lift(base.values(theta) + change[: base.rank], theta)
+            arm, start = arm.with_theta(lifted), base.rank
+        named, values = [], []
+        for own, old in zip(self.named, self.values, strict=True):
+            effect, kept = own.effect, list(own.kept)
+            lower, upper = room(effect, arm)
+            new = old.copy()
+            new[kept] += change[start : start + len(kept)]
+            values.append(np.clip(new, lower, upper))
+            start += len(kept)
+            count = len(effect.shape)
+            if count:
+                low, high, step = _shape_bounds(effect)
+                shape = np.array(effect.shape)
+                limit = np.maximum(_SHAPE_STEP * np.abs(shape), 30.0 * step)
+                shape = shape + np.clip(change[start : start + count], -limit, limit)
+                effect = effect.with_shape(np.clip(shape, low, high))
+                start += count
+            named.append(Named(effect, own.kept))
+        return Patch(arm, tuple(named), tuple(values), self.change + change[: len(self.change)])
+
+    def parameters(self) -> tuple[tuple[ParameterName, ...], FloatArray]:
+        """Name the free parameters of the named effects, shapes behind quantities."""
+        names: list[ParameterName] = []
+        numbers: list[float] = []
+        for own, values in zip(self.named, self.values, strict=True):
+            all_names = own.effect.parameters(self.arm.robot)
+            names += [all_names[k] for k in own.kept]
+            numbers += [float(values[k]) for k in own.kept]
+            names += own.effect.shape_parameters(self.arm.robot)
+            numbers += list(own.effect.shape)
+        return tuple(names), np.array(numbers)
+
+
+def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
+    """Return by how much values may change that the arm has already in part, each (P,)."""
+    lower, upper = effect.bounds()
+    there = _there(arm, effect)
+    if there is None:
+        return lower, upper
+    position, rows = there
+    values = arm.values[position][rows]
+    return lower - values, upper - values
+
+
+def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
+    """Return an arm with an effect; what it has of the same changes instead."""
+    there = _there(arm, effect)
+    if there is None:
+        return arm.with_effect(effect, values)
+    position, rows = there
+    changed = arm.values[position].copy()
+    changed[rows] += values
+    return replace(arm, values=(*arm.values[:position], changed, *arm.values[position + 1 :]))
+
+
+def _there(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
+    """Return where an arm has the values of an effect already; None if it has not all of them."""
+    wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
+    for position, own in enumerate(arm.effects):
+        if type(own) is type(effect) and not own.shapes and not own.points:
+            names = [(p.name, p.joint) for p in own.parameters(arm.robot)]
+            if set(wanted) <= set(names):
+                return position, [names.index(name) for name in wanted]
+    return None
+
+
+def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return bounds of a shape and steps for differences, per value."""
+    owners = len(effect.owners)
+    low = np.tile([s.lower for s in effect.shapes], owners)
+    high = np.tile([s.upper for s in effect.shapes], owners)
+    size = np.tile([max(abs(s.default), 1e-3) for s in effect.shapes], owners)
+    return low, high, _STEP * np.maximum(np.abs(np.array(effect.shape)), 0.1 * size)
+
+
+def patch_columns(state: Patch, part: Trajectory, base: BaseParameters | None) -> FloatArray:
+    """Return the columns of base parameters, values and shapes in rows, shape (M, n, f)."""
+    if part.before:
+        return _columns_before(state, part, base)
+    model, motion = memoized_arm(state.model), part.motion
+    blocks = [np.empty((len(part.rows), motion.n_joints, 0))]
+    if base is not None:
+        blocks.append(part.reduce(_base_columns(state, model, motion, base)))
+    for named in state.named:
+        columns = model.columns_of(named.effect, motion)[:, :, list(named.kept)]
+        blocks.append(part.reduce(columns))
+        if named.effect.shape:
+            position = len(model.effects) - 1 - model.effects[::-1].index(named.effect)
+            blocks.append(part.reduce(_shape_columns(model, position, motion)))
+    return np.concatenate(blocks, axis=2)
+
+
+def _columns_before(state: Patch, part: Trajectory, base: BaseParameters | None) -> FloatArray:
+    """Return the columns where nothing that was named acts."""
+    sizes = [len(own.kept) + len(own.effect.shape) for own in state.named]
+    nothing = np.zeros((len(part.rows), part.motion.n_joints, sum(sizes)))
+    if base is None:
+        return nothing
+    own = part.reduce(_base_columns(state, memoized_arm(state.arm), part.motion, base))
+    return np.concatenate([own, nothing], axis=2)
+
+
+def _base_columns(
+    state: Patch, model: ArmModel, motion: Motion, base: BaseParameters
+) -> FloatArray:
+    """Return the columns of what is free of the arm, shape (N, n, r)."""
+    own = [model.columns_of(effect, motion) for effect in state.arm.effects]
+    rigid = len(state.arm.robot.rigid_parameters)
+    if base.rank and base.independent.min() >= rigid:
+        return np.asarray(np.concatenate(own, axis=2)[:, :, base.independent - rigid])
+    return np.concatenate([model.rigid_columns(motion), *own], axis=2)[:, :, base.independent]
+
+
+def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray:
+    """Return the columns of the shape of one of a model's effects, by differences, (N, n, S)."""
+    effect = model.effects[position]
+    low, high, step = _shape_bounds(effect)
+    shape = np.array(effect.shape)
+    columns = np.empty((len(motion), motion.n_joints, len(shape)))
+    for index, own in enumerate(step):
+        ends, torques = np.clip(shape[index] + [own, -own], low[index], high[index]), []
+        for end in ends:
+            moved = shape.copy()
+            moved[index] = end
+            torques.append(_torque_with(model, position, effect.with_shape(moved), motion))
+        columns[:, :, index] = (torques[0] - torques[1]) / max(ends[0] - ends[1], 1e-12)
+    return columns
+
+
+def _torque_with(model: ArmModel, position: int, effect: Effect, motion: Motion) -> FloatArray:
+    """Return the torque with another shape of an effect, without what does not depend on it."""
+    if effect.linear and not isinstance(effect, TorqueReading):
+        return np.asarray(model.columns_of(effect, motion) @ model.values[position])
+    effects = (*model.effects[:position], effect, *model.effects[position + 1 :])
+    return replace(model, effects=effects).torque(motion)

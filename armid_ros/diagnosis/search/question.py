@@ -1,0 +1,99 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is asked of an arm: what of it is taken as given, and what is fitted beside every cause."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.search.fit import excited
+from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.model import BaseParameters, group_columns
+import numpy as np
+
+#: Friction of which the rest leaves less than this share of its columns is fitted with the rest.
+_TOLD = 1e-4
+
+
+@dataclass(frozen=True)
+class Question:
+    """
+    What is asked of an arm.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        The arm as given.
+    base : BaseParameters or None
+        What of it is free.
+    beside : ArmModel
+        The arm with the friction of joints that nobody gave values of.
+    beside_base : BaseParameters or None
+        What of that is free.
+    unknown : tuple of Effect
+        That friction, joint by joint.
+    most : int
+        Causes that are looked for.
+
+    """
+
+    arm: ArmModel
+    base: BaseParameters | None
+    beside: ArmModel
+    beside_base: BaseParameters | None
+    unknown: tuple[Effect, ...]
+    most: int
+
+
+def as_given(arm: ArmModel, data: Sequence[Trajectory], most: int) -> Question:
+    """Ask what a model lacks whose values are right, as far as it has any."""
+    beside, unknown = with_friction(arm)
+    return Question(
+        arm, _without_values(arm, data), beside, _without_values(beside, data), unknown, most
+    )
+
+
+def fitted_anew(
+    arm: ArmModel, data: Sequence[Trajectory], most: int, rng: np.random.Generator
+) -> Question:
+    """Ask what a model lacks of which only the structure counts."""
+    beside, unknown = with_friction(arm)
+    return Question(
+        arm,
+        excited(arm, arm.base_parameters(rng), data)[0],
+        beside,
+        excited(beside, beside.base_parameters(rng), data)[0],
+        unknown,
+        most,
+    )
+
+
+def with_friction(arm: ArmModel) -> tuple[ArmModel, tuple[Effect, ...]]:
+    """Return an arm with what every joint may be taken to have, and what was added."""
+    there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
+    added: list[Effect] = []
+    beside = arm
+    for kind in CATALOGUE.values():
+        joints = tuple(j for j in arm.robot.joints if (kind.name, j) not in there)
+        if kind.everywhere and joints:
+            beside = beside.with_effect(kind.on(arm.robot, joints))
+            added += [kind.on(arm.robot, (joint,)) for joint in joints]
+    return beside, tuple(added)
+
+
+def _without_values(arm: ArmModel, data: Sequence[Trajectory]) -> BaseParameters | None:
+    """Return the parameters of effects that have no value yet, as far as data tell them."""
+    rigid = len(arm.robot.rigid_parameters)
+    names, theta = arm.parameters, arm.theta
+    free = np.array([k for k in range(rigid, len(names)) if theta[k] == 0.0], dtype=np.intp)
+    if not len(free):
+        return None
+    columns = [part.reduce(arm.effect_columns(part.motion)[:, :, free - rigid]) for part in data]
+    stacked = np.concatenate([block.reshape(-1, len(free)) for block in columns])
+    kept = group_columns(stacked, tuple(names[k] for k in free), tolerance=_TOLD)
+    grouping = np.zeros((kept.rank, len(names)))
+    grouping[:, free] = kept.grouping
+    return replace(kept, standard=names, independent=free[kept.independent], grouping=grouping)

@@ -1,0 +1,138 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Shapes refined by variable projection (Golub and Pereyra 1973): values are fitted at each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.data.rows import Problem, Projection
+from armid_ros.diagnosis.search.candidates import effect_rows, Group
+from armid_ros.effects import Effect, Shape
+from armid_ros.errors import ModelError
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Shapes that the data give a good start of, and how far from it a search goes: of a peak of a
+#: spectrum [1/rev], of a level near the highest torque (far below it, it would be the torque).
+_NEAR = {'ripple_order': 1.0, 'saturation_torque': 0.08}
+#: How far from a peak of the spectrum its side lobes are looked at [1/rad], and what is too slow
+#: for a ripple: gravity and springs are.
+_LOBES, _LOWEST_ORDER = 3.0, 3.0
+#: Rounds and evaluations per shape of a refinement.
+_GOLDEN, _ROUNDS = 7, 2
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """The data and the arm that columns are computed for, when shapes are refined."""
+
+    arm: ArmModel
+    data: tuple[Trajectory, ...]
+
+    def columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
+        """Return the columns of an effect in rows, shape (R, n, p)."""
+        blocks = [effect_rows(self.arm, effect, part) for part in self.data]
+        return np.asarray(np.concatenate(blocks)[:, :, list(kept)])
+
+    def smooth_columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
+        """Return what they would be without the noise that positions have beyond the motion."""
+        smooth = tuple(part.smooth for part in self.data)
+        return replace(self, data=smooth).columns(effect, kept)
+
+    def reads_torque(self, effect: Effect, kept: Sequence[int]) -> bool:
+        """Return whether the columns of an effect are made of the measured torque."""
+        silent = tuple(
+            replace(part, motion=part.motion.with_torque(np.zeros_like(part.motion.q)))
+            for part in self.data
+        )
+        without = replace(self, data=silent).columns(effect, kept)
+        return not np.array_equal(without, self.columns(effect, kept))
+
+
+def refine(
+    problem: Problem,
+    projection: Projection,
+    group: Group,
+    left: FloatArray,
+    work: Workspace,
+) -> tuple[Group, FloatArray]:
+    """
+    Refine the shape of a group by variable projection; return it with its columns.
+
+    What is left has nothing in it that the free columns could make.
+
+    """
+    effect, kept = group.effect, group.kept
+    lower, upper = (bound[list(kept)] for bound in effect.bounds())
+    cache: dict[tuple[float, ...], tuple[float, FloatArray]] = {}
+
+    def gain(shape: FloatArray) -> float:
+        key = tuple(shape.tolist())
+        if key not in cache:
+            try:
+                columns = work.columns(effect.with_shape(shape), kept)
+            except ModelError:
+                return -np.inf
+            weighted = (columns * problem.weight[:, :, np.newaxis]).reshape(-1, len(kept))
+            own, aim = projection.products(weighted), weighted.T @ left.ravel()
+            values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
+            if len(kept) == 1:  # what is not possible is no gain
+                values = np.clip(values, lower, upper)
+            cache[key] = float(2.0 * values @ aim - values @ own @ values), columns
+        return cache[key][0]
+
+    shape = np.array(effect.shape)
+    gain(shape)
+    for _ in range(_ROUNDS if len(shape) > 1 else 1):
+        for index, kind in enumerate(effect.shapes):
+            shape = _line_search(gain, shape, index, kind)
+    best = max(cache, key=lambda key: cache[key][0])
+    return replace(group, effect=effect.with_shape(best)), cache[best][1]
+
+
+def _line_search(
+    gain: Callable[[FloatArray], float], shape: FloatArray, index: int, kind: Shape
+) -> FloatArray:
+    """Search one shape around where it is, by golden sections of its logarithm if positive."""
+    value = float(shape[index])
+    positive = kind.lower > 0.0 and value > 0.0 and kind.name not in _NEAR
+    if kind.name in _NEAR:
+        reach = _NEAR[kind.name] if kind.unit == '1/rev' else _NEAR[kind.name] * abs(value)
+        low, high = max(kind.lower, value - reach), min(kind.upper, value + reach)
+    elif positive:
+        ratio = max([b / a for a, b in pairwise(sorted(kind.grid)) if a > 0.0] or [3.0])
+        ratio = min(ratio, 3.5)
+        low = np.log(max(kind.lower, value / ratio))
+        high = np.log(min(kind.upper, value * ratio))
+    else:
+        reach = max(0.15 * abs(value), 0.05 * float(np.ptp(kind.grid)), 1e-3)
+        low, high = max(kind.lower, value - reach), min(kind.upper, value + reach)
+
+    def at(x: float) -> FloatArray:
+        moved = shape.copy()
+        moved[index] = np.exp(x) if positive else x
+        return moved
+
+    if kind.unit == '1/rev':  # side lobes beside the peak are almost as high
+        scan = value + np.linspace(-_LOBES, _LOBES, 25)
+        value = max(scan[scan > min(value, _LOWEST_ORDER)].tolist(), key=lambda x: gain(at(x)))
+        low, high = value - 0.2, value + 0.2
+    golden = (np.sqrt(5.0) - 1.0) / 2.0
+    a, b = high - golden * (high - low), low + golden * (high - low)
+    fa, fb = gain(at(a)), gain(at(b))
+    for _ in range(_GOLDEN):
+        if fa > fb:
+            high, b, fb = b, a, fa
+            a = high - golden * (high - low)
+            fa = gain(at(a))
+        else:
+            low, a, fa = a, b, fb
+            b = low + golden * (high - low)
+            fb = gain(at(b))
+    chosen = at(a if fa > fb else b)
+    return chosen if max(fa, fb) > gain(shape) else shape

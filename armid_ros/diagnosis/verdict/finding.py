@@ -1,0 +1,255 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A cause as it is said: name, joints, values, share of the gap, and what else it may be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.search.explain import Explanation
+from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.step import Step
+from armid_ros.diagnosis.verdict.attribution import Attribution
+from armid_ros.diagnosis.verdict.experiment import separating
+from armid_ros.effects import Effect
+from armid_ros.effects.tied import Tied
+from armid_ros.estimate import ParameterName
+from armid_ros.model.spring_ties import Tie
+from armid_ros.motion import FloatArray
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A name that the data do not exclude in the place of another, and the joints it is on."""
+
+    name: str
+    joints: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """
+    One named effect.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the catalogue.
+    joints : tuple of str
+        The joints it is on; none for the whole arm.
+    parameters : tuple of ParameterName
+        Its parameters, shapes included.
+    values, std : tuple of float
+        Their values and standard deviations; nan where the data do not tell.
+    share : float
+        Share of the held-out gap that it takes, 0 to 1.
+    share_interval : tuple of float
+        Its 95 % interval.
+    p : float
+        Probability of such a gain if it did nothing, over all that was tried.
+    rivals : tuple of Rival
+        What the data do not exclude in its place, the likeliest first.
+    experiment : str
+        What would separate them; empty if there is nothing to separate.
+    gain : float
+        Squares over the unit of the gap that it takes, held out.
+    ties : tuple of Tie
+        Where it holds the arm, in the order of its joints, if it ends at another machine.
+
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    parameters: tuple[ParameterName, ...]
+    values: tuple[float, ...]
+    std: tuple[float, ...]
+    share: float
+    share_interval: tuple[float, float]
+    p: float
+    rivals: tuple[Rival, ...] = ()
+    experiment: str = ''
+    gain: float = 0.0
+    ties: tuple[Tie, ...] = ()
+
+    @property
+    def ambiguous_with(self) -> tuple[str, ...]:
+        """Names that the data do not exclude in its place."""
+        return tuple(rival.name for rival in self.rivals)
+
+    def place_of(self, joint: str) -> str:
+        """Return where a joint's parameters act: at a segment that is tied, or the joint."""
+        return next((tie.name for tie in self.ties if tie.joint == joint), joint)
+
+    def of_joint(self, joint: str) -> list[tuple[ParameterName, float, float]]:
+        """Return name, value and standard deviation of the parameters of one joint."""
+        rows = zip(self.parameters, self.values, self.std, strict=True)
+        return [row for row in rows if row[0].joint == joint]
+
+
+@dataclass(frozen=True)
+class _Said:
+    """One name of an explanation, in the words of the catalogue."""
+
+    effect: Effect
+    parameters: tuple[ParameterName, ...]
+    values: FloatArray
+    std: FloatArray
+
+
+def findings(
+    explanation: Explanation,
+    attribution: Attribution,
+    arm: ArmModel,
+    rng: np.random.Generator,
+) -> tuple[Finding, ...]:
+    """Say what was found: effects of one name together, those that take most of the gap first."""
+    said = _in_words(explanation, arm)
+    merged: dict[str, list[int]] = {}
+    for index, parts in enumerate(said):
+        for part in parts:
+            merged.setdefault(part.effect.name, []).append(index)
+    result = []
+    for name, indices in merged.items():
+        parts = [part for k in indices for part in said[k] if part.effect.name == name]
+        steps = [explanation.steps[k] for k in indices]
+        joints = _joints([part.effect.joints for part in parts], arm)
+        order = [joint for joint in arm.robot.joints if joint in joints]
+        rows = [
+            (parameter, float(value), float(std))
+            for part in parts
+            for parameter, value, std in zip(part.parameters, part.values, part.std, strict=True)
+            if np.isfinite(std)
+        ]
+        places = [*order, '']
+        rows.sort(key=lambda row: places.index(row[0].joint) if row[0].joint in places else 0)
+        rivals = _rivals(steps, set(merged), arm)
+        result.append(
+            Finding(
+                name,
+                joints,
+                tuple(row[0] for row in rows),
+                tuple(row[1] for row in rows),
+                tuple(row[2] for row in rows),
+                attribution.share(indices),
+                attribution.interval(indices, rng),
+                max(min(1.0, step.trial.p * step.tried) for step in steps),
+                rivals,
+                separating(name, rivals[0].name, order) if rivals else '',
+                float(attribution.taken[indices].sum()),
+                _ties([part.effect for part in parts], order),
+            )
+        )
+    return tuple(sorted(result, key=lambda one: -one.share))
+
+
+def small_print(
+    trials: Sequence[Trial], total: float, tried: int, arm: ArmModel
+) -> tuple[Finding, ...]:
+    """Say what is statistically there and does not matter."""
+    result = []
+    for trial in trials:
+        effect, kept = trial.group.effect, list(trial.group.kept)
+        names = effect.parameters(arm.robot)
+        spread = np.sqrt(np.sum((trial.gains - trial.gains.mean()) ** 2))
+        share, wide = trial.gain / total, 2.0 * float(spread) / total
+        result.append(
+            Finding(
+                effect.name,
+                effect.joints,
+                tuple(names[k] for k in kept),
+                tuple(trial.values.tolist()),
+                tuple(trial.std.tolist()),
+                share,
+                (share - wide, share + wide),
+                min(1.0, trial.p * tried),
+                gain=trial.gain,
+            )
+        )
+    return tuple(result)
+
+
+def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Said]]:
+    """Return the effects of the catalogue that each name of an explanation stands for."""
+    fitted = explanation.fitted
+    starts = np.cumsum([0, *(len(own.kept) + len(own.effect.shape) for own in fitted.named)])
+    covariance = fitted.estimate.covariance
+    result = []
+    for k, (own, values) in enumerate(zip(fitted.named, fitted.values, strict=True)):
+        span = slice(starts[k], starts[k + 1])
+        words = own.effect.named_as(values, arm)
+        if len(words) == 1 and words[0][0] is own.effect:
+            result.append(
+                [
+                    _Said(
+                        own.effect,
+                        fitted.estimate.parameters[span],
+                        fitted.estimate.values[span],
+                        np.sqrt(np.diag(covariance)[span]),
+                    )
+                ]
+            )
+            continue
+        parts = _translated(own.effect, values, covariance[span, span], arm)
+        result.append([part for part in parts if _told(part)] or parts[:1])
+    return result
+
+
+def _translated(
+    effect: Effect, values: FloatArray, covariance: FloatArray, arm: ArmModel
+) -> list[_Said]:
+    """Return an effect in other words, deviations by the slopes of the translation."""
+    parts = []
+    step = 1e-4 * np.sqrt(np.maximum(np.diag(covariance), 1e-18))
+    for position, (word, numbers) in enumerate(effect.named_as(values, arm)):
+        slopes = np.column_stack(
+            [
+                (
+                    effect.named_as(values + change, arm)[position][1]
+                    - effect.named_as(values - change, arm)[position][1]
+                )
+                / (2.0 * size)
+                for change, size in zip(np.diag(step), step, strict=True)
+            ]
+        )
+        std = np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+        parts.append(_Said(word, word.parameters(arm.robot), numbers, std))
+    return parts
+
+
+def _told(part: _Said) -> bool:
+    """Return whether any value is told from zero by three deviations, and is worth a word."""
+    typical = [q.typical[0] if q.typical else 0.0 for q in part.effect.quantities]
+    size = np.abs(part.values)
+    return bool(np.any((size > 3.0 * part.std) & (size > np.array(typical))))
+
+
+def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
+    ties = {t.joint: t for effect in effects if isinstance(effect, Tied) for t in effect.ties}
+    return tuple(ties[joint] for joint in joints if joint in ties)
+
+
+def _rivals(steps: Sequence[Step], named: set[str], arm: ArmModel) -> tuple[Rival, ...]:
+    """Return the other names that are possible, the likeliest first, and where."""
+    best: dict[str, list[Trial]] = {}
+    for step in steps:
+        here: dict[str, Trial] = {}
+        for trial in sorted(step.rivals, key=lambda trial: -trial.gain):
+            here.setdefault(trial.group.effect.name, trial)
+        for name in here.keys() - named:
+            best.setdefault(name, []).append(here[name])
+    order = sorted(best, key=lambda name: -max(trial.gain for trial in best[name]))
+    return tuple(
+        Rival(name, _joints([trial.group.effect.joints for trial in best[name]], arm))
+        for name in order
+    )
+
+
+def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]:
+    """Return the joints of several effects of a name, in order but for those of pairs."""
+    joints = [joint for group in groups for joint in group]
+    if any(len(group) > 1 for group in groups):
+        return tuple(dict.fromkeys(joints))
+    return tuple(joint for joint in arm.robot.joints if joint in joints)

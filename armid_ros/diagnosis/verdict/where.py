@@ -1,0 +1,159 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where a residual lives: in which joint, and over which quantity it is not flat."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
+from armid_ros.motion import FloatArray, read_only
+import numpy as np
+
+_BINS = 16
+#: An axis is worth a word if its bins hold this share of the residual's power.
+_TELLING = 0.15
+
+
+@dataclass(frozen=True)
+class Axis:
+    """
+    The mean residual over one quantity.
+
+    Attributes
+    ----------
+    name, unit : str
+        The quantity.
+    centres, means : ndarray, shape (B,)
+        Middle of each bin, and the mean residual in it [N m].
+    share : float
+        Share of the residual's power that the means hold.
+
+    """
+
+    name: str
+    unit: str
+    centres: FloatArray
+    means: FloatArray
+    share: float
+
+
+@dataclass(frozen=True)
+class Where:
+    """
+    What is left of one joint.
+
+    Attributes
+    ----------
+    joint : str
+        The joint.
+    share_of_gap : float
+        Its share of the excess of all joints, 0 to 1.
+    signature : str
+        In words, over which quantity the residual changes.
+    axes : tuple of Axis
+        All quantities, the telling ones first.
+
+    """
+
+    joint: str
+    share_of_gap: float
+    signature: str
+    axes: tuple[Axis, ...]
+
+
+def locate(
+    arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], limits: FloatArray
+) -> tuple[Where, ...]:
+    """
+    Describe the residual of every joint that is beyond its noise, the worst first.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Gives the load.
+    evidence : Evidence
+        Motion, and the unit of the gap.
+    residual : sequence of ndarray, shape (M, n)
+        What is left [N m].
+    limits : ndarray, shape (n,)
+        Joints below this loss have no gap.
+
+    """
+    losses = evidence.losses(residual)
+    beyond = np.where(losses > limits, losses - 1.0, 0.0)
+    pairs = zip(evidence.data, residual, strict=True)
+    now = [(part, rows) for part, rows in pairs if not part.before]
+    data, residual = [part for part, _ in now], [rows for _, rows in now]
+    total = max(float(beyond.sum()), 1e-300)
+    rows = [_quantities(arm, part) for part in data]
+    told = np.concatenate([part.told for part in data])
+    left = np.concatenate(residual)
+    result = []
+    for joint in np.argsort(-beyond):
+        if beyond[joint] <= 0.0:
+            break
+        use = told[:, joint]
+        axes = []
+        for index, (name, unit, _) in enumerate(rows[0]):
+            values = np.concatenate([row[index][2][:, joint] for row in rows])
+            axes.append(_axis(name, unit, values[use], left[use, joint]))
+        axes.sort(key=lambda axis: -axis.share)
+        name = arm.robot.joints[joint]
+        share = float(beyond[joint] / total)
+        result.append(Where(name, share, _in_words(axes), tuple(axes)))
+    return tuple(result)
+
+
+def _quantities(arm: ArmModel, part: Trajectory) -> list[tuple[str, str, FloatArray]]:
+    motion = part.at_rows
+    load = arm.load(arm.link_motion(motion))
+    time = np.repeat(motion.t[:, np.newaxis], motion.n_joints, axis=1)
+    return [
+        ('velocity', 'rad/s', motion.dq),
+        ('position', 'rad', motion.q),
+        ('load', 'N m', load),
+        ('load against motion', 'N m', np.abs(load) * np.sign(motion.dq)),
+        ('acceleration', 'rad/s^2', motion.ddq),
+        ('time', 's', time),
+    ]
+
+
+def _axis(name: str, unit: str, x: FloatArray, left: FloatArray) -> Axis:
+    edges = np.quantile(x, np.linspace(0.0, 1.0, _BINS + 1))
+    index = np.clip(np.searchsorted(edges, x, side='right') - 1, 0, _BINS - 1)
+    counts = np.bincount(index, minlength=_BINS)
+    safe = np.maximum(counts, 1)
+    means = np.bincount(index, left, _BINS) / safe
+    centres = np.bincount(index, x, _BINS) / safe
+    power = float(np.sum(left**2))
+    share = float(np.sum(counts * means**2)) / power if power > 0.0 else 0.0
+    filled = counts > 0
+    return Axis(name, unit, read_only(centres[filled]), read_only(means[filled]), share)
+
+
+def _in_words(axes: Sequence[Axis]) -> str:
+    best = axes[0]
+    if best.share < _TELLING:
+        return 'along no single quantity of the joint: fast in time, or of several joints'
+    peak = int(np.argmax(np.abs(best.means)))
+    line = np.polyfit(best.centres, best.means, 1)
+    straight = np.polyval(line, best.centres)
+    size = float(np.sum(best.means**2))
+    share = f'{100 * best.share:.0f} % of its power'
+    if np.sum((best.means - straight) ** 2) < 0.15 * size:
+        return f'in proportion to {best.name} ({share})'
+    if best.name == 'velocity' and _jumps(best):
+        return f'a jump with the direction of motion ({share})'
+    return f'over {best.name}, most at {best.centres[peak]:.3g} {best.unit} ({share})'
+
+
+def _jumps(axis: Axis) -> bool:
+    forward = axis.means[axis.centres > 0.0]
+    backward = axis.means[axis.centres < 0.0]
+    if len(forward) < 2 or len(backward) < 2:
+        return False
+    step = abs(forward.mean() - backward.mean())
+    return bool(step > 3.0 * max(forward.std(), backward.std()))

@@ -1,0 +1,199 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From what was found to a word and a sentence that the evidence bears out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.floor import Floor
+from armid_ros.diagnosis.verdict.finding import Finding, Rival
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
+import numpy as np
+
+Word = Literal[
+    'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
+]
+
+#: Several recordings whose periods differ slowly, each a little, tell as well: of 60 sets of
+#: recordings in which nothing happened, none had a geometric mean of the structure above 2.4.
+_SEVERAL, _ON_AVERAGE = 3, 3.5
+#: A sentence with more joints than this only counts them; tables have the rest.
+_JOINTS_SAID = 3
+#: Standard deviations to either side of a 95 % interval.
+_NORMAL = 1.96
+
+
+@dataclass(frozen=True)
+class Left:
+    """
+    What is left in the joints.
+
+    Attributes
+    ----------
+    excess : ndarray, shape (n,)
+        Loss over the loss up to which it is no gap; above one there is something.
+    where : str
+        The data that show it, for a sentence.
+
+    """
+
+    excess: FloatArray
+    where: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """
+    The word and the sentence.
+
+    Attributes
+    ----------
+    word : str
+        See ``Word``.
+    summary : str
+        A sentence or two.
+
+    """
+
+    word: Word
+    summary: str
+
+
+def decide(
+    findings: Sequence[Finding],
+    floors: Sequence[Floor],
+    left: Sequence[Left],
+    arm: ArmModel,
+    floor_in_words: str,
+    *,
+    refitted: bool,
+) -> Verdict:
+    """
+    Decide what may be said.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+        What was named.
+    floors : sequence of Floor
+        Noise of the recordings.
+    left : sequence of Left
+        What the patched model leaves, of each set of data.
+    arm : ArmModel
+        Gives the joints.
+    floor_in_words : str
+        What was there before, or noise.
+    refitted : bool
+        Whether the body was fitted anew.
+
+    """
+    worst = max(left, key=lambda one: float(one.excess.max()))
+    open_gap = bool(worst.excess.max() > 1.0)
+    joint = arm.robot.joints[int(np.argmax(worst.excess))]
+    strange = _not_repeating(floors, arm)
+    if strange and (not findings or open_gap):
+        return Verdict('not_repeatable', _strange(strange, findings))
+    rest = (
+        f'the error of {joint} is {np.sqrt(worst.excess.max()):.1f} times as large as '
+        f'{floor_in_words} can be {worst.where}'
+    )
+    if not findings:
+        if open_gap:
+            text = f'Something is missing: {rest}. Nothing in the catalogue explains it.'
+            return Verdict('unknown', text)
+        how = ' once its rigid body and friction are fitted' if refitted else ''
+        text = f'The model explains the recordings{how}: what is left is {floor_in_words}.'
+        return Verdict('consistent', text)
+    said = ' '.join(sentence(finding, arm.robot) for finding in findings)
+    if open_gap:
+        return Verdict('partial', f'{said} There is more: {rest}.')
+    doubtful = [finding for finding in findings if finding.rivals]
+    if doubtful:
+        first = doubtful[0]
+        others = ' or '.join(_elsewhere(rival, first.joints) for rival in first.rivals)
+        text = f'{said} These data cannot tell it from {others}. {first.experiment}'
+        return Verdict('ambiguous', text)
+    return Verdict('named', f'{said} The rest is {floor_in_words}.')
+
+
+def sentence(finding: Finding, robot: Robot) -> str:
+    """Say what a cause is and how much it explains, as a person would."""
+    words = finding.name.replace('_', ' ')
+    article = 'An' if words[0] in 'aeiou' else 'A'
+    share = f'{100.0 * min(max(finding.share, 0.0), 1.0):.0f} %'
+    explains = f'explains {share} of the gap'
+    if finding.ties:
+        where = ', '.join(_tie(finding, tie.joint, tie.name) for tie in finding.ties)
+        return f'{words.capitalize()} at {where} {explains}.'
+    if finding.name == 'payload' and finding.values:
+        mass = _as_sure(finding.values[0], finding.std[0])
+        return f'A payload of {mass} kg on {finding.joints[0]} {explains}.'
+    if len(finding.joints) > _JOINTS_SAID:
+        return f'{words.capitalize()} in {len(finding.joints)} joints {explains}.'
+    where = f' in {", ".join(finding.joints)}' if finding.joints else ''
+    shown = [
+        f'{p.name.replace("_", " ")} {_with_degrees(value, std, p.unit)}'
+        for p, value, std in zip(finding.parameters, finding.values, finding.std, strict=True)
+    ]
+    if len(shown) > 3:
+        shown = [*shown[:2], f'and {len(shown) - 2} more']
+    numbers = f' ({", ".join(shown)})' if shown else ''
+    return f'{article} {words}{where}{numbers} {explains}.'
+
+
+def _with_degrees(value: float, std: float, unit: str) -> str:
+    text = f'{_as_sure(value, std)} {unit}'.strip()
+    if unit == 'rad':
+        return f'{text}, {np.rad2deg(value):.1f} degrees'
+    return text
+
+
+def _not_repeating(floors: Sequence[Floor], arm: ArmModel) -> list[str]:
+    """Return the joints that did not do the same in equal periods."""
+    known = [floor for floor in floors if floor.period is not None]
+    if not known:
+        return []
+    often = np.sum([~floor.repeats for floor in known], axis=0) >= max(1, len(known) / 2)
+    if len(known) >= _SEVERAL:
+        mean = np.exp(np.mean([np.log(floor.structure) for floor in known], axis=0))
+        often = often | (mean > _ON_AVERAGE)
+    return [joint for joint, odd in zip(arm.robot.joints, often, strict=True) if odd]
+
+
+def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
+    text = (
+        f'Equal periods differ in {", ".join(joints)} by more than noise, and not with time or '
+        'velocity: something acts that does not repeat, such as contact or a person. '
+    )
+    if findings:
+        names = ', '.join(finding.name.replace('_', ' ') for finding in findings)
+        return text + f'{names} is provisional.'
+    return text + 'No effect of the arm is named.'
+
+
+def _tie(finding: Finding, joint: str, segment: str) -> str:
+    shown = [
+        f'{p.name.replace("_", " ")} {_as_sure(value, std)} {p.unit}'
+        for p, value, std in finding.of_joint(joint)
+    ]
+    return f'{segment} ({", ".join(shown)})'
+
+
+def _elsewhere(rival: Rival, joints: Sequence[str]) -> str:
+    """Return a name, and the joints where they are others than those."""
+    there = '' if set(rival.joints) == set(joints) else f' of {", ".join(rival.joints)}'
+    return rival.name.replace('_', ' ') + (there if rival.joints else '')
+
+
+def _as_sure(value: float, std: float) -> str:
+    """Return a value to the second digit of its 95 % interval, and that."""
+    wide = _NORMAL * std
+    if not 0.0 < wide < np.inf:
+        return f'{value:.4g}'
+    decimals = max(0, 1 - int(np.floor(np.log10(wide))))
+    return f'{value:.{decimals}f} +- {wide:.{decimals}f}'
