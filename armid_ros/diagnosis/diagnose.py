@@ -39,6 +39,9 @@ import numpy as np
 #: Told the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
+#: Recordings hardly show what takes less than this share of the share it takes of others.
+_HARDLY = 0.1
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -201,9 +204,10 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     explanation, notes = chosen.explanation, list(chosen.notes)
     evidence = explanation.evidence
     unseen = _unseen(validate, explanation, prepared, chosen)
-    explanation, shares = _told_from_zero(explanation, unseen, rng)
+    least = settings.thresholds.headline if np.any(chosen.misfit > 0.0) else 0.0
+    explanation, shares = _headline(explanation, unseen, least)
     found = findings(explanation, shares, arm, rng)
-    worse = harmed(explanation, unseen)
+    worse = harmed(explanation, unseen, settings)
     patched = explanation.fitted.arm
     if worse:
         names = ', '.join(one.name.replace('_', ' ') for one in found)
@@ -253,14 +257,29 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     )
 
 
-def _told_from_zero(
-    explanation: Explanation, unseen: Evidence | None, rng: np.random.Generator
+def _headline(
+    explanation: Explanation, unseen: Evidence | None, least: float
 ) -> tuple[Explanation, Attribution]:
-    """Drop names that take nothing of data they were not found in, and share out the gap."""
-    shares = attribute(explanation, unseen)
-    for k in reversed(shares.order):
-        if shares.interval([k], rng)[0] <= 0.0:
-            return _told_from_zero(explanation.without(k), unseen, rng)
+    """
+    Drop names that other data deny, leave small ones to the small print, share out the gap.
+
+    It is shared out on those data, or on the data left out one by one where those hardly show
+    what was named.
+
+    """
+    shares = left_out = attribute(explanation, None)
+    names = range(len(explanation.steps))
+    if unseen is not None:
+        seen = attribute(explanation, unseen)
+        for k in reversed(seen.order):
+            if seen.denied(k):
+                return _headline(explanation.without(k), unseen, least)
+        if seen.share(names) > _HARDLY * left_out.share(names):
+            shares = seen
+    small = [k for k in names if shares.share([k]) < least]
+    if small:
+        least_of_all = min(small, key=lambda k: shares.share([k]))
+        return _headline(explanation.without(least_of_all), unseen, least)
     return explanation, shares
 
 
@@ -276,7 +295,7 @@ def _unseen(
     data = trajectories(validate, prepared.used, explanation.fitted.arm)
     noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]
     sigma = [np.maximum(one, chosen.misfit) for one in noise]
-    return Evidence(tuple(data), tuple(sigma), tuple(noise))
+    return Evidence(tuple(data), tuple(sigma), tuple(noise), explanation.evidence.varies)
 
 
 def _left(

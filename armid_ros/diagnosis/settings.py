@@ -33,6 +33,8 @@ class Thresholds:
         Lead over its own share that excludes another one however few blocks show it.
     misfit_share : float
         Power of a cause over that of the model's own misfit, below which it is small print.
+    headline : float
+        Share that a cause takes of a gap beside a misfit, below which it is small print.
     same_fit : float
         Factor between losses of two explanations that are as good as each other where the unit is
         a misfit of other data.
@@ -52,6 +54,7 @@ class Thresholds:
     tie: float = 0.02
     far: float = 0.25
     misfit_share: float = 1.0
+    headline: float = 0.1
     same_fit: float = 1.5
     least_visible: float = 0.02
     confidence: float = 0.99

@@ -330,7 +330,7 @@ class Effect(ABC):
 
         """
 
-    def plausible(self, values: FloatArray, arm: ArmModel, *, described: bool) -> bool:
+    def plausible(self, values: FloatArray, arm: ArmModel) -> bool:
         """
         Return whether values within the bounds are what one would call by this name.
 
@@ -340,8 +340,6 @@ class Effect(ABC):
             Parameter values.
         arm : ArmModel
             The arm without them.
-        described : bool
-            Whether its body is as somebody described it, not as it was identified.
 
         """
         return True

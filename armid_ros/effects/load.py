@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 #: How far from its joint a link's mass may be without a word in the description [m].
 _REACH = 0.1
-#: Share by which masses of descriptions are off often enough for no payload to be needed.
-_OFF = 0.12
 _UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 
@@ -88,13 +86,9 @@ class Payload(_LinkBody):
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         return robot.joints[-1:]
 
-    def plausible(self, values: FloatArray, arm: ArmModel, *, described: bool) -> bool:
-        """Return whether it weighs more than what the description of its link is off by."""
-        if not described:
-            return bool(values[0] > 0.0)
-        link = arm.robot.joints.index(self.joints[0])
-        mass = float(arm.robot.rigid_parameters[len(LINK_PARAMETERS) * link])
-        return bool(values[0] > _OFF * mass)
+    def plausible(self, values: FloatArray, arm: ArmModel) -> bool:
+        """Return whether it weighs anything."""
+        return bool(values[0] > 0.0)
 
     def spread(self, robot: Robot) -> FloatArray:
         """Return what an arm may carry at the most: as much as it weighs, a little off, (P,)."""

@@ -37,12 +37,16 @@ class Baseline:
         What the model leaves of them [N m].
     misfit : ndarray, shape (n,)
         Root mean square that it leaves of recordings it was not identified from [N m].
+    varies : ndarray, shape (n,)
+        Squares that it leaves of the recording it predicts worst, over those of all: another
+        motion makes another misfit.
 
     """
 
     data: tuple[Trajectory, ...]
     residual: tuple[FloatArray, ...]
     misfit: FloatArray
+    varies: FloatArray
 
     @classmethod
     def of(cls, arm: ArmModel, data: Sequence[Trajectory], rng: np.random.Generator) -> Baseline:
@@ -65,7 +69,11 @@ class Baseline:
             others = np.linalg.lstsq(sum(own) - own[k], sum(to) - to[k], rcond=1e-10)[0]
             left[fold == k] += w[fold == k] @ (whole - others)
         others = np.sqrt(np.mean(left**2, axis=0, where=informative))
-        return cls(tuple(data), tuple(residual), np.sqrt(scale * others))
+        worst = np.max(
+            [np.mean(left[fold == k] ** 2, axis=0, where=informative[fold == k]) for k in folds],
+            axis=0,
+        )
+        return cls(tuple(data), tuple(residual), np.sqrt(scale * others), worst / others**2)
 
     def values(
         self, arm: ArmModel, effect: Effect, kept: Sequence[int], precision: FloatArray

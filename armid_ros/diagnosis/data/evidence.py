@@ -123,12 +123,15 @@ class Evidence:
         [N m].
     noise : tuple of ndarray, each (n,)
         Its noise [N m].
+    varies : ndarray, shape (n,), or None
+        By how much the squares of a misfit vary from motion to motion; None: as a rule.
 
     """
 
     data: tuple[Trajectory, ...]
     sigma: tuple[FloatArray, ...]
     noise: tuple[FloatArray, ...]
+    varies: FloatArray | None = None
 
     @cached_property
     def count(self) -> FloatArray:
@@ -155,6 +158,12 @@ class Evidence:
                 squares += np.sum((left / sigma) ** 2, axis=0, where=part.told)
         return np.asarray(squares / np.maximum(self.count, 1.0))
 
+    def split(self, weighted: FloatArray, weight: FloatArray) -> list[FloatArray]:
+        """Return weighted rows (R, n) of all trajectories one by one, without their weights."""
+        rows = np.where(weight > 0.0, weighted / np.where(weight > 0.0, weight, 1.0), 0.0)
+        cuts = np.cumsum([len(part.rows) for part in self.data])[:-1]
+        return np.split(rows, cuts)
+
     def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
         """
         Return the loss of each joint up to which what is left is no gap, shape (n,).
@@ -171,7 +180,9 @@ class Evidence:
         parts = [k for k, part in enumerate(self.data) if not part.before]
         sigma = np.mean([self.sigma[k] ** 2 for k in parts], axis=0)
         own = np.mean([self.noise[k] ** 2 for k in parts], axis=0) / sigma
-        misfit = np.where(own < 1.0 / thresholds.same_fit, thresholds.same_fit, 1.0)
+        varies = 1.0 if self.varies is None else np.maximum(self.varies, 1.0)
+        beside = thresholds.same_fit * varies
+        misfit = np.where(own < 1.0 / thresholds.same_fit, beside, 1.0)
         matters = (settings.material * self.torque_rms) ** 2 / sigma
         return np.asarray(np.maximum(noise, misfit) + matters)
 

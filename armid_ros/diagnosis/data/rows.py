@@ -13,11 +13,12 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-#: Recordings fewer than this are cut into parts.
-LEAST_FOLDS = 3
+#: Parts that data are held out in, two of each recording at the least: what one fast recording
+#: shows alone can be learned from half of it.
+PARTS = 6
 #: Blocks of each part of the data, of a second or two, which is longer than any correlation of
 #: noise; a block has this many rows at the least.
-BLOCKS, _LEAST_ROWS = 12, 8
+BLOCKS, _LEAST_ROWS = 6, 8
 #: Free columns of which others leave less than this share are dependent.
 _DEPENDENT = 1e-7
 
@@ -37,9 +38,9 @@ class Problem:
         One over the noise, zero where a row is not informative [1/(N m)].
     block : ndarray of int, shape (R,)
         Stretch of the data that a row belongs to; longer than any correlation.
-    fold_of_block, half_of_block : ndarray of int, shape (B,)
-        Part of the data that a block belongs to, and half of a part; -1 where nothing is held
-        out, as what was recorded when nothing was wrong.
+    fold_of_block : ndarray of int, shape (B,)
+        Part of the data that a block belongs to; -1 where nothing is held out, as what was
+        recorded when nothing was wrong.
 
     """
 
@@ -48,7 +49,6 @@ class Problem:
     weight: FloatArray
     block: npt.NDArray[np.intp]
     fold_of_block: npt.NDArray[np.intp]
-    half_of_block: npt.NDArray[np.intp]
 
     @property
     def used(self) -> npt.NDArray[np.bool_]:
@@ -81,20 +81,18 @@ def make_problem(
 
 def block_rows(
     data: Sequence[Trajectory],
-) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Return the block of every row, and the part and half of a part of every block."""
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Return the block of every row, and the part of the data of every block."""
     fold = fold_rows(data)
     block = np.empty(len(fold), dtype=np.intp)
-    owner: list[tuple[int, int]] = []
+    owner: list[int] = []
     for k in np.unique(fold):
         rows = np.flatnonzero(fold == k)
         pieces = min(BLOCKS, max(2, len(rows) // _LEAST_ROWS))
         for piece in np.array_split(rows, pieces):
             block[piece] = len(owner)
-            half = 2 * k + int(2 * (piece[0] - rows[0]) >= len(rows))
-            owner.append((k, max(half, -1)))
-    fold_of, half_of = np.array(owner, dtype=np.intp).T
-    return block, fold_of, half_of
+            owner.append(int(k))
+    return block, np.array(owner, dtype=np.intp)
 
 
 def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
@@ -112,9 +110,9 @@ def weighted_rows(
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
-    """Return the part of the data of every row: a recording, or a stretch of one if few."""
+    """Return the part of the data of every row, a stretch of a recording; -1 if from before."""
     recordings = len({part.fold for part in data if not part.before})
-    pieces = 1 if recordings >= LEAST_FOLDS else -(-(LEAST_FOLDS + 1) // recordings)
+    pieces = max(2, -(-PARTS // max(recordings, 1)))
     rows = []
     for part in data:
         if part.before:
@@ -122,8 +120,7 @@ def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
             continue
         span = np.linspace(0, pieces, len(part.rows), endpoint=False).astype(np.intp)
         rows.append(part.fold * pieces + span)
-    whole = np.concatenate(rows)
-    known, index = np.unique(whole, return_inverse=True)
+    known, index = np.unique(np.concatenate(rows), return_inverse=True)
     return np.asarray(index - int(known[0] < 0), dtype=np.intp)
 
 

@@ -21,7 +21,7 @@ from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.search.explain import explain, Explanation, View
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.question import as_given, fitted_anew
+from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -103,44 +103,48 @@ def _since(
     tell(0.2, 'what has changed')
     noise = prepared.as_told
     sigma = tuple(np.maximum(one, baseline.misfit) for one in noise)
-    evidence = Evidence(prepared.data, sigma, noise)
+    evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
     given = as_given(arm, prepared.data, 2 * settings.thresholds.few_causes)
     found = explain(given, evidence, settings, baseline=baseline)
     if not found.steps:
         return Chosen(found, baseline.misfit, OWN_MISFIT)
     tell(0.7, 'a body common to both')
-    whole, common = _common_body(arm, evidence, baseline, rng)
-    first = found.steps[0].trial.gains
-    ahead = first - (whole - common)
+    both = _with_before(evidence, baseline)
+    anew = fitted_anew(arm, both.data, settings.thresholds.few_causes, rng)
+    whole, common = _common_body(arm, evidence, both, anew)
+    ahead = found.steps[0].trial.gains - (whole - common)
     if ahead.sum() > settings.thresholds.tie * whole.sum():
         return Chosen(found, baseline.misfit, OWN_MISFIT)
     note = (
-        'a rigid body and friction common to these recordings and the baseline explain as much as '
-        'any cause: the baseline did not determine them for this motion; identify with both'
+        'the baseline did not determine the model for these motions: a rigid body and friction '
+        'common to both were fitted'
     )
-    quiet = found.withdrawn()
-    return Chosen(quiet, _wider(quiet, baseline), OWN_MISFIT, (note,))
+    return Chosen(explain(anew, both, settings), baseline.misfit, OWN_MISFIT, (note,))
+
+
+def _with_before(evidence: Evidence, baseline: Baseline) -> Evidence:
+    """Return the data with the baseline, in which nothing that is named acts."""
+    before = tuple(replace(part, before=True) for part in baseline.data)
+    unit = (baseline.misfit,) * len(before)
+    return Evidence(
+        (*evidence.data, *before),
+        (*evidence.sigma, *unit),
+        (*evidence.noise, *unit),
+        evidence.varies,
+    )
 
 
 def _common_body(
-    arm: ArmModel, evidence: Evidence, baseline: Baseline, rng: np.random.Generator
+    arm: ArmModel, evidence: Evidence, both: Evidence, anew: Question
 ) -> tuple[FloatArray, FloatArray]:
     """Return the held-out squares of the model as given, and of one fitted to both, (B,)."""
-    data = (*evidence.data, *(replace(part, before=True) for part in baseline.data))
-    sigma = (*evidence.sigma, *[baseline.misfit] * len(baseline.data))
-    question = fitted_anew(arm, data, 0, rng)
-    both = fit(arm, (), data, sigma, question.base)
-    problem = View.of(both, Evidence(data, sigma, sigma)).problem
+    common = fit(arm, (), both.data, both.sigma, anew.base)
+    problem = View.of(common, both).problem
     free = tuple(range(problem.x.shape[2]))
-    _, common = held_out(problem, free, [], both.hold, both.pull)
+    _, left = held_out(problem, free, [], common.hold, common.pull)
     alone = fit(arm, (), evidence.data, evidence.sigma, None)
     _, whole = held_out(View.of(alone, evidence).problem, (), [], np.zeros((0, 0)), np.zeros(0))
-    return whole, common
-
-
-def _wider(found: Explanation, baseline: Baseline) -> FloatArray:
-    """Return the misfit of a model that the baseline did not determine for this motion."""
-    return np.asarray(baseline.misfit * np.sqrt(np.maximum(found.losses, 1.0)))
+    return whole, left
 
 
 def _at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:

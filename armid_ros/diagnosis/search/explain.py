@@ -86,7 +86,9 @@ class Explanation:
             self.base,
             [self.fitted.values[k] for k in keep],
         )
-        return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
+        minor = (*self.minor, self.steps[name].trial)
+        steps = tuple(self.steps[k] for k in keep)
+        return replace(self, fitted=fitted, steps=steps, minor=minor)
 
     def withdrawn(self) -> Explanation:
         """Return the explanation without any name."""
@@ -113,7 +115,8 @@ def explain(
     """Take causes as long as any passes, then name the friction that matters, and prune."""
     found = _forward(question, evidence, settings, start, baseline)
     named, steps, values, survey, minor = found
-    kept = _friction(question, named, values, evidence, settings)
+    whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
+    kept = _friction(question, named, values, evidence, settings, whole)
     named = [*named, *(own for own, _, _ in kept)]
     steps = [*steps, *(step for _, step, _ in kept)]
     values = [*values, *(value for _, _, value in kept)]
@@ -281,6 +284,7 @@ def _friction(
     values: Sequence[FloatArray],
     evidence: Evidence,
     settings: DiagnosisSettings,
+    whole: tuple[float | None, int],
 ) -> list[tuple[Named, Step, FloatArray]]:
     """
     Return the friction of unknown value that is there, beside what was named.
@@ -312,12 +316,13 @@ def _friction(
         judged = {}
         for k, (effect, column, value) in alive.items():
             group = Group.of(effect, slice(0, 1), (0,), arm.robot)
-            trial, problem, beside, total = view.trial(group, [column], [value], gone)
+            trial, problem, beside, power = view.trial(group, [column], [value], gone)
+            total = power if whole[0] is None else whole[0]
             good = False
             if trial is not None:
                 here = Round(evidence, work, settings, total)
                 gains = trial.joint_gains(problem, beside.free)
-                good = acceptable(trial, here, len(question.unknown)) and material(gains, here)
+                good = acceptable(trial, here, whole[1]) and material(gains, here)
                 judged[k] = trial, total
             gain = trial.gain if trial is not None else -np.inf
             if not good and (weakest is None or gain < weakest[0]):
@@ -330,7 +335,7 @@ def _friction(
     result = []
     for k, (effect, _, value) in alive.items():
         trial, total = judged[k]
-        step = Step(trial, (), (trial,), total, 1)
+        step = Step(trial, (), (trial,), total, whole[1])
         result.append((Named(effect, (0,)), step, np.array([value])))
     return result
 

@@ -26,9 +26,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-#: Columns of which one part of the data has more than this share do nothing in the others, and
-#: nothing can be learned of them there: halves of that part are left out instead.
-_IN_ONE_PART = 0.999
 #: Directions of which the free columns leave less than this share of their squares are not seen.
 _UNSEEN = 1e-10
 
@@ -259,32 +256,21 @@ def held_out(
     """
     known = products(problem, free, groups)
     whole = np.ones(len(known.power), dtype=bool)
-    foldings = problem.fold_of_block, problem.half_of_block
+    folding = problem.fold_of_block
     everything = _Base.of(known, whole, hold, pull)
-    lone = [_in_one_part(values, problem.fold_of_block) for values in known.own]
-    trials: list[Trial | None] = [None] * len(groups)
-    power = np.zeros(len(known.power))
-    for number, folding in enumerate(foldings):
-        members = [k for k, alone in enumerate(lone) if alone == bool(number)]
-        if number and not members:
-            continue
-        bases = [_Base.of(known, folding != part, hold, pull) for part in range(folding.max() + 1)]
-        if not number:
-            power = _left(known, bases, folding)
-        for k in members:
-            old = None if before is None else before[k]
-            trials[k] = _tried(known, groups[k], k, everything, bases, folding, old)
+    bases = [_Base.of(known, folding != part, hold, pull) for part in range(folding.max() + 1)]
+    power = _left(known, bases, folding)
+    values = [None] * len(groups) if before is None else before
+    trials = [
+        _tried(known, group, k, everything, bases, folding, old)
+        for k, (group, old) in enumerate(zip(groups, values, strict=True))
+    ]
     asked = problem.fold_of_block >= 0
     return [
         replace(t, cross=t.cross[asked], square=t.square[asked], piece=t.piece[asked])
         for t in trials
         if t is not None
     ], power[asked]
-
-
-def _in_one_part(own: FloatArray, fold: npt.NDArray[np.intp]) -> bool:
-    sizes = np.bincount(fold + 1, np.trace(own, axis1=1, axis2=2))[1:]
-    return bool(len(sizes) > 1 and sizes.max() > _IN_ONE_PART * sizes.sum())
 
 
 def _left(known: Products, bases: Sequence[_Base], folding: npt.NDArray[np.intp]) -> FloatArray:

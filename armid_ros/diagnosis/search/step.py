@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -22,7 +23,7 @@ import numpy.typing as npt
 
 #: Best groups that are looked at row by row; shapes of this many are refined, of groups that have
 #: this share of the best worth.
-_LOOKED_AT, _REFINED, _PROMISING = 30, 4, 0.4
+_LOOKED_AT, _REFINED, _PROMISING = 30, 6, 0.4
 #: Causes in the small print.
 _SMALL_PRINT = 5
 #: Columns that take less than this share of their gain without the noise of positions beyond the
@@ -182,7 +183,7 @@ def next_step(
         return None, survey, problem
     first = passing[0]
     tied = [first, *(t for t in passing[1:] if not beaten(t, first, here))]
-    winner = simplest(tied, here)
+    winner = likeliest(tied, gains, problem, beside, here)
     rivals = tuple(
         trial
         for trial in tied
@@ -216,6 +217,30 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
     return z >= thresholds.rival_z or squares > thresholds.far * first.gain
 
 
+def likeliest(
+    tied: Sequence[Trial],
+    gains: dict[int, FloatArray],
+    problem: Problem,
+    beside: Beside,
+    here: Round,
+) -> Trial:
+    """
+    Return the simplest of the causes that leave no gap, or the best where each leaves one.
+
+    One cause that explains everything goes before two that do it together.
+
+    """
+    if len(tied) == 1:
+        return tied[0]
+    since = problem.fold_of_block[problem.block] >= 0
+    left = project(problem, beside.free).rest(problem.y)[since]
+    squares = np.sum(left**2, axis=0)
+    count = np.maximum(here.evidence.count, 1.0)
+    limits = here.evidence.limits(here.evidence.split(left, problem.weight[since]), here.settings)
+    able = [t for t in tied if np.all((squares - gains[id(t)]) / count <= limits)]
+    return simplest(able, here) if able else tied[0]
+
+
 def simplest(tied: Sequence[Trial], here: Round) -> Trial:
     """
     Return the cause with the least freedom.
@@ -241,9 +266,7 @@ def acceptable(trial: Trial, here: Round, tried: int) -> bool:
 def possible(trial: Trial, here: Round) -> bool:
     """Return whether the values are what could be called by the name."""
     group, arm = trial.group, here.work.arm
-    return bool(_inside(trial, here).all()) and group.effect.plausible(
-        trial.values, arm, described=here.baseline is None
-    )
+    return bool(_inside(trial, here).all()) and group.effect.plausible(trial.values, arm)
 
 
 def _inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
@@ -297,11 +320,14 @@ def _with_refined_shapes(
     refined: list[Trial] = []
     found: list[FloatArray] = []
     first = problem.x.shape[2]
+    tried: Counter[str] = Counter()
     for trial in ranking[:_LOOKED_AT]:
         effect = trial.group.effect
         promising = worth(trial, here) > _PROMISING * best and len(refined) < _REFINED
+        promising = promising and tried[effect.name] < _REFINED // 2
         if not (promising and trial.gain > 0.0):
             continue
+        tried[effect.name] += 1
         inside = [k for k, good in enumerate(_inside(trial, here)) if good]
         if 0 < len(inside) < trial.group.size:
             own = problem.x[:, :, trial.group.columns][:, :, inside]

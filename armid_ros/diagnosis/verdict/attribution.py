@@ -41,12 +41,29 @@ class Attribution:
         The gap.
     taken : ndarray, shape (K, B)
         What each name takes of it, in the order of the explanation.
+    made : ndarray, shape (K, B)
+        Squares of what each name predicts.
 
     """
 
     order: tuple[int, ...]
     whole: FloatArray
     taken: FloatArray
+    made: FloatArray
+
+    def denied(self, name: int) -> bool:
+        """
+        Return whether data deny a name: no more follows it than noise would.
+
+        The slope of what is left on what the name predicts is one for a cause, zero for none.
+
+        """
+        made = self.made[name]
+        cross = (self.taken[name] + made) / 2.0
+        slope = float(cross.sum() / max(float(made.sum()), 1e-300))
+        scatter = cross - slope * made
+        wide = 2.0 * float(np.sqrt(np.sum(scatter**2)) / max(float(made.sum()), 1e-300))
+        return slope + wide < 1.0 and slope - wide <= 0.0
 
     def share(self, names: Sequence[int]) -> float:
         """Return the share that some of the names take together."""
@@ -73,13 +90,15 @@ def attribute(explanation: Explanation, unseen: Evidence | None) -> Attribution:
         Data that nothing was fitted to; None predicts each part of the data from the others.
 
     """
-    order, whole, taken = _left_out(explanation)
+    order, whole, taken, made = _left_out(explanation)
     if unseen is None:
-        return Attribution(order, whole, taken)
+        return Attribution(order, whole, taken, made)
     return _predicted(explanation, order, unseen)
 
 
-def _left_out(explanation: Explanation) -> tuple[tuple[int, ...], FloatArray, FloatArray]:
+def _left_out(
+    explanation: Explanation,
+) -> tuple[tuple[int, ...], FloatArray, FloatArray, FloatArray]:
     """Predict each part of the data from the others, name after name."""
     view = View.of(explanation.fitted, explanation.evidence)
     named = explanation.fitted.named
@@ -94,11 +113,11 @@ def _left_out(explanation: Explanation) -> tuple[tuple[int, ...], FloatArray, Fl
         for c in range(span[0] + len(own.kept), span[1])
     ]
     left = list(range(len(named)))
-    taken = np.zeros((len(named), 0))
+    taken = made = np.zeros((len(named), 0))
     order: list[int] = []
     whole: FloatArray | None = None
     while left:
-        best: tuple[float, int, FloatArray] | None = None
+        best: tuple[float, int, FloatArray, FloatArray] | None = None
         asked = [c for k in left for c in columns[k]]
         values = [view.value(c) for c in asked]
         problem, free, hold, pull = view.without(asked, values, shapes)
@@ -109,34 +128,38 @@ def _left_out(explanation: Explanation) -> tuple[tuple[int, ...], FloatArray, Fl
             start = span.stop
         trials, power = held_out(problem, free, groups, hold, pull)
         whole = power if whole is None else whole
-        taken = np.zeros((len(named), len(power))) if not taken.size else taken
+        if not taken.size:
+            taken, made = np.zeros((2, len(named), len(power)))
         by_group = {id(trial.group): trial for trial in trials}
         for k, group in zip(left, groups, strict=True):
             trial = by_group.get(id(group))
             if trial is not None and (best is None or trial.gain > best[0]):
-                best = trial.gain, k, trial.gains
+                best = trial.gain, k, trial.gains, trial.square
         if best is None:
             order += left
             break
-        _, k, gains = best
-        taken[k] = gains
+        _, k, taken[best[1]], made[best[1]] = best
         order.append(k)
         left.remove(k)
     if whole is None:
         _, free, hold, pull = view.without((), ())
         _, whole = held_out(view.problem, free, [], hold, pull)
-    return tuple(order), whole, taken.reshape(len(named), len(whole))
+    size = len(named), len(whole)
+    return tuple(order), whole, taken.reshape(size), made.reshape(size)
 
 
 def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
     """Predict other data, name after name, with values fitted to all of the data."""
     arms = [explanation.reference.arm, *_staircase(explanation, order)]
-    blocks, _, _ = block_rows(unseen.data)
-    squares = [_squares(arm, unseen, blocks) for arm in arms]
-    taken = np.zeros((len(order), len(squares[0])))
+    blocks, _ = block_rows(unseen.data)
+    left = [[part.residual(arm) for part in unseen.data] for arm in arms]
+    squares = [_squares(rows, unseen, blocks) for rows in left]
+    taken, made = np.zeros((2, len(order), len(squares[0])))
     for position, k in enumerate(order):
         taken[k] = squares[position] - squares[position + 1]
-    return Attribution(tuple(order), squares[0], taken)
+        steps = zip(left[position], left[position + 1], strict=True)
+        made[k] = _squares([before - after for before, after in steps], unseen, blocks)
+    return Attribution(tuple(order), squares[0], taken, made)
 
 
 def _staircase(explanation: Explanation, order: Sequence[int]) -> list[ArmModel]:
@@ -152,10 +175,12 @@ def _staircase(explanation: Explanation, order: Sequence[int]) -> list[ArmModel]
     return [*arms, fitted.arm] if order else []
 
 
-def _squares(arm: ArmModel, evidence: Evidence, blocks: npt.NDArray[np.intp]) -> FloatArray:
-    """Return the squares over the unit of what an arm leaves in every block."""
+def _squares(
+    torque: Sequence[FloatArray], evidence: Evidence, blocks: npt.NDArray[np.intp]
+) -> FloatArray:
+    """Return the squares over the unit of torques (M, n) of each trajectory in every block."""
     rows = [
-        np.sum((part.residual(arm) * part.told / sigma) ** 2, axis=1)
-        for part, sigma in zip(evidence.data, evidence.sigma, strict=True)
+        np.sum((values * part.told / sigma) ** 2, axis=1)
+        for values, part, sigma in zip(torque, evidence.data, evidence.sigma, strict=True)
     ]
     return np.asarray(np.bincount(blocks, np.concatenate(rows)))
