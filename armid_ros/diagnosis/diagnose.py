@@ -178,12 +178,31 @@ def diagnose(
         chosen = diagnose_ties(arm, recordings, prepared, settings)
     if chosen is None:
         chosen = explained(arm, prepared, known, settings, rng, tell)
+        unseen = _unseen(validate, chosen.explanation, prepared, chosen)
+        if harmed(chosen.explanation, unseen, settings):
+            chosen = _second_choice(chosen, arm, prepared, known, settings, rng, tell)
     notes += chosen.notes
     explanation, remarks = as_bodies(chosen.explanation, arm)
     return _said(
         replace(chosen, explanation=explanation, notes=(*notes, *remarks)),
         (arm, gate, prepared, validate, settings, rng, tell),
     )
+
+
+def _second_choice(
+    chosen: Chosen,
+    arm: ArmModel,
+    prepared: Prepared,
+    baseline: Baseline | None,
+    settings: DiagnosisSettings,
+    rng: np.random.Generator,
+    tell: Progress,
+) -> Chosen:
+    """Explain the gap without the names that make the model worse somewhere."""
+    gone = {own.effect.name for own in chosen.explanation.fitted.named}
+    library = tuple(name for name in settings.library if name not in gone)
+    again = explained(arm, prepared, baseline, replace(settings, library=library), rng, tell)
+    return again if again.explanation.steps else chosen
 
 
 _Context = tuple[

@@ -61,9 +61,30 @@ class Gate:
 
 def check_data(arm: ArmModel, recordings: Sequence[Recording], data: Sequence[Trajectory]) -> Gate:
     """Look for faults of the data."""
-    slopes, correlation = _compare(arm, data)
+    slopes, correlation = _compare(_under_its_gravity(arm, data), data)
     faults = [*_time_base(recordings), *_torques(arm, slopes, correlation)]
     return Gate(tuple(faults), tuple(_clipped(recordings)), slopes, correlation)
+
+
+def _under_its_gravity(arm: ArmModel, data: Sequence[Trajectory]) -> ArmModel:
+    """
+    Return an arm under the gravity that explains the torques, if that does so better than a sign.
+
+    An arm that hangs takes the opposite torques of one that stands, but for its inertia.
+
+    """
+    bare = ArmModel(arm.robot, quasi_static=arm.quasi_static)
+    columns = np.concatenate([part.reduce(bare.gravity_columns(part.motion)) for part in data])
+    left = np.concatenate([part.residual(bare) for part in data])
+    torque = left + np.concatenate([part.reduce(bare.torque(part.motion)) for part in data])
+    scale = np.maximum(np.sqrt(np.mean(torque**2, axis=0)), 1e-12)
+    flat = (columns / scale[:, np.newaxis]).reshape(-1, 3)
+    change = np.linalg.lstsq(flat, (left / scale).ravel(), rcond=None)[0]
+    after = np.sum(((left - columns @ change) / scale) ** 2)
+    negated = np.sum(((left - 2.0 * torque) / scale) ** 2)
+    if after >= min(negated, 0.5 * np.sum((left / scale) ** 2)):
+        return arm
+    return ArmModel(arm.robot.with_gravity(arm.robot.gravity + change), arm.effects, arm.values)
 
 
 def _time_base(recordings: Sequence[Recording]) -> list[str]:
