@@ -151,6 +151,20 @@ def diagnose(
     """
     settings = settings or DiagnosisSettings()
     tell = progress or _silent
+    if settings.everything:
+        least = settings.thresholds.headline
+        result = diagnose(
+            arm,
+            recordings,
+            validate=validate,
+            baseline=baseline,
+            settings=settings.without_small_print(),
+            rng=rng,
+            progress=tell,
+        )
+        large = tuple(one for one in result.findings if one.share >= least)
+        small = tuple(one for one in result.findings if one.share < least)
+        return replace(result, findings=large, minor=(*small, *result.minor))
     tell(0.02, 'filtering')
     used = choose_filters([*recordings, *baseline], settings)
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from armid_ros.effects import CATALOGUE, Kind
 from armid_ros.effects.tied import Partner, TiedInteraction, TiedSlack
@@ -94,6 +94,11 @@ class DiagnosisSettings:
     material: float = 0.01
     everything: bool = False
     thresholds: Thresholds = field(default_factory=Thresholds)
+
+    def without_small_print(self) -> DiagnosisSettings:
+        """Return settings by which all that is there beyond chance is named."""
+        thresholds = replace(self.thresholds, misfit_share=0.0, headline=0.0)
+        return replace(self, material=0.0, everything=False, thresholds=thresholds)
 
     @property
     def kinds(self) -> tuple[Kind, ...]:
