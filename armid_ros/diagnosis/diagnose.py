@@ -338,7 +338,8 @@ def _left(
         residual = explanation.fitted.residual
     else:
         residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
-    excess = evidence.losses(residual) / evidence.limits(residual, settings)
+    more = 1.0 if evidence is explanation.evidence else settings.thresholds.predicted
+    excess = evidence.losses(residual) / (more * evidence.limits(residual, settings))
     return Left(excess, f'in {where}')
 
 

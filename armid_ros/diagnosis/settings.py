@@ -41,7 +41,11 @@ class Thresholds:
     least_visible : float
         A group of which what is free leaves less than this share of its columns is not visible.
     confidence : float
-        Level up to which what is left counts as noise that two periods tell so well.
+        Level, of all joints together, up to which what is left counts as noise that two periods
+        tell so well.
+    predicted : float
+        Factor by which squares may be larger on motions that were not used: values that others
+        told are not exact there.
     few_causes, many_causes : int
         Causes that are looked for in a model as given, and beside a body that is fitted anew.
 
@@ -58,6 +62,7 @@ class Thresholds:
     same_fit: float = 1.5
     least_visible: float = 0.02
     confidence: float = 0.99
+    predicted: float = 2.0
     few_causes: int = 4
     many_causes: int = 16
 

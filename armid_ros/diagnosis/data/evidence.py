@@ -176,7 +176,8 @@ class Evidence:
         thresholds = settings.thresholds
         count = np.maximum(self.count, 2.0)
         free = np.maximum(count / self._lasting(residual), 4.0)
-        noise = stats.f.ppf(thresholds.confidence, free, free)
+        each = 1.0 - (1.0 - thresholds.confidence) / len(count)
+        noise = stats.f.ppf(each, free, free)
         parts = [k for k, part in enumerate(self.data) if not part.before]
         sigma = np.mean([self.sigma[k] ** 2 for k in parts], axis=0)
         own = np.mean([self.noise[k] ** 2 for k in parts], axis=0) / sigma

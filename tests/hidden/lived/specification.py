@@ -3,14 +3,8 @@
 """
 Which cases there are: what the kind and the number of a case stand for.
 
-Every kind has a set, 'development' or 'locked', of seeds and arms of its own.
-
-| kind | question |
-|---|---|
-| SET | an arm that has lived, two days, one cause or none; any number of cases |
-| SET/exact | an exact description, friction given by values or by name only, no day 1: a payload, an encoder's zero, a link, or nothing |
-| SET/mounting | gravity of 20 directions over the sphere, of the earth or the moon; friction unknown, no day 1; even numbers exact, odd ones worn |
-| SET/pairs | the same arm and cause twice: periodic (even) and point to point (odd) |
+A kind is the name of a set, 'development' or 'locked', each with seeds and arms of its own, and a
+question after a stroke: see README.md.
 
 """
 
@@ -28,7 +22,7 @@ SEEDS = {'development': 20261122, 'locked': 48611307}
 KINDS = tuple(f'{name}{kind}' for name in SEEDS for kind in ('', '/exact', '/mounting', '/pairs'))
 
 #: How many cases a kind has where nothing else is said.
-COUNTS = {'': 96, '/exact': 24, '/mounting': 20, '/pairs': 28}
+COUNTS = {'': 96, '/exact': 36, '/mounting': 20, '/pairs': 28}
 
 #: Gap of each class of size, from and to. A natural one is as large as such causes are: a payload
 #: of 2 to 12 per cent of the arm's mass, a tilt of 1 to 10 degrees, a wall.
@@ -135,6 +129,11 @@ class LivedSpec:
     shared_seed: int
 
     @property
+    def second_of_pair(self) -> bool:
+        """Whether its cause is that of the case before it."""
+        return self.kind.endswith('/pairs') and self.index % 2 == 1
+
+    @property
     def key(self) -> str:
         """Name of the case."""
         return f'{self.kind}/{self.index}'
@@ -166,8 +165,9 @@ def specify(kind: str, index: int) -> LivedSpec:
     exact = question == 'exact' or (question == 'mounting' and index % 2 == 0)
     days = ('day_2',) if question in ('exact', 'mounting') else ('day_1', 'day_2')
     runs = [f'{day}/{k}' for day in days for k in range(3)] + ['held_out']
-    styles = {run: _STYLES[(k + index) % 4] if style == 'mixed' else style
-              for k, run in enumerate(runs)}
+    styles = {
+        run: _STYLES[(k + index) % 4] if style == 'mixed' else style for k, run in enumerate(runs)
+    }
     return LivedSpec(
         kind, index, arm, cause, size, gap, styles, exact, friction, gravity, seed, shared
     )

@@ -111,9 +111,7 @@ class Wear:
     def none(cls, n: int) -> Wear:
         """Return an arm as from the drawing, without clutter and friction."""
         zero = np.zeros(n)
-        return cls(
-            **{name: zero for name in cls.__dataclass_fields__ if name != 'lag'}, lag=0.0
-        )
+        return cls(**{name: zero for name in cls.__dataclass_fields__ if name != 'lag'}, lag=0.0)
 
     def of_a_run(self, rng: np.random.Generator) -> Wear:
         """Return it as it is in one recording: friction is never twice the same."""
@@ -157,7 +155,7 @@ def bristle(q: FloatArray, distance: FloatArray) -> FloatArray:
 
 
 def low_pass(tau: FloatArray, lag: float, step: float) -> FloatArray:
-    """Return torques behind a first-order low-pass, exact where they are linear between samples."""
+    """Return torques behind a first-order low-pass, exact if linear between the samples."""
     if lag <= 0.0:
         return tau
     ratio = step / lag
