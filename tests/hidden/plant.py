@@ -62,7 +62,7 @@ class Plant:
 
     def build(self) -> Live:
         """Compile the arm."""
-        spec = mujoco.MjSpec.from_string(_bare_urdf(self.robot))
+        spec = mujoco.MjSpec.from_string(bare_urdf(self.robot))
         spec.compiler.fusestatic = True
         spec.compiler.balanceinertia = False
         spec.option.timestep = self.dt
@@ -210,7 +210,7 @@ def _controller_model(
     return torque + COMPENSATION * friction + rotor * reference.ddq, inertia + rotor
 
 
-def _bare_urdf(robot: Robot) -> str:
+def bare_urdf(robot: Robot) -> str:
     """Return the robot's URDF without what is not dynamics, for MuJoCo to read by itself."""
     root = ElementTree.fromstring(robot.urdf)
     for link in root.iter('link'):

@@ -1,0 +1,100 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is recorded of an arm that has lived, at 100 to 500 Hz, with the faults of real logs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from tests.hidden.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """
+    Encoders, torque readings and the clock.
+
+    Attributes
+    ----------
+    rate : float
+        Samples per second [Hz].
+    jitter : float
+        Standard deviation of a stamp [s].
+    resolution : float
+        Step of the encoders [rad].
+    position_noise : float
+        Standard deviation of a position before it is counted [rad].
+    torque_noise : ndarray, shape (n,)
+        Standard deviation of a torque [N m].
+    correlation_time : float
+        Of the coloured half of the torque noise [s].
+    velocity : {'none', 'measured', 'differentiated'}
+        What is recorded of the velocity.
+
+    """
+
+    rate: float
+    jitter: float
+    resolution: float
+    position_noise: float
+    torque_noise: FloatArray
+    correlation_time: float
+    velocity: str
+
+    @classmethod
+    def draw(cls, strength: FloatArray, rng: np.random.Generator) -> Instruments:
+        """Draw instruments for joints of some strength [N m]."""
+        level = np.exp(rng.uniform(np.log(0.004), np.log(0.02)))
+        return cls(
+            rate=float(rng.choice([100.0, 125.0, 200.0, 250.0, 500.0])),
+            jitter=float(rng.choice([2e-5, 1e-4, 3e-4])),
+            resolution=2.0 * np.pi / 2.0 ** int(rng.integers(16, 21)),
+            position_noise=float(np.exp(rng.uniform(np.log(5e-6), np.log(3e-5)))),
+            torque_noise=level * strength,
+            correlation_time=float(np.exp(rng.uniform(np.log(0.005), np.log(0.08)))),
+            velocity=str(rng.choice(['none', 'measured', 'differentiated'])),
+        )
+
+    def stamps(self, t: FloatArray) -> FloatArray:
+        """Return when samples are due within a time [s], shape (N,)."""
+        return np.arange(int(t[-1] * self.rate) - 1) / self.rate
+
+    def taken(self, stamps: FloatArray, end: float, rng: np.random.Generator) -> FloatArray:
+        """Return when samples are really taken [s], shape (N,)."""
+        error = np.clip(rng.normal(size=len(stamps)), -3.0, 3.0)
+        return np.clip(stamps + self.jitter * error, 0.0, end)
+
+    def positions(self, q: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return positions as the encoders count them."""
+        noisy = q + self.position_noise * rng.normal(size=q.shape)
+        return self.resolution * np.round(noisy / self.resolution)
+
+    def velocities(
+        self, dq: FloatArray, counted: FloatArray, rng: np.random.Generator
+    ) -> FloatArray | None:
+        """Return velocities as they are recorded."""
+        noise = rng.normal(size=dq.shape)
+        if self.velocity == 'none':
+            return None
+        if self.velocity == 'measured':
+            return dq + (self.position_noise + 0.3 * self.resolution) * self.rate * 0.2 * noise
+        backward = np.zeros_like(counted)
+        backward[1:] = np.diff(counted, axis=0) * self.rate
+        return lfilter([0.4], [1.0, -0.6], backward, axis=0)
+
+    def torques(self, tau: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return torques with noise, half white and half coloured."""
+        decay = np.exp(-1.0 / (self.rate * self.correlation_time))
+        start = rng.normal(size=(1, tau.shape[1]))
+        steps = np.sqrt(1.0 - decay**2) * rng.normal(size=tau.shape)
+        slow, _ = lfilter([1.0], [1.0, -decay], steps, axis=0, zi=decay * start)
+        noise = np.sqrt(0.5) * (slow + rng.normal(size=tau.shape))
+        return tau + self.torque_noise * noise
+
+
+def sampled(times: FloatArray, t: FloatArray, values: FloatArray) -> FloatArray:
+    """Return signals (N, n) at other times."""
+    return np.column_stack([np.interp(times, t, column) for column in values.T])
