@@ -172,8 +172,7 @@ def lived_case(kind: str, index: int) -> LivedCase:
     described = Chain.of(robot)
     arm = _draw_arm(spec, described, robot)
     paths = {
-        run: _draw_run(spec, run, arm.chain, robot, style)
-        for run, style in spec.styles.items()
+        run: _draw_run(spec, run, arm.chain, robot, style) for run, style in spec.styles.items()
     }
     instruments = Instruments.draw(_strength(described, robot), spec.rng('instruments'))
     if spec.exact:

@@ -107,7 +107,9 @@ class Chain:
             parts.append(self._torque(q[rows].T, dq[rows].T, ddq[rows].T).T)
         return np.concatenate(parts)
 
-    def point(self, joint: int, offset: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def point(
+        self, joint: int, offset: FloatArray, q: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """
         Return where a point of a link is and how it moves with the joints.
 
@@ -230,8 +232,10 @@ def body_parts(body: FloatArray) -> tuple[float, FloatArray, FloatArray]:
     """Return mass, centre and inertia about the centre of a body."""
     mass = float(body[0])
     centre = body[1:4] / mass if mass else np.zeros(3)
-    return mass, centre, _symmetric(body[4:]) - mass * (
-        centre @ centre * np.eye(3) - np.outer(centre, centre)
+    return (
+        mass,
+        centre,
+        _symmetric(body[4:]) - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre)),
     )
 
 

@@ -125,9 +125,7 @@ def tracked(path: Path, chain: Chain, error: FloatArray) -> Path:
     push = -error * (0.5 * load + 0.5 * dry)
     push = np.column_stack([np.interp(path.t, path.t[coarse], p) for p in push.T])
     position, velocity, acceleration = _second_order(push - push[0])
-    return Path(
-        path.t, path.q + position + push[0], path.dq + velocity, path.ddq + acceleration
-    )
+    return Path(path.t, path.q + position + push[0], path.dq + velocity, path.ddq + acceleration)
 
 
 def sines(room: Room, duration: float, rng: np.random.Generator) -> Path:
@@ -240,9 +238,7 @@ def _clock(duration: float) -> FloatArray:
     return np.arange(round((duration + 2.0 * REST) / STEP) + 1) * STEP
 
 
-def _windowed(
-    t: FloatArray, wave: tuple[FloatArray, FloatArray, FloatArray], room: Room
-) -> Path:
+def _windowed(t: FloatArray, wave: tuple[FloatArray, FloatArray, FloatArray], room: Room) -> Path:
     """Fade a wave in and out, and scale it to the room."""
     end = t[-1] - REST
     rise, fall = np.clip((t - REST) / _RUN, 0.0, 1.0), np.clip((end - t) / _RUN, 0.0, 1.0)

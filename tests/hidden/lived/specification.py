@@ -166,8 +166,9 @@ def specify(kind: str, index: int) -> LivedSpec:
     exact = question == 'exact' or (question == 'mounting' and index % 2 == 0)
     days = ('day_2',) if question in ('exact', 'mounting') else ('day_1', 'day_2')
     runs = [f'{day}/{k}' for day in days for k in range(3)] + ['held_out']
-    styles = {run: _STYLES[(k + index) % 4] if style == 'mixed' else style
-              for k, run in enumerate(runs)}
+    styles = {
+        run: _STYLES[(k + index) % 4] if style == 'mixed' else style for k, run in enumerate(runs)
+    }
     return LivedSpec(
         kind, index, arm, cause, size, gap, styles, exact, friction, gravity, seed, shared
     )

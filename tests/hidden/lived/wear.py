@@ -111,9 +111,7 @@ class Wear:
     def none(cls, n: int) -> Wear:
         """Return an arm as from the drawing, without clutter and friction."""
         zero = np.zeros(n)
-        return cls(
-            **{name: zero for name in cls.__dataclass_fields__ if name != 'lag'}, lag=0.0
-        )
+        return cls(**{name: zero for name in cls.__dataclass_fields__ if name != 'lag'}, lag=0.0)
 
     def of_a_run(self, rng: np.random.Generator) -> Wear:
         """Return it as it is in one recording: friction is never twice the same."""
