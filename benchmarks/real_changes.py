@@ -60,6 +60,8 @@ def main() -> int:
                     f'[{answer.seconds:.1f} s] {answer.error}',
                     flush=True,
                 )
+                if answer.verdict == 'bad_data':
+                    print(f'             {answer.summary}')
                 if answer.minor:
                     print(f'             minor: {"; ".join(map(str, answer.minor))}')
     return 0

@@ -14,6 +14,7 @@ from armid_ros.robots import load_robot, Robot
 import numpy as np
 
 from tests.hidden.arrays import FloatArray
+from tests.hidden.lived.chain import body_parts, body_vector
 
 #: Where the description of each arm is: a shipped name or a file of example-robot-data.
 PUBLISHED = {
@@ -99,8 +100,6 @@ def worn_bodies(bodies: FloatArray, rng: np.random.Generator) -> FloatArray:
     Masses are off by up to 6 per cent, centres by up to 4 mm in each direction.
 
     """
-    from tests.hidden.lived.chain import body_parts, body_vector
-
     worn = bodies.copy()
     for body in worn:
         mass, centre, central = body_parts(body)

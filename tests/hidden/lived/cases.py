@@ -13,7 +13,7 @@ import numpy as np
 
 from tests.hidden.arrays import FloatArray, Parameter
 from tests.hidden.lived.arms import load_arm, worn_bodies
-from tests.hidden.lived.causes import Cause, CAUSES, Scene, Tilt
+from tests.hidden.lived.causes import Cause, CAUSES, Mounting, Scene
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.instruments import Instruments, sampled
 from tests.hidden.lived.motions import draw_path, Path, tracked
@@ -167,7 +167,75 @@ def lived_case(kind: str, index: int) -> LivedCase:
         Number, from 0.
 
     """
-    spec = specify(kind, index)
+    draft = draw_case(specify(kind, index))
+    spec, robot, arm, paths = draft.spec, draft.robot, draft.arm, draft.paths
+    cause = draft.cause
+    recordings = {
+        run: _record(spec, run, draft.worn[run], paths[run], draft.instruments, cause)
+        for run in paths
+    }
+    reach = draft.gap(cause) if cause else 0.0
+    chain = cause.bodies(arm.chain) if cause else arm.chain
+    return LivedCase(
+        spec=spec,
+        urdf=_path_of(robot),
+        known=_known(spec, arm.wear, robot),
+        day_1=tuple(r for run, r in recordings.items() if run.startswith('day_1')),
+        day_2=tuple(r for run, r in recordings.items() if run.startswith('day_2')),
+        held_out=recordings['held_out'],
+        truth=_truth(cause),
+        gravity=chain.gravity,
+        misfit=draft.floor,
+        misfit_share=draft.share,
+        gap=reach,
+    )
+
+
+@dataclass(frozen=True)
+class Draft:
+    """
+    A case before it is recorded.
+
+    Attributes
+    ----------
+    spec : LivedSpec
+        What it is made of.
+    robot : Robot
+        As described.
+    arm : LivedArm
+        As it is on day 1.
+    worn : dict of str to LivedArm
+        As it is in each run.
+    paths : dict of str to Path
+        Motion of each run.
+    instruments : Instruments
+        What records it.
+    floor : ndarray, shape (n,)
+        Misfit of an ordinary model of day 1 in each joint [N m].
+    share : float
+        Misfit of all joints over the torque.
+    cause : Cause or None
+        What happened.
+
+    """
+
+    spec: LivedSpec
+    robot: Robot
+    arm: LivedArm
+    worn: dict[str, LivedArm]
+    paths: dict[str, Path]
+    instruments: Instruments
+    floor: FloatArray
+    share: float
+    cause: Cause | None
+
+    def gap(self, cause: Cause) -> float:
+        """Return the gap that a cause makes in the recording that is held out."""
+        return gap(self.worn['held_out'], self.paths['held_out'], cause, self.floor)
+
+
+def draw_case(spec: LivedSpec) -> Draft:
+    """Draw all of a case; the second of a pair has the cause of the first."""
     robot = load_arm(spec.arm)
     described = Chain.of(robot)
     arm = _draw_arm(spec, described, robot)
@@ -179,25 +247,10 @@ def lived_case(kind: str, index: int) -> LivedCase:
         instruments = replace(instruments, jitter=0.0, torque_noise=0.5 * instruments.torque_noise)
     worn = {run: replace(arm, wear=_wear_of(spec, arm.wear, run)) for run in paths}
     floor, share = _floor(described, worn, paths, instruments)
-    cause = _draw_cause(spec, worn, paths, described, robot, floor)
-    recordings = {
-        run: _record(spec, run, worn[run], paths[run], instruments, cause) for run in paths
-    }
-    reach = gap(worn['held_out'], paths['held_out'], cause, floor) if cause else 0.0
-    chain = cause.bodies(arm.chain) if cause else arm.chain
-    return LivedCase(
-        spec=spec,
-        urdf=_path_of(robot),
-        known=_known(spec, arm.wear, robot),
-        day_1=tuple(r for run, r in recordings.items() if run.startswith('day_1')),
-        day_2=tuple(r for run, r in recordings.items() if run.startswith('day_2')),
-        held_out=recordings['held_out'],
-        truth=_truth(cause),
-        gravity=chain.gravity,
-        misfit=floor,
-        misfit_share=share,
-        gap=reach,
-    )
+    draft = Draft(spec, robot, arm, worn, paths, instruments, floor, share, None)
+    if spec.second_of_pair:
+        return replace(draft, cause=draw_case(specify(spec.kind, spec.index - 1)).cause)
+    return replace(draft, cause=_draw_cause(draft, described))
 
 
 def _path_of(robot: Robot) -> FilePath:
@@ -272,59 +325,25 @@ def _floor(
     return np.hypot(floor, noise), share
 
 
-def _draw_cause(
-    spec: LivedSpec,
-    worn: dict[str, LivedArm],
-    paths: dict[str, Path],
-    described: Chain,
-    robot: Robot,
-    floor: FloatArray,
-) -> Cause | None:
+def _draw_cause(draft: Draft, described: Chain) -> Cause | None:
+    spec, robot = draft.spec, draft.robot
     if spec.cause == 'none':
         return None
-    second = [path for run, path in paths.items() if not run.startswith('day_1')]
+    if spec.gravity is not None:
+        return Mounting(spec.gravity)
+    second = [path for run, path in draft.paths.items() if not run.startswith('day_1')]
     ends = np.array([robot.lower, robot.upper])
     scene = Scene(
-        chain=worn['held_out'].chain,
+        chain=draft.arm.chain,
         strength=_strength(described, robot),
-        speed=np.sqrt(np.mean([(path.dq**2).mean(axis=0) for path in second], axis=0)) * 2.0,
+        speed=2.0 * np.sqrt(np.mean([(path.dq**2).mean(axis=0) for path in second], axis=0)),
         low=np.min([path.q.min(axis=0) for path in second], axis=0),
         high=np.max([path.q.max(axis=0) for path in second], axis=0),
         middle=np.where(np.isfinite(ends).all(axis=0), ends, 0.0).mean(axis=0),
         end=float(min(path.t[-1] for path in second)),
     )
-    if spec.gravity is not None:
-        return Mounting(tuple(spec.gravity))
     cause = CAUSES[spec.cause].draw(scene, spec.rng('cause'))
-    if spec.wanted is None:
-        return cause
-    arm, path = worn['held_out'], paths['held_out']
-    return sized(cause, spec.wanted, lambda tried: gap(arm, path, tried, floor))
-
-
-@dataclass(frozen=True)
-class Mounting(Cause):
-    """Gravity of any direction and magnitude."""
-
-    vector: tuple[float, float, float]
-    name = 'gravity'
-
-    @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Mounting:
-        return cls(tuple(Tilt.draw(scene, rng).bodies(scene.chain).gravity.tolist()))
-
-    def scaled(self, factor: float) -> Mounting:
-        return self
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return tuple(
-            Parameter(f'gravity_{axis}', '', value, 'm/s^2')
-            for axis, value in zip('xyz', self.vector, strict=True)
-        )
-
-    def bodies(self, chain: Chain) -> Chain:
-        return chain.with_gravity(np.array(self.vector))
+    return cause if spec.wanted is None else sized(cause, spec.wanted, draft.gap)
 
 
 def _record(

@@ -129,7 +129,7 @@ def tracked(path: Path, chain: Chain, error: FloatArray) -> Path:
 
 
 def sines(room: Room, duration: float, rng: np.random.Generator) -> Path:
-    """Sums of sines of frequencies that have no common period."""
+    """Return sums of sines of frequencies that have no common period."""
     t = _clock(duration)
     n, count = len(room.centre), 5
     rate = 2.0 * np.pi * np.exp(rng.uniform(np.log(0.06), np.log(0.9), (n, count)))
@@ -142,7 +142,7 @@ def sines(room: Room, duration: float, rng: np.random.Generator) -> Path:
 
 
 def periodic(room: Room, duration: float, rng: np.random.Generator) -> Path:
-    """Two equal periods of a Fourier series, with run-in and run-out."""
+    """Return two equal periods of a Fourier series, with run-in and run-out."""
     t = _clock(duration)
     n, count = len(room.centre), int(rng.integers(4, 8))
     rate = 2.0 * np.pi * np.arange(1, count + 1) / ((duration - 2.0 * _RUN) / 2.0)
@@ -158,7 +158,7 @@ def periodic(room: Room, duration: float, rng: np.random.Generator) -> Path:
 
 
 def dwells(room: Room, duration: float, rng: np.random.Generator) -> Path:
-    """Point to point, at rest between the moves; quintic or trapezoidal."""
+    """Return moves from point to point, at rest between them; quintic or trapezoidal."""
     t = _clock(duration)
     n = len(room.centre)
     q, dq, ddq = (np.zeros((len(t), n)) for _ in range(3))
@@ -184,7 +184,7 @@ def dwells(room: Room, duration: float, rng: np.random.Generator) -> Path:
 
 
 def wandering(room: Room, duration: float, rng: np.random.Generator) -> Path:
-    """What a person steers: changes of mind at odd times, pauses, some joints longer than others."""
+    """Return what a person steers: changes of mind and pauses at odd times in every joint."""
     t = _clock(duration)
     n = len(room.centre)
     aims = np.zeros((len(t), n))

@@ -1,10 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The effort that an arm that has lived reports along a motion, exactly, with and without a cause."""
+"""The effort that an arm reports along a motion, exactly, with and without a cause."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+import numpy as np
 
 from tests.hidden.arrays import FloatArray
 from tests.hidden.lived.causes import Cause
@@ -78,8 +80,6 @@ def friction(
         Dry friction that a cause adds [N m].
 
     """
-    import numpy as np
-
     level = wear.coulomb + wear.load_share * np.abs(load) + more_dry
     slow = np.zeros_like(path.dq)
     there = wear.stribeck_speed > 0.0

@@ -121,7 +121,7 @@ def filtered(values: FloatArray) -> FloatArray:
 
 
 def _fit(recordings: Sequence[Rows]) -> FloatArray:
-    n, p = recordings[0].columns.shape[1:]
+    p = recordings[0].columns.shape[2]
     columns = np.concatenate([rows.columns for rows in recordings])
     tau = np.concatenate([rows.tau for rows in recordings])
     weight = 1.0 / np.maximum(tau.std(axis=0), 1e-9)

@@ -3,14 +3,8 @@
 """
 Which cases there are: what the kind and the number of a case stand for.
 
-Every kind has a set, 'development' or 'locked', of seeds and arms of its own.
-
-| kind | question |
-|---|---|
-| SET | an arm that has lived, two days, one cause or none; any number of cases |
-| SET/exact | an exact description, friction given by values or by name only, no day 1: a payload, an encoder's zero, a link, or nothing |
-| SET/mounting | gravity of 20 directions over the sphere, of the earth or the moon; friction unknown, no day 1; even numbers exact, odd ones worn |
-| SET/pairs | the same arm and cause twice: periodic (even) and point to point (odd) |
+A kind is the name of a set, 'development' or 'locked', each with seeds and arms of its own, and a
+question after a stroke: see README.md.
 
 """
 
@@ -133,6 +127,11 @@ class LivedSpec:
     gravity: tuple[float, float, float] | None
     seed: int
     shared_seed: int
+
+    @property
+    def second_of_pair(self) -> bool:
+        """Whether its cause is that of the case before it."""
+        return self.kind.endswith('/pairs') and self.index % 2 == 1
 
     @property
     def key(self) -> str:

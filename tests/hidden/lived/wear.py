@@ -155,7 +155,7 @@ def bristle(q: FloatArray, distance: FloatArray) -> FloatArray:
 
 
 def low_pass(tau: FloatArray, lag: float, step: float) -> FloatArray:
-    """Return torques behind a first-order low-pass, exact where they are linear between samples."""
+    """Return torques behind a first-order low-pass, exact if linear between the samples."""
     if lag <= 0.0:
         return tau
     ratio = step / lag

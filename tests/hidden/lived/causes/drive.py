@@ -1,0 +1,188 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Other friction, another rotor, a spring across a joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.lived.causes.base import JointCause, Scene
+from tests.hidden.lived.chain import Chain
+from tests.hidden.lived.motions import Path
+from tests.hidden.lived.wear import Wear
+
+
+class Coulomb(JointCause):
+    """A gear that has become stiff."""
+
+    name = 'coulomb_friction'
+
+    @classmethod
+    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
+        j = scene.joint(rng)
+        return cls(scene.chain.joints[j], j, 0.15 * scene.strength[j])
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('coulomb_torque', self.joint, self.value, 'N m'),)
+
+    def wear(self, wear: Wear) -> Wear:
+        return self._more(wear, 'coulomb')
+
+
+class Viscous(JointCause):
+    """A gear with other grease."""
+
+    name = 'viscous_friction'
+
+    @classmethod
+    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
+        j = scene.joint(rng)
+        return cls(scene.chain.joints[j], j, 0.15 * scene.strength[j] / scene.speed[j])
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('viscous_coefficient', self.joint, self.value, 'N m s/rad'),)
+
+    def wear(self, wear: Wear) -> Wear:
+        return self._more(wear, 'viscous')
+
+
+@dataclass(frozen=True)
+class Stribeck(JointCause):
+    """A gear that sticks at low speed."""
+
+    name = 'stribeck_friction'
+    velocity: float = 0.1
+
+    @classmethod
+    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
+        j = scene.joint(rng)
+        velocity = float(scene.speed[j] * rng.uniform(0.15, 0.5))
+        return cls(scene.chain.joints[j], j, 0.2 * scene.strength[j], velocity)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter('stribeck_torque', self.joint, self.value, 'N m'),
+            Parameter('stribeck_velocity', self.joint, self.velocity, 'rad/s'),
+        )
+
+    def dry(self, dq: FloatArray) -> FloatArray:
+        return self._column(dq, self.value * np.exp(-((dq[:, self.index] / self.velocity) ** 2)))
+
+
+class LoadFriction(JointCause):
+    """A gear in which dry friction grows with the load."""
+
+    name = 'load_dependent_friction'
+    factors = (0.02, 6.0)
+
+    @classmethod
+    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
+        j = scene.joint(rng, loaded=True)
+        return cls(scene.chain.joints[j], j, 0.1)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('load_coefficient', self.joint, self.value, ''),)
+
+    def wear(self, wear: Wear) -> Wear:
+        return self._more(wear, 'load_share')
+
+
+class Rotor(JointCause):
+    """A drive exchanged for one with a heavier rotor."""
+
+    name = 'rotor_inertia'
+
+    @classmethod
+    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
+        j = scene.joint(rng, first=1)
+        return cls(scene.chain.joints[j], j, 0.05 * scene.strength[j] / scene.speed[j])
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('rotor_inertia', self.joint, self.value, 'kg m^2'),)
+
+    def wear(self, wear: Wear) -> Wear:
+        return self._more(wear, 'rotor')
+
+
+@dataclass(frozen=True)
+class Spring(JointCause):
+    """A hose or a cable across a joint."""
+
+    name = 'joint_spring'
+    rest: float = 0.0
+
+    @classmethod
+    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
+        j = scene.joint(rng)
+        low, high = scene.low[j], scene.high[j]
+        value = 0.3 * scene.strength[j] / (high - low)
+        return cls(scene.chain.joints[j], j, value, float(rng.uniform(low, high)))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (
+            Parameter('spring_stiffness', self.joint, self.value, 'N m/rad'),
+            Parameter('spring_preload', self.joint, -self.value * self.rest, 'N m'),
+        )
+
+    def torque(self, path: Path, chain: Chain) -> FloatArray:
+        return self._column(path.q, self.value * (path.q[:, self.index] - self.rest))
+
+
+class CubicDrag(JointCause):
+    """Drag that grows with the cube of the speed: in no catalogue."""
+
+    name = 'cubic_drag'
+    in_catalogue = False
+
+    @classmethod
+    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
+        j = scene.joint(rng)
+        return cls(scene.chain.joints[j], j, 0.1 * scene.strength[j] / scene.speed[j] ** 3)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('cubic_coefficient', self.joint, self.value, 'N m s^3/rad^3'),)
+
+    def torque(self, path: Path, chain: Chain) -> FloatArray:
+        return self._column(path.q, self.value * path.dq[:, self.index] ** 3)
+
+
+@dataclass(frozen=True)
+class Bumps(JointCause):
+    """Places in a gear that push one way where they are entered, the other way where left."""
+
+    name = 'bumps'
+    in_catalogue = False
+    places: tuple[float, ...] = ()
+    width: float = 0.1
+
+    @classmethod
+    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
+        j = scene.joint(rng)
+        low, high = scene.low[j], scene.high[j]
+        places = low + (high - low) * rng.uniform(0.15, 0.85, 3)
+        return cls(
+            scene.chain.joints[j],
+            j,
+            0.3 * scene.strength[j],
+            tuple(places.tolist()),
+            0.05 * float(high - low),
+        )
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter('torque', self.joint, self.value, 'N m'),)
+
+    def torque(self, path: Path, chain: Chain) -> FloatArray:
+        x = (path.q[:, self.index, np.newaxis] - np.array(self.places)) / self.width
+        return self._column(path.q, -self.value * (x * np.exp(-(x**2))).sum(axis=1))

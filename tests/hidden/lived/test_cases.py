@@ -1,0 +1,159 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Cases are what their kind says: clutter always, one cause or none, sizes as asked for."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from tests.hidden.lived.adapter import recording_of, robot_of
+from tests.hidden.lived.arms import ARMS, load_arm
+from tests.hidden.lived.cases import draw_case, lived_case
+from tests.hidden.lived.chain import body_parts, Chain
+from tests.hidden.lived.specification import KINDS, ORDER, SIZES, specify, sphere
+
+ROUND = len(ORDER)
+
+
+def described_part(case, run):
+    """Return the effort that description and true gravity explain of a run, and the rest."""
+    draft = draw_case(case.spec)
+    path = draft.paths[run]
+    return draft.arm.chain.torque(path.q, path.dq, path.ddq), draft.worn[run].effort(path)
+
+
+def test_a_case_is_the_same_every_time_and_like_no_other():
+    first = lived_case('development', 5)
+    lived_case.cache_clear()
+    again, other = lived_case('development', 5), lived_case('development', 5 + ROUND)
+    assert first is not again
+    np.testing.assert_array_equal(first.held_out.tau, again.held_out.tau)
+    assert first.truth == again.truth
+    assert first.truth[0].parameters != other.truth[0].parameters
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_specifications_of_all_kinds_have_seeds_of_their_own(kind):
+    seeds = {specify(kind, k).seed for k in range(100)}
+    others = {specify(k, i).seed for k in KINDS if k != kind for i in range(100)}
+    assert len(seeds) == 100
+    assert not seeds & others
+
+
+def test_arms_of_the_sets_differ_and_have_three_to_seven_joints():
+    assert len(set(ARMS['locked']) - set(ARMS['development'])) >= 6
+    for names in ARMS.values():
+        assert {load_arm(name).n_joints for name in names} == {3, 4, 5, 6, 7}
+
+
+def test_every_round_has_every_cause_and_clear_ones_are_most():
+    specs = [specify('development', k) for k in range(4 * ROUND)]
+    assert {spec.cause for spec in specs[:ROUND]} == {cause for cause, _ in ORDER}
+    sizes = [spec.size for spec in specs if spec.cause != 'none']
+    assert 0.3 < sizes.count('clear') / len(sizes) < 0.7
+    assert {'natural', 'medium', 'small'} <= set(sizes)
+    for cause in {cause for cause, size in ORDER if size == 'by turns'}:
+        assert len({spec.size for spec in specs if spec.cause == cause}) >= 3
+    styles = {style for spec in specs for style in spec.styles.values()}
+    assert styles == {'sines', 'dwells', 'wandering', 'periodic'}
+
+
+@pytest.mark.parametrize('index', range(8))
+def test_clutter_is_always_there(index):
+    draft = draw_case(specify('development', index))
+    described = Chain.of(draft.robot)
+    for field in fields(draft.arm.wear):
+        assert np.all(np.asarray(getattr(draft.arm.wear, field.name)) != 0.0), field.name
+    assert np.all(np.abs(draft.arm.wear.gain) <= 0.02)
+    assert np.all((draft.arm.wear.load_share >= 0.01) & (draft.arm.wear.load_share <= 0.04))
+    for true, drawn in zip(draft.arm.chain.bodies, described.bodies, strict=True):
+        (mass, centre, _), (mass_0, centre_0, _) = body_parts(true), body_parts(drawn)
+        assert 0.0 < abs(mass / mass_0 - 1.0) <= 0.06
+        assert 0.0 < np.abs(centre - centre_0).max() <= 0.004
+    assert draft.instruments.jitter > 0.0
+    assert 100.0 <= draft.instruments.rate <= 500.0
+    assert 0.01 < draft.share < 0.2  # what an ordinary model of day 1 leaves
+
+
+@pytest.mark.parametrize('index', [1, 4, 9, 10, 12, 13, 21, 26])
+def test_a_cause_has_the_size_that_was_asked_for(index):
+    case = lived_case('development', index)
+    low, high = SIZES[case.spec.size]
+    assert low / 1.2 < case.gap < high * 1.2
+    held_out = case.held_out.contribution
+    worst = ((held_out**2).mean(axis=0) / case.misfit**2).max()
+    assert worst == pytest.approx(case.gap, rel=0.2)
+
+
+def test_only_day_2_has_the_cause_and_nothing_is_nothing():
+    case, free = lived_case('development', 1), lived_case('development', 3)
+    for run in case.day_1:
+        assert not run.contribution.any()
+    for run in (*case.day_2, case.held_out):
+        guilty = [joint in case.truth[0].joints for joint in run.joints]
+        assert np.all(run.contribution.any(axis=0) == guilty)
+    assert free.truth == ()
+    assert not any(run.contribution.any() for run in (*free.day_2, free.held_out))
+
+
+def test_effort_less_contribution_is_a_healthy_arm_with_noise():
+    case = lived_case('development', 9)
+    draft = draw_case(case.spec)
+    path, run = draft.paths['held_out'], case.held_out
+    healthy = draft.worn['held_out'].effort(path)
+    expected = np.column_stack([np.interp(run.t, path.t, column) for column in healthy.T])
+    left = run.tau - run.contribution - expected
+    # noise, and what a stamp that is off makes of a torque that jumps
+    assert np.all(np.median(np.abs(left), axis=0) < 1.5 * run.noise)
+    assert np.all(np.abs(left.mean(axis=0)) < 0.3 * run.noise)
+
+
+def test_no_two_recordings_move_alike():
+    case = lived_case('development', 2)
+    runs = (*case.day_1, *case.day_2, case.held_out)
+    starts = {tuple(run.q[len(run.t) // 3]) for run in runs}
+    assert len(starts) == len(runs) == 7
+    assert all(15.0 < run.t[-1] < 26.0 for run in runs)
+
+
+def test_exact_arms_are_their_description():
+    case = lived_case('development/exact', 2)
+    assert case.day_1 == ()
+    assert case.truth == ()
+    assert [known.name for known in case.known] == ['viscous_friction', 'coulomb_friction']
+    rigid, effort = described_part(case, 'held_out')
+    draft = draw_case(case.spec)
+    viscous, coulomb = (known.values for known in case.known)
+    dq = draft.paths['held_out'].dq
+    moving = np.abs(dq) > 0.1
+    friction = viscous * dq + coulomb * np.sign(dq)
+    np.testing.assert_allclose((effort - rigid)[moving], friction[moving], atol=1e-6)
+    assert lived_case('development/exact', 1).known[0].values is None
+
+
+def test_mountings_cover_the_sphere():
+    directions = np.array([sphere(k) for k in range(20)])
+    sizes = np.linalg.norm(directions, axis=1)
+    np.testing.assert_allclose(sorted(set(sizes.round(6))), [1.62, 9.81])
+    unit = directions / sizes[:, np.newaxis]
+    nearest = np.sort(unit @ unit.T, axis=1)[:, -2]
+    assert np.degrees(np.arccos(nearest.min())) < 50.0
+    assert np.all(np.linalg.norm(unit.mean(axis=0)) < 0.1)
+    case = lived_case('development/mounting', 1)
+    np.testing.assert_allclose(case.gravity, sphere(1))
+
+
+def test_the_second_of_a_pair_has_the_cause_of_the_first():
+    periodic, pauses = (lived_case('development/pairs', k) for k in (2, 3))
+    assert periodic.truth == pauses.truth
+    assert periodic.urdf == pauses.urdf
+    assert {r.style for r in periodic.day_2} == {'periodic'}
+    assert {r.style for r in pauses.day_2} == {'dwells'}
+
+
+def test_the_adapter_gives_what_the_package_reads():
+    case = lived_case('development', 0)
+    robot, recording = robot_of(case), recording_of(case.held_out)
+    assert recording.joints == robot.joints
+    np.testing.assert_array_equal(recording.tau, case.held_out.tau)
