@@ -21,13 +21,13 @@ from armid_ros.errors import ArmidError
 from armid_ros.recording import Recording
 
 from benchmarks.real_days import DAYS, RealDays
-from benchmarks.two_days import Answer, ask, identified
+from benchmarks.two_days import Answer, ask, identification_of
 
 
 def answers(days: RealDays) -> tuple[Answer, Answer]:
     """Return what is said of day 2, and of day 1 again."""
     try:
-        arm = identified(days.robot, days.day_1)
+        arm = identification_of(days.robot, days.day_1).arm
     except ArmidError as error:
         refused = Answer('no model', error=str(error))
         return refused, refused

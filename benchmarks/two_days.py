@@ -17,7 +17,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification import identify
+from armid_ros.identification import Identification, identify
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
@@ -99,12 +99,12 @@ class Answer:
     error: str = ''
 
 
-def identified(robot: Robot, recordings: Sequence[Recording]) -> ArmModel:
-    """Return the model of an arm that `armid identify` makes with its defaults."""
+def identification_of(robot: Robot, recordings: Sequence[Recording]) -> Identification:
+    """Identify an arm as `armid identify` does with its defaults."""
     arm = ArmModel(robot)
     for name in EFFECTS:
         arm = arm.with_effect(make_effect(name, robot))
-    return identify(arm, list(recordings), rng=np.random.default_rng(0)).arm
+    return identify(arm, list(recordings), rng=np.random.default_rng(0))
 
 
 def ask(
