@@ -25,7 +25,7 @@ from pathlib import Path
 import traceback
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
+from armid_ros.effects import CATALOGUE
 from armid_ros.identification import Identification
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -69,7 +69,7 @@ def known_arm(case: LivedCase) -> ArmModel:
     """Return the description with the friction that is known, by values or by name."""
     arm = ArmModel(robot_of(case))
     for known in case.known:
-        arm = arm.with_effect(make_effect(known.name, arm.robot, known.joints), known.values)
+        arm = arm.with_effect(CATALOGUE[known.name].on(arm.robot, known.joints), known.values)
     return arm
 
 
