@@ -4,7 +4,9 @@
 
 from dataclasses import replace
 
+from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
+from armid_ros.motion import Motion
 import numpy as np
 import pytest
 
@@ -15,8 +17,11 @@ from benchmarks.two_days import Answer, answer_of, identification_of, Named
 from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.arms import load_arm
 from tests.hidden.lived.cases import lived_case
-from tests.hidden.lived.causes import CAUSES, Scene
+from tests.hidden.lived.causes import CAUSES, Holding, Pulling, Scene
 from tests.hidden.lived.chain import Chain
+from tests.hidden.lived.motions import draw_path, tracked
+from tests.hidden.lived.plant import LivedArm
+from tests.hidden.lived.wear import Wear
 
 EARTH = np.array([0.0, 0.0, -9.81])
 
@@ -60,6 +65,47 @@ def test_causes_have_the_names_units_and_parameters_of_the_catalogue(word):
         known = (*effect.parameters(robot), *effect.shape_parameters(robot))
         names = {(p.name, p.joint or '', p.unit) for p in known}
         assert {(p.name, p.joint, p.unit) for p in cause.parameters} <= names
+
+
+def catalogued(robot, cause):
+    """Return the arm of a robot with a cause as the package has it."""
+    told = {(p.name, p.joint): p.value for p in cause.parameters}
+    effect = CATALOGUE[cause.name].on(robot, cause.joints or None)
+    if isinstance(cause, Holding | Pulling):
+        effect = effect.with_shape(np.array([cause.attachment]))
+    elif effect.shape_parameters(robot):
+        shape = [
+            told.get((p.name, p.joint), value)
+            for p, value in zip(effect.shape_parameters(robot), effect.shape, strict=True)
+        ]
+        effect = effect.with_shape(np.reshape(shape, (len(effect.owners), -1)))
+    values = [told.get((p.name, p.joint or ''), 0.0) for p in effect.parameters(robot)]
+    return ArmModel(robot).with_effect(effect, values)
+
+
+@pytest.mark.parametrize(
+    'word', sorted(word for word, cause in CAUSES.items() if cause.in_catalogue)
+)
+def test_true_parameters_of_a_cause_make_its_torque_in_the_package(word):
+    """Two codes of one definition; where the package goes by derivatives, of a small cause."""
+    robot = load_arm('ur5')
+    chain = Chain.of(robot)
+    wanted = draw_path('sines', robot, chain, 8.0, np.random.default_rng(5))
+    path = tracked(wanted, chain, np.zeros(6))
+    arm = LivedArm(chain, replace(Wear.none(6), presliding=np.full(6, 1e-7)))
+    ends = np.array([robot.lower, robot.upper])
+    ones = np.ones(6)
+    middle = np.where(np.isfinite(ends).all(axis=0), ends, 0.0).mean(axis=0)
+    scene = Scene(chain, 5.0 * ones, ones, -ones, ones, middle, 10.0)
+    cause = CAUSES[word].draw(scene, np.random.default_rng(1))
+    cause = cause.scaled({'delay': 0.2, 'encoder': 0.1}.get(word, 1.0))
+    rows = slice(400, -400, 10)
+    said = Motion(chain.joints, path.t, path.q, path.dq, path.ddq, None)
+    more = catalogued(robot, cause).torque(said) - ArmModel(robot).torque(said)
+    true = arm.contribution(path, cause)
+    moving = np.all(np.abs(path.dq) > 0.02, axis=1)[rows]
+    error = np.linalg.norm((more - true)[rows][moving]) / np.linalg.norm(true[rows][moving])
+    assert error < 0.02
 
 
 def test_first_tied_and_elsewhere_are_told_apart():
