@@ -6,8 +6,8 @@ Whether the diagnosis names what happened to arms that have lived.
 A model is identified on day 1, and the diagnosis is asked about day 2, with day 1 as baseline; and
 about day 1 itself, of which nothing may be named. Cases: tests/hidden/lived/README.md.
 
-    python -m benchmarks.lived [KIND] [--cases FIRST:LAST] [--only TEXT ...] [--no-again]
-        [--out FILE] [--processes N]
+    python -m benchmarks.lived [KIND] [--cases FIRST:LAST] [--only CAUSE ...] [--no-again]
+        [--plain] [--out FILE] [--processes N]
 
 """
 
@@ -34,6 +34,7 @@ import numpy as np
 from benchmarks.hidden_effects import table
 from benchmarks.lived_scoring import LivedJudged, LivedTruth, score
 from benchmarks.looks import look
+from benchmarks.plain_ranking import plain_ranking
 from benchmarks.two_days import Answer, ask, identification_of
 from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.cases import lived_case, LivedCase
@@ -106,14 +107,18 @@ def true_shares(
 
 
 def run(
-    kind: str, cases: Sequence[int], processes: int = 2, again: bool = True
+    kind: str,
+    cases: Sequence[int],
+    processes: int = 2,
+    again: bool = True,
+    question: Ask = ask,
 ) -> list[LivedJudged]:
     """Judge cases in several processes, with a line of progress each."""
     judged = []
     context = multiprocessing.get_context('spawn')
     count = len(cases)
     with ProcessPoolExecutor(processes, mp_context=context) as pool:
-        jobs = pool.map(judge, [kind] * count, cases, [again] * count)
+        jobs = pool.map(judge, [kind] * count, cases, [again] * count, [question] * count)
         for one in jobs:
             judged.append(one)
             print(_line(one), flush=True)
@@ -127,6 +132,7 @@ def main() -> None:
     parser.add_argument('--cases', default=':', metavar='FIRST:LAST', help='some of them')
     parser.add_argument('--only', nargs='+', default=[], metavar='CAUSE', help='of some causes')
     parser.add_argument('--no-again', action='store_true', help='do not ask about day 1')
+    parser.add_argument('--plain', action='store_true', help='ask the plain ranking instead')
     parser.add_argument('--out', type=Path, help='file for all answers, as JSON')
     parser.add_argument('--processes', type=int, default=2)
     options = parser.parse_args()
@@ -135,10 +141,12 @@ def main() -> None:
     cases = select(options.kind, options.cases, options.only)
     what = f'lived, {options.kind}, {len(cases)} cases'
     what += f', only {" ".join(options.only)}' if options.only else ''
+    what += ', the plain ranking' if options.plain else ''
+    question = plain_ranking if options.plain else ask
     with ExitStack() as stack:
         locked = options.kind.startswith('locked')
         record = stack.enter_context(look(what)) if locked else None
-        judged = run(options.kind, cases, options.processes, not options.no_again)
+        judged = run(options.kind, cases, options.processes, not options.no_again, question)
         print(f'\n{what}\n{table(score(judged))}')
         if record is not None:
             record.table = table(score(judged))
@@ -176,7 +184,7 @@ def _line(one: LivedJudged) -> str:
         f'{truth.key} {truth.arm} {truth.style} {truth.size} gap {truth.gap:.2g} '
         f'share {truth.share_of_power:.2f} {truth.share_of_excess:.2f}: '
         f'{truth.name or "nothing"}{where} -> {mark}: {answer.verdict} {names}{again} '
-        f'[{answer.seconds:.1f} s] {answer.error}'.rstrip()
+        f'[{answer.seconds:.1f} s] {answer.error.strip().rpartition(chr(10))[2]}'.rstrip()
     )
 
 

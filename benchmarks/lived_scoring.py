@@ -219,7 +219,8 @@ def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
     again = [j for j in judged if j.again is not None]
     seconds = [j.answer.seconds for j in judged if np.isfinite(j.answer.seconds)]
     shares = [abs(j.share_error) for j in stated]
-    too_many = [j.too_many for j in judged if not j.truth.name or j.truth.in_catalogue]
+    answered = [j for j in judged if not j.answer.error]
+    too_many = [j.too_many for j in answered if not j.truth.name or j.truth.in_catalogue]
     return (
         rate('cause named first', seen, lambda j: j.first, least=0.90),
         rate('  first or in a tie of 3', seen, lambda j: j.tied, least=0.97),
@@ -229,8 +230,8 @@ def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
         rate('  first, gap below 1', unseen, lambda j: j.first),
         number('names too many', np.mean, too_many, 'at most 0.2', lambda x: x <= 0.2),
         rate('joint of the headline right', headed, lambda j: j.placed, least=0.97),
-        rate('nothing happened, silent', free, lambda j: not j.answer.headline, least=0.95),
-        rate('same day again, silent', again, lambda j: not said(j.again), least=0.95),
+        rate('nothing happened, silent', free, lambda j: silent(j.answer), least=0.95),
+        rate('same day again, silent', again, lambda j: silent(j.again), least=0.95),
         rate('outside the catalogue, said so', outside, lambda j: j.admitted, least=0.90),
         rate('share within 5 points', shares, lambda e: e <= 0.05),
         number('  error, median', np.median, shares, 'at most 0.05', lambda x: x <= 0.05),
@@ -243,6 +244,6 @@ def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
     )
 
 
-def said(answer: Answer | None) -> bool:
-    """Whether an answer names anything."""
-    return answer is not None and bool(answer.headline)
+def silent(answer: Answer | None) -> bool:
+    """Whether there is an answer, and it names nothing."""
+    return answer is not None and not answer.headline and not answer.error
