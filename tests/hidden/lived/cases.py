@@ -13,6 +13,7 @@ import numpy as np
 
 from tests.hidden.arrays import FloatArray, Parameter
 from tests.hidden.lived.arms import load_arm, worn_bodies
+from tests.hidden.lived.cache import kept
 from tests.hidden.lived.causes import Cause, CAUSES, Mounting, Scene
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.instruments import Instruments, sampled
@@ -167,7 +168,13 @@ def lived_case(kind: str, index: int) -> LivedCase:
         Number, from 0.
 
     """
-    draft = draw_case(specify(kind, index))
+    spec = specify(kind, index)
+    case = kept(spec.key.replace('/', '_'), lambda: _record_case(draw_case(spec)))
+    return replace(case, urdf=_path_of(load_arm(spec.arm)))
+
+
+def _record_case(draft: Draft) -> LivedCase:
+    """Record all runs of a case."""
     spec, robot, arm, paths = draft.spec, draft.robot, draft.arm, draft.paths
     cause = draft.cause
     recordings = {

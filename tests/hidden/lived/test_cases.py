@@ -33,6 +33,17 @@ def test_a_case_is_the_same_every_time_and_like_no_other():
     assert first.truth[0].parameters != other.truth[0].parameters
 
 
+def test_a_case_that_was_kept_is_the_one_that_was_made(tmp_path, monkeypatch):
+    made = lived_case('development/exact', 5)
+    monkeypatch.setenv('ARMID_LIVED_CACHE', str(tmp_path))
+    for _ in range(2):
+        lived_case.cache_clear()
+        kept = lived_case('development/exact', 5)
+        np.testing.assert_array_equal(made.held_out.tau, kept.held_out.tau)
+        assert made.truth == kept.truth
+    assert len(list(tmp_path.rglob('*.pickle'))) == 1
+
+
 @pytest.mark.parametrize('kind', KINDS)
 def test_specifications_of_all_kinds_have_seeds_of_their_own(kind):
     seeds = {specify(kind, k).seed for k in range(100)}
