@@ -32,7 +32,7 @@ from armid_ros.recording import Recording
 import numpy as np
 
 from benchmarks.hidden_effects import table
-from benchmarks.lived_scoring import LivedJudged, LivedTruth, score
+from benchmarks.lived_scoring import breakdown, LivedJudged, LivedTruth, score
 from benchmarks.looks import look
 from benchmarks.plain_ranking import plain_ranking
 from benchmarks.two_days import Answer, ask, identification_of
@@ -148,6 +148,8 @@ def main() -> None:
         record = stack.enter_context(look(what)) if locked else None
         judged = run(options.kind, cases, options.processes, not options.no_again, question)
         print(f'\n{what}\n{table(score(judged))}')
+        if not locked:
+            print(breakdown(judged))
         if record is not None:
             record.table = table(score(judged))
     if options.out:

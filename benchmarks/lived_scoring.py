@@ -21,7 +21,7 @@ VISIBLE = 1.0
 #: A tie of more names says nothing.
 LARGEST_TIE = 3
 
-#: Names of one and the same thing, by the name of the truth.
+#: Names of one and the same thing in the same joint, by the name of the truth.
 ALSO = {
     'payload': ('link_inertia',),
     'link_inertia': ('payload',),
@@ -99,10 +99,13 @@ class LivedTruth:
             described=described,
         )
 
-    @property
-    def right(self) -> set[str]:
-        """Names that are right."""
-        return {self.name, *ALSO.get(self.name, ())}
+    def among(self, named: Named) -> str:
+        """Return which name of a finding is right, its own before its rivals; empty if none."""
+        for name in (named.name, *(rival for rival, _ in named.rivals)):
+            same = name in ALSO.get(self.name, ())
+            if name == self.name or (same and set(named.joints_of(name)) == set(self.joints)):
+                return name
+        return ''
 
 
 @dataclass(frozen=True)
@@ -127,26 +130,29 @@ class LivedJudged:
 
     @property
     def first(self) -> bool:
-        """Whether the cause is named first, alone."""
-        return bool(self.answer.headline) and self.answer.headline[0].name in self.truth.right
+        """Whether the cause is named first, before its rivals."""
+        headline = self.answer.headline
+        return bool(headline) and self.truth.among(headline[0]) == headline[0].name
 
     @property
     def tied(self) -> bool:
         """Whether the cause is named first, or in a tie with the first that is short."""
         if not self.answer.headline:
             return False
-        names = self.answer.headline[0].names
-        return bool(names & self.truth.right) and (self.first or len(names) <= LARGEST_TIE)
+        leading = self.answer.headline[0]
+        return self.first or (
+            len(leading.names) <= LARGEST_TIE and bool(self.truth.among(leading))
+        )
 
     @property
     def anywhere(self) -> bool:
         """Whether the cause is in the headline at all."""
-        return any(named.names & self.truth.right for named in self.answer.headline)
+        return any(self.truth.among(named) for named in self.answer.headline)
 
     @property
     def too_many(self) -> int:
         """Names in the headline that nothing stands behind."""
-        true = [named for named in self.answer.headline if named.names & self.truth.right]
+        true = [named for named in self.answer.headline if self.truth.among(named)]
         mounting = self.truth.name == 'gravity'  # direction and magnitude are two names
         return len(self.answer.headline) - min(len(true), 2 if mounting else 1)
 
@@ -154,7 +160,7 @@ class LivedJudged:
     def placed(self) -> bool:
         """Whether the first of the headline is in the joints of the cause."""
         first = self.answer.headline[0]
-        name = next(iter(first.names & self.truth.right), first.name)
+        name = self.truth.among(first) or first.name
         return set(first.joints_of(name)) == set(self.truth.joints)
 
     @property
@@ -207,13 +213,13 @@ def gravity_of(headline: Iterable[Named], described: FloatArray) -> FloatArray:
 def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
     """Compute all metrics."""
     free = [j for j in judged if not j.truth.name]
-    named = [j for j in judged if j.truth.in_catalogue or j.truth.name == 'gravity']
+    named = [j for j in judged if _can_be_named(j.truth)]
     seen = [j for j in named if j.truth.gap >= VISIBLE]
     large = [j for j in seen if j.truth.size in ('natural', 'clear')]
     unseen = [j for j in named if j.truth.gap < VISIBLE]
     outside = [j for j in judged if j.truth.name and j not in named and j.truth.gap >= VISIBLE]
     headed = [j for j in seen if j.tied and j.truth.joints]
-    stated = [j for j in seen if j.first and np.isfinite(j.answer.headline[0].share)]
+    stated = [j for j in seen if j.first and np.isfinite(j.share_error)]
     errors = [error for j in seen for error in j.parameter_errors()]
     turned = [j.gravity_error() for j in seen if j.truth.cause == 'mounting' and j.first]
     again = [j for j in judged if j.again is not None]
@@ -242,6 +248,25 @@ def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
         number('processor time, median [s]', np.median, seconds, 'at most 5', lambda x: x <= 5.0),
         number('processor time, longest [s]', np.max, seconds, 'at most 20', lambda x: x <= 20.0),
     )
+
+
+def breakdown(judged: Sequence[LivedJudged]) -> str:
+    """Return how many are named first of those that are visible, by cause, style and size."""
+    seen = [j for j in judged if j.truth.name and j.truth.gap >= VISIBLE]
+    rows = []
+    for what in ('cause', 'style', 'size'):
+        groups = sorted({getattr(j.truth, what) for j in seen})
+        counts = []
+        for group in groups:
+            own = [j for j in seen if getattr(j.truth, what) == group]
+            hits = sum(j.first if _can_be_named(j.truth) else j.admitted for j in own)
+            counts.append(f'{group} {hits}/{len(own)}')
+        rows.append(f'by {what}: {", ".join(counts)}')
+    return '\n'.join(rows)
+
+
+def _can_be_named(truth: LivedTruth) -> bool:
+    return truth.in_catalogue or truth.name == 'gravity'
 
 
 def silent(answer: Answer | None) -> bool:

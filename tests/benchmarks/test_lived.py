@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks.hidden_effects import table
 from benchmarks.lived import judge, known_arm, select, true_shares
-from benchmarks.lived_scoring import gravity_of, LivedJudged, LivedTruth, score
+from benchmarks.lived_scoring import breakdown, gravity_of, LivedJudged, LivedTruth, score
 from benchmarks.two_days import Answer, answer_of, identification_of, Named
 from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.arms import load_arm
@@ -143,6 +143,14 @@ def test_joint_share_and_parameters_are_compared_with_the_truth():
     assert judged[1].parameter_errors() == [(pytest.approx(0.5), False)]
     assert metric(judged, 'share within 5 points') == 0.5
     assert 'NOT reached' in table(score(judged))
+
+
+def test_rates_are_broken_down_by_what_cases_are_made_of():
+    right = LivedJudged(COULOMB, said(Named('coulomb_friction', ('elbow',))))
+    bumps = replace(COULOMB, cause='bumps', name='bumps', in_catalogue=False, style='sines')
+    rows = breakdown([right, LivedJudged(COULOMB, said()), LivedJudged(bumps, said())])
+    assert 'by cause: bumps 0/1, coulomb 1/2' in rows
+    assert 'by style: dwells 1/2, sines 0/1' in rows
 
 
 def test_silence_is_right_where_nothing_happened():
