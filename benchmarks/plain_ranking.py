@@ -8,7 +8,8 @@ offsets are fitted to day 1; the misfit of each joint there, each recording told
 the unit. Every cause is fitted alone to what that model leaves of day 2, and judged on a recording
 that was left out, all ways round: by the share of the power that it takes, less a price per
 parameter. Without a day 1 the description is the model, friction is fitted beside every cause, and
-the unit is what a full fit leaves. Motions are low-passed at 6 Hz; there is nothing else to it.
+the unit is what a full fit leaves. Motions are low-passed at 6 Hz, joints at rest do not count;
+there is nothing else to it.
 
 """
 
@@ -35,6 +36,9 @@ PRICE = 0.002
 #: What takes less than this share is not named.
 LEAST = 0.15
 
+#: Share of its largest speed below which a joint rests.
+RESTING = 0.02
+
 #: How softly bodies are held to the description, in columns of length 1.
 _RIDGE = 1e-3
 
@@ -52,6 +56,8 @@ class Rows:
         Direction of motion, filtered like the torque.
     tau, slope : ndarray, shape (R, n)
         Torque and its derivative.
+    moving : ndarray, shape (R, n)
+        1 where a joint moves; 0 where it rests, and dry friction may be anything.
 
     """
 
@@ -61,6 +67,7 @@ class Rows:
     sign: FloatArray
     tau: FloatArray
     slope: FloatArray
+    moving: FloatArray
 
 
 def plain_ranking(
@@ -92,19 +99,15 @@ def ranking(
         unit, _ = _misfit(chain, asked)
         values = np.zeros(13 * chain.n_joints)
         beside = [_drives(rows) for rows in asked]
-    left = [
-        (rows.tau - chain.torque(rows.q, rows.dq, rows.ddq) - _columns(chain, rows) @ values)
-        / unit
-        for rows in asked
-    ]
-    weight = 1.0 / unit[:, np.newaxis]
-    before = _left_out(left, [columns * weight for columns in beside])
+    left = [(_beyond(chain, rows) - _columns(chain, rows) @ values) / unit for rows in asked]
+    weights = [rows.moving[:, :, np.newaxis] / unit[:, np.newaxis] for rows in asked]
+    before = _left_out(left, [c * w for c, w in zip(beside, weights, strict=True)])
     causes = [list(_causes(chain, rows)) for rows in asked]
     named = []
     for k, (name, joints, _) in enumerate(causes[0]):
         columns = [
             np.concatenate([own[k][2], more], axis=2) * weight
-            for own, more in zip(causes, beside, strict=True)
+            for own, more, weight in zip(causes, beside, weights, strict=True)
         ]
         share = 1.0 - _left_out(left, columns) / before
         named.append(Named(name, joints, share=share - PRICE * causes[0][k][2].shape[2]))
@@ -126,7 +129,8 @@ def rows_of(recording: Recording) -> Rows:
     sign = sosfiltfilt(low, np.tanh(dq / (0.02 * np.abs(dq).max(axis=0) + 1e-9)), axis=0)
     ddq, slope = (np.gradient(values, 1.0 / rate, axis=0) for values in (dq, tau))
     thin = slice(round(0.3 * rate), -round(0.3 * rate), max(round(rate / ROWS_PER_SECOND), 1))
-    return Rows(*(values[thin] for values in (q, dq, ddq, sign, tau, slope)))
+    moving = (np.abs(dq) > RESTING * np.abs(dq).max(axis=0)).astype(float)
+    return Rows(*(values[thin] for values in (q, dq, ddq, sign, tau, slope, moving)))
 
 
 def _causes(chain: Chain, rows: Rows) -> Iterator[tuple[str, tuple[str, ...], FloatArray]]:
@@ -183,20 +187,28 @@ def _drives(rows: Rows) -> FloatArray:
 
 
 def _columns(chain: Chain, rows: Rows) -> FloatArray:
-    return np.concatenate([chain.columns(rows.q, rows.dq, rows.ddq), _drives(rows)], axis=2)
+    """Return the columns of bodies and drives, shape (R, n, 13 n); zero at rest."""
+    columns = np.concatenate([chain.columns(rows.q, rows.dq, rows.ddq), _drives(rows)], axis=2)
+    return columns * rows.moving[:, :, np.newaxis]
+
+
+def _beyond(chain: Chain, rows: Rows) -> FloatArray:
+    """Return what the description leaves of the torque, shape (R, n); zero at rest [N m]."""
+    return (rows.tau - chain.torque(rows.q, rows.dq, rows.ddq)) * rows.moving
 
 
 def _misfit(chain: Chain, recordings: Sequence[Rows]) -> tuple[FloatArray, FloatArray]:
     """Return rms of each joint on recordings left out, and the values fitted to all of them."""
     columns = [_columns(chain, rows) for rows in recordings]
-    left = [rows.tau - chain.torque(rows.q, rows.dq, rows.ddq) for rows in recordings]
+    left = [_beyond(chain, rows) for rows in recordings]
     scale = np.concatenate(left).std(axis=0) + 1e-9
     residuals = []
     for k in range(len(recordings)):
         others = [i for i in range(len(recordings)) if i != k] or [k]
         values = _fit([left[i] for i in others], [columns[i] for i in others], scale, _RIDGE)
         residuals.append(left[k] - columns[k] @ values)
-    unit = np.sqrt((np.concatenate(residuals) ** 2).mean(axis=0))
+    count = np.concatenate([rows.moving for rows in recordings]).sum(axis=0)
+    unit = np.sqrt((np.concatenate(residuals) ** 2).sum(axis=0) / count)
     return unit, _fit(left, columns, scale, _RIDGE)
 
 
