@@ -57,7 +57,7 @@ lint: $(STAMPS)/armid_ros $(STAMPS)/test  ## format, lint, layers, types
 bench: $(STAMPS)/armid_ros $(STAMPS)/bench  ## speed and accuracy, side by side with the peers
 	$(BIN)/python -m benchmarks $(BENCH)
 
-benchmark: $(STAMPS)/armid_ros $(STAMPS)/test  ## name the effects hidden in the locked set, about 40 min
+benchmark: $(STAMPS)/armid_ros $(STAMPS)/test  ## name the effects hidden in the locked set, about 30 min
 	$(BIN)/python -m benchmarks.hidden_effects locked --out benchmark
 
 # make lock UPGRADE=1 takes the newest of everything; without, what is locked stays if it can.

@@ -13,7 +13,12 @@ LIBRARY = {
     'browser',
     'change_information',
     'leg_pair_in_mujoco',
+    'lived_scoring',
+    'looks',
+    'plain_ranking',
+    'real_days',
     'real_recordings',
+    'two_days',
 }
 
 

@@ -6,8 +6,8 @@ Whether the diagnosis names effects that are hidden in recordings of MuJoCo arms
 The cases are those of tests/hidden, whose data come from code that has nothing in common with the
 diagnosis; rates have 95 % intervals (Wilson). Reach and what counts: tests/hidden/README.md.
 
-    python -m benchmarks.hidden_effects [development|locked] [--slice] [--only TEXT] [--baseline]
-        [--single] [--out DIR]
+    python -m benchmarks.hidden_effects [development|development_2|locked] [--slice] [--only TEXT]
+        [--baseline] [--single] [--out DIR]
 
 """
 
@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
 from dataclasses import asdict, replace
 import json
 import multiprocessing
@@ -33,10 +34,11 @@ from armid_ros.motion import FloatArray
 import numpy as np
 
 from benchmarks.bic_selection import bic_selection
+from benchmarks.looks import look
 from tests.hidden.cases import Case, make_case, VISIBLE
 from tests.hidden.catalogue import HIDDEN
-from tests.hidden.scoring import confusion, Finding, Judged, Outcome, score, Truth
-from tests.hidden.specification import case_list, CaseSpec
+from tests.hidden.scoring import confusion, Finding, Judged, Metric, Outcome, score, Truth
+from tests.hidden.specification import case_list, CaseSpec, SETS
 
 #: Every so many cases of a kind are in the slice.
 SLICE = {'single': 9, 'free': 20, 'pair': 8, 'outside': 5, 'removed': 10}
@@ -219,16 +221,21 @@ def select(name: str, only: Iterable[str] = (), part: bool = False) -> list[Case
     return [spec for spec in specs if not texts or any(text in spec.key for text in texts)]
 
 
-def report(judged: Sequence[Judged]) -> None:
-    """Print the table."""
-    print(f'\n{"":30s} {"value":>7s}  {"95 %":>15s} {"cases":>6s}  reach')
-    for metric in score(judged):
+def report(judged: Sequence[Judged]) -> str:
+    """Return the table."""
+    return table(score(judged))
+
+
+def table(metrics: Iterable[Metric]) -> str:
+    """Return metrics as the rows of a table."""
+    rows = [f'{"":30s} {"value":>7s}  {"95 %":>15s} {"cases":>6s}  reach']
+    for metric in metrics:
         interval = '' if np.isnan(metric.low) else f'{metric.low:.3f} - {metric.high:.3f}'
         verdict = {True: 'reached', False: 'NOT reached', None: ''}[metric.good]
         wanted = f'{metric.reach}: {verdict}' if metric.reach else ''
-        print(
-            f'{metric.name:30s} {metric.value:7.3f}  {interval:>15s} {metric.count:6d}  {wanted}'
-        )
+        row = f'{metric.name:30s} {metric.value:7.3f}  {interval:>15s} {metric.count:6d}  {wanted}'
+        rows.append(row.rstrip())
+    return '\n'.join(rows)
 
 
 def compare(judged: Sequence[Judged], baseline: Sequence[Judged]) -> None:
@@ -293,7 +300,7 @@ def draw_confusion(judged: Sequence[Judged], path: Path) -> None:
 def main() -> None:
     """Run a set of cases, print the table and write what is asked for."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks.hidden_effects')
-    parser.add_argument('set', nargs='?', choices=['development', 'locked'])
+    parser.add_argument('set', nargs='?', choices=SETS)
     parser.add_argument('--slice', action='store_true', help='a few cases of every kind')
     parser.add_argument('--only', nargs='+', default=[], metavar='TEXT', help='keys that have it')
     parser.add_argument('--baseline', action='store_true', help='pooled BIC on the same cases')
@@ -305,12 +312,25 @@ def main() -> None:
         os.environ.setdefault(variable, '1')  # the processes share the cores as it is
     part = options.slice or options.set is None
     specs = select(options.set or 'development', options.only, part)
-    judged = run(specs, options.processes, judge_single if options.single else judge)
-    report(judged)
+    with ExitStack() as stack:
+        record = stack.enter_context(look(_part(options))) if options.set == 'locked' else None
+        judged = run(specs, options.processes, judge_single if options.single else judge)
+        print(f'\n{report(judged)}')
+        if record is not None:
+            record.table = report(judged)
     if options.baseline:
         compare(judged, run(specs, options.processes, judge_baseline))
     if options.out:
         write(judged, options.out)
+
+
+def _part(options: argparse.Namespace) -> str:
+    """Say which part of a set is looked at."""
+    parts = [f'laboratory, {options.set}']
+    parts += ['a slice'] if options.slice else []
+    parts += ['one period of one recording each'] if options.single else []
+    parts += [f'only {" ".join(options.only)}'] if options.only else []
+    return ', '.join(parts)
 
 
 def _number(value: Any) -> float:

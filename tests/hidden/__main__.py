@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tests.hidden.calibration import calibrate_all
 from tests.hidden.cases import make_case, write_case
-from tests.hidden.specification import case_list, find_case
+from tests.hidden.specification import case_list, find_case, SETS
 
 
 def main() -> None:
@@ -19,7 +19,7 @@ def main() -> None:
     calibrating = jobs.add_parser('calibrate', help='find the sizes that sizes.json lacks')
     listing = jobs.add_parser('list', help='print the names of the cases')
     for job in (calibrating, listing):
-        job.add_argument('sets', nargs='*', default=['development', 'locked'])
+        job.add_argument('sets', nargs='*', default=list(SETS))
     calibrating.add_argument('--processes', type=int, default=2)
     writing = jobs.add_parser('write', help='write the recordings of a case as bags')
     writing.add_argument('key')

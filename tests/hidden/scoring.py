@@ -271,32 +271,32 @@ def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
     sizes = np.array([size for size, _ in errors])
     seconds = np.array([j.outcome.seconds for j in judged])
     return (
-        _rate('false alarms', free, lambda j: j.false_alarm, most=0.02),
-        _rate('wrong names', single, lambda j: j.wrong, most=0.02),
-        _rate(
+        rate('false alarms', free, lambda j: j.false_alarm, most=0.02),
+        rate('wrong names', single, lambda j: j.wrong, most=0.02),
+        rate(
             '  of them provisional', single, lambda j: j.wrong and j.outcome.verdict == 'partial'
         ),
-        _rate('top-1 name right', single, lambda j: j.top, least=0.90),
-        _rate('truth among the names', single, lambda j: j.found is not None, least=0.97),
-        _number('  mean number of names', np.mean, sets, 'at most 3', lambda x: x <= 3.0),
-        _rate('  with names too many', single, lambda j: j.extra),
-        _rate('  nothing found', single, lambda j: not j.findings),
-        _rate('joint right', placed, lambda j: j.localised, least=0.98),
-        _number('gap closed, median', np.median, closed, 'at least 0.95', lambda x: x >= 0.95),
-        _number(
+        rate('top-1 name right', single, lambda j: j.top, least=0.90),
+        rate('truth among the names', single, lambda j: j.found is not None, least=0.97),
+        number('  mean number of names', np.mean, sets, 'at most 3', lambda x: x <= 3.0),
+        rate('  with names too many', single, lambda j: j.extra),
+        rate('  nothing found', single, lambda j: not j.findings),
+        rate('joint right', placed, lambda j: j.localised, least=0.98),
+        number('gap closed, median', np.median, closed, 'at least 0.95', lambda x: x >= 0.95),
+        number(
             'gap closed, 10th percentile', _tenth, closed, 'at least 0.85', lambda x: x >= 0.85
         ),
-        _rate('pairs exact', pairs, lambda j: j.exact, least=0.80),
-        _rate('pairs within the sets', pairs, lambda j: j.exact_set),
-        _rate('unknown or partial', [*outside, *removed], lambda j: j.admitted, least=0.90),
-        _rate('  outside the library', outside, lambda j: j.admitted),
-        _rate('  name removed', removed, lambda j: j.admitted),
-        _number('parameter error, median', np.median, sizes, 'at most 0.10', lambda x: x <= 0.10),
-        _rate('95 % intervals with the truth', errors, lambda e: e[1], least=0.90, most=0.98),
-        _rate('silent where nothing shows', unseen, lambda j: not j.findings),
-        _rate('failures', judged, lambda j: bool(j.outcome.error)),
-        _number('processor time, median [s]', np.median, seconds, '', None),
-        _number('processor time, longest [s]', np.max, seconds, 'at most 30', lambda x: x <= 30.0),
+        rate('pairs exact', pairs, lambda j: j.exact, least=0.80),
+        rate('pairs within the sets', pairs, lambda j: j.exact_set),
+        rate('unknown or partial', [*outside, *removed], lambda j: j.admitted, least=0.90),
+        rate('  outside the library', outside, lambda j: j.admitted),
+        rate('  name removed', removed, lambda j: j.admitted),
+        number('parameter error, median', np.median, sizes, 'at most 0.10', lambda x: x <= 0.10),
+        rate('95 % intervals with the truth', errors, lambda e: e[1], least=0.90, most=0.98),
+        rate('silent where nothing shows', unseen, lambda j: not j.findings),
+        rate('failures', judged, lambda j: bool(j.outcome.error)),
+        number('processor time, median [s]', np.median, seconds, '', None),
+        number('processor time, longest [s]', np.max, seconds, 'at most 30', lambda x: x <= 30.0),
     )
 
 
@@ -329,7 +329,7 @@ def _tenth(values: Any) -> float:
     return float(np.quantile(values, 0.1))
 
 
-def _rate(
+def rate(
     name: str,
     cases: Sequence[Any],
     test: Callable[[Any], bool],
@@ -337,6 +337,7 @@ def _rate(
     least: float | None = None,
     most: float | None = None,
 ) -> Metric:
+    """Return a row with the share of cases that pass a test, and what is wanted of it."""
     hits, total = sum(map(bool, map(test, cases))), len(cases)
     value = hits / total if total else np.nan
     wanted = [f'at least {least:g}'] if least is not None else []
@@ -347,13 +348,14 @@ def _rate(
     return Metric(name, value, *wilson(hits, total), total, ', '.join(wanted), good)
 
 
-def _number(
+def number(
     name: str,
     statistic: Callable[[Any], Any],
     values: Sequence[float] | np.ndarray,
     reach: str,
     test: Callable[[float], bool] | None,
 ) -> Metric:
+    """Return a row with a statistic of values, and what is wanted of it."""
     value = float(statistic(values)) if len(values) else np.nan
     good = bool(test(value)) if test and len(values) else None
     return Metric(name, value, np.nan, np.nan, len(values), reach, good)

@@ -14,6 +14,8 @@ import numpy as np
 
 from tests.hidden.catalogue import CATALOGUED, HIDDEN, OUTSIDE_NAMES
 
+SETS = ('development', 'development_2', 'locked')
+
 SPECIFICATION = Path(__file__).with_name('specification.json')
 
 #: What is not hidden together with something else: it acts on the whole arm, changes what the
@@ -79,21 +81,22 @@ class CaseSpec:
 
 @cache
 def case_list(name: str) -> tuple[CaseSpec, ...]:
-    """Return all cases of the set 'development' or 'locked'."""
+    """Return all cases of a set: 'development', 'development_2' or 'locked'."""
     rules = json.loads(SPECIFICATION.read_text())[name]
     rng = np.random.default_rng(rules['seed'])
     machines, spread = rules['machines'], rules['spread']
+    seeded_as = rules.get('seeded_as', name)  # the name of the set when it was drawn
     cases: list[CaseSpec] = []
 
-    def add(kind: str, key: str, effects: tuple[str, ...], gaps: tuple[float, ...], noise=1.0):
-        key = f'{name}/{key}'
+    def add(kind: str, label: str, effects: tuple[str, ...], gaps: tuple[float, ...], noise=1.0):
+        key = f'{name}/{label}'
         classes = [HIDDEN[effect] for effect in effects]
         exact = any(c.rigid for c in classes) or len(cases) % 2 == 0
         needs = {need for c in classes for need in c.needs}
         bare = bool(rng.random() < 0.25) and needs <= {'rotor_inertia'}
         sizes = tuple(float(gap * spread ** rng.uniform(-1.0, 1.0)) for gap in gaps)
         machine = machines[int(rng.integers(len(machines)))]
-        seed = crc32(f'{rules["seed"]} {key}'.encode())
+        seed = crc32(f'{rules["seed"]} {seeded_as}/{label}'.encode())
         cases.append(CaseSpec(key, kind, machine, effects, sizes, exact, bare, noise, seed))
 
     for effect in CATALOGUED:

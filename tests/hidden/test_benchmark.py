@@ -96,7 +96,7 @@ def test_slice_has_all_kinds_and_is_short():
 
 
 def test_report_and_files_tell_the_same(judged, tmp_path, capsys):
-    hidden_effects.report([judged])
+    print(hidden_effects.report([judged]))
     assert 'NOT reached' in capsys.readouterr().out
     hidden_effects.write([judged], tmp_path / 'out')
     document = json.loads((tmp_path / 'out' / 'outcomes.json').read_text())

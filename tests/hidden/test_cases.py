@@ -13,7 +13,7 @@ import pytest
 from tests.hidden.cases import make_case, SIZES, write_case
 from tests.hidden.catalogue import CATALOGUED, HIDDEN
 from tests.hidden.sizing import noise_floor
-from tests.hidden.specification import case_list, find_case
+from tests.hidden.specification import case_list, find_case, SETS
 
 DESIGNED = (
     'viscous_friction coulomb_friction stribeck_friction asymmetric_friction quadratic_friction '
@@ -29,7 +29,7 @@ def test_every_name_of_the_catalogue_is_hidden():
     assert sorted(CATALOGUED) == sorted(DESIGNED)
 
 
-@pytest.mark.parametrize('name', ['development', 'locked'])
+@pytest.mark.parametrize('name', SETS)
 def test_lists_have_what_was_asked_for(name):
     cases = case_list(name)
     kinds = Counter(case.kind for case in cases)
@@ -44,13 +44,13 @@ def test_lists_have_what_was_asked_for(name):
 
 
 def test_sets_have_nothing_in_common():
-    seeds = [{case.seed for case in case_list(name)} for name in ('development', 'locked')]
-    assert not seeds[0] & seeds[1]
+    seeds = [{case.seed for case in case_list(name)} for name in SETS]
+    assert sum(map(len, seeds)) == len(set().union(*seeds))
 
 
 def test_sizes_are_kept_for_every_case():
     sizes = json.loads(SIZES.read_text())
-    for name in ('development', 'locked'):
+    for name in SETS:
         for case in case_list(name):
             if case.effects:
                 assert len(sizes[case.sized_as]['effects']) == len(case.effects), case.key
@@ -62,8 +62,8 @@ def test_sizes_are_kept_for_every_case():
         'development/coulomb_friction/0.5-0',
         'development/torque_crosstalk/3-0',
         'development/payload/20-0',
-        'locked/joint_spring/3-0',
-        'locked/quadratic_friction/20-1',
+        'development_2/joint_spring/3-0',
+        'development_2/quadratic_friction/20-1',
     ],
 )
 def test_gap_is_of_the_class_asked_for(key):

@@ -24,7 +24,7 @@ def imports(path):
 
 
 def test_files_import_descriptions_and_arrays_only():
-    for path in HERE.glob('*.py'):
+    for path in HERE.rglob('*.py'):
         if path.stem in JUDGING:
             continue
         ours = {name for name in imports(path) if name.split('.')[0] == 'armid_ros'}
@@ -33,7 +33,8 @@ def test_files_import_descriptions_and_arrays_only():
 
 def test_nothing_else_comes_along():
     """Not even what is imported imports a model, an effect or a simulator."""
-    modules = [p.stem for p in HERE.glob('*.py') if not p.stem.startswith(('test_', '__'))]
+    paths = [p.relative_to(HERE).with_suffix('') for p in HERE.rglob('*.py')]
+    modules = ['.'.join(p.parts) for p in paths if not p.stem.startswith(('test_', '__'))]
     code = (
         f'import importlib, sys\n'
         f'for name in {modules!r}:\n'

@@ -1,0 +1,202 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether the diagnosis names what happened to arms that have lived.
+
+A model is identified on day 1, and the diagnosis is asked about day 2, with day 1 as baseline; and
+about day 1 itself, of which nothing may be named. Cases: tests/hidden/lived/README.md.
+
+    python -m benchmarks.lived [KIND] [--cases FIRST:LAST] [--only CAUSE ...] [--no-again]
+        [--plain] [--out FILE] [--processes N]
+
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
+from dataclasses import asdict, replace
+import json
+import multiprocessing
+import os
+from pathlib import Path
+import traceback
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import CATALOGUE
+from armid_ros.identification import Identification
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+import numpy as np
+
+from benchmarks.hidden_effects import table
+from benchmarks.lived_scoring import breakdown, LivedJudged, LivedTruth, score
+from benchmarks.looks import look
+from benchmarks.plain_ranking import plain_ranking
+from benchmarks.two_days import Answer, ask, identification_of
+from tests.hidden.lived.adapter import recording_of, robot_of
+from tests.hidden.lived.cases import lived_case, LivedCase
+from tests.hidden.lived.specification import COUNTS, KINDS, specify
+
+#: Asks about recordings: see two_days.ask, which is the ordinary one.
+Ask = Callable[..., Answer]
+
+
+def judge(kind: str, index: int, again: bool = True, question: Ask = ask) -> LivedJudged:
+    """Make a case and ask about it; an exception is an answer, too."""
+    case = lived_case(kind, index)
+    day_1, day_2 = ([recording_of(run) for run in day] for day in (case.day_1, case.day_2))
+    held_out = recording_of(case.held_out)
+    described = robot_of(case).gravity
+    shares = (np.nan, np.nan)
+    repeated = None
+    try:
+        if day_1:
+            found = identification_of(robot_of(case), day_1)
+            arm, shares = found.arm, true_shares(found, held_out, case.held_out.contribution)
+        else:
+            arm = known_arm(case)
+        answer = question(arm, day_2, validate=[held_out], baseline=day_1)
+        if day_1 and again:
+            repeated = question(arm, day_1[:2], validate=day_1[2:], baseline=day_1)
+    except Exception:
+        answer = Answer(verdict='failed', error=traceback.format_exc(limit=-3))
+    return LivedJudged(LivedTruth.of(case, shares, described), answer, repeated)
+
+
+def known_arm(case: LivedCase) -> ArmModel:
+    """Return the description with the friction that is known, by values or by name."""
+    arm = ArmModel(robot_of(case))
+    for known in case.known:
+        arm = arm.with_effect(CATALOGUE[known.name].on(arm.robot, known.joints), known.values)
+    return arm
+
+
+def true_shares(
+    found: Identification, held_out: Recording, contribution: FloatArray
+) -> tuple[float, float]:
+    """
+    Return which share a cause takes of what a model leaves of a recording.
+
+    Joints count by what the model leaves of them on the day it was identified.
+
+    Parameters
+    ----------
+    found : Identification
+        The model.
+    held_out : Recording
+        With the cause.
+    contribution : ndarray, shape (N, n)
+        Torque of the cause [N m].
+
+    Returns
+    -------
+    of_power, of_excess : float
+        Of all that is left, and of what of it is more than on the day of identification.
+
+    """
+    if not np.any(contribution):
+        return np.nan, np.nan
+    without = replace(held_out, tau=held_out.tau - contribution)
+    floor = _power(found.training)
+    before, after = (_power(found.predict([one])) for one in (held_out, without))
+    there, rest = np.sum(before / floor), np.sum(after / floor)
+    return float(1.0 - rest / there), float((there - rest) / max(there - len(floor), 1e-9))
+
+
+def run(
+    kind: str,
+    cases: Sequence[int],
+    processes: int = 2,
+    again: bool = True,
+    question: Ask = ask,
+) -> list[LivedJudged]:
+    """Judge cases in several processes, with a line of progress each."""
+    judged = []
+    context = multiprocessing.get_context('spawn')
+    count = len(cases)
+    with ProcessPoolExecutor(processes, mp_context=context) as pool:
+        jobs = pool.map(judge, [kind] * count, cases, [again] * count, [question] * count)
+        for one in jobs:
+            judged.append(one)
+            print(_line(one), flush=True)
+    return judged
+
+
+def main() -> None:
+    """Run a kind of cases, print the table and write what is asked for."""
+    parser = argparse.ArgumentParser(prog='python -m benchmarks.lived')
+    parser.add_argument('kind', nargs='?', default='development', choices=KINDS)
+    parser.add_argument('--cases', default=':', metavar='FIRST:LAST', help='some of them')
+    parser.add_argument('--only', nargs='+', default=[], metavar='CAUSE', help='of some causes')
+    parser.add_argument('--no-again', action='store_true', help='do not ask about day 1')
+    parser.add_argument('--plain', action='store_true', help='ask the plain ranking instead')
+    parser.add_argument('--out', type=Path, help='file for all answers, as JSON')
+    parser.add_argument('--processes', type=int, default=2)
+    options = parser.parse_args()
+    for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
+        os.environ.setdefault(variable, '1')  # the processes share the cores as it is
+    cases = select(options.kind, options.cases, options.only)
+    what = f'lived, {options.kind}, {len(cases)} cases'
+    what += f', only {" ".join(options.only)}' if options.only else ''
+    what += ', the plain ranking' if options.plain else ''
+    question = plain_ranking if options.plain else ask
+    with ExitStack() as stack:
+        locked = options.kind.startswith('locked')
+        record = stack.enter_context(look(what)) if locked else None
+        judged = run(options.kind, cases, options.processes, not options.no_again, question)
+        print(f'\n{what}\n{table(score(judged))}')
+        if not locked:
+            print(breakdown(judged))
+        if record is not None:
+            record.table = table(score(judged))
+    if options.out:
+        rows = [asdict(one) for one in judged]
+        options.out.write_text(json.dumps(rows, indent=1, default=_plain), encoding='utf-8')
+
+
+def select(kind: str, cases: str = ':', only: Sequence[str] = ()) -> list[int]:
+    """Return the numbers of cases: a range such as '0:24', and of some causes."""
+    first, _, last = cases.partition(':')
+    question = kind.removeprefix(kind.partition('/')[0])
+    numbers = range(int(first or 0), int(last or COUNTS[question]))
+    return [k for k in numbers if not only or specify(kind, k).cause in only]
+
+
+def _power(fits: Sequence) -> FloatArray:
+    """Return the mean square that is left of each joint, where its torque says something."""
+    used = np.concatenate([fit.informative for fit in fits])
+    residual = np.concatenate([fit.residual for fit in fits])
+    return np.sum(residual**2, axis=0, where=used) / np.maximum(used.sum(axis=0), 1)
+
+
+def _line(one: LivedJudged) -> str:
+    truth, answer = one.truth, one.answer
+    mark = 'first' if one.first else 'tied' if one.tied else 'there' if one.anywhere else '-'
+    if not truth.name:
+        mark = '-' if answer.headline else 'silent'
+    elif not truth.in_catalogue and truth.name != 'gravity':
+        mark = 'admitted' if one.admitted else '-'
+    where = f'@{",".join(truth.joints)}' if truth.joints else ''
+    names = '; '.join(map(str, answer.headline)) or 'nothing'
+    again = '' if one.again is None else f' | again: {"; ".join(map(str, one.again.headline))}'
+    return (
+        f'{truth.key} {truth.arm} {truth.style} {truth.size} gap {truth.gap:.2g} '
+        f'share {truth.share_of_power:.2f} {truth.share_of_excess:.2f}: '
+        f'{truth.name or "nothing"}{where} -> {mark}: {answer.verdict} {names}{again} '
+        f'[{answer.seconds:.1f} s] {answer.error.strip().rpartition(chr(10))[2]}'.rstrip()
+    )
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f'{type(value).__name__} is no JSON')
+
+
+if __name__ == '__main__':
+    main()

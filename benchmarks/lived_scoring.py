@@ -1,0 +1,274 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How good answers about arms that have lived are: against the truth, with 95 % intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from benchmarks.two_days import Answer, Named
+from tests.hidden.arrays import FloatArray
+from tests.hidden.lived.cases import LivedCase
+from tests.hidden.scoring import Metric, number, rate
+
+#: Below this gap a cause is no more than the model of day 1 leaves anyway.
+VISIBLE = 1.0
+
+#: A tie of more names says nothing.
+LARGEST_TIE = 3
+
+#: Names of one and the same thing in the same joint, by the name of the truth.
+ALSO = {
+    'payload': ('link_inertia',),
+    'link_inertia': ('payload',),
+    'gravity': ('base_tilt', 'gravity_magnitude'),
+    'base_tilt': ('gravity',),
+}
+
+#: What is honest where no catalogue has the cause.
+ADMITTED = ('unknown', 'partial', 'not_repeatable')
+
+
+@dataclass(frozen=True)
+class LivedTruth:
+    """
+    A case without its recordings.
+
+    Attributes
+    ----------
+    key, cause, size, style, arm : str
+        What it was made of.
+    name : str
+        What happened, as the catalogue calls it; empty for nothing.
+    joints : tuple of str
+        Where.
+    parameters : tuple of (name, joint, value)
+        True values.
+    in_catalogue : bool
+        Whether the catalogue has it.
+    gap : float
+        Power over the squared misfit of day 1.
+    share_of_power, share_of_excess : float
+        What the torque of the cause takes of the power that the model of day 1 leaves of the
+        held-out recording, and of what of it is more than the model's misfit on day 1.
+    gravity, described : ndarray, shape (3,)
+        True and described gravity [m/s^2].
+
+    """
+
+    key: str
+    cause: str
+    size: str
+    style: str
+    arm: str
+    name: str
+    joints: tuple[str, ...]
+    parameters: tuple[tuple[str, str, float], ...]
+    in_catalogue: bool
+    gap: float
+    share_of_power: float
+    share_of_excess: float
+    gravity: FloatArray
+    described: FloatArray
+
+    @classmethod
+    def of(cls, case: LivedCase, shares: tuple[float, float], described: FloatArray) -> LivedTruth:
+        """Take the truth out of a case."""
+        spec = case.spec
+        (truth,) = case.truth or (None,)
+        return cls(
+            key=case.key,
+            cause=spec.cause,
+            size=spec.size,
+            style=case.held_out.style,
+            arm=spec.arm,
+            name=truth.name if truth else '',
+            joints=truth.joints if truth else (),
+            parameters=tuple((p.name, p.joint, p.value) for p in truth.parameters)
+            if truth
+            else (),
+            in_catalogue=truth.in_catalogue if truth else False,
+            gap=case.gap,
+            share_of_power=shares[0],
+            share_of_excess=shares[1],
+            gravity=case.gravity,
+            described=described,
+        )
+
+    def among(self, named: Named) -> str:
+        """Return which name of a finding is right, its own before its rivals; empty if none."""
+        for name in (named.name, *(rival for rival, _ in named.rivals)):
+            same = name in ALSO.get(self.name, ())
+            if name == self.name or (same and set(named.joints_of(name)) == set(self.joints)):
+                return name
+        return ''
+
+
+@dataclass(frozen=True)
+class LivedJudged:
+    """
+    One case: what is true, what was said of it, and what was said of the day before.
+
+    Attributes
+    ----------
+    truth : LivedTruth
+        What happened.
+    answer : Answer
+        What was said of day 2.
+    again : Answer or None
+        What was said of day 1; None if it was not asked.
+
+    """
+
+    truth: LivedTruth
+    answer: Answer
+    again: Answer | None = None
+
+    @property
+    def first(self) -> bool:
+        """Whether the cause is named first, before its rivals."""
+        headline = self.answer.headline
+        return bool(headline) and self.truth.among(headline[0]) == headline[0].name
+
+    @property
+    def tied(self) -> bool:
+        """Whether the cause is named first, or in a tie with the first that is short."""
+        if not self.answer.headline:
+            return False
+        leading = self.answer.headline[0]
+        return self.first or (
+            len(leading.names) <= LARGEST_TIE and bool(self.truth.among(leading))
+        )
+
+    @property
+    def anywhere(self) -> bool:
+        """Whether the cause is in the headline at all."""
+        return any(self.truth.among(named) for named in self.answer.headline)
+
+    @property
+    def too_many(self) -> int:
+        """Names in the headline that nothing stands behind."""
+        true = [named for named in self.answer.headline if self.truth.among(named)]
+        mounting = self.truth.name == 'gravity'  # direction and magnitude are two names
+        return len(self.answer.headline) - min(len(true), 2 if mounting else 1)
+
+    @property
+    def placed(self) -> bool:
+        """Whether the first of the headline is in the joints of the cause."""
+        first = self.answer.headline[0]
+        name = self.truth.among(first) or first.name
+        return set(first.joints_of(name)) == set(self.truth.joints)
+
+    @property
+    def share_error(self) -> float:
+        """Stated share less the nearer of the two true ones; nan if none is stated."""
+        said = self.answer.headline[0].share
+        errors = said - np.array([self.truth.share_of_power, self.truth.share_of_excess])
+        return float(errors[np.argmin(np.abs(errors))])
+
+    @property
+    def admitted(self) -> bool:
+        """Whether it is admitted that nothing in the catalogue explains what is there."""
+        pushed = self.truth.name == 'pushes' and any(
+            'human_interaction' in named.names for named in self.answer.headline
+        )
+        return self.answer.verdict in ADMITTED or pushed
+
+    def parameter_errors(self) -> list[tuple[float, bool]]:
+        """Return errors over the largest value of their kind, and whether intervals hold."""
+        if not self.first:
+            return []
+        said = {(n, j): (value, std) for n, j, value, std in self.answer.headline[0].parameters}
+        errors = []
+        largest = max(abs(value) for _, _, value in self.truth.parameters)
+        for name, joint, true in self.truth.parameters:
+            value, std = said.get((name, joint), (np.nan, np.nan))
+            if np.isfinite(value) and 3.0 * abs(true) >= largest > 0.0:
+                error = abs(value - true)
+                errors.append((error / abs(true), bool(error <= 1.96 * std)))
+        return errors
+
+    def gravity_error(self) -> tuple[float, float]:
+        """Return how far gravity is off: direction [deg], and magnitude as a share."""
+        told = gravity_of(self.answer.headline, self.truth.described)
+        size, true = np.linalg.norm(told), np.linalg.norm(self.truth.gravity)
+        cosine = told @ self.truth.gravity / size / true
+        return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))), float(size / true - 1.0)
+
+
+def gravity_of(headline: Iterable[Named], described: FloatArray) -> FloatArray:
+    """Return the gravity that a headline stands for, shape (3,) [m/s^2]."""
+    values = {name: value for named in headline for name, _, value, _ in named.parameters}
+    if 'gravity_x' in values:
+        return np.array([values[f'gravity_{axis}'] for axis in 'xyz'])
+    turn = Rotation.from_rotvec([values.get('tilt_x', 0.0), values.get('tilt_y', 0.0), 0.0])
+    size = np.linalg.norm(described)
+    return turn.inv().apply(described) * (1.0 + values.get('gravity_difference', 0.0) / size)
+
+
+def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
+    """Compute all metrics."""
+    free = [j for j in judged if not j.truth.name]
+    named = [j for j in judged if _can_be_named(j.truth)]
+    seen = [j for j in named if j.truth.gap >= VISIBLE]
+    large = [j for j in seen if j.truth.size in ('natural', 'clear')]
+    unseen = [j for j in named if j.truth.gap < VISIBLE]
+    outside = [j for j in judged if j.truth.name and j not in named and j.truth.gap >= VISIBLE]
+    headed = [j for j in seen if j.tied and j.truth.joints]
+    stated = [j for j in seen if j.first and np.isfinite(j.share_error)]
+    errors = [error for j in seen for error in j.parameter_errors()]
+    turned = [j.gravity_error() for j in seen if j.truth.cause == 'mounting' and j.first]
+    again = [j for j in judged if j.again is not None]
+    seconds = [j.answer.seconds for j in judged if np.isfinite(j.answer.seconds)]
+    shares = [abs(j.share_error) for j in stated]
+    answered = [j for j in judged if not j.answer.error]
+    too_many = [j.too_many for j in answered if not j.truth.name or j.truth.in_catalogue]
+    return (
+        rate('cause named first', seen, lambda j: j.first, least=0.90),
+        rate('  first or in a tie of 3', seen, lambda j: j.tied, least=0.97),
+        rate('  anywhere in the headline', seen, lambda j: j.anywhere),
+        rate('  first, natural and clear', large, lambda j: j.first),
+        rate('  nothing named', seen, lambda j: not j.answer.headline),
+        rate('  first, gap below 1', unseen, lambda j: j.first),
+        number('names too many', np.mean, too_many, 'at most 0.2', lambda x: x <= 0.2),
+        rate('joint of the headline right', headed, lambda j: j.placed, least=0.97),
+        rate('nothing happened, silent', free, lambda j: silent(j.answer), least=0.95),
+        rate('same day again, silent', again, lambda j: silent(j.again), least=0.95),
+        rate('outside the catalogue, said so', outside, lambda j: j.admitted, least=0.90),
+        rate('share within 5 points', shares, lambda e: e <= 0.05),
+        number('  error, median', np.median, shares, 'at most 0.05', lambda x: x <= 0.05),
+        number('parameter error, median', np.median, [e for e, _ in errors], '', None),
+        rate('95 % intervals with the truth', errors, lambda e: e[1], least=0.90, most=0.98),
+        rate('mounting within 1 deg and 2 %', turned, lambda e: e[0] <= 1.0 and abs(e[1]) <= 0.02),
+        rate('failures', judged, lambda j: bool(j.answer.error)),
+        number('processor time, median [s]', np.median, seconds, 'at most 5', lambda x: x <= 5.0),
+        number('processor time, longest [s]', np.max, seconds, 'at most 20', lambda x: x <= 20.0),
+    )
+
+
+def breakdown(judged: Sequence[LivedJudged]) -> str:
+    """Return how many are named first of those that are visible, by cause, style and size."""
+    seen = [j for j in judged if j.truth.name and j.truth.gap >= VISIBLE]
+    rows = []
+    for what in ('cause', 'style', 'size'):
+        groups = sorted({getattr(j.truth, what) for j in seen})
+        counts = []
+        for group in groups:
+            own = [j for j in seen if getattr(j.truth, what) == group]
+            hits = sum(j.first if _can_be_named(j.truth) else j.admitted for j in own)
+            counts.append(f'{group} {hits}/{len(own)}')
+        rows.append(f'by {what}: {", ".join(counts)}')
+    return '\n'.join(rows)
+
+
+def _can_be_named(truth: LivedTruth) -> bool:
+    return truth.in_catalogue or truth.name == 'gravity'
+
+
+def silent(answer: Answer | None) -> bool:
+    """Whether there is an answer, and it names nothing."""
+    return answer is not None and not answer.headline and not answer.error

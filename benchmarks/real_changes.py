@@ -1,0 +1,71 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the diagnosis says happened to real machines between two days.
+
+A model is identified on day 1, the diagnosis is asked about day 2, and about day 1 again. What
+happened is known: see benchmarks/real_days.py.
+
+    python -m benchmarks.real_changes [TEXT ...]    # only the questions that have one of the texts
+
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import sys
+import tempfile
+
+from armid_ros.errors import ArmidError
+from armid_ros.recording import Recording
+
+from benchmarks.real_days import DAYS, RealDays
+from benchmarks.two_days import Answer, ask, identification_of
+
+
+def answers(days: RealDays) -> tuple[Answer, Answer]:
+    """Return what is said of day 2, and of day 1 again."""
+    try:
+        arm = identification_of(days.robot, days.day_1).arm
+    except ArmidError as error:
+        refused = Answer('no model', error=str(error))
+        return refused, refused
+
+    def said(recordings: tuple[Recording, ...], validate: tuple[Recording, ...]) -> Answer:
+        try:
+            return ask(arm, recordings, validate=validate, baseline=days.day_1)
+        except ArmidError as error:
+            return Answer('refused', error=str(error))
+
+    return said(days.day_2, days.held_out), said(days.day_1, ())
+
+
+def main() -> int:
+    """Print what is said, below what happened."""
+    folder = os.environ.get('ARMID_DATA')
+    if not folder:
+        print('real_changes: ARMID_DATA names no folder with recordings', file=sys.stderr)
+        return 0
+    texts = sys.argv[1:]
+    with tempfile.TemporaryDirectory() as out:
+        for name, load in DAYS.items():
+            if texts and not any(text in name for text in texts):
+                continue
+            days = load(Path(folder), Path(out))
+            print(f'\n{days.name}\n    wanted   {days.wanted}')
+            for what, answer in zip(('day 2', 'day 1'), answers(days), strict=True):
+                print(
+                    f'    {what}    {answer.verdict:14s} {"; ".join(map(str, answer.headline))} '
+                    f'[{answer.seconds:.1f} s] {answer.error}',
+                    flush=True,
+                )
+                if answer.verdict == 'bad_data':
+                    print(f'             {answer.summary}')
+                if answer.minor:
+                    print(f'             minor: {"; ".join(map(str, answer.minor))}')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

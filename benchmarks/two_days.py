@@ -1,0 +1,173 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+One arm on two days: a model is identified on the first, and the diagnosis is asked what changed.
+
+This is the one place of the benchmarks that knows how the question is put.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import inspect
+import time
+from typing import Any
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.identification import Identification, identify
+from armid_ros.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+
+#: What a model of day 1 has besides its bodies: the default of `armid identify`.
+EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
+
+
+@dataclass(frozen=True)
+class Named:
+    """
+    A cause in a headline.
+
+    Attributes
+    ----------
+    name : str
+        Name in the catalogue.
+    joints : tuple of str
+        Where; empty for the whole arm.
+    rivals : tuple of (name, joints)
+        What the data cannot tell from it.
+    parameters : tuple of (name, joint, value, std)
+        What was estimated.
+    share : float
+        Share of the held-out gap that it takes; nan if it is not said.
+    share_interval : (float, float)
+        Its interval.
+
+    """
+
+    name: str
+    joints: tuple[str, ...] = ()
+    rivals: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    parameters: tuple[tuple[str, str, float, float], ...] = ()
+    share: float = np.nan
+    share_interval: tuple[float, float] = (np.nan, np.nan)
+
+    @property
+    def names(self) -> set[str]:
+        """All names it may be."""
+        return {self.name, *(name for name, _ in self.rivals)}
+
+    def joints_of(self, name: str) -> tuple[str, ...]:
+        """Return where it is if it is a name."""
+        return self.joints if name == self.name else dict(self.rivals).get(name, self.joints)
+
+    def __str__(self) -> str:
+        """Write names and joints."""
+        where = ','.join(self.joints) if len(self.joints) < 4 else f'{len(self.joints)} joints'
+        share = '' if np.isnan(self.share) else f' {self.share:.2f}'
+        return '|'.join((self.name, *dict(self.rivals))) + (f'@{where}' if where else '') + share
+
+
+@dataclass(frozen=True)
+class Answer:
+    """
+    What a diagnosis said.
+
+    Attributes
+    ----------
+    verdict : str
+        As in diagnosis.json; 'failed' where there was none.
+    headline, minor : tuple of Named
+        What takes the gap, and what else is there.
+    seconds : float
+        Processor time [s].
+    summary : str
+        In words.
+    error : str
+        Why there is no diagnosis; empty if there is one.
+
+    """
+
+    verdict: str
+    headline: tuple[Named, ...] = ()
+    minor: tuple[Named, ...] = ()
+    seconds: float = np.nan
+    summary: str = ''
+    error: str = ''
+
+
+def identification_of(robot: Robot, recordings: Sequence[Recording]) -> Identification:
+    """Identify an arm as `armid identify` does with its defaults."""
+    arm = ArmModel(robot)
+    for name in EFFECTS:
+        arm = arm.with_effect(make_effect(name, robot))
+    return identify(arm, list(recordings), rng=np.random.default_rng(0))
+
+
+def ask(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    *,
+    validate: Sequence[Recording] = (),
+    baseline: Sequence[Recording] = (),
+) -> Answer:
+    """
+    Ask the diagnosis what is not in a model.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        What is known.
+    recordings, validate : sequence of Recording
+        Of the day in question; the second are not fitted.
+    baseline : sequence of Recording
+        Of the day on which the model was identified.
+
+    """
+    from armid_ros.diagnosis import diagnose, diagnosis_document
+
+    more: dict[str, Any] = {}
+    if 'baseline' in inspect.signature(diagnose).parameters:
+        more['baseline'] = tuple(baseline)
+    begin = time.process_time()
+    found = diagnose(
+        arm, list(recordings), validate=list(validate), rng=np.random.default_rng(0), **more
+    )
+    seconds = time.process_time() - begin
+    return answer_of(diagnosis_document(found), seconds)
+
+
+def answer_of(document: dict[str, Any], seconds: float) -> Answer:
+    """Read an answer from a document of the schema armid/diagnosis/1."""
+    return Answer(
+        verdict=document['verdict'],
+        headline=tuple(_named(effect) for effect in document['effects']),
+        minor=tuple(_named(effect) for effect in document.get('minor', ())),
+        seconds=seconds,
+        summary=document.get('summary', ''),
+    )
+
+
+def _named(effect: dict[str, Any]) -> Named:
+    rivals = {rival['name']: tuple(rival['joints']) for rival in effect.get('rivals', ())}
+    for name in effect.get('ambiguous_with', ()):
+        rivals.setdefault(name, ())
+    low, high = effect.get('share_interval') or (None, None)
+    return Named(
+        name=effect['name'],
+        joints=tuple(effect['joints']),
+        rivals=tuple(rivals.items()),
+        parameters=tuple(
+            (p['name'], p.get('joint') or '', _number(p['value']), _number(p.get('std')))
+            for p in effect.get('parameters', ())
+        ),
+        share=_number(effect.get('share')),
+        share_interval=(_number(low), _number(high)),
+    )
+
+
+def _number(value: Any) -> float:
+    return float('nan') if value is None else float(value)

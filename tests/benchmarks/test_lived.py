@@ -1,0 +1,253 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The benchmark of lived arms counts what was said against the truth."""
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import CATALOGUE
+from armid_ros.motion import Motion
+import numpy as np
+import pytest
+
+from benchmarks.hidden_effects import table
+from benchmarks.lived import judge, known_arm, select, true_shares
+from benchmarks.lived_scoring import breakdown, gravity_of, LivedJudged, LivedTruth, score
+from benchmarks.two_days import Answer, answer_of, identification_of, Named
+from tests.hidden.lived.adapter import recording_of, robot_of
+from tests.hidden.lived.arms import load_arm
+from tests.hidden.lived.cases import lived_case
+from tests.hidden.lived.causes import CAUSES, Holding, Pulling, Scene
+from tests.hidden.lived.chain import Chain
+from tests.hidden.lived.motions import draw_path, tracked
+from tests.hidden.lived.plant import LivedArm
+from tests.hidden.lived.wear import Wear
+
+EARTH = np.array([0.0, 0.0, -9.81])
+
+COULOMB = LivedTruth(
+    key='development/1',
+    cause='coulomb',
+    size='clear',
+    style='dwells',
+    arm='ur5',
+    name='coulomb_friction',
+    joints=('elbow',),
+    parameters=(('coulomb_torque', 'elbow', 2.0),),
+    in_catalogue=True,
+    gap=5.0,
+    share_of_power=0.7,
+    share_of_excess=0.8,
+    gravity=EARTH,
+    described=EARTH,
+)
+
+
+def said(*headline, verdict='named'):
+    """Return an answer."""
+    return Answer(verdict, tuple(headline), seconds=1.0)
+
+
+def metric(judged, name):
+    """Return the value of one row."""
+    return next(m.value for m in score(judged) if m.name.strip() == name)
+
+
+@pytest.mark.parametrize('word', sorted(CAUSES))
+def test_causes_have_the_names_units_and_parameters_of_the_catalogue(word):
+    robot = load_arm('ur5')
+    low, high, ones = -np.ones(6), np.ones(6), np.ones(6)
+    scene = Scene(Chain.of(robot), ones, ones, low, high, np.zeros(6), 10.0)
+    cause = CAUSES[word].draw(scene, np.random.default_rng(0))
+    assert cause.in_catalogue == (cause.name in CATALOGUE)
+    if cause.in_catalogue:
+        effect = CATALOGUE[cause.name].on(robot, cause.joints or None)
+        known = (*effect.parameters(robot), *effect.shape_parameters(robot))
+        names = {(p.name, p.joint or '', p.unit) for p in known}
+        assert {(p.name, p.joint, p.unit) for p in cause.parameters} <= names
+
+
+def catalogued(robot, cause):
+    """Return the arm of a robot with a cause as the package has it."""
+    told = {(p.name, p.joint): p.value for p in cause.parameters}
+    effect = CATALOGUE[cause.name].on(robot, cause.joints or None)
+    if isinstance(cause, Holding | Pulling):
+        effect = effect.with_shape(np.array([cause.attachment]))
+    elif effect.shape_parameters(robot):
+        shape = [
+            told.get((p.name, p.joint), value)
+            for p, value in zip(effect.shape_parameters(robot), effect.shape, strict=True)
+        ]
+        effect = effect.with_shape(np.reshape(shape, (len(effect.owners), -1)))
+    values = [told.get((p.name, p.joint or ''), 0.0) for p in effect.parameters(robot)]
+    return ArmModel(robot).with_effect(effect, values)
+
+
+@pytest.mark.parametrize(
+    'word', sorted(word for word, cause in CAUSES.items() if cause.in_catalogue)
+)
+def test_true_parameters_of_a_cause_make_its_torque_in_the_package(word):
+    """Two codes of one definition; where the package goes by derivatives, of a small cause."""
+    robot = load_arm('ur5')
+    chain = Chain.of(robot)
+    wanted = draw_path('sines', robot, chain, 8.0, np.random.default_rng(5))
+    path = tracked(wanted, chain, np.zeros(6))
+    arm = LivedArm(chain, replace(Wear.none(6), presliding=np.full(6, 1e-7)))
+    ends = np.array([robot.lower, robot.upper])
+    ones = np.ones(6)
+    middle = np.where(np.isfinite(ends).all(axis=0), ends, 0.0).mean(axis=0)
+    scene = Scene(chain, 5.0 * ones, ones, -ones, ones, middle, 10.0)
+    cause = CAUSES[word].draw(scene, np.random.default_rng(1))
+    cause = cause.scaled({'delay': 0.2, 'encoder': 0.1}.get(word, 1.0))
+    rows = slice(400, -400, 10)
+    said = Motion(chain.joints, path.t, path.q, path.dq, path.ddq, None)
+    more = catalogued(robot, cause).torque(said) - ArmModel(robot).torque(said)
+    true = arm.contribution(path, cause)
+    moving = np.all(np.abs(path.dq) > 0.02, axis=1)[rows]
+    error = np.linalg.norm((more - true)[rows][moving]) / np.linalg.norm(true[rows][moving])
+    assert error < 0.02
+
+
+def test_first_tied_and_elsewhere_are_told_apart():
+    right = Named('coulomb_friction', ('elbow',))
+    wrong = Named('torque_ripple', ('elbow',))
+    tie = Named('stribeck_friction', ('elbow',), rivals=(('coulomb_friction', ('elbow',)),))
+    crowd = replace(tie, rivals=(*tie.rivals, ('a', ()), ('b', ())))
+    for headline, first, tied, anywhere, too_many in (
+        ((right,), True, True, True, 0),
+        ((right, wrong), True, True, True, 1),
+        ((wrong, right), False, False, True, 1),
+        ((tie,), False, True, True, 0),
+        ((crowd,), False, False, True, 0),
+        ((wrong,), False, False, False, 1),
+        ((), False, False, False, 0),
+    ):
+        one = LivedJudged(COULOMB, said(*headline))
+        assert (one.first, one.tied, one.anywhere, one.too_many) == (
+            first,
+            tied,
+            anywhere,
+            too_many,
+        )
+
+
+def test_joint_share_and_parameters_are_compared_with_the_truth():
+    values = (('coulomb_torque', 'elbow', 2.2, 0.2),)
+    good = Named('coulomb_friction', ('elbow',), (), values, share=0.77)
+    bad = replace(good, joints=('wrist',), parameters=(('coulomb_torque', 'elbow', 3.0, 0.1),))
+    judged = [LivedJudged(COULOMB, said(one)) for one in (good, replace(bad, share=0.2))]
+    assert judged[0].share_error == pytest.approx(-0.03)
+    assert judged[1].share_error == pytest.approx(-0.5)
+    assert [one.placed for one in judged] == [True, False]
+    assert judged[0].parameter_errors() == [(pytest.approx(0.1), True)]
+    assert judged[1].parameter_errors() == [(pytest.approx(0.5), False)]
+    assert metric(judged, 'share within 5 points') == 0.5
+    assert 'NOT reached' in table(score(judged))
+
+
+def test_rates_are_broken_down_by_what_cases_are_made_of():
+    right = LivedJudged(COULOMB, said(Named('coulomb_friction', ('elbow',))))
+    bumps = replace(COULOMB, cause='bumps', name='bumps', in_catalogue=False, style='sines')
+    rows = breakdown([right, LivedJudged(COULOMB, said()), LivedJudged(bumps, said())])
+    assert 'by cause: bumps 0/1, coulomb 1/2' in rows
+    assert 'by style: dwells 1/2, sines 0/1' in rows
+
+
+def test_silence_is_right_where_nothing_happened():
+    free = replace(COULOMB, name='', joints=(), parameters=(), in_catalogue=False, gap=0.0)
+    loud = said(Named('torque_ripple', ('elbow',)))
+    judged = [LivedJudged(free, said(), again=said()), LivedJudged(free, loud, again=loud)]
+    assert metric(judged, 'nothing happened, silent') == 0.5
+    assert metric(judged, 'same day again, silent') == 0.5
+    assert metric(judged, 'names too many') == 0.5
+
+
+def test_what_no_catalogue_has_is_to_be_admitted():
+    bumps = replace(COULOMB, name='bumps', in_catalogue=False)
+    assert LivedJudged(bumps, said(verdict='unknown')).admitted
+    assert not LivedJudged(bumps, said(Named('torque_ripple'))).admitted
+    pushed = Named('human_interaction', ('elbow',))
+    assert LivedJudged(replace(bumps, name='pushes'), said(pushed)).admitted
+
+
+def test_gravity_is_read_from_any_of_its_names():
+    wall = Named('base_tilt', (), (), (('tilt_x', '', 0.0, 0.0), ('tilt_y', '', np.pi / 2, 0.0)))
+    moon = Named('gravity_magnitude', (), (), (('gravity_difference', '', 1.62 - 9.81, 0.0),))
+    np.testing.assert_allclose(gravity_of([wall], EARTH), [9.81, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(gravity_of([wall, moon], EARTH), [1.62, 0.0, 0.0], atol=1e-9)
+    truth = replace(COULOMB, name='gravity', gravity=np.array([9.81, 0.0, 0.1]))
+    angle, size = LivedJudged(truth, said(wall)).gravity_error()
+    assert angle == pytest.approx(np.degrees(np.arctan(0.1 / 9.81)))
+    assert abs(size) < 1e-3
+
+
+def test_an_answer_is_read_from_the_document():
+    document = {
+        'verdict': 'ambiguous',
+        'effects': [
+            {
+                'name': 'payload',
+                'joints': ['wrist'],
+                'share': 0.91,
+                'share_interval': [0.88, 0.93],
+                'ambiguous_with': ['human_interaction'],
+                'rivals': [{'name': 'human_interaction', 'joints': ['elbow']}],
+                'parameters': [{'name': 'payload_m', 'joint': 'wrist', 'value': 3.0, 'std': 0.1}],
+            }
+        ],
+        'minor': [{'name': 'torque_ripple', 'joints': ['wrist'], 'share': 0.01}],
+    }
+    answer = answer_of(document, 2.0)
+    (found,) = answer.headline
+    assert found.names == {'payload', 'human_interaction'}
+    assert found.joints_of('human_interaction') == ('elbow',)
+    assert found.share_interval == (0.88, 0.93)
+    assert found.parameters == (('payload_m', 'wrist', 3.0, 0.1),)
+    assert answer.minor[0].name == 'torque_ripple'
+
+
+def test_true_share_is_what_the_torque_of_the_cause_takes():
+    case = lived_case('development', 9)
+    found = identification_of(robot_of(case), [recording_of(run) for run in case.day_1])
+    held_out = recording_of(case.held_out)
+    of_power, of_excess = true_shares(found, held_out, case.held_out.contribution)
+    assert 0.3 < of_power < of_excess < 1.5
+    nothing = np.zeros_like(case.held_out.contribution)
+    assert np.isnan(true_shares(found, held_out, nothing)).all()
+
+
+def test_known_friction_is_in_the_model_with_its_values_or_without():
+    case = lived_case('development/exact', 0)
+    arm = known_arm(case)
+    assert [effect.name for effect in arm.effects] == ['viscous_friction', 'coulomb_friction']
+    np.testing.assert_array_equal(arm.values[1], case.known[1].values)
+    by_name = known_arm(lived_case('development/exact', 1))
+    assert not np.any(by_name.values[1])
+
+
+def test_a_question_that_fails_is_counted_as_one():
+    def fails(*args, **options):
+        raise ValueError('no')
+
+    one = judge('development/exact', 2, question=fails)
+    assert one.answer.verdict == 'failed'
+    assert 'ValueError' in one.answer.error
+    assert metric([one], 'failures') == 1.0
+
+
+def test_questions_get_both_days_and_day_1_again():
+    asked = []
+
+    def question(arm, recordings, *, validate, baseline):
+        asked.append((len(recordings), len(validate), len(baseline)))
+        return said()
+
+    one = judge('development', 3, question=question)
+    assert asked == [(3, 1, 3), (2, 1, 3)]
+    assert one.again == said()
+
+
+def test_cases_are_selected_by_range_and_cause():
+    assert select('development', '4:8') == [4, 5, 6, 7]
+    assert select('development', '0:48', ['delay']) == [7, 31]
+    assert len(select('locked/mounting')) == 20
