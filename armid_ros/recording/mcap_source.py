@@ -1,27 +1,39 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of an MCAP file, with or without its index, chunked or not, compressed or not."""
+"""
+Messages of an MCAP file, with or without its index, chunked or not, compressed or not.
+
+What the file says of its messages - checksums, indexes, counts - is compared with them. A chunk
+that is damaged is left out as a whole, for no message in it can be told from a whole one.
+
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 import heapq
 import mmap
 from pathlib import Path
 import zlib
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import open_regular
+from armid_ros.recording.compression import (
+    CORRUPT,
+    decompressed,
+    partly_decompressed,
+    stated_size,
+)
 from armid_ros.recording.mcap_content import (
-    are_messages,
     BLOCK_MESSAGES,
     Gathered,
     message_block,
+    tiled,
     walk,
 )
 from armid_ros.recording.mcap_records import (
     add_definition,
     Chunk,
-    chunk_content,
     FileMap,
     map_file,
     MESSAGE,
@@ -29,16 +41,20 @@ from armid_ros.recording.mcap_records import (
 )
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Block, IntArray, RawMessage, records_at, Topic
 from mcap.records import Channel
 import numpy as np
 import numpy.typing as npt
 
+_Rows = npt.NDArray[np.void]
+_COMPRESSIONS = ('', 'zstd', 'lz4')
+
 
 class McapSource:
     """One MCAP file."""
 
-    def __init__(self, path: Path, *, check: bool = False) -> None:
+    def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """
         Open a file.
 
@@ -46,8 +62,8 @@ class McapSource:
         ----------
         path : Path
             The file.
-        check : bool
-            Whether to compare the checksums of chunks, which takes as long again as reading.
+        settings : ReadSettings
+            What to check, and how much memory to take.
 
         Raises
         ------
@@ -55,14 +71,14 @@ class McapSource:
             It cannot be read, or is no MCAP file.
 
         """
-        self._check = check
-        self._found = map_file(_map(path), path)
+        self._settings = settings
+        self._found = map_file(_map(path), path, check=settings.check_crc)
         self._counts: dict[int, int] | None = None
 
     @property
     def damage(self) -> str:
         """What is wrong with the file, as far as it was read; empty for a whole one."""
-        return self._found.damage
+        return str(self._found.damage)
 
     def close(self) -> None:
         """Let go of the file."""
@@ -83,23 +99,26 @@ class McapSource:
         """Yield the messages of a topic, in the order they are stored."""
         self._survey()
         wanted = sorted(c.id for c in self._found.channels.values() if c.topic == topic)
-        gathered = Gathered(self._found.data)
+        gathered, count = Gathered(self._found.data), 0
         for chunk in self._found.chunks:
-            if chunk.indexes and chunk.whole and not any(c in chunk.indexes for c in wanted):
+            if self._is_without(chunk, wanted):
                 continue
-            if chunk.whole and not chunk.compression and not self._check:
-                data = self._found.data
-                yield from gathered.add_in_place(self._offsets(data, chunk, wanted, chunk.begin))
+            content, offsets, rows = self._messages_in(chunk)
+            offsets = self._possible(offsets, rows, wanted)
+            count += len(offsets)
+            if content is self._found.data:
+                yield from gathered.add_in_place(offsets)
             else:
-                content = self._content(chunk)
-                yield from gathered.add(content, self._offsets(content, chunk, wanted, 0))
+                yield from gathered.add(content, offsets)
         loose = self._loose()
         if len(loose):
-            channels = records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)
-            loose = loose[np.isin(channels['channel'], wanted)]
+            rows = records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)
+            loose = self._possible(loose, rows, wanted)
+            count += len(loose)
             for at in range(0, len(loose), BLOCK_MESSAGES):
                 yield from gathered.add_in_place(loose[at : at + BLOCK_MESSAGES])
         yield from gathered.flush()
+        self._compare_count(topic, wanted, count)
 
     def messages(self) -> Iterator[RawMessage]:
         """Yield all messages in the order they were logged."""
@@ -107,7 +126,7 @@ class McapSource:
         names = {channel.id: channel.topic for channel in self._found.channels.values()}
         pending: list[tuple[int, int, RawMessage]] = []
         number = 0
-        for start_time, block, channels in self._pieces():
+        for start_time, block, channels in self._pieces(sorted(names)):
             while pending and pending[0][0] < start_time:
                 yield heapq.heappop(pending)[2]
             times = zip(
@@ -117,34 +136,32 @@ class McapSource:
                 strict=True,
             )
             for at, (channel, log_time, publish_time) in enumerate(times):
-                if channel not in names:
-                    continue
                 raw = RawMessage(names[channel], log_time, publish_time, block.message(at))
                 heapq.heappush(pending, (log_time, number, raw))
                 number += 1
         while pending:
             yield heapq.heappop(pending)[2]
+        self._compare_count('all topics', list(names), number)
 
-    def _pieces(self) -> Iterator[tuple[int, Block, npt.NDArray[np.uint16]]]:
+    def _pieces(
+        self, channels: Sequence[int]
+    ) -> Iterator[tuple[int, Block, npt.NDArray[np.uint16]]]:
         """Yield messages of all channels by chunk, chunks by their first log time."""
         for chunk in sorted(self._found.chunks, key=lambda chunk: chunk.start_time):
-            content = self._content(chunk)
-            offsets = walk(content)[0]
-            rows = records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
-            # In a damaged chunk a time can be anything; one beyond the year 2262 is not played.
-            possible = (rows['log_time'] >= 0) & (rows['publish_time'] >= 0)
-            if possible.any():
-                block = message_block(content, offsets[possible])
-                yield chunk.start_time, block, rows['channel'][possible]
+            content, offsets, rows = self._messages_in(chunk)
+            offsets = self._possible(offsets, rows, channels)
+            if len(offsets):
+                yield chunk.start_time, *_piece(content, offsets)
         loose = self._loose()
         if len(loose):
             data = self._found.data
             rows = records_at(data, loose, MESSAGE.itemsize).view(MESSAGE)
+            loose = self._possible(loose, rows, channels)
+            rows = records_at(data, loose, MESSAGE.itemsize).view(MESSAGE)
             loose = loose[np.argsort(rows['log_time'], kind='stable')]
             for at in range(0, len(loose), BLOCK_MESSAGES):
-                block = message_block(data, loose[at : at + BLOCK_MESSAGES])
-                rows = records_at(data, loose[at : at + BLOCK_MESSAGES], MESSAGE.itemsize)
-                yield int(block.log_time[0]), block, rows.view(MESSAGE)['channel']
+                block, of = _piece(data, loose[at : at + BLOCK_MESSAGES])
+                yield int(block.log_time[0]), block, of
 
     def _survey(self) -> dict[int, int]:
         """Make sure all channels are known, and return the number of messages of each."""
@@ -154,17 +171,81 @@ class McapSource:
         if found.finished and summary and summary.channel_count == len(found.channels):
             self._counts = dict(summary.channel_message_counts)
             return self._counts
-        ids = [int(channel) for channel in self._loose_channels()]
-        for chunk in found.chunks:
-            content = self._content(chunk)
-            offsets, definitions = walk(content)
-            for opcode, begin, end in definitions:
-                add_definition(found, opcode, content[begin:end])
-            rows = records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
-            ids += rows['channel'].tolist()
-        channels, counts = np.unique(np.array(ids, np.int64), return_counts=True)
-        self._counts = dict(zip(channels.tolist(), counts.tolist(), strict=True))
+        counts: dict[int, int] = {}
+        for rows in (self._loose_channels(), *map(self._channels_in, found.chunks)):
+            for channel, count in zip(*np.unique(rows, return_counts=True), strict=True):
+                counts[int(channel)] = counts.get(int(channel), 0) + int(count)
+        self._counts = counts
         return self._counts
+
+    def _channels_in(self, chunk: Chunk) -> npt.NDArray[np.uint16]:
+        """Return the channel of each message in a chunk, and note its definitions."""
+        content, begin, end = self._content(chunk)
+        offsets, definitions, _ = walk(content, begin, end)
+        for opcode, start, stop in definitions:
+            add_definition(self._found, opcode, content[start:stop])
+        return records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)['channel'].copy()
+
+    def _is_without(self, chunk: Chunk, wanted: Collection[int]) -> bool:
+        """Tell whether a chunk has no message of some channels, by an index that is compared."""
+        # A damaged index shows in the count, which a file that was not finished does not have.
+        return bool(
+            self._found.finished
+            and self._found.statistics
+            and chunk.whole
+            and chunk.indexes
+            and not any(channel in chunk.indexes for channel in wanted)
+        )
+
+    def _messages_in(self, chunk: Chunk) -> tuple[bytes | mmap.mmap, IntArray, _Rows]:
+        """Return the content of a chunk, where messages begin in it, and their heads."""
+        content, begin, end = self._content(chunk)
+        if chunk.indexes and chunk.whole and end > begin:
+            offsets = self._indexed(chunk) + begin
+            rows = tiled(content, offsets, begin, end)
+            if rows is not None:
+                return content, offsets, rows
+        offsets, _, position = walk(content, begin, end)
+        if chunk.whole and position != end:
+            self._found.damage.add(
+                f'the chunk at byte {chunk.begin} is damaged: '
+                f'some messages {self._found.span(chunk)} are lost'
+            )
+        return content, offsets, records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
+
+    def _indexed(self, chunk: Chunk) -> IntArray:
+        """Return where the index of a chunk says that messages begin in its content."""
+        parts = [
+            np.frombuffer(self._found.data, '<u8', 2 * count, at)[1::2].astype(np.int64)
+            for at, count in chunk.indexes.values()
+        ]
+        if len(parts) == 1:
+            offsets = parts[0]
+            return offsets if (np.diff(offsets) > 0).all() else np.sort(offsets)
+        return np.sort(np.concatenate(parts), kind='stable')
+
+    def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
+        """Return those of messages that are of some channels and have a time."""
+        channels = rows['channel']
+        chosen = np.isin(channels, wanted) if len(wanted) != 1 else channels == wanted[0]
+        late = (rows['log_time'] < 0) | (rows['publish_time'] < 0)
+        if late.any():
+            self._found.damage.add(
+                f'{int((late & chosen).sum())} messages with a time after the year 2262 are left out'
+            )
+            chosen &= ~late
+        return offsets if chosen.all() else offsets[chosen]
+
+    def _compare_count(self, what: str, channels: Collection[int], count: int) -> None:
+        """Hold the number of messages against the one that the writer counted."""
+        summary = self._found.statistics
+        if not (self._found.finished and summary and summary.channel_message_counts):
+            return
+        expected = sum(summary.channel_message_counts.get(channel, 0) for channel in channels)
+        if count != expected:
+            self._found.damage.add(
+                f'{count} messages of {what} where the writer counted {expected}'
+            )
 
     def _describe(self, channel: Channel, count: int) -> Topic:
         """Describe the topic of a channel."""
@@ -178,48 +259,69 @@ class McapSource:
         qos = parse_qos(channel.metadata.get('offered_qos_profiles'))
         return Topic(channel.topic, described, qos, count, channel.message_encoding)
 
-    def _content(self, chunk: Chunk) -> bytes:
-        """Return the content of a chunk, empty and the damage noted if it is not to be had."""
+    def _content(self, chunk: Chunk) -> tuple[bytes | mmap.mmap, int, int]:
+        """Return what holds the content of a chunk, and where; nothing if it is damaged."""
         try:
-            content = chunk_content(self._found, chunk)
-        except RecordingError as problem:
-            self._found.damage = str(problem)
-            return b''
-        if self._check and chunk.whole and chunk.crc and zlib.crc32(content) != chunk.crc:
-            self._found.damage = f'the checksum of the chunk at byte {chunk.begin} is wrong'
-            return b''
-        return content
+            content, begin, end = self._unpacked(chunk)
+        except _DamagedChunk as problem:
+            self._found.damage.add(f'{problem}: messages {self._found.span(chunk)} are left out')
+            return b'', 0, 0
+        if self._settings.check_crc and chunk.whole and chunk.crc:
+            # A compressed content is all of its buffer, and a file is not copied for its sum.
+            if zlib.crc32(memoryview(content)[begin:end]) != chunk.crc:
+                self._found.damage.add(
+                    f'the checksum of the chunk at byte {chunk.begin} is wrong: '
+                    f'messages {self._found.span(chunk)} are left out'
+                )
+                return b'', 0, 0
+        return content, begin, end
 
-    def _offsets(
-        self, data: bytes | mmap.mmap, chunk: Chunk, wanted: list[int], begin: int
-    ) -> IntArray:
-        """Return where the messages of channels begin in a chunk whose content begins there."""
-        end = begin + chunk.size
-        if chunk.indexes and chunk.whole and len(data) >= end:
-            parts = []
-            for channel in wanted:
-                at, count = chunk.indexes.get(channel, (0, 0))
-                entries = np.frombuffer(self._found.data, '<i8', 2 * count, at)
-                parts.append(entries[1::2] + begin)
-            offsets = np.concatenate(parts)
-            if len(wanted) > 1 or (len(offsets) > 1 and (np.diff(offsets) <= 0).any()):
-                offsets.sort()
-            if are_messages(data, offsets, wanted, begin, end):
-                return offsets
-        if begin:
-            offsets = walk(bytes(memoryview(data)[begin:end]))[0] + begin
-        else:
-            offsets = walk(data)[0]
-        rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
-        return offsets[np.isin(rows['channel'], wanted)]
+    def _unpacked(self, chunk: Chunk) -> tuple[bytes | mmap.mmap, int, int]:
+        """Return what holds the content of a chunk, and where."""
+        where = f'{chunk.compression} chunk' if chunk.compression else 'chunk'
+        where = f'the {where} at byte {chunk.begin}'
+        if chunk.compression not in _COMPRESSIONS:
+            raise _DamagedChunk(
+                f"{where} is compressed with '{chunk.compression}', and only zstd and lz4 can be read"
+            )
+        stored = memoryview(self._found.data)[chunk.begin : chunk.end]
+        if not chunk.compression:
+            if chunk.whole and len(stored) != chunk.size:
+                raise _DamagedChunk(f'{where} is damaged')
+            return self._found.data, chunk.begin, chunk.begin + min(len(stored), chunk.size)
+        if not chunk.whole:
+            size = min(chunk.size, self._settings.memory_limit)
+            content = partly_decompressed(stored, chunk.compression, size)
+            return content, 0, len(content)
+        try:
+            said = stated_size(stored, chunk.compression)
+        except CORRUPT as error:
+            raise _DamagedChunk(f'{where} is damaged: {error}') from error
+        if said is None or said == chunk.size:
+            self._settings.require(chunk.size, where)
+        try:
+            content = decompressed(stored, chunk.compression, chunk.size)
+        except RecordingError as error:
+            raise _DamagedChunk(f'{where} is damaged: {error}') from error
+        return content, 0, len(content)
 
     def _loose(self) -> IntArray:
-        """Return where messages outside chunks begin."""
+        """Return where records of messages outside chunks begin."""
         return np.array([begin - RECORD_HEADER for begin, _ in self._found.loose], np.int64)
 
     def _loose_channels(self) -> npt.NDArray[np.uint16]:
-        rows = records_at(self._found.data, self._loose(), MESSAGE.itemsize).view(MESSAGE)
-        return np.asarray(rows['channel'])
+        """Return the channel of each message outside chunks."""
+        loose = self._loose()
+        return records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)['channel']
+
+
+class _DamagedChunk(Exception):
+    """A chunk whose content is not to be had."""
+
+
+def _piece(data: bytes | mmap.mmap, offsets: IntArray) -> tuple[Block, npt.NDArray[np.uint16]]:
+    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
+    return message_block(data, offsets), rows['channel']
 
 
 def _full_name(name: str) -> str:
@@ -230,10 +332,10 @@ def _full_name(name: str) -> str:
 
 def _map(path: Path) -> bytes | mmap.mmap:
     """Return the bytes of a file without reading them."""
-    try:
-        with path.open('rb') as stream:
-            if not stream.seek(0, 2):
-                raise RecordingError(f'{path}: the file is empty')
+    with open_regular(path, RecordingError) as stream:
+        if not stream.seek(0, 2):
+            raise RecordingError(f'{path}: the file is empty')
+        try:
             return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-    except OSError as error:
-        raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error
+        except OSError as error:
+            raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error
