@@ -143,7 +143,7 @@ def _check_size(text: str) -> None:
 
 
 def _line(event: yaml.Event) -> int:
-    return int(event.start_mark.line) + 1
+    return 0 if event.start_mark is None else int(event.start_mark.line) + 1
 
 
 def _said(problem: BaseException) -> str:

@@ -11,14 +11,13 @@ exactly that is damaged, and nothing is unpacked beyond it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-import mmap
 from typing import BinaryIO
 
 from armid_ros.errors import RecordingError
 import lz4.frame
 import zstandard
 
-_Buffer = bytes | memoryview | mmap.mmap
+_Buffer = bytes | memoryview
 #: What the decompressors raise for rubbish.
 CORRUPT = (zstandard.ZstdError, RuntimeError, MemoryError, OverflowError, ValueError)
 _STEP = 1 << 20

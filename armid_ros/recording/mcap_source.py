@@ -106,10 +106,10 @@ class McapSource:
             content, offsets, rows = self._messages_in(chunk)
             offsets = self._possible(offsets, rows, wanted)
             count += len(offsets)
-            if content is self._found.data:
-                yield from gathered.add_in_place(offsets)
-            else:
+            if isinstance(content, bytes):
                 yield from gathered.add(content, offsets)
+            else:
+                yield from gathered.add_in_place(offsets)
         loose = self._loose()
         if len(loose):
             rows = records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)
@@ -231,7 +231,8 @@ class McapSource:
         late = (rows['log_time'] < 0) | (rows['publish_time'] < 0)
         if late.any():
             self._found.damage.add(
-                f'{int((late & chosen).sum())} messages with a time after the year 2262 are left out'
+                f'{int((late & chosen).sum())} messages are left out, for their time is after the '
+                'year 2262'
             )
             chosen &= ~late
         return offsets if chosen.all() else offsets[chosen]
@@ -282,7 +283,7 @@ class McapSource:
         where = f'the {where} at byte {chunk.begin}'
         if chunk.compression not in _COMPRESSIONS:
             raise _DamagedChunk(
-                f"{where} is compressed with '{chunk.compression}', and only zstd and lz4 can be read"
+                f"{where} is compressed with '{chunk.compression}'; zstd and lz4 can be read"
             )
         stored = memoryview(self._found.data)[chunk.begin : chunk.end]
         if not chunk.compression:

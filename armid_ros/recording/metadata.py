@@ -130,8 +130,8 @@ def read_metadata(bag: Path) -> BagMetadata:
             counts = _counts(information.get('topics_with_message_count'))
     except RecordingError as error:
         raise RecordingError(
-            f'{path}: no valid description of a bag ({str(error).lstrip(": ")}); move it away, and '
-            'the files beside it will be read without it'
+            f'{path}: no valid description of a bag ({str(error).lstrip(": ")}); move it away, '
+            'and the files beside it will be read without it'
         ) from error
     # Up to version 3 the paths began with the name of the directory.
     files = tuple(bag / Path(name).name for name in names)
