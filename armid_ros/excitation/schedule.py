@@ -56,7 +56,7 @@ class Excitation:
             raise TrajectoryError(f'excitation: a run-in of {self.run_in} s')
         if not self.duration <= MAX_DURATION:
             raise TrajectoryError(
-                f'excitation: {self.n_periods} periods of {self.trajectory.period:g} s with run-ins '
+                f'excitation: {self.n_periods} periods of {self.trajectory.period:g} s, run-ins '
                 f'of {self.run_in:g} s last {self.duration:.3g} s; a day is the most'
             )
         if self.start is not None:

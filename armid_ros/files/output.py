@@ -20,8 +20,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from armid_ros.errors import ArmidError, OutputError
-from armid_ros.files.documents import load_json
+from armid_ros.errors import OutputError
+from armid_ros.files.documents import load_json, reading
 from armid_ros.files.regular import read_text
 
 #: Files by whose schema a folder is known; each is the one that its command writes last.
@@ -97,6 +97,7 @@ def result_folder(
         kind or robot.
 
     """
+    made = [one for one in (path, *path.parents) if not os.path.lexists(one)]
     try:
         path.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -110,6 +111,9 @@ def result_folder(
         yield path
     finally:
         os.close(descriptor)
+        with suppress(OSError):  # what failed before it wrote anything leaves no folder behind
+            for one in made:
+                one.rmdir()
 
 
 def _lock(path: Path, descriptor: int) -> None:
@@ -136,11 +140,10 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
         if not os.path.lexists(path / name):
             continue
         try:
-            found = load_json(read_text(path / name, OutputError))
-            kind, other = str(found['schema']), str(found.get('robot', ''))
-        except (ArmidError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
-            kind, other = f'{name}, which cannot be read', ''
-        except RecursionError:
+            with reading(path / name, OutputError):
+                found = load_json(read_text(path / name, OutputError))
+                kind, other = str(found['schema']), str(found.get('robot', ''))
+        except OutputError:
             kind, other = f'{name}, which cannot be read', ''
         if kind != schema:
             raise OutputError(f'{path}: holds {kind}, not {schema}; {_HINT}')
@@ -153,6 +156,8 @@ _HINT = 'name another folder, or write over it with --force'
 
 def _same(robot: str, other: str) -> bool:
     """Tell whether two names mean one robot: shipped names, or paths of one file."""
+    if '-' in (robot, other):  # that of the bag, whichever it is
+        return True
     return robot == other or Path(robot).absolute() == Path(other).absolute()
 
 
