@@ -74,6 +74,8 @@ class McapSource:
         self._settings = settings
         self._found = map_file(_map(path), path, check=settings.check_crc)
         self._counts: dict[int, int] | None = None
+        # A writer makes checksums or does not.
+        self._has_crc = any(chunk.crc for chunk in self._found.chunks)
 
     @property
     def damage(self) -> str:
@@ -214,9 +216,16 @@ class McapSource:
         return content, offsets, records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
 
     def _indexed(self, chunk: Chunk) -> IntArray:
-        """Return where the index of a chunk says that messages begin in its content."""
+        """
+        Return where the index of a chunk says that messages begin in its content.
+
+        What lies beyond the content is put at its end, where no message can begin.
+
+        """
         parts = [
-            np.frombuffer(self._found.data, '<u8', 2 * count, at)[1::2].astype(np.int64)
+            np.minimum(
+                np.frombuffer(self._found.data, '<u8', 2 * count, at)[1::2], chunk.size
+            ).astype(np.int64)
             for at, count in chunk.indexes.values()
         ]
         if len(parts) == 1:
@@ -267,8 +276,7 @@ class McapSource:
         except _DamagedChunk as problem:
             self._found.damage.add(f'{problem}: messages {self._found.span(chunk)} are left out')
             return b'', 0, 0
-        if self._settings.check_crc and chunk.whole and chunk.crc:
-            # A compressed content is all of its buffer, and a file is not copied for its sum.
+        if self._settings.check_crc and chunk.whole and self._has_crc:
             if zlib.crc32(memoryview(content)[begin:end]) != chunk.crc:
                 self._found.damage.add(
                     f'the checksum of the chunk at byte {chunk.begin} is wrong: '

@@ -78,7 +78,7 @@ def read_recording(
         chosen = _choose_topic(bag, joints, topic)
         decoder = JointStateDecoder(joints)
         where = f'{path}: {chosen.name}'
-        with reading(where, RecordingError):
+        with reading(path, RecordingError):
             pieces = list(_within(settings, where, _decoded(bag, chosen, decoder)))
         damage = bag.damage
     _check_joints(where, decoder, joints)

@@ -14,6 +14,7 @@ import json
 import os
 import resource
 import sys
+from typing import Any
 
 
 def main() -> None:
@@ -24,7 +25,13 @@ def main() -> None:
     seconds, memory = int(request['seconds']) + 1, int(request['memory'])
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    answer = {}
+    json.dump(expanded(request), answers)
+    answers.close()
+
+
+def expanded(request: dict[str, Any]) -> dict[str, str]:
+    """Return the text that a file expands to, or the error why it does not."""
+    answer: dict[str, str] = {}
     try:
         import xacro
 
@@ -35,15 +42,14 @@ def main() -> None:
     except ImportError:
         answer['error'] = 'a xacro file needs the Python package xacro'
     except MemoryError:
-        answer['error'] = f'takes more than {memory >> 20} MiB'
+        answer['error'] = 'takes too much memory'
     except RecursionError:
         answer['error'] = 'nested too deep'
     except SystemExit:
         answer['error'] = 'it cannot be expanded'
     except Exception as error:  # xacro evaluates Python expressions: anything can come out
         answer['error'] = ' '.join(str(error).split()) or type(error).__name__
-    json.dump(answer, answers)
-    answers.close()
+    return answer
 
 
 if __name__ == '__main__':
