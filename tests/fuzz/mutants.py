@@ -9,6 +9,8 @@ from xml.etree import ElementTree
 from hypothesis import strategies as st
 import yaml
 
+# The dumper in C, where there is one, is five times as fast.
+_DUMPER = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
 #: Values at which code breaks.
 INTEGERS = (0, 1, 2, 21, 22, 255, 256, 2**15, 2**16 - 1, 2**31 - 1, 2**31, 2**32 - 1, 2**62)
 INTEGERS += (2**63 - 1, 2**63, 2**64 - 1)
@@ -17,7 +19,8 @@ TEXTS = (
     '', '0', '-1', '1e999', '-inf', 'nan', '1e308', '1e-320', '9' * 5000, 'x' * 5000, 'null', '~',
     '2001-01-01', '2001-99-99', '1:60:60', '\x1b[2J', '[' * 200, '{', '}', '&a [*a]', '*a',
     '!!binary x', '!!python/object:os.system {}', '0x' + 'f' * 4000, 'true', '<x/>', '&lol;', '\0',
-    '..', '/dev/zero', '\N{SNOWMAN}', "'", '"', '# ', '- ', ': ', '  ', '\t', '${1/0}', '$(env HOME)',
+    '..', '/dev/zero', '\N{SNOWMAN}', "'", '"', '# ', '- ', ': ', '  ', '\t',
+    '${1/0}', '$(env HOME)',
 )  # fmt: skip
 WEIRD = st.one_of(
     st.sampled_from(
@@ -163,13 +166,9 @@ def edited_tree(tree, edits):
     for path, operation, value in edits:
         holder, key, node = None, None, tree
         for place in path:
-            keys = (
-                list(node)
-                if isinstance(node, dict)
-                else range(len(node))
-                if isinstance(node, list)
-                else ()
-            )
+            keys = list(node) if isinstance(node, dict) else []
+            if isinstance(node, list):
+                keys = list(range(len(node)))
             if not len(keys):
                 break
             holder, key = node, keys[int(place * len(keys))]
@@ -199,7 +198,7 @@ def to_json(tree):
 
 def to_yaml(tree):
     """Return a document as YAML."""
-    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
+    return yaml.dump(tree, Dumper=_DUMPER, sort_keys=False, allow_unicode=True)
 
 
 NUMBERS = ('nan', 'inf', '-inf', '1e999', '1e308', '1e-320', '0', '-1', '', 'x', '0 0', '1 2 3 4')

@@ -173,7 +173,8 @@ def test_mcap_chunks_with_right_checksums(folder, compression, fields):
     name = chunk.compression.encode()
     head = struct.pack(
         f'<QQQII{len(name)}sQ',
-        chunk.start_time, chunk.end_time, len(plain), zlib.crc32(plain), len(name), name, len(packed),
+        chunk.start_time, chunk.end_time, len(plain), zlib.crc32(plain),
+        len(name), name, len(packed),
     )  # fmt: skip
     begin = chunk.begin - len(head) - 9
     mutant = folder / 'work' / 'chunk.mcap'
@@ -217,8 +218,8 @@ def remove(bag):
         bag.rmdir()
 
 
-CELLS = ('NULL', "'text'", '3.5', '-1', '9223372036854775807', "x''", "x'00'", "CAST(x'ff' AS TEXT)",
-         'zeroblob(1000000)', "'9e99'", '0', '1')  # fmt: skip
+CELLS = ('NULL', "'text'", '3.5', '-1', '9223372036854775807', "x''", "x'00'",
+         "CAST(x'ff' AS TEXT)", 'zeroblob(1000000)', "'9e99'", '0', '1')  # fmt: skip
 COLUMNS = (
     *(('messages', column) for column in ('id', 'topic_id', 'timestamp', 'data')),
     *(('topics', column) for column in ('id', 'name', 'type', 'serialization_format',

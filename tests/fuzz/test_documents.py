@@ -140,7 +140,8 @@ XACRO = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">
 <xacro:if value="${n > 2}"><xacro:link name="two"><origin xyz="0 0 0.1"/></xacro:link></xacro:if>
 <joint name="a" type="revolute"><parent link="base"/><child link="one"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="${radians(60)}" effort="10" velocity="1"/></joint>
-<joint name="b" type="continuous"><parent link="one"/><child link="two"/><axis xyz="0 1 0"/></joint>
+<joint name="b" type="continuous"><parent link="one"/><child link="two"/><axis xyz="0 1 0"/>
+</joint>
 </robot>"""
 
 
