@@ -137,6 +137,9 @@ class Bag:
                     count = topic.count + (known.count if known else 0)
                     described = known if known and known.message_type.definition else topic
                     merged[topic.name] = replace(described, count=count)
+        for name, count in self._metadata.counts.items():
+            if count and name not in merged:
+                self._damage.add(f'{FILE_NAME} counts {count} messages of {name}, there are none')
         return tuple(merged.values())
 
     def blocks(self, topic: str) -> Iterator[Block]:

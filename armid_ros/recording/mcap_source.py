@@ -48,6 +48,8 @@ import numpy as np
 import numpy.typing as npt
 
 _Rows = npt.NDArray[np.void]
+#: Of a message that is kept as an object [bytes].
+_OVERHEAD = 400
 _COMPRESSIONS = ('', 'zstd', 'lz4')
 
 
@@ -127,10 +129,12 @@ class McapSource:
         self._survey()
         names = {channel.id: channel.topic for channel in self._found.channels.values()}
         pending: list[tuple[int, int, RawMessage]] = []
-        number = 0
+        number = size = 0
         for start_time, block, channels in self._pieces(sorted(names)):
             while pending and pending[0][0] < start_time:
-                yield heapq.heappop(pending)[2]
+                raw = heapq.heappop(pending)[2]
+                size -= len(raw.cdr) + _OVERHEAD
+                yield raw
             times = zip(
                 channels.tolist(),
                 block.log_time.tolist(),
@@ -141,6 +145,9 @@ class McapSource:
                 raw = RawMessage(names[channel], log_time, publish_time, block.message(at))
                 heapq.heappush(pending, (log_time, number, raw))
                 number += 1
+                size += len(raw.cdr) + _OVERHEAD
+            # Chunks that overlap in time have to be kept until it is clear which message is first.
+            self._settings.require(size, 'what has to be put in order of time')
         while pending:
             yield heapq.heappop(pending)[2]
         self._compare_count('all topics', list(names), number)

@@ -19,6 +19,7 @@ KNOWN = (*MOVABLE, 'fixed', 'floating', 'planar')
 
 ROUNDING = 1e-6  # relative; descriptions print six digits
 NEGLIGIBLE = 1e-12  # kg m^2
+MAX_CHAIN = 500  # joints one behind the other; Pinocchio's reader descends by recursion
 SHORTEST_AXIS = 1e-100  # below, a component divided by it is no direction any more
 
 Vector = tuple[float, float, float]
@@ -173,15 +174,22 @@ def _check_tree(source: str, links: dict[str, Inertial | None], joints: Iterable
         raise RobotError(
             f'{source}: {len(roots)} links have no parent ({", ".join(roots)}); only the base may'
         )
-    rooted = set(roots)
+    depth = dict.fromkeys(roots, 0)
     for link in links:
         path: dict[str, None] = {}
-        while link not in rooted:
+        while link not in depth:
             if link in path:
                 raise RobotError(f"{source}: link '{link}' is part of a closed loop of joints")
             path[link] = None
             link = carriers[link].parent
-        rooted.update(path)
+        for below, name in enumerate(reversed(path), start=depth[link] + 1):
+            depth[name] = below
+    deepest = max(depth, key=depth.__getitem__)
+    if depth[deepest] > MAX_CHAIN:
+        raise RobotError(
+            f"{source}: link '{deepest}' is {depth[deepest]} joints from the base; {MAX_CHAIN} "
+            'are the most'
+        )
 
 
 class _Reader:

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from armid_ros.errors import RobotError
 from armid_ros.robots.description import Description, Joint
 
-#: Memory of the regressor of one pose grows with the square of the joints and that of the search
-#: for base parameters with the cube, to 2 GB at 1,000; a humanoid with both hands has 70.
-MAX_DRIVEN = 250
+#: Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70.
+MAX_DRIVEN = 150
 GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
 
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mutants: of bytes, of the records of an MCAP file, of texts and of documents."""
 
+from copy import deepcopy
 import json
 import struct
 from xml.etree import ElementTree
@@ -162,8 +163,8 @@ TREE_EDIT = st.tuples(
 
 def edited_tree(tree, edits):
     """Return a document of maps, lists and scalars with some of its nodes edited."""
-    tree = json.loads(json.dumps(tree))
-    for path, operation, value in edits:
+    tree = deepcopy(tree)
+    for path, operation, value in deepcopy(edits):
         holder, key, node = None, None, tree
         for place in path:
             keys = list(node) if isinstance(node, dict) else []
@@ -185,7 +186,7 @@ def edited_tree(tree, edits):
         elif operation == 'scale' and isinstance(node, float):
             holder[key] = node * 1e200
         elif operation == 'twice' and isinstance(holder, list):
-            holder.insert(key, node)
+            holder.insert(key, deepcopy(node))
         elif operation == 'rename' and isinstance(holder, dict):
             holder[str(value)[:50]] = holder.pop(key)
     return tree
