@@ -14,16 +14,10 @@ from collections.abc import Collection, Iterator, Sequence
 import heapq
 import mmap
 from pathlib import Path
-import zlib
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
-from armid_ros.recording.compression import (
-    CORRUPT,
-    decompressed,
-    partly_decompressed,
-    stated_size,
-)
+from armid_ros.recording.mcap_chunks import Content, Contents
 from armid_ros.recording.mcap_content import (
     BLOCK_MESSAGES,
     Gathered,
@@ -50,7 +44,6 @@ import numpy.typing as npt
 _Rows = npt.NDArray[np.void]
 #: Of a message that is kept as an object [bytes].
 _OVERHEAD = 400
-_COMPRESSIONS = ('', 'zstd', 'lz4')
 
 
 class McapSource:
@@ -76,8 +69,7 @@ class McapSource:
         self._settings = settings
         self._found = map_file(_map(path), path, check=settings.check_crc)
         self._counts: dict[int, int] | None = None
-        # A writer makes checksums or does not.
-        self._has_crc = any(chunk.crc for chunk in self._found.chunks)
+        self._contents = Contents(self._found, settings)
 
     @property
     def damage(self) -> str:
@@ -87,6 +79,7 @@ class McapSource:
     def close(self) -> None:
         """Let go of the file."""
         self._found = FileMap(b'')
+        self._contents = Contents(self._found, self._settings)
 
     def topics(self) -> tuple[Topic, ...]:
         """Return the topics, in order of appearance."""
@@ -104,10 +97,9 @@ class McapSource:
         self._survey()
         wanted = sorted(c.id for c in self._found.channels.values() if c.topic == topic)
         gathered, count = Gathered(self._found.data), 0
-        for chunk in self._found.chunks:
-            if self._is_without(chunk, wanted):
-                continue
-            content, offsets, rows = self._messages_in(chunk)
+        read = [chunk for chunk in self._found.chunks if not self._is_without(chunk, wanted)]
+        for chunk, unpacked in self._contents.of(read):
+            content, offsets, rows = self._messages_in(chunk, unpacked)
             offsets = self._possible(offsets, rows, wanted)
             count += len(offsets)
             if isinstance(content, bytes):
@@ -156,8 +148,9 @@ class McapSource:
         self, channels: Sequence[int]
     ) -> Iterator[tuple[int, Block, npt.NDArray[np.uint16]]]:
         """Yield messages of all channels by chunk, chunks by their first log time."""
-        for chunk in sorted(self._found.chunks, key=lambda chunk: chunk.start_time):
-            content, offsets, rows = self._messages_in(chunk)
+        in_order = sorted(self._found.chunks, key=lambda chunk: chunk.start_time)
+        for chunk, unpacked in self._contents.of(in_order):
+            content, offsets, rows = self._messages_in(chunk, unpacked)
             offsets = self._possible(offsets, rows, channels)
             if len(offsets):
                 yield chunk.start_time, *_piece(content, offsets)
@@ -181,15 +174,16 @@ class McapSource:
             self._counts = dict(summary.channel_message_counts)
             return self._counts
         counts: dict[int, int] = {}
-        for rows in (self._loose_channels(), *map(self._channels_in, found.chunks)):
+        inside = (self._channels_in(unpacked) for _, unpacked in self._contents.of(found.chunks))
+        for rows in (self._loose_channels(), *inside):
             for channel, count in zip(*np.unique(rows, return_counts=True), strict=True):
                 counts[int(channel)] = counts.get(int(channel), 0) + int(count)
         self._counts = counts
         return self._counts
 
-    def _channels_in(self, chunk: Chunk) -> npt.NDArray[np.uint16]:
+    def _channels_in(self, unpacked: Content) -> npt.NDArray[np.uint16]:
         """Return the channel of each message in a chunk, and note its definitions."""
-        content, begin, end = self._content(chunk)
+        content, begin, end = unpacked
         offsets, definitions, _ = walk(content, begin, end)
         for opcode, start, stop in definitions:
             add_definition(self._found, opcode, content[start:stop])
@@ -206,9 +200,11 @@ class McapSource:
             and not any(channel in chunk.indexes for channel in wanted)
         )
 
-    def _messages_in(self, chunk: Chunk) -> tuple[bytes | mmap.mmap, IntArray, _Rows]:
+    def _messages_in(
+        self, chunk: Chunk, unpacked: Content
+    ) -> tuple[bytes | mmap.mmap, IntArray, _Rows]:
         """Return the content of a chunk, where messages begin in it, and their heads."""
-        content, begin, end = self._content(chunk)
+        content, begin, end = unpacked
         if chunk.indexes and chunk.whole and end > begin:
             offsets = self._indexed(chunk) + begin
             rows = tiled(content, offsets, begin, end)
@@ -276,51 +272,6 @@ class McapSource:
         qos = parse_qos(channel.metadata.get('offered_qos_profiles'))
         return Topic(channel.topic, described, qos, count, channel.message_encoding)
 
-    def _content(self, chunk: Chunk) -> tuple[bytes | mmap.mmap, int, int]:
-        """Return what holds the content of a chunk, and where; nothing if it is damaged."""
-        try:
-            content, begin, end = self._unpacked(chunk)
-        except _DamagedChunk as problem:
-            self._found.damage.add(f'{problem}: messages {self._found.span(chunk)} are left out')
-            return b'', 0, 0
-        if self._settings.check_crc and chunk.whole and self._has_crc:
-            if zlib.crc32(memoryview(content)[begin:end]) != chunk.crc:
-                self._found.damage.add(
-                    f'the checksum of the chunk at byte {chunk.begin} is wrong: '
-                    f'messages {self._found.span(chunk)} are left out'
-                )
-                return b'', 0, 0
-        return content, begin, end
-
-    def _unpacked(self, chunk: Chunk) -> tuple[bytes | mmap.mmap, int, int]:
-        """Return what holds the content of a chunk, and where."""
-        where = f'{chunk.compression} chunk' if chunk.compression else 'chunk'
-        where = f'the {where} at byte {chunk.begin}'
-        if chunk.compression not in _COMPRESSIONS:
-            raise _DamagedChunk(
-                f"{where} is compressed with '{chunk.compression}'; zstd and lz4 can be read"
-            )
-        stored = memoryview(self._found.data)[chunk.begin : chunk.end]
-        if not chunk.compression:
-            if chunk.whole and len(stored) != chunk.size:
-                raise _DamagedChunk(f'{where} is damaged')
-            return self._found.data, chunk.begin, chunk.begin + min(len(stored), chunk.size)
-        if not chunk.whole:
-            size = min(chunk.size, self._settings.memory_limit)
-            content = partly_decompressed(stored, chunk.compression, size)
-            return content, 0, len(content)
-        try:
-            said = stated_size(stored, chunk.compression)
-        except CORRUPT as error:
-            raise _DamagedChunk(f'{where} is damaged: {error}') from error
-        if said is None or said == chunk.size:
-            self._settings.require(chunk.size, where)
-        try:
-            content = decompressed(stored, chunk.compression, chunk.size)
-        except RecordingError as error:
-            raise _DamagedChunk(f'{where} is damaged: {error}') from error
-        return content, 0, len(content)
-
     def _loose(self) -> IntArray:
         """Return where records of messages outside chunks begin."""
         return np.array([begin - RECORD_HEADER for begin, _ in self._found.loose], np.int64)
@@ -329,10 +280,6 @@ class McapSource:
         """Return the channel of each message outside chunks."""
         loose = self._loose()
         return records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)['channel']
-
-
-class _DamagedChunk(Exception):
-    """A chunk whose content is not to be had."""
 
 
 def _piece(data: bytes | mmap.mmap, offsets: IntArray) -> tuple[Block, npt.NDArray[np.uint16]]:
