@@ -117,6 +117,7 @@ def true_arm(robot: Robot) -> ArmModel:
 def _make_room(out: Path) -> None:
     """Take away what a demo left; refuse a folder with anything else in it."""
     ours = {*OUTPUTS, *(path.name for path in out.glob('*.png'))}
+    ours |= {f'.{name}.part' for name in ours}  # of a demo that was killed
     foreign = sorted(path.name for path in out.iterdir() if path.name not in ours)
     if foreign:
         raise RecordingError(f'{out}: holds {foreign[0]}, which no demo wrote; name a new folder')
