@@ -1,18 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-The content of the chunks of an MCAP file: unpacked, and compared with its checksum.
-
-Both take as long as decoding what is in them, and neither holds Python's lock: the next chunks are
-unpacked by other threads while one is decoded.
-
-"""
+"""The content of the chunks of an MCAP file: unpacked, and compared with its checksum."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 import mmap
 from typing import NamedTuple
 import zlib
@@ -28,13 +20,10 @@ from armid_ros.recording.mcap_records import Chunk, FileMap
 from armid_ros.recording.settings import ReadSettings
 
 _COMPRESSIONS = ('', 'zstd', 'lz4')
-_THREADS = 2
-#: Chunks that are unpacked ahead, and their size beyond which one is enough [bytes].
-_AHEAD, _LARGE = 4, 16 << 20
 
 
 class Content(NamedTuple):
-    """What holds the content of a chunk, and where in it; empty for a damaged one."""
+    """What holds the content of a chunk, and where in it."""
 
     data: bytes | mmap.mmap
     begin: int
@@ -52,7 +41,7 @@ class Contents:
 
     def of(self, chunks: Iterable[Chunk]) -> Iterator[tuple[Chunk, Content]]:
         """
-        Yield the contents of some chunks, in their order.
+        Yield the contents of some chunks, in their order, without damaged ones.
 
         Raises
         ------
@@ -60,23 +49,12 @@ class Contents:
             A chunk takes more memory than the settings allow.
 
         """
-        waiting: deque[tuple[Chunk, Future[Content]]] = deque()
-        with ThreadPoolExecutor(_THREADS) as pool:
-            for chunk in chunks:
-                while waiting and (len(waiting) >= _AHEAD or chunk.size > _LARGE):
-                    yield self._noted(*waiting.popleft())
-                waiting.append((chunk, pool.submit(self._checked, chunk)))
-            while waiting:
-                yield self._noted(*waiting.popleft())
-
-    def _noted(self, chunk: Chunk, unpacking: Future[Content]) -> tuple[Chunk, Content]:
-        """Return a content when it is there; note the damage in the order of the chunks."""
-        try:
-            return chunk, unpacking.result()
-        except _DamagedChunk as problem:
-            span = self._found.span(chunk)
-            self._found.damage.add(f'{problem}: messages {span} are left out')
-            return chunk, Content(b'', 0, 0)
+        for chunk in chunks:
+            try:
+                yield chunk, self._checked(chunk)
+            except _DamagedChunk as problem:
+                span = self._found.span(chunk)
+                self._found.damage.add(f'{problem}: messages {span} are left out')
 
     def _checked(self, chunk: Chunk) -> Content:
         """Return a content whose checksum is right."""
