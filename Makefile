@@ -31,7 +31,7 @@ TREE := $(shell find armid_ros scripts launch config resource -name __pycache__ 
 MESSAGES := $(shell find msg_schemas -type f)
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test coverage lint bench benchmark lock clean help check
+.PHONY: all demo test fuzz coverage lint bench benchmark lock clean help check
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
 
@@ -44,6 +44,10 @@ demo: $(STAMPS)/armid_ros $(VENV)/setup.bash  ## identify the shipped arm on the
 test: lint  ## lint, types, layers, and every test
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest \
 		--durations=15 --numprocesses=auto --dist=loadfile $(PYTEST)
+
+fuzz: $(STAMPS)/armid_ros $(STAMPS)/test  ## read 10,000 damaged files of every kind, and keep what fails in tests/fuzz/failures
+	ARMID_FUZZ=$(or $(FUZZ),10000) OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest \
+		--numprocesses=0 tests/fuzz $(PYTEST)
 
 coverage: override PYTEST += --cov=armid_ros --cov-report=term
 coverage: test  ## the same, and which lines the tests run; takes half as long again

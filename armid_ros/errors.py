@@ -3,8 +3,24 @@
 """The errors a user can cause; each message says what is wrong, where, and what to do."""
 
 
+def visible(text: str) -> str:
+    """
+    Return a text as it may go to a terminal: control characters are spelled out.
+
+    Names come from files and messages; an escape sequence in one must not move the cursor.
+
+    """
+    if text.isprintable():
+        return text
+    return ''.join(c if c.isprintable() or c in '\n\t' else repr(c)[1:-1] for c in text)
+
+
 class ArmidError(Exception):
     """Base of every error that bad input can cause; the command line prints it and exits 2."""
+
+    def __str__(self) -> str:
+        """Return the message, fit for a terminal."""
+        return visible(super().__str__())
 
 
 class RobotError(ArmidError):
@@ -25,3 +41,7 @@ class TrajectoryError(ArmidError):
 
 class IdentificationError(ArmidError):
     """The data cannot identify what was asked."""
+
+
+class OutputError(ArmidError):
+    """A result cannot be written, or would take the place of another one."""

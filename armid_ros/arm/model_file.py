@@ -22,6 +22,7 @@ from armid_ros.effects import CATALOGUE, Effect, Kind
 from armid_ros.effects.tied import TIED, Tied, TiedKind
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.files import finite, is_file, load_yaml, read_text, reading, write_file
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot, Robot
@@ -121,7 +122,7 @@ def _tied(kind: type[Tied], entry: dict[str, Any]) -> TiedKind:
 
 
 def _point(values: Sequence[float]) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
+    x, y, z = (finite(value, 'a coordinate of a tie') for value in values)
     return x, y, z
 
 
@@ -131,7 +132,7 @@ def save_model(
     """Write model.yaml; a relative path of the description is taken from the file's own folder."""
     document = model_document(arm, robot, estimate)
     text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=99)
-    Path(path).write_text(text, encoding='utf-8')
+    write_file(path, text)
 
 
 def load_model(path: str | Path, robot: Robot | None = None) -> ArmModel:
@@ -153,25 +154,20 @@ def load_model(path: str | Path, robot: Robot | None = None) -> ArmModel:
 
     """
     path = Path(path)
-    try:
-        document = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise ModelError(f'{path}: {error.strerror}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ModelError(f'{path}: not YAML: {error}') from error
-    if not isinstance(document, dict) or document.get('schema') != SCHEMA:
-        raise ModelError(f"{path}: not an arm model; its 'schema' has to be {SCHEMA}")
-    try:
+    text = read_text(path, ModelError)
+    with reading(path, ModelError):
+        try:
+            document = load_yaml(text)
+        except (yaml.YAMLError, ValueError) as error:
+            raise ModelError(f'not YAML: {" ".join(str(error).split())}') from error
+        if not isinstance(document, dict) or document.get('schema') != SCHEMA:
+            raise ModelError(f"not an arm model; its 'schema' has to be {SCHEMA}")
         return _arm(document, robot or _described(path, str(document['robot'])))
-    except (KeyError, TypeError, ValueError) as error:
-        raise ModelError(f'{path}: {type(error).__name__} {error} is missing or wrong') from error
-    except ModelError as error:
-        raise ModelError(f'{path}: {error}') from error
 
 
 def _described(path: Path, source: str) -> Robot:
     beside = path.parent / source
-    return load_robot(str(beside) if beside.is_file() else source)
+    return load_robot(str(beside) if is_file(beside) else source)
 
 
 def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
@@ -194,7 +190,12 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
 
 
 def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> FloatArray:
-    table = {(row['name'], row['joint']): float(row['value']) for row in rows}
+    table: dict[tuple[str, str], float] = {}
+    for row in rows:
+        key = str(row['name']), str(row['joint'])
+        if key in table:
+            raise ModelError(f"parameter '{key[0]}' of joint '{key[1]}' is given twice")
+        table[key] = finite(row['value'], f"parameter '{key[0]}' of joint '{key[1]}'")
     missing = [name for name in names if (name.name, name.joint) not in table]
     if missing:
         raise ModelError(

@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
+import errno
 from importlib import import_module
 import sys
 from typing import Any
 
 from armid_ros import __version__
-from armid_ros.errors import ArmidError
+from armid_ros.errors import ArmidError, visible
 import click
 
 #: Command and module, in the order of the work; a module is imported when its command is called.
@@ -49,6 +50,12 @@ class Commands(click.Group):
             return super().invoke(ctx)
         except ArmidError as error:
             click.echo(f'armid: {" ".join(str(error).split())}', err=True)
+            sys.exit(2)
+        except OSError as error:  # a disk that is full, a folder that went away
+            if error.errno == errno.EPIPE:
+                raise
+            where = f'{error.filename}: ' if error.filename else ''
+            click.echo(visible(f'armid: {where}{error.strerror or error}'), err=True)
             sys.exit(2)
 
 

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from armid_ros.cli import options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import say
+from armid_ros.files import json_text, write_file
 from armid_ros.identification.comparison import compare as run
+from armid_ros.identification.comparison import SCHEMA
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.report.compare_report import compare_report, tell
 import click
@@ -28,16 +29,16 @@ def compare(before: Path, after: Path, out: Path, as_json: bool) -> None:
     A and B are folders that identify wrote, identification.json or model.yaml.
 
     """
+    options.hold(out, SCHEMA)
     first, second = read_parameters(before), read_parameters(after)
     comparison = run(first, second)
     files = [Path(first.source), Path(second.source)]
     page = compare_report(comparison, provenance(files))
-    out.mkdir(parents=True, exist_ok=True)
-    (out / 'report.html').write_text(page, encoding='utf-8')
     document = comparison.document()
-    (out / 'comparison.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    write_file(out / 'report.html', page)
+    write_file(out / 'comparison.json', json_text(document, indent=1))
     if as_json:
-        click.echo(json.dumps(document))
+        click.echo(json_text(document))
         return
     for sentence in tell(comparison):
         say(sentence)

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 import shutil
 from typing import Any
@@ -15,8 +14,10 @@ from armid_ros.cli.terminal import ConvergenceTable, progress, say
 from armid_ros.effects import make_effect
 from armid_ros.errors import RecordingError
 from armid_ros.excitation import design, DesignSettings, Excitation, save_excitation
+from armid_ros.files import json_text
 from armid_ros.identification import identification_document, identify, Score, write_document
 from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.identification.output import SCHEMA
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_recording
 from armid_ros.robots import collision_model, load_robot, Robot
@@ -55,6 +56,7 @@ def demo(gravity: str, rate: float, out: Path, seed: int, as_json: bool) -> None
     robot = load_robot(ROBOT, gravity=gravity)
     truth = true_arm(robot)
     nominal = ArmModel(robot, truth.effects)
+    options.hold(out, SCHEMA, ROBOT)
     _make_room(out)
 
     excitation = _excite(nominal, rng)
@@ -98,7 +100,7 @@ def demo(gravity: str, rate: float, out: Path, seed: int, as_json: bool) -> None
     with progress('drawing'):
         _draw(out, robot, result, history, target, result.base.values(truth.theta))
     if as_json:
-        click.echo(json.dumps(document))
+        click.echo(json_text(document))
         return
     _tell(out, document, Score.of(result.training).relative_error_percent)
 
@@ -114,8 +116,8 @@ def true_arm(robot: Robot) -> ArmModel:
 
 def _make_room(out: Path) -> None:
     """Take away what a demo left; refuse a folder with anything else in it."""
-    out.mkdir(parents=True, exist_ok=True)
     ours = {*OUTPUTS, *(path.name for path in out.glob('*.png'))}
+    ours |= {f'.{name}.part' for name in ours}  # of a demo that was killed
     foreign = sorted(path.name for path in out.iterdir() if path.name not in ours)
     if foreign:
         raise RecordingError(f'{out}: holds {foreign[0]}, which no demo wrote; name a new folder')

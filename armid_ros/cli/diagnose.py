@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import json
 from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_model, save_model
@@ -22,8 +21,10 @@ from armid_ros.diagnosis import (
     next_run,
     NextRun,
 )
+from armid_ros.diagnosis.output import SCHEMA
 from armid_ros.errors import ArmidError
 from armid_ros.excitation import save_excitation
+from armid_ros.files import json_text, write_file
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.signals import conditioning
 from armid_ros.identification.verification import ForwardValidation, simulate_held_out
@@ -61,6 +62,7 @@ import numpy as np
 @options.gravity
 @options.joints
 @options.seed
+@options.reading
 @options.as_json
 def diagnose(
     bags: tuple[Path, ...],
@@ -81,6 +83,7 @@ def diagnose(
     as_json: bool,
 ) -> None:
     """Find which effect a model lacks, and add it."""
+    options.hold(out, SCHEMA, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = ArmModel(robot) if model is None else load_model(model, robot)
     arm = options.with_effects(arm, effects)
@@ -111,7 +114,6 @@ def diagnose(
     document = diagnosis_document(result)
     document['forward'] = [pair.document() for pair in forward]
     document['next_run'] = None if run_next is None else run_next.document()
-    out.mkdir(parents=True, exist_ok=True)
     estimate = None if result.explanation is None else result.explanation.fitted.estimate
     source = options.kept_source(robot_source, robot, out)
     save_model(out / 'model.yaml', result.arm, source, estimate)
@@ -127,10 +129,10 @@ def diagnose(
     )
     if run_next is not None:
         save_excitation(run_next.excitation, out / EXPERIMENT_FILE)
-    (out / 'report.html').write_text(page, encoding='utf-8')
-    (out / 'diagnosis.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    write_file(out / 'report.html', page)
+    write_file(out / 'diagnosis.json', json_text(document, indent=1))
     if as_json:
-        click.echo(json.dumps(document))
+        click.echo(json_text(document))
         return
     _show(result)
     for pair in forward:

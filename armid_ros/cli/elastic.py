@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-import json
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from armid_ros.cli import options
 from armid_ros.cli.springs import identify_springs
 from armid_ros.cli.terminal import print_parameters, progress, say
 from armid_ros.errors import RecordingError, RobotError
+from armid_ros.files import json_text, write_file
 from armid_ros.identification.two_inertia import (
     Accelerometers,
     identify_two_inertia,
@@ -20,7 +20,7 @@ from armid_ros.identification.two_inertia import (
     TwoInertiaIdentification,
     write_runs,
 )
-from armid_ros.identification.two_inertia.output import elastic_document
+from armid_ros.identification.two_inertia.output import elastic_document, SCHEMA
 from armid_ros.motion import FloatArray
 from armid_ros.report.elastic_report import elastic_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
@@ -127,7 +127,7 @@ def elastic(
         proportional=_pair(kp, 'kp', loop.proportional),
         integral=_pair(ki, 'ki', loop.integral),
     )
-    out.mkdir(parents=True, exist_ok=True)
+    options.hold(out, SCHEMA, robot_source)
     with progress('reading') as tick:
         if demo:
             bags, steps = _simulate(shipped, robot, sensors, out, experiments, seed, tick)
@@ -158,11 +158,11 @@ def elastic(
                 seed=seed if demo else None,
             ),
         )
-        (out / 'report.html').write_text(page, encoding='utf-8')
+        write_file(out / 'report.html', page)
     document = elastic_document(result, robot_source)
-    (out / 'elastic.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    write_file(out / 'elastic.json', json_text(document, indent=1))
     if as_json:
-        click.echo(json.dumps(document))
+        click.echo(json_text(document))
         return
     _tell(document)
     say(f'{out}: {", ".join(["elastic.json", "report.html", *files])}')

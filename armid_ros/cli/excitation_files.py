@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-import json
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from armid_ros.excitation import (
     save_excitation,
     used_shares,
 )
+from armid_ros.files import json_text, write_file
 from armid_ros.motion import Motion
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.report.excitation_report import excitation_report
@@ -28,6 +28,7 @@ import numpy as np
 
 #: Waypoints per second of the JointTrajectory; controllers interpolate between them.
 WAYPOINT_RATE = 50.0
+SCHEMA = 'armid/excitation/1'
 #: Name of the bag.
 BAG = 'trajectory'
 
@@ -73,14 +74,12 @@ def require_free(folder: Path) -> None:
 
 def write_plan(folder: Path, plan: Plan, result: Design) -> dict[str, Any]:
     """Fill a folder with a design and return what is in excitation.json."""
-    folder.mkdir(parents=True, exist_ok=True)
     run = result.excitation
     save_excitation(run, folder / 'excitation.yaml')
     save_excitation(run, folder / 'excitation.csv')
     motion = run.motion(WAYPOINT_RATE)
     write_joint_trajectory(folder / BAG, motion, robot_description=plan.arm.robot.urdf)
     document = _document(plan, result, motion)
-    (folder / 'excitation.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
     page = excitation_report(
         result,
         plan.arm,
@@ -94,7 +93,8 @@ def write_plan(folder: Path, plan: Plan, result: Design) -> dict[str, Any]:
             seed=plan.seed,
         ),
     )
-    (folder / 'report.html').write_text(page, encoding='utf-8')
+    write_file(folder / 'report.html', page)
+    write_file(folder / 'excitation.json', json_text(document, indent=1))
     return document
 
 
@@ -106,7 +106,8 @@ def _document(plan: Plan, result: Design, motion: Motion) -> dict[str, Any]:
     clearance = min(float(one.path_clearance(motion.q).min()) for one in bodies)
     shares = used_shares(result.limits, motion, plan.arm.joint_torque(motion))
     return {
-        'schema': 'armid/excitation/1',
+        'schema': SCHEMA,
+        'robot': plan.robot,
         'joints': list(result.excitation.joints),
         'duration': result.excitation.duration,
         'period': settings.period,

@@ -5,13 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-import json
 from pathlib import Path
 from typing import Any
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import options
-from armid_ros.cli.excitation_files import Plan, require_free, WAYPOINT_RATE, write_plan
+from armid_ros.cli.excitation_files import Plan, require_free, SCHEMA, WAYPOINT_RATE, write_plan
 from armid_ros.cli.excite_springs import COURSES, refuse_other_options, write_course
 from armid_ros.cli.terminal import progress, say
 from armid_ros.effects import parse_effect
@@ -27,6 +26,7 @@ from armid_ros.excitation import (
     TARGETS,
     whole_period,
 )
+from armid_ros.files import json_text
 from armid_ros.identification.signals import conditioning, segments, SignalSettings
 from armid_ros.motion import FloatArray
 from armid_ros.robots import collision_model
@@ -158,6 +158,7 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
 @options.gravity
 @options.joints
 @options.seed
+@options.reading
 @options.as_json
 def excite(
     robot_source: str,
@@ -229,6 +230,7 @@ def excite(
     )
     folders = {speed: out if len(speeds) == 1 else out / f'{speed}' for speed in speeds}
     for folder in folders.values():
+        options.hold(folder, SCHEMA, robot_source)
         require_free(folder)
     with progress('designing') as tick:
 
@@ -251,7 +253,7 @@ def excite(
         documents = {speed: write_plan(folders[speed], plan, designs[speed]) for speed in designs}
     for speed, document in documents.items():
         if as_json:
-            click.echo(json.dumps(document))
+            click.echo(json_text(document))
         else:
             _tell(folders[speed], designs[speed], document)
     missing = [str(speed) for speed in speeds if speed not in designs]

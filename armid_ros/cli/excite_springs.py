@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armid_ros.cli.excitation_files import BAG, require_free
+from armid_ros.cli import options
+from armid_ros.cli.excitation_files import BAG, require_free, SCHEMA
 from armid_ros.cli.terminal import say
 from armid_ros.excitation import load_environment, with_obstacles
 from armid_ros.motion import FloatArray
@@ -21,7 +22,7 @@ COURSES = {'multisine': multisine_course, 'steps': step_course}
 #: Options that a course takes as well as a design, and that a course alone takes.
 _SHARED = {
     'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'gravity', 'joints',
-    'seed',
+    'seed', 'force', 'crc', 'memory_limit',
 }  # fmt: skip
 _OWN = {'share'}
 
@@ -47,6 +48,7 @@ def write_course(
     out: Path,
 ) -> None:
     """Write the trajectory as a bag."""
+    options.hold(out, SCHEMA, robot.name)
     require_free(out)
     obstacles = load_environment(environment) if environment else ()
     bodies = with_obstacles(collision_model(robot), obstacles)
@@ -56,6 +58,5 @@ def write_course(
         return bool(inside) and float(bodies.path_clearance(q).min()) >= clearance
 
     course = COURSES[kind](robot, duration, share, np.random.default_rng(seed), clear)
-    out.mkdir(parents=True, exist_ok=True)
     write_joint_trajectory(out / BAG, course, robot_description=robot.urdf)
     say(f'{out / BAG}: {len(course.t)} waypoints, {course.duration:.1f} s')

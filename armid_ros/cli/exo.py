@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from armid_ros.cli import options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say, Tick
 from armid_ros.errors import ModelError
+from armid_ros.files import json_text, write_file
 from armid_ros.identification.interaction import identify_interaction, Interaction
 from armid_ros.identification.interaction_recording import recorded_interaction_problem
 from armid_ros.motion import FloatArray, Motion
@@ -34,6 +34,7 @@ import numpy as np
 #: Joints that the source drives by torque, one at a time.
 _DRIVEN = ('exo_swing_hip', 'exo_swing_knee')
 _SOFTER = 0.2
+SCHEMA = 'armid/exo/1'
 _RATE = 1000.0
 
 
@@ -61,6 +62,7 @@ _RATE = 1000.0
 @click.option('--torque-noise', default=0.5, show_default=True, help='Simulated [N m].')
 @click.option('--angle-noise', default=0.05, show_default=True, help='Simulated [deg].')
 @options.seed
+@options.reading
 @options.as_json
 def exo(
     bag: Path | None,
@@ -86,15 +88,18 @@ def exo(
     names = topics.split(',')
     if len(names) != 2:
         raise ModelError(f'--topics {topics}: give two, of the machine and of its wearer')
-    out.mkdir(parents=True, exist_ok=True)
+    options.hold(out, SCHEMA)
     simulated = bag is None
     with progress('recording') as tick:
         if bag is None:
             bag = out / 'recording'
             noise = torque_noise, np.radians(angle_noise)
             _record(bag, names, pair, gait, duration, noise, np.random.default_rng(seed))
-        machine = read_recording(bag, joints=pair.robot.joints, topic=names[0])
-        wearer = read_recording(bag, joints=pair.other.joints, topic=names[1])
+        settings = options.read_settings()
+        machine, wearer = (
+            read_recording(bag, joints=one.joints, topic=name, settings=settings)
+            for one, name in zip((pair.robot, pair.other), names, strict=True)
+        )
         found = _identify(pair, machine, wearer, inertias, tick)
         tick(0.6, 'driving joints by torque')
         checks = _checks(pair, gait) if simulated else None
@@ -114,10 +119,10 @@ def exo(
             [bag], {'inertias': inertias, 'topics': topics}, seed if simulated else None
         ),
     )
-    (out / 'report.html').write_text(page, encoding='utf-8')
-    (out / 'exo.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    write_file(out / 'report.html', page)
+    write_file(out / 'exo.json', json_text(document, indent=1))
     if as_json:
-        click.echo(json.dumps(document))
+        click.echo(json_text(document))
         return
     print_rows(
         [
@@ -240,4 +245,4 @@ def _document(
         }
         for right, wrong in (checks.checks if checks else ())
     ]
-    return {'schema': 'armid/exo/1', 'recording': source, 'stiffness': rows, 'gait': gait}
+    return {'schema': SCHEMA, 'recording': source, 'stiffness': rows, 'gait': gait}

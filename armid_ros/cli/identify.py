@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from armid_ros.cli import options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
 from armid_ros.errors import IdentificationError
+from armid_ros.files import json_text, write_file
 from armid_ros.identification import (
     Identification,
     identification_document,
@@ -28,6 +28,7 @@ from armid_ros.identification import (
 from armid_ros.identification import (
     identify as run,
 )
+from armid_ros.identification.output import SCHEMA
 from armid_ros.report import identification_report
 import click
 import numpy as np
@@ -82,6 +83,7 @@ import numpy as np
 @options.gravity
 @options.joints
 @options.seed
+@options.reading
 @options.as_json
 def identify(
     bags: tuple[Path, ...],
@@ -104,6 +106,7 @@ def identify(
     as_json: bool,
 ) -> None:
     """Fit a model with uncertainties to recordings."""
+    options.hold(out, SCHEMA, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
     if not physical and (total_mass is not None or boxes):
@@ -125,7 +128,6 @@ def identify(
             verify(result, arm, recordings, held_out, rng=rng, progress=tick) if verifies else None
         )
     document = identification_document(result, robot_source, validation, verification)
-    out.mkdir(parents=True, exist_ok=True)
     source = options.kept_source(robot_source, robot, out)
     save_model(out / 'model.yaml', result.arm, source, result.estimate)
     exports = _export(result.arm, out) if physical else {}
@@ -140,10 +142,10 @@ def identify(
         exports=exports,
         provenance=provenance([*bags, *validate], document['settings'], seed),
     )
-    (out / 'report.html').write_text(page, encoding='utf-8')
+    write_file(out / 'report.html', page)
     write_document(out / 'identification.json', document)
     if as_json:
-        click.echo(json.dumps(document))
+        click.echo(json_text(document))
         return
     print_parameters(document['parameters'])
     if result.physical is not None:
@@ -163,7 +165,7 @@ def _export(arm: ArmModel, out: Path) -> dict[str, tuple[str, ...]]:
     """Write the arm for other programs; return what each file has no place for, by its name."""
     made = {'identified.urdf': arm_urdf(arm), 'identified.mjcf.xml': arm_mjcf(arm)}
     for name, exported in made.items():
-        (out / name).write_text(exported.text, encoding='utf-8')
+        write_file(out / name, exported.text)
     return {name: exported.without_place for name, exported in made.items()}
 
 

@@ -4,19 +4,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any, TypeVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import RobotError
+from armid_ros.files import default_memory_limit, result_folder, write_file
 from armid_ros.motion import FloatArray
-from armid_ros.recording import read_recording, read_robot_description, Recording
+from armid_ros.recording import (
+    read_recording,
+    read_robot_description,
+    ReadSettings,
+    Recording,
+)
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
 import click
 import numpy as np
 
+_Command = TypeVar('_Command', bound=Callable[..., Any])
 Corners = tuple[Sequence[float], Sequence[float]]
+
+#: Where the context keeps what its commands share.
+_FORCE, _CRC, _MEMORY = 'armid.force', 'armid.crc', 'armid.memory'
 
 DEFAULT_EFFECTS = 'viscous_friction,coulomb_friction,torque_offset'
 
@@ -25,7 +36,8 @@ robot = click.option(
     'robot_source',
     required=True,
     metavar='R',
-    help='Shipped name, path of a URDF or xacro, or - for the /robot_description in the bag.',
+    help='Shipped name, path of a URDF or xacro, or - for the /robot_description in the bag. '
+    'A xacro is a program, which can read any file: name only one that you trust.',
 )
 gravity = click.option(
     '--gravity', default='earth', show_default=True, help='earth, moon, or a vector x,y,z [m/s^2].'
@@ -40,11 +52,34 @@ effects = click.option(
     metavar='E,...',
     help="What acts beside the rigid body; 'E@joint+joint' for some joints only.",
 )
-folder = click.option(
+_out = click.option(
     '--out',
     required=True,
     type=click.Path(file_okay=False, path_type=Path),
     help='Folder to fill.',
+)
+_force = click.option(
+    '--force',
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({_FORCE: value}),
+    help='Write over results of another kind or robot.',
+)
+_crc = click.option(
+    '--crc/--no-crc',
+    default=True,
+    show_default=True,
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({_CRC: value}),
+    help='Compare the checksums of bags, and leave out what is damaged.',
+)
+_memory = click.option(
+    '--memory-limit',
+    type=click.FloatRange(0.0, min_open=True),
+    metavar='MB',
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({_MEMORY: value}),
+    help='That a bag may take [MB]; a quarter of the memory by default.',
 )
 bag = click.option(
     '--out', required=True, type=click.Path(path_type=Path), help='Bag to write; must not exist.'
@@ -53,13 +88,38 @@ seed = click.option('--seed', default=0, show_default=True, help='Of every rando
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
 
 
+def folder(command: _Command) -> _Command:
+    """Add --out, a folder of results, and --force, to write over others."""
+    return _out(_force(command))
+
+
+def reading(command: _Command) -> _Command:
+    """Add the options that say how bags are read."""
+    return _crc(_memory(command))
+
+
+def hold(out: Path, schema: str, robot: str = '') -> None:
+    """Make a folder, and keep it for the results of this command as long as the command runs."""
+    context = click.get_current_context()
+    force = bool(context.meta.get(_FORCE, False))
+    context.with_resource(result_folder(out, schema, robot, force=force))
+
+
+def read_settings() -> ReadSettings:
+    """Return how this command is to read bags."""
+    meta = click.get_current_context().meta
+    limit = meta.get(_MEMORY)
+    size = default_memory_limit() if limit is None else int(limit * 1e6)
+    return ReadSettings(check_crc=bool(meta.get(_CRC, True)), memory_limit=size)
+
+
 def open_robot(source: str, gravity: str, joints: str | None, bags: Sequence[Path] = ()) -> Robot:
     """Load the robot that --robot, --gravity and --joints ask for."""
     chosen = tuple(joints.split(',')) if joints else None
     if source != '-':
         return load_robot(source, gravity=gravity, joints=chosen)
     for path in bags:
-        text = read_robot_description(path)
+        text = read_robot_description(path, read_settings())
         if text is not None:
             return robot_from_urdf(text, gravity=gravity, joints=chosen, source=str(path))
     raise RobotError(
@@ -108,12 +168,15 @@ def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
 
 def read(bags: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
     """Read what the bags hold of the robot's joints."""
-    return [read_recording(path, joints=robot.joints, topic=topic) for path in bags]
+    settings = read_settings()
+    return [
+        read_recording(path, joints=robot.joints, topic=topic, settings=settings) for path in bags
+    ]
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
     """Return how files in a folder refer to the robot; one from a bag is put beside them."""
     if source == '-':
-        (out / 'robot.urdf').write_text(robot.urdf, encoding='utf-8')
+        write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'
     return str(Path(source).resolve()) if Path(source).is_file() else source

@@ -137,6 +137,7 @@ def _both_sides(out: Path, arm: ElasticArm, reference: Reference, rate: float, t
 @click.command(epilog='Example: armid recover crashed/crashed_0.mcap --out whole')
 @click.argument('file', type=click.Path(path_type=Path))
 @options.bag
+@options.reading
 def recover(file: Path, out: Path) -> None:
     """Make a recording whole whose writer was killed; the file itself is left as it is."""
-    say(recover_bag(file, out).describe())
+    say(recover_bag(file, out, options.read_settings()).describe())

@@ -5,16 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-import json
 from pathlib import Path
 from typing import Any
 
 from armid_ros.arm import load_model
+from armid_ros.cli import options
 from armid_ros.cli.terminal import progress, say
 from armid_ros.errors import RecordingError
+from armid_ros.files import json_text, write_file
 from armid_ros.identification.two_inertia.files import read_sides
 from armid_ros.identification.two_inertia.joints import fit_springs
-from armid_ros.identification.two_inertia.output import springs_document
+from armid_ros.identification.two_inertia.output import springs_document, SPRINGS_SCHEMA
 from armid_ros.recording.elastic_topics import LINK
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.report.springs_report import springs_report
@@ -33,6 +34,7 @@ def identify_springs(
     as_json: bool,
 ) -> None:  # fmt: skip
     """Fit springs to bags with both encoders of any arm, and write what was found."""
+    options.hold(out, SPRINGS_SCHEMA, source)
     body = robot if model is None else load_model(model, robot).body
     if not bags:
         raise RecordingError('no bag is named; give one with encoders on both sides of the joints')
@@ -45,15 +47,14 @@ def identify_springs(
         tick(0.5, 'fitting')
         found = fit_springs(body, sides, np.random.default_rng(seed))
     document = springs_document(found, source)
-    out.mkdir(parents=True, exist_ok=True)
-    (out / 'elastic.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    write_file(out / 'elastic.json', json_text(document, indent=1))
     provenance = Provenance(
         files=hash_files(bags), versions=versions(), settings={'model': str(model or source)}
     )
     page = springs_report(found, robot.name, provenance=provenance)
-    (out / 'report.html').write_text(page, encoding='utf-8')
+    write_file(out / 'report.html', page)
     if as_json:
-        click.echo(json.dumps(document))
+        click.echo(json_text(document))
         return
     for joint in document['joints']:
         say(_line(joint))

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-import json
 from typing import Any, Self
 
+from armid_ros.errors import visible
 from armid_ros.estimate import Estimate
+from armid_ros.files import json_text
 from armid_ros.identification.identifiability import told_from_zero
 from armid_ros.motion import FloatArray
 import click
@@ -24,7 +25,7 @@ Tick = Callable[..., None]
 
 def say(text: str) -> None:
     """Print a line."""
-    click.echo(text)
+    click.echo(visible(text))
 
 
 @contextmanager
@@ -48,7 +49,7 @@ def progress(what: str) -> Iterator[Tick]:
 def print_rows(rows: Sequence[dict[str, Any]], as_json: bool, right: Sequence[str] = ()) -> None:
     """Print rows as a table, or as JSON; numeric columns are named in `right`."""
     if as_json:
-        click.echo(json.dumps(list(rows), indent=1))
+        click.echo(json_text(list(rows), indent=1))
         return
     table = Table(box=None, header_style='bold')
     for head in rows[0] if rows else ():
@@ -83,7 +84,7 @@ def _told(row: dict[str, Any]) -> bool:
 
 
 def _cell(value: Any) -> str:
-    return ', '.join(map(str, value)) if isinstance(value, list) else str(value)
+    return visible(', '.join(map(str, value)) if isinstance(value, list) else str(value))
 
 
 class ConvergenceTable:
@@ -124,5 +125,6 @@ class ConvergenceTable:
             name = estimate.parameters[k]
             numbers = (estimate.values[k], estimate.std[k], self._truth[k])
             texts = [f'{number:.4f}' for number in numbers]
-            table.add_row(*map(Text, (name.name, name.joint, *texts, name.unit)))
+            cells = (name.name, name.joint, *texts, name.unit)
+            table.add_row(*(Text(visible(cell)) for cell in cells))
         self._live.update(table)

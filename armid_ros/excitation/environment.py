@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import TrajectoryError
+from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.robots import CollisionModel
 import coal
 import numpy as np
 import pinocchio as pin
-import yaml
 
 #: Kinds of obstacle and the numbers that each one's size is made of.
 KINDS: Mapping[str, tuple[str, ...]] = {
@@ -60,7 +60,11 @@ class Obstacle:
     ignore: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        """Check kind and numbers."""
+        """Check names, kind and numbers."""
+        if not all(isinstance(name, str) for name in (self.name, self.kind, *self.ignore)):
+            raise TrajectoryError(
+                f"obstacle '{self.name}': name, kind and the links to ignore are texts; quote them"
+            )
         if self.kind not in KINDS:
             raise TrajectoryError(
                 f"obstacle '{self.name}': no kind '{self.kind}'; there are {', '.join(KINDS)}"
@@ -158,15 +162,12 @@ def load_environment(path: str | Path) -> tuple[Obstacle, ...]:
 
     """
     path = Path(path)
-    try:
-        entries: Any = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise TrajectoryError(f'{path}: cannot be read: {error.strerror}') from error
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise TrajectoryError(f'{path}: {error}') from error
-    if not isinstance(entries, list):
-        raise TrajectoryError(f'{path}: has to be a list of obstacles')
-    return tuple(_obstacle(path, number, entry) for number, entry in enumerate(entries, start=1))
+    text = read_text(path, TrajectoryError)
+    with reading(path, TrajectoryError):
+        entries: Any = load_yaml(text)
+        if not isinstance(entries, list):
+            raise TrajectoryError('has to be a list of obstacles')
+        return tuple(_obstacle(path, number, entry) for number, entry in enumerate(entries, 1))
 
 
 def _obstacle(path: Path, number: int, entry: Any) -> Obstacle:

@@ -19,6 +19,7 @@ from typing import Any
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.schedule import Excitation
+from armid_ros.files import finite, load_yaml, read_text, reading, write_file
 import numpy as np
 import yaml
 
@@ -31,9 +32,7 @@ def save_excitation(excitation: Excitation, path: str | Path) -> None:
     writer = {'.yaml': _to_yaml, '.yml': _to_yaml, '.csv': _to_csv}.get(path.suffix)
     if writer is None:
         raise TrajectoryError(f'{path}: an excitation is written as .yaml or .csv')
-    beside = path.with_name(path.name + '.part')
-    beside.write_text(writer(excitation), encoding='utf-8')
-    beside.replace(path)
+    write_file(path, writer(excitation))
 
 
 def load_excitation(path: str | Path) -> Excitation:
@@ -50,16 +49,9 @@ def load_excitation(path: str | Path) -> Excitation:
     reader = {'.yaml': _from_yaml, '.yml': _from_yaml, '.csv': _from_csv}.get(path.suffix)
     if reader is None:
         raise TrajectoryError(f'{path}: an excitation is a .yaml or a .csv file')
-    try:
-        return reader(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise TrajectoryError(f'{path}: cannot be read: {error.strerror}') from error
-    except TrajectoryError as error:
-        raise TrajectoryError(f'{path}: {error}') from error
-    except KeyError as error:
-        raise TrajectoryError(f'{path}: no {error.args[0]}') from error
-    except (TypeError, ValueError, yaml.YAMLError) as error:
-        raise TrajectoryError(f'{path}: {error}') from error
+    text = read_text(path, TrajectoryError)
+    with reading(path, TrajectoryError):
+        return reader(text)
 
 
 def _to_yaml(excitation: Excitation) -> str:
@@ -89,13 +81,13 @@ def _to_yaml(excitation: Excitation) -> str:
 
 
 def _from_yaml(text: str) -> Excitation:
-    content: Any = yaml.safe_load(text)
+    content: Any = load_yaml(text)
     if not isinstance(content, dict) or content.get('schema') != SCHEMA:
         raise TrajectoryError(f'not an excitation: it has to say schema: {SCHEMA}')
     joints = content['joints']
     trajectory = FourierTrajectory(
         tuple(str(joint['name']) for joint in joints),
-        float(content['period']),
+        finite(content['period'], 'period'),
         np.array([joint['q0'] for joint in joints], dtype=float),
         np.array([joint['a'] for joint in joints], dtype=float),
         np.array([joint['b'] for joint in joints], dtype=float),
@@ -103,10 +95,18 @@ def _from_yaml(text: str) -> Excitation:
     start = content.get('start')
     return Excitation(
         trajectory,
-        int(content['n_periods']),
-        float(content['run_in']),
+        _whole(content['n_periods']),
+        finite(content['run_in'], 'run_in'),
         None if start is None else np.array(start, dtype=float),
     )
+
+
+def _whole(value: Any) -> int:
+    """Return a number of periods."""
+    number = finite(value, 'n_periods')
+    if number != round(number):
+        raise ValueError(f'n_periods has to be a whole number, not {value}')
+    return round(number)
 
 
 def _to_csv(excitation: Excitation) -> str:
@@ -135,6 +135,8 @@ def _from_csv(text: str) -> Excitation:
         line.lstrip('# ').rsplit(',', 1) for line in lines if line.startswith('#') and ',' in line
     )
     rows = list(csv.DictReader(line for line in lines if not line.startswith('#')))
+    if any(None in row or None in row.values() for row in rows):
+        raise TrajectoryError('a row has not as many columns as the head')
     harmonics = max((int(key[1:]) for key in rows[0] if key[0] == 'a'), default=0) if rows else 0
 
     def column(key: str) -> list[float]:
@@ -149,4 +151,4 @@ def _from_csv(text: str) -> Excitation:
         np.array([column(f'b{k}') for k in range(1, harmonics + 1)]).T,
     )
     start = None if all(map(math.isnan, starts)) else np.array(starts)
-    return Excitation(trajectory, int(run['n_periods']), float(run['run_in [s]']), start)
+    return Excitation(trajectory, _whole(run['n_periods']), float(run['run_in [s]']), start)

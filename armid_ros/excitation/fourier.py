@@ -50,6 +50,10 @@ class FourierTrajectory:
         for name in ('q0', 'a', 'b'):
             object.__setattr__(self, name, read_only(getattr(self, name)))
         n = len(self.joints)
+        if len(set(self.joints)) != n:
+            raise TrajectoryError(
+                f'Fourier trajectory: a joint is named twice: {", ".join(self.joints)}'
+            )
         if (
             self.q0.shape != (n,)
             or self.a.ndim != 2

@@ -21,6 +21,8 @@ import numpy.typing as npt
 
 #: How far period * rate may be from a whole number for the periods to count as identical.
 _WHOLE_SAMPLES = 1e-6
+#: The longest run [s]. Its samples are kept in memory, 1 GB for six joints at 50 Hz.
+MAX_DURATION = 86400.0
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,15 @@ class Excitation:
 
     def __post_init__(self) -> None:
         """Check the numbers and freeze the start pose."""
-        if self.n_periods < 1:
+        if int(self.n_periods) != self.n_periods or self.n_periods < 1:
             raise TrajectoryError(f'excitation: {self.n_periods} periods; at least one is needed')
         if not (np.isfinite(self.run_in) and self.run_in > 0.0):
             raise TrajectoryError(f'excitation: a run-in of {self.run_in} s')
+        if not self.duration <= MAX_DURATION:
+            raise TrajectoryError(
+                f'excitation: {self.n_periods} periods of {self.trajectory.period:g} s, run-ins '
+                f'of {self.run_in:g} s last {self.duration:.3g} s; a day is the most'
+            )
         if self.start is not None:
             start = read_only(self.start)
             object.__setattr__(self, 'start', start)

@@ -28,6 +28,7 @@ import numpy as np
 from scipy.special import erfc
 from scipy.stats import chi2
 
+SCHEMA = 'armid/comparison/1'
 #: Probability that the list of changes has a chance find in it.
 CHANCE = 0.05
 #: Directions of a covariance below this share of the largest, all scaled, are rounding.
@@ -149,7 +150,7 @@ class Comparison:
     def document(self) -> dict[str, Any]:
         """Return the comparison for programs to read (schema armid/comparison/1)."""
         return {
-            'schema': 'armid/comparison/1',
+            'schema': SCHEMA,
             'before': self.before.source,
             'after': self.after.source,
             'parameters': [

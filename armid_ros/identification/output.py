@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-import json
 from pathlib import Path
 import re
 from typing import Any
 
 from armid_ros.arm import parameter_table
+from armid_ros.files import json_text, write_file
 from armid_ros.identification.consistency import NoiseCheck
 from armid_ros.identification.identify import Fit, Identification, Score
 from armid_ros.identification.verification import Verification
@@ -91,9 +91,9 @@ def identification_document(
 
 def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
     """Write a document as JSON, a row of numbers on a line."""
-    text = json.dumps(document, indent=1)
+    text = json_text(document, indent=1)
     rows = re.sub(r'\[\n[^][{}"]*\]', lambda row: ' '.join(row[0].split()), text)
-    Path(path).write_text(rows + '\n', encoding='utf-8')
+    write_file(path, rows + '\n')
 
 
 def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:

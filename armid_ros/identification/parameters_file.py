@@ -6,18 +6,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-import json
 from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
+from armid_ros.files import finite, is_file, load_json, load_yaml, read_text, reading
 from armid_ros.motion import FloatArray
 import numpy as np
 import yaml
 
 #: A grouping is a combination of others if this share of it is left at most.
 _SAME_GROUPING = 1e-6
+#: Relative; what is written has 16 digits.
+_ROUNDING = 1e-9
 _SCHEMAS = ('armid/identification/1', 'armid/model/1')
 
 
@@ -109,27 +111,23 @@ def read_parameters(path: str | Path) -> Parameters:
     path = Path(path)
     if path.is_dir():
         kept = [path / name for name in ('identification.json', 'model.yaml')]
-        found = [file for file in kept if file.is_file()]
+        found = [file for file in kept if is_file(file)]
         if not found:
             raise ModelError(
                 f'{path}: neither identification.json nor model.yaml is in it; '
                 'name the folder that armid identify wrote'
             )
         path = found[0]
-    try:
-        text = path.read_text(encoding='utf-8')
-        document = json.loads(text) if path.suffix == '.json' else yaml.safe_load(text)
-    except OSError as error:
-        raise ModelError(f'{path}: {error.strerror}') from error
-    except (ValueError, yaml.YAMLError) as error:
-        reason = ' '.join(str(error).split())
-        raise ModelError(f'{path}: neither JSON nor YAML: {reason}') from error
-    if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
-        raise ModelError(f"{path}: its 'schema' has to be {' or '.join(_SCHEMAS)}")
-    try:
+    text = read_text(path, ModelError)
+    with reading(path, ModelError):
+        try:
+            document = load_json(text) if path.suffix == '.json' else load_yaml(text)
+        except (ValueError, yaml.YAMLError) as error:
+            reason = ' '.join(str(error).split())
+            raise ModelError(f'neither JSON nor YAML: {reason}') from error
+        if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
+            raise ModelError(f"its 'schema' has to be {' or '.join(_SCHEMAS)}")
         return parameters_of(str(path), document)
-    except (KeyError, TypeError, ValueError) as error:
-        raise ModelError(f'{path}: {type(error).__name__} {error} is missing or wrong') from error
 
 
 def parameters_of(source: str, document: dict[str, Any]) -> Parameters:
@@ -145,19 +143,36 @@ def parameters_of(source: str, document: dict[str, Any]) -> Parameters:
     rows = list(document.get('parameters', document.get('rigid_parameters', [])))
     for effect in document.get('effects', []):
         rows += effect['parameters']
-    values = {
-        ParameterName(row['name'], row['joint'], row['unit']): (
-            float(row['value']),
-            float(row['std']),
-        )
-        for row in rows
-        if row['std'] is not None
-    }
+    values: dict[ParameterName, tuple[float, float]] = {}
+    for row in rows:
+        name = ParameterName(str(row['name']), str(row['joint']), str(row['unit']))
+        if row['std'] is None:
+            continue
+        if name in values:
+            raise ValueError(f'{name.name} of joint {name.joint} is given twice')
+        values[name] = _value(row, name)
     covariance = _covariance(document.get('covariance'), len(values))
-    terms = dict(zip(values, document.get('grouping', []), strict=False))
+    grouping = [_terms(row) for row in document.get('grouping', [])]
+    terms = dict(zip(values, grouping, strict=False))
     scores = [*document.get('validation', []), document.get('training')]
-    error = scores[0]['relative_error_percent'] if scores[0] else None
+    error = None
+    if scores[0]:
+        error = finite(scores[0]['relative_error_percent'], 'relative_error_percent')
     return Parameters(source, str(document['robot']), values, error, covariance, terms)
+
+
+def _value(row: Mapping[str, Any], name: ParameterName) -> tuple[float, float]:
+    """Return a value and its standard deviation, which are finite, and the latter not negative."""
+    which = f'{name.name} of joint {name.joint}'
+    value, std = finite(row['value'], which), finite(row['std'], f'the std of {which}')
+    if std < 0.0:
+        raise ValueError(f'the std of {which} is negative: {std:g}')
+    return value, std
+
+
+def _terms(row: Mapping[str, Any]) -> dict[str, float]:
+    """Return the factors of the parameters that one groups."""
+    return {str(term): finite(factor, f'the factor of {term}') for term, factor in row.items()}
 
 
 def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatArray:
@@ -173,4 +188,10 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     matrix = np.zeros((size, size))
     for index, row in enumerate(rows):
         matrix[index, : index + 1] = matrix[: index + 1, index] = row
+    if not np.isfinite(matrix).all():
+        raise ValueError('a covariance with a number that is not finite')
+    deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    largest = np.outer(deviations, deviations)
+    if (np.diag(matrix) < 0.0).any() or (np.abs(matrix) > largest * (1.0 + _ROUNDING)).any():
+        raise ValueError('a covariance with a negative variance or a correlation beyond one')
     return matrix

@@ -10,6 +10,7 @@ from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm.model_file import parameter_table, save_model
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate
+from armid_ros.files import write_file
 from armid_ros.identification.online import OnlineIdentifier
 import yaml
 
@@ -63,11 +64,9 @@ def save_identification(folder: Path, identifier: OnlineIdentifier) -> tuple[Pat
     paths = tuple(folder / name for name in ('estimate.yaml', 'model.yaml', 'robot.urdf'))
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        paths[2].write_text(robot.urdf, encoding='utf-8')
+        write_file(paths[2], robot.urdf)
         save_model(paths[1], identifier.model(), paths[2].name, estimate)
-        beside = folder / 'estimate.yaml.part'
-        beside.write_text(yaml.safe_dump(document, sort_keys=False, width=99), encoding='utf-8')
-        beside.replace(paths[0])
+        write_file(paths[0], yaml.safe_dump(document, sort_keys=False, width=99))
     except OSError as error:
         raise ModelError(f'{folder}: cannot be written: {error.strerror}') from error
     return paths

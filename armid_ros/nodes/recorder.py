@@ -8,11 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
+import os
 from pathlib import Path
+import shutil
 import struct
-from typing import Any
+import time
+from typing import Any, NoReturn
 
 from armid_ros.errors import ArmidError, RecordingError
+from armid_ros.files import size_text
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.message_classes import installed_definition, is_stamped, message_class
 from armid_ros.nodes.parameters import names, NodeParameter
@@ -27,6 +31,10 @@ OpenBag = Callable[[Path], BagWriter]
 LOOK_PERIOD = 0.1
 #: How often what waits in memory is written out [s]; bounds what a kill loses.
 FLUSH_PERIOD = 0.1
+#: How often the disk is looked at [s].
+WATCH_PERIOD = 1.0
+#: A disk that will be full within this time is warned of [s].
+_WARNED = 60.0
 #: Messages kept while simulated time has not begun.
 _HELD = 1000
 
@@ -60,6 +68,14 @@ class RecorderNode(ArmidNode):
             'compression', 'zstd', 'Compression of the chunks.', choices=('zstd', 'lz4', 'none')
         ),
         NodeParameter(
+            'min_free',
+            50.0,
+            'Free space on the disk below which the bag is completed and the node ends.',
+            'MB',
+            lower=0.0,
+            upper=1e6,
+        ),
+        NodeParameter(
             'chunk_age', 0.2, 'Age at which a chunk is written out.', 's', lower=0.01, upper=60.0
         ),
     )
@@ -74,6 +90,7 @@ class RecorderNode(ArmidNode):
         self._held: list[tuple[Channel, bytes]] = []
         self._bags = 0
         self._count = 0
+        self._begun = 0.0
         self._simulated = bool(self.value('use_sim_time'))
         self.last_stamps: dict[str, int] = {}
         self.offer('~/start', self.start)
@@ -81,6 +98,7 @@ class RecorderNode(ArmidNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(LOOK_PERIOD, self.look, clock=steady)
         self.create_timer(FLUSH_PERIOD, self._flush, clock=steady)
+        self.create_timer(WATCH_PERIOD, self.watch, clock=steady)
         if self.value('record'):
             self.start()
 
@@ -107,6 +125,8 @@ class RecorderNode(ArmidNode):
         self._writer = self._open_bag(self._next_path())
         self._bags += 1
         self._count = 0
+        self._begun = time.monotonic()
+        self.watch()
         self.look()
         return self._tell(f'recording into {self._writer.path}')
 
@@ -117,9 +137,12 @@ class RecorderNode(ArmidNode):
         for subscription in self._subscriptions_by_topic.values():
             subscription.close()
         self._subscriptions_by_topic.clear()
+        self._write_held(self._writer, 0)
         writer, self._writer = self._writer, None
-        self._write_held(writer, 0)
-        writer.close()
+        try:
+            writer.close()
+        except ArmidError as error:
+            raise self._given_up(writer, str(error)) from error
         return self._tell(f'{writer.path}: {self._count} messages')
 
     def look(self) -> None:
@@ -132,6 +155,34 @@ class RecorderNode(ArmidNode):
             wanted = topic in self._wanted if self._wanted else '/_' not in topic
             if wanted and topic not in self._subscriptions_by_topic:
                 self._record(self._writer, topic, types)
+
+    def watch(self) -> None:
+        """
+        Look whether the bag is still there, and has room to grow.
+
+        Raises
+        ------
+        RecordingError
+            It was deleted or moved, or the disk is all but full; it is complete nevertheless.
+
+        """
+        writer = self._writer
+        if writer is None:
+            return
+        if not writer.in_place:
+            self._give_up(f'{writer.file}: was deleted or moved while it was written')
+        try:
+            free = shutil.disk_usage(writer.path).free
+        except OSError as error:
+            self._give_up(f'{writer.path}: {error.strerror}')
+        least = self.value('min_free') * 1e6
+        if free < least:
+            self._give_up(f'{writer.path}: {size_text(free)} are left on the disk')
+        rate = writer.size / max(time.monotonic() - self._begun, WATCH_PERIOD)
+        if free - least < _WARNED * rate:
+            self.complaints.say(
+                'disk', f'the disk of {writer.path} will be full in less than {_WARNED:.0f} s'
+            )
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say where the messages go and how many there are."""
@@ -198,14 +249,38 @@ class RecorderNode(ArmidNode):
             now = max(now, sent)
         try:
             writer.write(channel.topic, data, now, sent or now)
-            self._count += 1
-            self.last_stamps[channel.topic] = sent
-        except OSError as error:
-            self.complaints.say('bag', f'{writer.path}: cannot be written: {error.strerror}')
+        except RecordingError as error:
+            self._give_up(str(error))
+        self._count += 1
+        self.last_stamps[channel.topic] = sent
 
     def _flush(self) -> None:
         if self._writer is not None:
-            self._writer.flush()
+            try:
+                self._writer.flush()
+            except RecordingError as error:
+                self._give_up(str(error))
+
+    def _give_up(self, reason: str) -> NoReturn:
+        """End the recording for a reason that keeps it from going on."""
+        writer, self._writer = self._writer, None
+        assert writer is not None
+        raise self._given_up(writer, reason)
+
+    def _given_up(self, writer: BagWriter, reason: str) -> RecordingError:
+        """Return the error that says why a recording ended, and what there is of it."""
+        lacking = ''
+        try:
+            writer.close()
+        except ArmidError:
+            lacking = writer.save()
+        count = sum(topic.count for topic in writer.topics)
+        kept = f'{count} messages are in {writer.file}'
+        if not os.path.lexists(writer.file):
+            kept = f'{count} messages went with it'
+        elif lacking:
+            kept += f', without its index ({lacking}): `armid recover` makes it whole'
+        return RecordingError(f'{reason}; recording ends: {kept}')
 
     def _tell(self, text: str) -> str:
         if self.context.ok():  # /rosout is gone once the process is told to end

@@ -20,6 +20,7 @@ from armid_ros.recording.qos import LATCHED, QosProfile
 from armid_ros.recording.reader import read_recording
 from armid_ros.recording.recording import Gap, ReadReport, Recording
 from armid_ros.recording.recover import recover, RecoveryReport
+from armid_ros.recording.settings import ReadSettings
 from armid_ros.recording.source import RawMessage, Topic
 from armid_ros.recording.string_message import read_robot_description, string_cdr
 from armid_ros.recording.together import recorded_together
@@ -34,6 +35,7 @@ from armid_ros.recording.writer import BagWriter
 __all__ = [
     'Recording',
     'ReadReport',
+    'ReadSettings',
     'Gap',
     'Beside',
     'recorded_together',

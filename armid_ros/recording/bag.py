@@ -14,26 +14,32 @@ from collections.abc import Callable, Iterator
 import contextlib
 from dataclasses import dataclass, replace
 import heapq
+import os
 from pathlib import Path
 import re
-import shutil
 import tempfile
 from types import TracebackType
 from typing import Self
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import open_regular, reading
+from armid_ros.recording.compression import message_content, unpacked
+from armid_ros.recording.damage import Damage
 from armid_ros.recording.mcap_source import McapSource
-from armid_ros.recording.metadata import FILE_NAME, read_metadata
+from armid_ros.recording.metadata import BagMetadata, FILE_NAME, read_metadata
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Block, RawMessage, Source, Topic
 from armid_ros.recording.sqlite_source import SqliteSource
 import numpy as np
-import zstandard
 
-_STORAGES: dict[str, Callable[[Path], Source]] = {'.mcap': McapSource, '.db3': SqliteSource}
+_STORAGES: dict[str, Callable[[Path, ReadSettings], Source]] = {
+    '.mcap': McapSource,
+    '.db3': SqliteSource,
+}
 _COMPRESSED = '.zstd'
 
 
-def topics(path: str | Path) -> tuple[Topic, ...]:
+def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
     """
     Return the topics of a bag, with types, definitions, QoS and counts.
 
@@ -43,11 +49,11 @@ def topics(path: str | Path) -> tuple[Topic, ...]:
         There is no bag that can be read.
 
     """
-    with Bag(path) as bag:
+    with Bag(path, settings) as bag:
         return bag.topics()
 
 
-def iter_raw(path: str | Path) -> Iterator[RawMessage]:
+def iter_raw(path: str | Path, settings: ReadSettings = DEFAULT) -> Iterator[RawMessage]:
     """
     Yield all messages of a bag in the order they were logged, as raw CDR.
 
@@ -59,14 +65,14 @@ def iter_raw(path: str | Path) -> Iterator[RawMessage]:
         There is no bag that can be read.
 
     """
-    with Bag(path) as bag:
+    with Bag(path, settings) as bag:
         yield from bag.messages()
 
 
 class Bag:
     """All files of a bag, as one source; a context manager."""
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, settings: ReadSettings = DEFAULT) -> None:
         """
         Open a bag.
 
@@ -74,6 +80,8 @@ class Bag:
         ----------
         path : str or Path
             A rosbag2 directory, or a file .mcap, .db3, .mcap.zstd or .db3.zstd.
+        settings : ReadSettings
+            What to check, and how much memory to take.
 
         Raises
         ------
@@ -82,11 +90,16 @@ class Bag:
 
         """
         self.path = Path(path)
+        self._settings = settings
         self._stack = contextlib.ExitStack()
-        files, mode = _files_of(self.path)
-        self._by_message = mode == 'message'
+        self._damage = Damage()
         try:
-            self._sources = [self._open(file) for file in files]
+            self._metadata = _files_of(self.path)
+        except OSError as error:
+            raise RecordingError(f'{self.path}: cannot be read: {error.strerror}') from error
+        self._by_message = self._metadata.compression_mode == 'message'
+        try:
+            self._sources = [self._open(file) for file in self._metadata.files]
         except BaseException:
             self._stack.close()
             raise
@@ -107,7 +120,8 @@ class Bag:
     @property
     def damage(self) -> str:
         """What is wrong with the files, as far as they were read; empty for a whole bag."""
-        return '; '.join(dict.fromkeys(s.damage for s in self._sources if s.damage))
+        said = (*(source.damage for source in self._sources), str(self._damage))
+        return '; '.join(dict.fromkeys(filter(None, said)))
 
     def close(self) -> None:
         """Let go of the files."""
@@ -116,49 +130,77 @@ class Bag:
     def topics(self) -> tuple[Topic, ...]:
         """Return the topics, in order of appearance."""
         merged: dict[str, Topic] = {}
-        for source in self._sources:
-            for topic in source.topics():
-                known = merged.get(topic.name)
-                count = topic.count + (known.count if known else 0)
-                described = known if known and known.message_type.definition else topic
-                merged[topic.name] = replace(described, count=count)
+        with reading(self.path, RecordingError):
+            for source in self._sources:
+                for topic in source.topics():
+                    known = merged.get(topic.name)
+                    count = topic.count + (known.count if known else 0)
+                    described = known if known and known.message_type.definition else topic
+                    merged[topic.name] = replace(described, count=count)
+        for name, count in self._metadata.counts.items():
+            if count and name not in merged:
+                self._damage.add(f'{FILE_NAME} counts {count} messages of {name}, there are none')
         return tuple(merged.values())
 
     def blocks(self, topic: str) -> Iterator[Block]:
         """Yield the messages of a topic, in the order they are stored."""
-        for source in self._sources:
-            for block in source.blocks(topic):
-                yield _decompressed(block, self.path) if self._by_message else block
+        count = 0
+        with reading(self.path, RecordingError):
+            for source in self._sources:
+                for block in source.blocks(topic):
+                    count += len(block)
+                    yield self._decompressed(block) if self._by_message else block
+        expected = self._metadata.counts.get(topic, count)
+        if count != expected:
+            self._damage.add(
+                f'{FILE_NAME} counts {expected} messages of {topic}, there are {count}'
+            )
 
     def messages(self) -> Iterator[RawMessage]:
         """Yield all messages in the order they were logged."""
+        limit = self._settings.memory_limit
         streams = [source.messages() for source in self._sources]
-        for message in heapq.merge(*streams, key=lambda message: message.log_time_ns):
-            if self._by_message:
-                yield message._replace(cdr=_decompress(message.cdr, self.path))
-            else:
-                yield message
+        with reading(self.path, RecordingError):
+            for message in heapq.merge(*streams, key=lambda message: message.log_time_ns):
+                if self._by_message:
+                    yield message._replace(cdr=message_content(message.cdr, limit))
+                else:
+                    yield message
 
     def _open(self, file: Path) -> Source:
         """Open one file."""
         storage = _STORAGES[_storage_suffix(file)]
-        source: Source = storage(self._unpacked(file) if file.suffix == _COMPRESSED else file)
+        with reading(file, RecordingError):
+            plain = self._unpacked(file) if file.suffix == _COMPRESSED else file
+            source: Source = storage(plain, self._settings)
         self._stack.callback(source.close)
         return source
 
     def _unpacked(self, file: Path) -> Path:
         """Decompress a file to a temporary one, which is removed when the bag is closed."""
         folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix='armid-'))
-        unpacked = Path(folder, file.stem)
+        plain, size = Path(folder, file.stem), 0
         try:
-            with file.open('rb') as packed, unpacked.open('wb') as stream:
-                with zstandard.ZstdDecompressor().stream_reader(packed) as content:
-                    shutil.copyfileobj(content, stream, 1 << 20)
+            with open_regular(file, RecordingError) as packed, plain.open('wb') as stream:
+                for piece in unpacked(packed):
+                    size += len(piece)
+                    self._settings.require(size, 'the unpacked file')
+                    stream.write(piece)
         except OSError as error:
             raise RecordingError(f'{file}: cannot be decompressed: {error.strerror}') from error
-        except zstandard.ZstdError as error:
-            raise RecordingError(f'{file}: the compressed file is damaged: {error}') from error
-        return unpacked
+        return plain
+
+    def _decompressed(self, block: Block) -> Block:
+        """Return a block with its messages decompressed."""
+        messages: list[bytes] = []
+        size = 0
+        for at in range(len(block)):
+            messages.append(message_content(block.message(at), self._settings.memory_limit))
+            size += len(messages[-1])
+            self._settings.require(size, 'a block of messages')
+        length = np.array([len(message) for message in messages], np.int64)
+        start = np.cumsum(length) - length
+        return Block(b''.join(messages), start, length, block.log_time, block.publish_time)
 
 
 @dataclass(frozen=True)
@@ -169,7 +211,7 @@ class _Part:
 
     def key(self) -> tuple[tuple[int, str], ...]:
         pieces = re.split(r'(\d+)', self.file.name)
-        return tuple((int(p), '') if p.isdigit() else (-1, p) for p in pieces)
+        return tuple((int(p), '') if p.isdecimal() else (-1, p) for p in pieces)
 
 
 def _storage_suffix(file: Path) -> str:
@@ -177,17 +219,17 @@ def _storage_suffix(file: Path) -> str:
     return Path(file.stem).suffix if file.suffix == _COMPRESSED else file.suffix
 
 
-def _files_of(path: Path) -> tuple[list[Path], str]:
-    """Return the files of a bag and how rosbag2 compressed them."""
-    if not path.exists():
+def _files_of(path: Path) -> BagMetadata:
+    """Return the files of a bag and what its metadata says of them."""
+    if not os.path.lexists(path):
         raise RecordingError(f'{path}: there is no such bag')
     if not path.is_dir():
         if _storage_suffix(path) not in _STORAGES:
             raise RecordingError(
                 f'{path}: not a bag; give a rosbag2 directory, or a file .mcap or .db3'
             )
-        return [path], ''
-    if (path / FILE_NAME).exists():
+        return BagMetadata((path,))
+    if os.path.lexists(path / FILE_NAME):
         metadata = read_metadata(path)
         files = list(metadata.files)
         odd = [file.name for file in files if _storage_suffix(file) not in _STORAGES]
@@ -196,7 +238,7 @@ def _files_of(path: Path) -> tuple[list[Path], str]:
                 f'{path / FILE_NAME}: names {", ".join(odd) or "no file"}; '
                 'a bag consists of .mcap or .db3 files'
             )
-        return files, metadata.compression_mode
+        return metadata
     found = [file for file in path.iterdir() if _storage_suffix(file) in _STORAGES]
     if not found:
         below = sorted({str(f.parent) for s in _STORAGES for f in path.glob(f'*/*{s}*')})
@@ -207,22 +249,4 @@ def _files_of(path: Path) -> tuple[list[Path], str]:
             f'{path}: holds both .mcap and .db3 files and no {FILE_NAME} that says which are the '
             f'bag; give one of {", ".join(sorted(file.name for file in found))}'
         )
-    return sorted(found, key=lambda file: _Part(file).key()), ''
-
-
-def _decompress(data: bytes, path: Path) -> bytes:
-    """Decompress one message."""
-    try:
-        # Not every writer puts the size of the content into the frame.
-        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
-    except zstandard.ZstdError as error:
-        raise RecordingError(f'{path}: a compressed message is damaged: {error}') from error
-
-
-def _decompressed(block: Block, path: Path) -> Block:
-    """Return a block with its messages decompressed."""
-    messages = [_decompress(block.message(at), path) for at in range(len(block))]
-    length = np.array([len(message) for message in messages], np.int64)
-    return Block(
-        b''.join(messages), np.cumsum(length) - length, length, block.log_time, block.publish_time
-    )
+    return BagMetadata(tuple(sorted(found, key=lambda file: _Part(file).key())))

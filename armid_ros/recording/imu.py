@@ -9,6 +9,7 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.writer import BagWriter
 import numpy as np
@@ -59,7 +60,9 @@ def write_accelerations(
     writer.write_many(topic, rows.view(np.dtype((np.void, layout.itemsize))), stamps)
 
 
-def read_accelerations(path: str | Path, topic: str) -> tuple[IntArray, FloatArray]:
+def read_accelerations(
+    path: str | Path, topic: str, settings: ReadSettings = DEFAULT
+) -> tuple[IntArray, FloatArray]:
     """
     Read the accelerometer readings of a topic.
 
@@ -76,7 +79,7 @@ def read_accelerations(path: str | Path, topic: str) -> tuple[IntArray, FloatArr
         There is no such bag or topic, or messages are not those of the type.
 
     """
-    with Bag(path) as bag:
+    with Bag(path, settings) as bag:
         found = {t.name: t.type_name for t in bag.topics()}
         if found.get(topic) != IMU:
             listed = ', '.join(name for name, kind in found.items() if kind == IMU)

@@ -48,6 +48,13 @@ class JointStates:
         """Return the number of messages."""
         return len(self.number)
 
+    @property
+    def nbytes(self) -> int:
+        """Memory of the arrays [bytes]."""
+        values = (self.position, self.velocity, self.effort)
+        arrays = (self.number, self.header, self.receive, *(v for v in values if v is not None))
+        return sum(array.nbytes for array in arrays)
+
 
 class JointStateDecoder:
     """
@@ -103,7 +110,10 @@ class JointStateDecoder:
                 return
             plan = self._plan_for(raw[:1])
             if plan is None:
-                raw, numbers, receive = raw[1:], numbers[1:], receive[1:]
+                # What equals a message that cannot be read cannot be read either.
+                other = raw != raw[0]
+                self.malformed += len(raw) - 1 - int(other.sum())
+                raw, numbers, receive = raw[other], numbers[other], receive[other]
                 continue
             rows = raw.view(plan.dtype)
             fits = plan.layout.fits(rows)

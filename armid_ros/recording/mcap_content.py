@@ -8,17 +8,16 @@ from collections.abc import Iterator
 import mmap
 import struct
 
-from armid_ros.recording.mcap_records import MESSAGE, RECORD_HEADER
+from armid_ros.recording.mcap_records import MESSAGE, MESSAGE_HEADER, RECORD_HEADER
 from armid_ros.recording.source import Block, IntArray, records_at
 from mcap.opcode import Opcode
 import numpy as np
+import numpy.typing as npt
 
 # Chunks are put together to blocks of about this size, for small chunks would leave array code
 # little to do at a time, and large blocks fall out of the processor's cache.
 _BLOCK_BYTES = 1 << 20
 BLOCK_MESSAGES = 4096
-
-_MESSAGE_HEADER = MESSAGE.itemsize - RECORD_HEADER
 
 
 class Gathered:
@@ -64,49 +63,97 @@ def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> Block:
     return Block(
         data,
         offsets + MESSAGE.itemsize,
-        rows['length'].astype(np.int64) - _MESSAGE_HEADER,
+        rows['length'].astype(np.int64) - MESSAGE_HEADER,
         rows['log_time'].astype(np.int64),
         rows['publish_time'].astype(np.int64),
     )
 
 
-def are_messages(
-    data: bytes | mmap.mmap, offsets: IntArray, channels: list[int], begin: int, end: int
-) -> bool:
-    """Tell whether the index of a chunk is to be trusted."""
-    if not len(offsets):
-        return True
-    if offsets[0] < begin or offsets[-1] + MESSAGE.itemsize > end:
-        return False
+def tiled(
+    data: bytes | mmap.mmap, offsets: IntArray, begin: int, end: int
+) -> npt.NDArray[np.void] | None:
+    """
+    Return the heads of messages, if they and definitions fill a chunk without a gap.
+
+    That shows the index of a chunk to be complete and right: the first record begins where the
+    content does, and every other one where the one before it ends.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        What holds the content.
+    offsets : ndarray, shape (N,)
+        Where messages begin, by the index; in ascending order.
+    begin, end : int
+        Where the content of the chunk is.
+
+    Returns
+    -------
+    ndarray of `MESSAGE`, shape (N,), or None
+        None if the index is not to be trusted.
+
+    """
+    if not len(offsets) or offsets[0] < begin or offsets[-1] + MESSAGE.itemsize > end:
+        return None
     rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
-    lengths = rows['length'].astype(np.int64)
-    ends = offsets + RECORD_HEADER + lengths
-    if len(channels) == 1:
-        known = rows['channel'] == channels[0]
-    else:
-        known = np.isin(rows['channel'], channels)
-    return bool(
-        (rows['opcode'] == Opcode.MESSAGE).all()
-        and known.all()
-        and (lengths >= _MESSAGE_HEADER).all()
-        and (ends <= end).all()
-    )
+    lengths = rows['length'].astype(np.uint64)
+    if (rows['opcode'] != Opcode.MESSAGE).any():
+        return None
+    if lengths.min() < MESSAGE_HEADER or lengths.max() > end - begin:
+        return None
+    ends = offsets + RECORD_HEADER + lengths.astype(np.int64)
+    gaps = np.flatnonzero(ends[:-1] != offsets[1:])
+    around = [(begin, int(offsets[0])), (int(ends[-1]), end)]
+    between = zip(ends[gaps].tolist(), offsets[gaps + 1].tolist(), strict=True)
+    for start, stop in (*around, *between):
+        if start > stop or (start < stop and not _are_definitions(data, start, stop)):
+            return None
+    return rows
 
 
-def walk(content: bytes | mmap.mmap) -> tuple[IntArray, list[tuple[int, int, int]]]:
-    """Return where messages begin in a chunk, and its schemas and channels."""
+def walk(
+    content: bytes | mmap.mmap, begin: int = 0, end: int | None = None
+) -> tuple[IntArray, list[tuple[int, int, int]], int]:
+    """
+    Find the records in the content of a chunk, one by one.
+
+    Parameters
+    ----------
+    content : bytes or mmap
+        What holds the content.
+    begin, end : int
+        Where the content is; all of it by default.
+
+    Returns
+    -------
+    offsets : ndarray, shape (N,)
+        Where messages begin.
+    definitions : list of (int, int, int)
+        Opcode, beginning and end of schemas and channels.
+    position : int
+        Where the last record ends; before ``end`` if what follows is none.
+
+    """
     offsets: list[int] = []
     definitions: list[tuple[int, int, int]] = []
     head = struct.Struct('<BQ')
-    position, size = 0, len(content)
+    position, size = begin, len(content) if end is None else end
     while position + RECORD_HEADER <= size:
         opcode, length = head.unpack_from(content, position)
-        end = position + RECORD_HEADER + length
-        if end > size:
+        stop = position + RECORD_HEADER + length
+        if stop > size:
             break
-        if opcode == Opcode.MESSAGE and length >= _MESSAGE_HEADER:
+        if opcode == Opcode.MESSAGE and length >= MESSAGE_HEADER:
             offsets.append(position)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            definitions.append((opcode, position + RECORD_HEADER, end))
-        position = end
-    return np.array(offsets, np.int64), definitions
+            definitions.append((opcode, position + RECORD_HEADER, stop))
+        else:  # a chunk has nothing else
+            break
+        position = stop
+    return np.array(offsets, np.int64), definitions, position
+
+
+def _are_definitions(data: bytes | mmap.mmap, begin: int, end: int) -> bool:
+    """Tell whether schemas and channels fill a stretch."""
+    offsets, _, position = walk(data, begin, end)
+    return position == end and not len(offsets)

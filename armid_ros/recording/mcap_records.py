@@ -5,7 +5,8 @@ The records of an MCAP file, found without its index.
 
 An MCAP file is a sequence of records, each an opcode, a length and a content; messages are as a
 rule inside chunks, and after each chunk come the offsets of its messages. Walking from the start
-finds everything, whether or not the writer lived to write the summary at the end.
+finds everything, whether or not the writer lived to write the summary at the end. Nothing that the
+file says of itself is believed where it can be compared.
 Specification: https://mcap.dev/spec
 
 """
@@ -17,15 +18,15 @@ from io import BytesIO
 import mmap
 from pathlib import Path
 import struct
+import zlib
 
 from armid_ros.errors import RecordingError
-import lz4.frame
+from armid_ros.recording.damage import Damage
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import EndOfFile
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema, Statistics
 import numpy as np
-import zstandard
 
 MAGIC = b'\x89MCAP0\r\n'
 RECORD_HEADER = 9
@@ -38,7 +39,14 @@ MESSAGE = np.dtype(
         'itemsize': 31,
     }
 )
+#: Bytes of a message record between its head and its data.
+MESSAGE_HEADER = MESSAGE.itemsize - RECORD_HEADER
 _CHUNK_HEADER = struct.Struct('<QQQII')
+_FOOTER = struct.Struct('<QQI')
+_INDEX_ENTRY = 16
+# Opcodes from here to _PRIVATE are none; those beyond are for whoever wants one.
+_UNKNOWN, _PRIVATE = 0x10, 0x80
+_DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
 
 
 @dataclass(frozen=True)
@@ -94,9 +102,9 @@ class FileMap:
     statistics : Statistics, optional
         The summary's.
     finished : bool
-        Whether the file has its footer.
-    damage : str
-        What is wrong with it; empty for a whole file.
+        Whether the file has its footer, and a summary before it that can be believed.
+    damage : Damage
+        What is wrong with it.
 
     """
 
@@ -107,12 +115,27 @@ class FileMap:
     channels: dict[int, Channel] = field(default_factory=dict)
     statistics: Statistics | None = None
     finished: bool = False
-    damage: str = ''
+    damage: Damage = field(default_factory=Damage)
+
+    def span(self, chunk: Chunk) -> str:
+        """Return when the messages of a chunk were logged, in words."""
+        begin = min((c.start_time for c in self.chunks if c.end_time), default=0)
+        start, end = (1e-9 * (time - begin) for time in (chunk.start_time, chunk.end_time))
+        return f'from {start:.3f} to {end:.3f} s after the beginning'
 
 
-def map_file(data: bytes | mmap.mmap, path: Path) -> FileMap:
+def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> FileMap:
     """
     Walk over the records of a file.
+
+    Parameters
+    ----------
+    data : mmap or bytes
+        The file.
+    path : Path
+        Its name, for the message.
+    check : bool
+        Whether to compare the checksums of what is outside chunks.
 
     Raises
     ------
@@ -123,33 +146,44 @@ def map_file(data: bytes | mmap.mmap, path: Path) -> FileMap:
     if data[: len(MAGIC)] != MAGIC:
         raise RecordingError(f'{path}: not an MCAP file, or its beginning is damaged')
     found = FileMap(data)
+    definitions: list[tuple[int, int, int]] = []
+    data_end = footer = None
     size, position = len(data), len(MAGIC)
     while position + RECORD_HEADER <= size:
         opcode, length = struct.unpack_from('<BQ', data, position)
         begin, end = position + RECORD_HEADER, position + RECORD_HEADER + length
-        if end > size or not opcode:
+        if not opcode or _UNKNOWN <= opcode < _PRIVATE:
+            break
+        if end > size:
             if opcode == Opcode.CHUNK:
                 _add_chunk(found, begin, size, whole=False)
             break
         if opcode == Opcode.CHUNK:
             _add_chunk(found, begin, end)
-        elif opcode == Opcode.MESSAGE_INDEX and found.chunks:
-            channel, count = struct.unpack_from('<HI', data, begin)
-            if length == 6 + count:
-                found.chunks[-1].indexes[channel] = (begin + 6, count // 16)
+        elif opcode == Opcode.MESSAGE_INDEX:
+            _add_index(found, begin, end)
         elif opcode == Opcode.MESSAGE:
-            found.loose.append((begin, end))
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS):
-            add_definition(found, opcode, data[begin:end])
+            _add_loose(found, begin, end)
+        elif opcode in _DEFINITIONS:
+            definitions.append((opcode, begin, end))
+        elif opcode == Opcode.DATA_END:
+            data_end = position
         position = end
         if opcode == Opcode.FOOTER:
             found.finished = data[end : end + len(MAGIC)] == MAGIC
+            footer = begin if length == _FOOTER.size else None
             break
     if not found.finished:
-        found.damage = (
+        found.damage.add(
             f'the file ends without its index, as after a crash: readable up to byte {position} '
             f'of {size}'
         )
+    if check and footer is not None:
+        definitions = _believed(found, definitions, footer)
+    for opcode, begin, end in definitions:
+        add_definition(found, opcode, data[begin:end])
+    if check and data_end is not None and found.loose:
+        _check_data(found, data_end)
     return found
 
 
@@ -159,60 +193,19 @@ def add_definition(found: FileMap, opcode: int, content: bytes) -> None:
     try:
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
-            found.schemas[schema.id] = schema
+            found.schemas.setdefault(schema.id, schema)
+            same = found.schemas[schema.id] == schema
         elif opcode == Opcode.CHANNEL:
             channel = Channel.read(stream)
-            found.channels[channel.id] = channel
+            found.channels.setdefault(channel.id, channel)
+            same = found.channels[channel.id] == channel
         else:
-            found.statistics = Statistics.read(stream)
-    except (EndOfFile, struct.error, UnicodeDecodeError) as error:
-        found.damage = f'a record of the file is damaged: {error}'
-
-
-def chunk_content(found: FileMap, chunk: Chunk) -> bytes:
-    """
-    Return the decompressed content of a chunk; of a chunk cut off, as much as there is.
-
-    Raises
-    ------
-    RecordingError
-        The content is damaged.
-
-    """
-    stored = memoryview(found.data)[chunk.begin : chunk.end]
-    try:
-        if not chunk.whole:
-            return _partial_content(stored, chunk.compression)
-        if chunk.compression == 'zstd':
-            return zstandard.ZstdDecompressor().decompress(stored, max_output_size=chunk.size)
-        if chunk.compression == 'lz4':
-            return bytes(lz4.frame.decompress(stored))
-    except (zstandard.ZstdError, RuntimeError, MemoryError, OverflowError) as error:
-        raise RecordingError(
-            f'a {chunk.compression} chunk at byte {chunk.begin} is damaged: {error}'
-        ) from error
-    if chunk.compression:
-        raise RecordingError(
-            f"a chunk is compressed with '{chunk.compression}'; zstd and lz4 can be read"
-        )
-    return bytes(stored)
-
-
-def _partial_content(stored: memoryview, compression: str) -> bytes:
-    """Decompress as far as possible; compressors write blocks that stand on their own."""
-    if compression == 'zstd':
-        decompressor = zstandard.ZstdDecompressor().decompressobj()
-    elif compression == 'lz4':
-        decompressor = lz4.frame.LZ4FrameDecompressor()
-    else:
-        return bytes(stored)
-    content = bytearray()
-    try:
-        for at in range(0, len(stored), 1024):
-            content += decompressor.decompress(bytes(stored[at : at + 1024]))
-    except (zstandard.ZstdError, RuntimeError):
-        pass
-    return bytes(content)
+            found.statistics, same = Statistics.read(stream), True
+    except (McapError, ArithmeticError, MemoryError, ValueError, struct.error) as error:
+        found.damage.add(f'a record of the file is damaged: {error}')
+        return
+    if not same:
+        found.damage.add('the file describes one of its channels in two ways; the first is used')
 
 
 def _add_chunk(found: FileMap, begin: int, end: int, *, whole: bool = True) -> None:
@@ -223,13 +216,54 @@ def _add_chunk(found: FileMap, begin: int, end: int, *, whole: bool = True) -> N
     start_time, end_time, size, crc, name = _CHUNK_HEADER.unpack_from(data, begin)
     position = begin + _CHUNK_HEADER.size
     if name > 64 or position + name + 8 > end:
+        found.damage.add(f'the chunk at byte {begin} is damaged')
         return
     compression = data[position : position + name].decode('ascii', 'replace')
     content = position + name + 8
     (stored,) = struct.unpack_from('<Q', data, content - 8)
+    chunk = Chunk(start_time, end_time, compression, size, crc, content, end, whole=whole)
     if whole and content + stored != end:
-        found.damage = f'the chunk at byte {begin} is damaged'
+        found.damage.add(f'the chunk at byte {begin} is damaged: messages {found.span(chunk)}')
         return
-    found.chunks.append(
-        Chunk(start_time, end_time, compression, size, crc, content, end, whole=whole)
-    )
+    found.chunks.append(chunk)
+
+
+def _add_index(found: FileMap, begin: int, end: int) -> None:
+    """Note the index of a channel's messages in the last chunk."""
+    if end - begin < 6 or not found.chunks:
+        return
+    channel, count = struct.unpack_from('<HI', found.data, begin)
+    if end - begin == 6 + count:
+        found.chunks[-1].indexes[channel] = (begin + 6, count // _INDEX_ENTRY)
+
+
+def _add_loose(found: FileMap, begin: int, end: int) -> None:
+    """Note a message outside chunks."""
+    if end - begin < MESSAGE_HEADER:
+        found.damage.add(f'the message at byte {begin} is too short for one')
+        return
+    found.loose.append((begin, end))
+
+
+def _believed(
+    found: FileMap, definitions: list[tuple[int, int, int]], footer: int
+) -> list[tuple[int, int, int]]:
+    """Return the definitions without those of a summary whose checksum is wrong."""
+    start, _, crc = _FOOTER.unpack_from(found.data, footer)
+    end = footer + _FOOTER.size - 4
+    if not crc or not start:
+        return definitions
+    if start <= end and zlib.crc32(memoryview(found.data)[start:end]) == crc:
+        return definitions
+    found.finished = False
+    found.damage.add('the checksum of the index at the end is wrong; it is not used')
+    return [entry for entry in definitions if entry[1] < start]
+
+
+def _check_data(found: FileMap, data_end: int) -> None:
+    """Compare the checksum of all messages outside chunks, where the writer made one."""
+    if data_end + RECORD_HEADER + 4 > len(found.data):
+        return
+    (crc,) = struct.unpack_from('<I', found.data, data_end + RECORD_HEADER)
+    if crc and zlib.crc32(memoryview(found.data)[:data_end]) != crc:
+        found.damage.add('the checksum of the file is wrong: any of its messages may be')

@@ -14,7 +14,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+import os
 from pathlib import Path
 import struct
 from typing import Any, Literal, NamedTuple
@@ -106,6 +108,20 @@ class McapWriter:
     def finished(self) -> bool:
         """Whether the file has its summary and is closed."""
         return self._stream.closed
+
+    @property
+    def size(self) -> int:
+        """Number of bytes in the file for good."""
+        return self._done.position
+
+    @property
+    def in_place(self) -> bool:
+        """Whether the file is still where it was made: neither deleted nor moved."""
+        try:
+            there, here = os.stat(self._path), os.fstat(self._stream.fileno())
+        except (OSError, ValueError):
+            return False
+        return os.path.samestat(there, here)
 
     @property
     def chunk_count(self) -> int:
@@ -238,6 +254,10 @@ class McapWriter:
         self._append(tail)
         self._stream.close()
 
+    def give_up(self) -> None:
+        """Close the file as it is; every chunk that was written can be read."""
+        self._stream.close()
+
     def _statistics(self) -> Statistics:
         counts = self.counts
         start, end = self.time_range
@@ -264,6 +284,9 @@ class McapWriter:
             while len(rest):
                 rest = rest[self._stream.write(rest) :]
         except OSError as error:
+            # A disk that is full takes the beginning; what is in the file ends with a whole step.
+            with suppress(OSError):
+                self._stream.truncate(position)
             raise RecordingError(f'{self._path}: cannot be written: {error.strerror}') from error
         return position + len(data)
 

@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import is_file, load_yaml, read_text, reading, write_file
 from armid_ros.recording.qos import dump_qos
 from armid_ros.recording.source import Topic
 import yaml
@@ -31,11 +32,14 @@ class BagMetadata:
         The files of the bag, in order.
     compression_mode : {'', 'file', 'message', 'storage'}
         What was compressed by rosbag2 itself.
+    counts : mapping of str to int
+        Number of messages of each topic, as its writer counted them.
 
     """
 
     files: tuple[Path, ...]
     compression_mode: str = ''
+    counts: Mapping[str, int] = field(default_factory=dict)
 
 
 def bag_information(
@@ -102,10 +106,8 @@ def dump(information: Mapping[str, Any]) -> str:
 
 
 def write_metadata(bag: Path, information: Mapping[str, Any]) -> None:
-    """Write metadata.yaml beside its place and move it there, so that it is whole or absent."""
-    beside = bag / (FILE_NAME + '.part')
-    beside.write_text(dump({'rosbag2_bagfile_information': information}), encoding='utf-8')
-    beside.replace(bag / FILE_NAME)
+    """Write metadata.yaml so that it is whole or absent."""
+    write_file(bag / FILE_NAME, dump({'rosbag2_bagfile_information': information}))
 
 
 def read_metadata(bag: Path) -> BagMetadata:
@@ -119,24 +121,42 @@ def read_metadata(bag: Path) -> BagMetadata:
 
     """
     path = bag / FILE_NAME
+    text = read_text(path, RecordingError)
     try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-        information = content['rosbag2_bagfile_information']
-        names = [str(name) for name in information['relative_file_paths']]
-        mode = str(information.get('compression_mode') or '').lower()
-    except OSError as error:
-        raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error
-    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, AttributeError) as error:
+        with reading('', RecordingError):
+            information = load_yaml(text)['rosbag2_bagfile_information']
+            names = _file_names(information['relative_file_paths'])
+            mode = str(information.get('compression_mode') or '').lower()
+            counts = _counts(information.get('topics_with_message_count'))
+    except RecordingError as error:
         raise RecordingError(
-            f'{path}: no valid description of a bag ({error}); move it away, and the files beside '
-            'it will be read without it'
+            f'{path}: no valid description of a bag ({str(error).lstrip(": ")}); move it away, '
+            'and the files beside it will be read without it'
         ) from error
     # Up to version 3 the paths began with the name of the directory.
     files = tuple(bag / Path(name).name for name in names)
-    missing = [file.name for file in files if not file.exists()]
+    missing = [file.name for file in files if not is_file(file)]
     if missing:
         present = ', '.join(sorted(entry.name for entry in bag.iterdir()))
         raise RecordingError(
             f'{path}: names {", ".join(missing)}, which the bag does not have; it has {present}'
         )
-    return BagMetadata(files, '' if mode == 'none' else mode)
+    return BagMetadata(files, '' if mode == 'none' else mode, counts)
+
+
+def _file_names(names: Any) -> list[str]:
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ValueError('relative_file_paths is no list of names')
+    if len(set(names)) != len(names):
+        raise ValueError('relative_file_paths names a file twice')
+    return names
+
+
+def _counts(entries: Any) -> dict[str, int]:
+    """Return the number of messages by topic, of those entries that say it."""
+    counts: dict[str, int] = {}
+    for entry in entries if isinstance(entries, list) else ():
+        name, count = entry['topic_metadata']['name'], entry['message_count']
+        if isinstance(name, str) and isinstance(count, int):
+            counts[name] = counts.get(name, 0) + count
+    return counts

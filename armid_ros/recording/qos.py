@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from armid_ros.files import load_yaml
 import yaml
 
 INFINITE_NS = 9223372036 * 10**9 + 854775807
@@ -96,11 +97,11 @@ def dump_qos_text(profiles: Iterable[QosProfile]) -> str:
 def parse_qos(profiles: str | Iterable[Mapping[str, Any]] | None) -> tuple[QosProfile, ...]:
     """Return profiles from either notation; none where it cannot be understood."""
     try:
-        listed = yaml.safe_load(profiles) if isinstance(profiles, str) else profiles
+        listed = load_yaml(profiles) if isinstance(profiles, str) else profiles
         if not isinstance(listed, (list, tuple)):
             return ()
         return tuple(_parse_profile(profile) for profile in listed if isinstance(profile, Mapping))
-    except (yaml.YAMLError, ValueError, TypeError):
+    except (yaml.YAMLError, ArithmeticError, ValueError, TypeError):
         # What a publisher offered is good to know, but no reason not to read what it sent.
         return ()
 

@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import reading
 from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state_decoder import JointStateDecoder, JointStates
@@ -23,6 +24,7 @@ from armid_ros.recording.series import (
     ordered,
     Series,
 )
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import IntArray, Topic
 import numpy as np
 
@@ -33,7 +35,11 @@ _PEEK_MESSAGES = 1000
 
 
 def read_recording(
-    path: str | Path, *, joints: Sequence[str], topic: str | None = None
+    path: str | Path,
+    *,
+    joints: Sequence[str],
+    topic: str | None = None,
+    settings: ReadSettings = DEFAULT,
 ) -> Recording:
     """
     Read the measurements of some joints from a bag.
@@ -48,6 +54,8 @@ def read_recording(
     topic : str, optional
         Topic of sensor_msgs/JointState; by default the only one, or the only one that names all
         the joints, or of several such the only one called 'joint_states'.
+    settings : ReadSettings
+        Whether checksums are compared, and how much memory to take.
 
     Returns
     -------
@@ -59,20 +67,40 @@ def read_recording(
     Raises
     ------
     RecordingError
-        There is no such bag or topic, the topic does not name a joint, or nothing usable is left.
+        There is no such bag or topic, the topic does not name a joint, nothing usable is left, or
+        it takes more memory than the settings allow.
 
     """
     joints = tuple(joints)
     if not joints or len(set(joints)) != len(joints):
         raise RecordingError(f'{path}: joints wanted must differ and not be none, got {joints}')
-    with Bag(path) as bag:
+    with Bag(path, settings) as bag:
         chosen = _choose_topic(bag, joints, topic)
         decoder = JointStateDecoder(joints)
-        pieces = [states for block in bag.blocks(chosen.name) for states in decoder.decode(block)]
+        where = f'{path}: {chosen.name}'
+        with reading(path, RecordingError):
+            pieces = list(_within(settings, where, _decoded(bag, chosen, decoder)))
         damage = bag.damage
-    where = f'{path}: {chosen.name}'
     _check_joints(where, decoder, joints)
-    return _assemble(str(path), chosen.name, joints, pieces, decoder, damage)
+    with reading(where, RecordingError):
+        return _assemble(str(path), chosen.name, joints, pieces, decoder, damage)
+
+
+def _decoded(bag: Bag, topic: Topic, decoder: JointStateDecoder) -> Iterator[JointStates]:
+    """Yield the messages of a topic as arrays."""
+    for block in bag.blocks(topic.name):
+        yield from decoder.decode(block)
+
+
+def _within(
+    settings: ReadSettings, where: str, pieces: Iterable[JointStates]
+) -> Iterator[JointStates]:
+    """Yield arrays as long as they take no more memory than allowed."""
+    size = 0
+    for piece in pieces:
+        size += piece.nbytes
+        settings.require(size, f'{where}: the recording')
+        yield piece
 
 
 def _assemble(

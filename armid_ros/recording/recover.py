@@ -5,10 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import os
 from pathlib import Path
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import reading
 from armid_ros.recording.mcap_source import McapSource
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Topic
 from armid_ros.recording.writer import BagWriter
 
@@ -53,7 +56,7 @@ class RecoveryReport:
         )
 
 
-def recover(file: str | Path, out: str | Path) -> RecoveryReport:
+def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT) -> RecoveryReport:
     """
     Copy what can be read of an MCAP file into a complete bag, with index and metadata.yaml.
 
@@ -66,6 +69,8 @@ def recover(file: str | Path, out: str | Path) -> RecoveryReport:
         The file, which is not changed; a directory with a single .mcap file stands for that.
     out : str or Path
         The bag directory to be made; it must not exist.
+    settings : ReadSettings
+        Whether checksums are compared, and how much memory to take.
 
     Returns
     -------
@@ -79,7 +84,13 @@ def recover(file: str | Path, out: str | Path) -> RecoveryReport:
 
     """
     path = _only_file(Path(file))
-    source = McapSource(path, check=True)
+    with reading(path, RecordingError):
+        return _copied(path, out, settings)
+
+
+def _copied(path: Path, out: str | Path, settings: ReadSettings) -> RecoveryReport:
+    """Copy what can be read of a file."""
+    source = McapSource(path, settings)
     try:
         if next(source.messages(), None) is None:
             raise RecordingError(
@@ -116,7 +127,7 @@ def _report(path: Path, writer: BagWriter, damage: str) -> RecoveryReport:
 def _only_file(path: Path) -> Path:
     """Return the file meant."""
     if not path.is_dir():
-        if not path.exists():
+        if not os.path.lexists(path):
             raise RecordingError(f'{path}: there is no such file')
         return path
     files = sorted(path.glob('*.mcap'))

@@ -1,29 +1,52 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of an SQLite file, as rosbag2 of any distribution writes it."""
+"""
+Messages of an SQLite file, as rosbag2 of any distribution writes it.
+
+SQLite has no checksums: what it can tell is that its pages fit together, and that a column holds
+what it should. Bytes changed within a message cannot be noticed.
+
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 import sqlite3
 from typing import Any
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import is_file, open_regular
+from armid_ros.recording.damage import Damage
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Block, RawMessage, Topic
 import numpy as np
 
 _BLOCK_MESSAGES = 4096
+_BLOCK_BYTES = 8 << 20
+_LONGEST = 2**31 - 1
+_JOURNALS = ('-wal', '-journal')
+# A time and bytes; whatever else a row holds was not written by a recorder.
+_WHOLE = "typeof(timestamp) = 'integer' AND timestamp >= 0 AND typeof(data) = 'blob'"
+_ERRORS = (sqlite3.Error, UnicodeDecodeError, OverflowError, MemoryError)
 
 
 class SqliteSource:
     """One SQLite file."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """
         Open a file, for reading only.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        settings : ReadSettings
+            What to check, and how much memory to take.
 
         Raises
         ------
@@ -32,35 +55,31 @@ class SqliteSource:
 
         """
         self._path = path
-        self._damage = ''
+        self._damage = Damage()
+        self._checks = settings.check_crc
+        open_regular(path, RecordingError).close()
+        # A file left behind by a crash has a journal beside it that SQLite must play back;
+        # 'immutable' would ignore it, and works where the folder cannot be written to.
+        journal = any(is_file(path.with_name(path.name + end)) for end in _JOURNALS)
+        mode = 'mode=ro' if journal else 'immutable=1'
         try:
-            path.open('rb').close()
-            # A file left behind by a crash has a journal beside it that SQLite must play back;
-            # 'immutable' would ignore it, and works where the folder cannot be written to.
-            journal = any(path.with_name(path.name + end).exists() for end in ('-wal', '-journal'))
-            mode = 'mode=ro' if journal else 'immutable=1'
             self._database = sqlite3.connect(
                 f'{path.resolve().as_uri()}?{mode}', uri=True, check_same_thread=False
             )
-            columns = {
-                table: {row[1] for row in self._database.execute(f'PRAGMA table_info({table})')}
-                for table in ('topics', 'messages', 'message_definitions')
-            }
-        except OSError as error:
-            raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error
-        except (sqlite3.Error, UnicodeDecodeError) as error:
-            raise RecordingError(f'{path}: not an SQLite file of rosbag2: {error}') from error
-        if not columns['topics'] or not columns['messages']:
+        except sqlite3.Error as error:
+            raise RecordingError(f'{path}: cannot be opened by SQLite: {error}') from error
+        try:
+            self._columns = self._opened(settings)
+        except (*_ERRORS, RecordingError) as error:
             self._database.close()
-            raise RecordingError(
-                f'{path}: an SQLite file, but not of rosbag2: it has no topics and messages'
-            )
-        self._columns = columns
+            if isinstance(error, RecordingError):
+                raise
+            raise RecordingError(f'{path}: not an SQLite file of rosbag2: {error}') from error
 
     @property
     def damage(self) -> str:
         """What is wrong with the file, as far as it was read; empty for a whole one."""
-        return self._damage
+        return str(self._damage)
 
     def close(self) -> None:
         """Let go of the file."""
@@ -73,24 +92,20 @@ class SqliteSource:
             for name in ('offered_qos_profiles', 'type_description_hash')
         ]
         try:
-            definitions = {}
-            if self._columns['message_definitions']:
-                definitions = {
-                    name: (encoding, text)
-                    for name, encoding, text in self._database.execute(
-                        'SELECT topic_type, encoding, encoded_message_definition '
-                        'FROM message_definitions'
-                    )
-                }
             rows = self._database.execute(
                 f'SELECT name, type, serialization_format, {", ".join(optional)}, '
-                '(SELECT count(*) FROM messages WHERE topic_id = topics.id) '
+                f'(SELECT count(*) FROM messages WHERE topic_id = topics.id AND {_WHOLE}) '
                 'FROM topics ORDER BY id'
             ).fetchall()
-        except (sqlite3.Error, UnicodeDecodeError) as error:
+            definitions = self._definitions()
+        except _ERRORS as error:
             raise RecordingError(f'{self._path}: the database is damaged: {error}') from error
         topics = []
-        for name, type_name, encoding, qos, type_hash, count in rows:
+        for *texts, count in rows:
+            name, type_name, encoding, qos, type_hash = map(_text, texts)
+            if not name:
+                self._damage.add('a topic of the database has no name')
+                continue
             language, text = definitions.get(type_name, ('', ''))
             described = MessageType(type_name, text, language, type_hash)
             topics.append(Topic(name, described, parse_qos(qos), count, encoding))
@@ -100,7 +115,7 @@ class SqliteSource:
         """Yield the messages of a topic, in the order they are stored."""
         query = (
             'SELECT timestamp, data FROM messages WHERE topic_id IN '
-            '(SELECT id FROM topics WHERE name = ?) ORDER BY id'
+            f'(SELECT id FROM topics WHERE CAST(name AS TEXT) = ?) AND {_WHOLE} ORDER BY id'
         )
         for rows in self._fetch(query, (topic,)):
             times = np.array([time for time, _ in rows], np.int64)
@@ -111,18 +126,92 @@ class SqliteSource:
     def messages(self) -> Iterator[RawMessage]:
         """Yield all messages in the order they were logged."""
         query = (
-            'SELECT name, timestamp, data FROM messages JOIN topics ON topic_id = topics.id '
-            'ORDER BY timestamp, messages.id'
+            'SELECT CAST(name AS TEXT), timestamp, data FROM messages JOIN topics '
+            f'ON topic_id = topics.id WHERE {_WHOLE} ORDER BY timestamp, messages.id'
         )
         for rows in self._fetch(query, ()):
             for name, time, data in rows:
-                yield RawMessage(name, time, time, bytes(data))
+                yield RawMessage(_text(name), time, time, data)
+
+    def _opened(self, settings: ReadSettings) -> dict[str, set[str]]:
+        """Return the columns of the tables, once the file is known to be one of rosbag2."""
+        database = self._database
+        database.text_factory = _lenient
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(settings.memory_limit, _LONGEST))
+        with suppress(sqlite3.Error):  # not known to old versions
+            database.execute('PRAGMA trusted_schema = OFF')
+        # A view could compute anything, for ever.
+        tables = {
+            name
+            for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
+        }
+        columns = {
+            table: {row[1] for row in database.execute(f'PRAGMA table_info({table})')}
+            if table in tables
+            else set()
+            for table in ('topics', 'messages', 'message_definitions')
+        }
+        needed = (
+            ('topics', {'id', 'name', 'type', 'serialization_format'}),
+            ('messages', {'id', 'topic_id', 'timestamp', 'data'}),
+        )
+        for table, names in needed:
+            if not names <= columns[table]:
+                raise RecordingError(
+                    f'{self._path}: an SQLite file, but not of rosbag2: it has no table {table} '
+                    f'with {", ".join(sorted(names))}'
+                )
+        if self._checks:
+            self._check()
+        return columns
+
+    def _check(self) -> None:
+        """Note what is wrong with the pages and the rows of the file."""
+        (verdict,) = self._database.execute('PRAGMA quick_check(1)').fetchone()
+        if verdict != 'ok':
+            self._damage.add(f'the database is damaged: {" ".join(_text(verdict).split())}')
+            return
+        (odd,) = self._database.execute(
+            f'SELECT count(*) FROM messages WHERE NOT ({_WHOLE}) OR timestamp IS NULL'
+        ).fetchone()
+        if odd:
+            self._damage.add(f'{odd} rows of messages have no time or no bytes; they are left out')
+        (lost,) = self._database.execute(
+            'SELECT count(*) FROM messages WHERE topic_id IS NULL OR topic_id NOT IN '
+            '(SELECT id FROM topics WHERE id IS NOT NULL)'
+        ).fetchone()
+        if lost:
+            self._damage.add(f'{lost} rows of messages have no topic; they are left out')
+
+    def _definitions(self) -> dict[str, tuple[str, str]]:
+        """Return language and text of the definition of each type."""
+        wanted = ('topic_type', 'encoding', 'encoded_message_definition')
+        if not set(wanted) <= self._columns['message_definitions']:
+            return {}
+        rows = self._database.execute(f'SELECT {", ".join(wanted)} FROM message_definitions')
+        return {_text(name): (_text(language), _text(text)) for name, language, text in rows}
 
     def _fetch(self, query: str, parameters: tuple[str, ...]) -> Iterator[list[tuple[Any, ...]]]:
         """Yield rows by the thousand, up to where the database is damaged."""
+        rows: list[tuple[Any, ...]] = []
+        size = 0
         try:
-            cursor = self._database.execute(query, parameters)
-            while rows := cursor.fetchmany(_BLOCK_MESSAGES):
-                yield rows
-        except (sqlite3.Error, UnicodeDecodeError) as error:
-            self._damage = f'the database is damaged: {error}'
+            for row in self._database.execute(query, parameters):
+                rows.append(row)
+                size += len(row[-1])
+                if len(rows) == _BLOCK_MESSAGES or size > _BLOCK_BYTES:
+                    yield rows
+                    rows, size = [], 0
+        except _ERRORS as error:
+            self._damage.add(f'the database is damaged: {error}')
+        if rows:
+            yield rows
+
+
+def _lenient(text: bytes) -> str:
+    return text.decode('utf-8', 'replace')
+
+
+def _text(value: object) -> str:
+    """Return what should be a text; empty where the column has something else."""
+    return value if isinstance(value, str) else ''

@@ -10,6 +10,7 @@ import struct
 from armid_ros.errors import RecordingError
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.message_types import STRING
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 
 _ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
 
@@ -31,7 +32,7 @@ def parse_string(cdr: bytes) -> str | None:
     return cdr[8 : 8 + length].rstrip(b'\0').decode('utf-8', 'replace')
 
 
-def read_robot_description(path: str | Path) -> str | None:
+def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -> str | None:
     """
     Return the robot description a bag holds.
 
@@ -39,6 +40,8 @@ def read_robot_description(path: str | Path) -> str | None:
     ----------
     path : str or Path
         A rosbag2 directory, or a bare file.
+    settings : ReadSettings
+        Whether checksums are compared, and how much memory to take.
 
     Returns
     -------
@@ -52,7 +55,7 @@ def read_robot_description(path: str | Path) -> str | None:
         The bag cannot be read, or holds several descriptions on topics of several robots.
 
     """
-    with Bag(path) as bag:
+    with Bag(path, settings) as bag:
         texts: dict[str, str] = {}
         for topic in bag.topics():
             if topic.type_name != STRING or not topic.name.endswith('robot_description'):

@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import reading
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state_encoder import Measured
 from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for, STRING
 from armid_ros.recording.qos import LATCHED
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Topic
 from armid_ros.recording.string_message import string_cdr
 from armid_ros.recording.writer import BagWriter
@@ -129,7 +131,11 @@ def write_joint_trajectory(
 
 
 def read_joint_trajectory(
-    path: str | Path, joints: Sequence[str], *, topic: str | None = None
+    path: str | Path,
+    joints: Sequence[str],
+    *,
+    topic: str | None = None,
+    settings: ReadSettings = DEFAULT,
 ) -> Motion:
     """
     Read the last JointTrajectory of a bag.
@@ -142,6 +148,8 @@ def read_joint_trajectory(
         The joints wanted, in this order.
     topic : str, optional
         Topic of the message; by default the only one of its type.
+    settings : ReadSettings
+        Whether checksums are compared, and how much memory to take.
 
     Returns
     -------
@@ -155,17 +163,21 @@ def read_joint_trajectory(
         There is no such bag or topic, or the trajectory does not name a joint or is not valid.
 
     """
-    read = read_waypoints(path, joints, topic=topic)
+    read = read_waypoints(path, joints, topic=topic, settings=settings)
     dq = np.gradient(read.q, read.t, axis=0) if read.dq is None else read.dq
     ddq = np.gradient(dq, read.t, axis=0) if read.ddq is None else read.ddq
     return Motion(read.joints, read.t, read.q, dq, ddq, read.tau)
 
 
 def read_waypoints(
-    path: str | Path, joints: Sequence[str], *, topic: str | None = None
+    path: str | Path,
+    joints: Sequence[str],
+    *,
+    topic: str | None = None,
+    settings: ReadSettings = DEFAULT,
 ) -> ReadWaypoints:
     """Read what the last JointTrajectory of a bag says itself; see `read_joint_trajectory`."""
-    with Bag(path) as bag:
+    with Bag(path, settings) as bag:
         chosen = _choose_topic(bag, topic)
         cdr = b''
         for block in bag.blocks(chosen.name):
@@ -173,11 +185,12 @@ def read_waypoints(
     where = f'{path}: {chosen.name}'
     if not cdr:
         raise RecordingError(f'{where} has no messages')
-    try:
-        message: Any = store_for(chosen.message_type).deserialize_cdr(cdr, JOINT_TRAJECTORY)
-    except SerdeError as error:
-        raise RecordingError(f'{where}: the trajectory cannot be decoded: {error}') from error
-    return _waypoints(where, message, tuple(joints))
+    with reading(where, RecordingError):
+        try:
+            message: Any = store_for(chosen.message_type).deserialize_cdr(cdr, JOINT_TRAJECTORY)
+        except SerdeError as error:
+            raise RecordingError(f'the trajectory cannot be decoded: {error}') from error
+        return _waypoints(where, message, tuple(joints))
 
 
 def _waypoints(where: str, message: Any, joints: tuple[str, ...]) -> ReadWaypoints:

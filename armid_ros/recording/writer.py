@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from armid_ros import __version__
-from armid_ros.errors import RecordingError
+from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.recording.mcap_records import MESSAGE, RECORD_HEADER
 from armid_ros.recording.mcap_writer import Compression, McapWriter, message_record
 from armid_ros.recording.message_types import message_type, MessageType
@@ -127,6 +127,16 @@ class BagWriter:
             replace(topic, count=counts[self._channels[name]])
             for name, topic in self._topics.items()
         )
+
+    @property
+    def size(self) -> int:
+        """Number of bytes written out."""
+        return self._mcap.size
+
+    @property
+    def in_place(self) -> bool:
+        """Whether the file is still where it was made: neither deleted nor moved."""
+        return self._mcap.in_place
 
     @property
     def time_range(self) -> tuple[int, int]:
@@ -302,6 +312,29 @@ class BagWriter:
             self._mcap.finish()
         write_metadata(self.path, self._information(self.file.name))
         self._closed = True
+
+    def save(self) -> str:
+        """
+        Complete the bag without what waits in memory, after it could not be written out.
+
+        Returns
+        -------
+        str
+            What could not be done; empty if the bag is complete. In either case every chunk that
+            was written can be read.
+
+        """
+        if self._closed:
+            return ''
+        self._closed = True
+        try:
+            if not self._mcap.finished:
+                self._mcap.finish()
+            write_metadata(self.path, self._information(self.file.name))
+        except ArmidError as error:
+            self._mcap.give_up()
+            return str(error)
+        return ''
 
     def _open_records(self) -> list[bytes]:
         """Return the records of the chunk to come."""

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from armid_ros.errors import RobotError
-import yaml
+from armid_ros.files import load_yaml, read_text, reading
 
 
 @dataclass(frozen=True)
@@ -47,16 +47,18 @@ def read_assumptions(path: Path | None = None) -> Mapping[str, Assumption]:
 
     """
     path = path or leg_pair_file('exoskeleton_legs/assumptions.yaml')
-    entries = yaml.safe_load(path.read_text(encoding='utf-8'))
-    try:
-        found = {
-            name: Assumption(entry['value'], entry['unit'], entry['reason'])
-            for name, entry in entries.items()
-        }
-    except (AttributeError, KeyError, TypeError) as error:
-        raise RobotError(
-            f'{path}: every entry needs value, unit and reason; one lacks {error}'
-        ) from None
+    text = read_text(path, RobotError)
+    with reading(path, RobotError):
+        entries = load_yaml(text)
+        try:
+            found = {
+                name: Assumption(entry['value'], entry['unit'], entry['reason'])
+                for name, entry in entries.items()
+            }
+        except (AttributeError, KeyError, TypeError) as error:
+            raise RobotError(
+                f'every entry needs value, unit and reason; one lacks {error}'
+            ) from None
     return MappingProxyType(found)
 
 

@@ -9,6 +9,7 @@ from itertools import combinations
 from pathlib import Path
 
 from armid_ros.errors import RobotError
+from armid_ros.files import read_text
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots.description import parse_description, parse_xml
 from armid_ros.robots.geometry import collision_geometry
@@ -256,9 +257,5 @@ def _find_srdf(robot: Robot) -> Path | None:
 def _disabled_pairs(robot: Robot, path: Path | None) -> set[frozenset[str]]:
     if path is None:
         return set()
-    try:
-        text = path.read_text(encoding='utf-8')
-    except (OSError, UnicodeDecodeError) as error:
-        raise RobotError(f'{path}: cannot be read as text: {error}') from None
-    elements = parse_xml(text, str(path)).iter('disable_collisions')
+    elements = parse_xml(read_text(path, RobotError), str(path)).iter('disable_collisions')
     return {frozenset((e.get('link1', ''), e.get('link2', ''))) for e in elements}

@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 import math
 from xml.etree import ElementTree
 
 from armid_ros.errors import RobotError
+from armid_ros.files.regular import TEXT_LIMIT
 import numpy as np
 
 MOVABLE = ('revolute', 'continuous', 'prismatic')
@@ -17,6 +19,8 @@ KNOWN = (*MOVABLE, 'fixed', 'floating', 'planar')
 
 ROUNDING = 1e-6  # relative; descriptions print six digits
 NEGLIGIBLE = 1e-12  # kg m^2
+MAX_CHAIN = 500  # joints one behind the other; Pinocchio's reader descends by recursion
+SHORTEST_AXIS = 1e-100  # below, a component divided by it is no direction any more
 
 Vector = tuple[float, float, float]
 
@@ -93,21 +97,20 @@ class Description:
         """Joints with a degree of freedom."""
         return tuple(joint for joint in self.joints if joint.movable)
 
-    def beyond(self, joint: Joint) -> tuple[Joint, ...]:
-        """Joints that a joint carries, at any depth."""
-        found: list[Joint] = []
-        tips = [joint.child]
-        while tips:
-            carried = [other for other in self.joints if other.parent in tips]
-            found += carried
-            tips = [other.child for other in carried]
-        return tuple(found)
+    @cached_property
+    def by_name(self) -> Mapping[str, Joint]:
+        """Joints by their name."""
+        return {joint.name: joint for joint in self.joints}
 
 
 def parse_xml(text: str, source: str) -> ElementTree.Element:
     """Return the root element of a URDF; RobotError says the line where the XML is broken."""
+    if len(text) > TEXT_LIMIT:
+        raise RobotError(f'{source}: {len(text)} characters, which no description has')
     try:
         root = ElementTree.fromstring(text)
+    except ValueError as error:  # an encoding that is not known, characters that are none
+        raise RobotError(f'{source}: malformed XML: {error}') from None
     except ElementTree.ParseError as error:
         line, column = error.position
         reason = str(error).split(':')[0]
@@ -171,13 +174,22 @@ def _check_tree(source: str, links: dict[str, Inertial | None], joints: Iterable
         raise RobotError(
             f'{source}: {len(roots)} links have no parent ({", ".join(roots)}); only the base may'
         )
+    depth = dict.fromkeys(roots, 0)
     for link in links:
-        seen = {link}
-        while link in carriers:
-            link = carriers[link].parent
-            if link in seen:
+        path: dict[str, None] = {}
+        while link not in depth:
+            if link in path:
                 raise RobotError(f"{source}: link '{link}' is part of a closed loop of joints")
-            seen.add(link)
+            path[link] = None
+            link = carriers[link].parent
+        for below, name in enumerate(reversed(path), start=depth[link] + 1):
+            depth[name] = below
+    deepest = max(depth, key=depth.__getitem__)
+    if depth[deepest] > MAX_CHAIN:
+        raise RobotError(
+            f"{source}: link '{deepest}' is {depth[deepest]} joints from the base; {MAX_CHAIN} "
+            'are the most'
+        )
 
 
 class _Reader:
@@ -206,16 +218,16 @@ class _Reader:
             raise RobotError(f'{self.source}: the <inertial> of {where} has no <{missing}>')
         xyz, rpy = self.origin(element, where)
         inertial = Inertial(
-            mass=self.number(mass, 'value', where),
+            mass=self.finite(mass, 'value', where),
             xyz=xyz,
             rpy=rpy,
             inertia=(
-                self.number(inertia, 'ixx', where),
-                self.number(inertia, 'ixy', where, 0.0),
-                self.number(inertia, 'ixz', where, 0.0),
-                self.number(inertia, 'iyy', where),
-                self.number(inertia, 'iyz', where, 0.0),
-                self.number(inertia, 'izz', where),
+                self.finite(inertia, 'ixx', where),
+                self.finite(inertia, 'ixy', where, 0.0),
+                self.finite(inertia, 'ixz', where, 0.0),
+                self.finite(inertia, 'iyy', where),
+                self.finite(inertia, 'iyz', where, 0.0),
+                self.finite(inertia, 'izz', where),
             ),
         )
         doubt = inertial.doubt()
@@ -250,8 +262,8 @@ class _Reader:
             upper=upper,
             velocity=velocity,
             effort=effort,
-            damping=0.0 if dynamics is None else self.number(dynamics, 'damping', where, 0.0),
-            friction=0.0 if dynamics is None else self.number(dynamics, 'friction', where, 0.0),
+            damping=0.0 if dynamics is None else self.finite(dynamics, 'damping', where, 0.0),
+            friction=0.0 if dynamics is None else self.finite(dynamics, 'friction', where, 0.0),
             mimic=self.mimic(element, where),
         )
 
@@ -291,8 +303,8 @@ class _Reader:
             return None
         return Mimic(
             joint=mimic.get('joint', ''),
-            multiplier=self.number(mimic, 'multiplier', where, 1.0),
-            offset=self.number(mimic, 'offset', where, 0.0),
+            multiplier=self.finite(mimic, 'multiplier', where, 1.0),
+            offset=self.finite(mimic, 'offset', where, 0.0),
         )
 
     def link(self, element: ElementTree.Element, role: str, where: str) -> str:
@@ -306,7 +318,9 @@ class _Reader:
         axis = element.find('axis')
         x, y, z = (1.0, 0.0, 0.0) if axis is None else self.vector(axis, 'xyz', where)
         length = math.hypot(x, y, z)
-        if length == 0.0:
+        if not length < math.inf:
+            raise RobotError(f'{self.source}: the axis of {where} is longer than a number can be')
+        if length < SHORTEST_AXIS:
             if element.get('type') in MOVABLE:
                 raise RobotError(f'{self.source}: the axis of {where} has no direction')
             return (1.0, 0.0, 0.0)
@@ -323,10 +337,25 @@ class _Reader:
         try:
             x, y, z = (float(number) for number in text.split())
         except ValueError:
+            x = y = z = math.nan
+        if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
             raise RobotError(
-                f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is not three numbers"
-            ) from None
+                f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is not three finite "
+                'numbers'
+            )
         return x, y, z
+
+    def finite(
+        self, element: ElementTree.Element, name: str, where: str, default: float | None = None
+    ) -> float:
+        """Return a number; only limits may be infinite."""
+        number = self.number(element, name, where, default)
+        if math.isinf(number):
+            raise RobotError(
+                f"{self.source}: {where}: {name}='{element.get(name)}' of <{element.tag}> is not "
+                'finite'
+            )
+        return number
 
     def number(
         self, element: ElementTree.Element, name: str, where: str, default: float | None = None

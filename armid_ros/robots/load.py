@@ -7,10 +7,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import math
+import os
 from pathlib import Path
 from xml.etree import ElementTree
 
 from armid_ros.errors import RobotError
+from armid_ros.files import read_text, reading
 from armid_ros.motion import FloatArray
 from armid_ros.robots.description import (
     Description,
@@ -23,6 +25,7 @@ from armid_ros.robots.gravity import parse_gravity
 from armid_ros.robots.robot import Robot
 from armid_ros.robots.selection import driven_joints, standing_position
 from armid_ros.robots.shipped import shipped_path, shipped_robots
+from armid_ros.robots.xacro_expansion import expand_xacro
 import numpy as np
 import pinocchio as pin
 
@@ -43,7 +46,9 @@ def load_robot(
     ----------
     source : str or Path
         A shipped name (see `shipped_robots`), the path of a URDF or xacro file, or the text of a
-        URDF, such as a /robot_description. Meshes need not exist.
+        URDF, such as a /robot_description. Meshes need not exist. A xacro file is a program: it
+        can read any file and the environment, so name only one that you trust. It is expanded in
+        a process of its own, for 20 s at most; a text is never expanded.
     gravity : str or array_like, shape (3,)
         'earth', 'moon', 'x,y,z' or a vector [m/s^2], in the frame of the base link.
     joints : sequence of str, optional
@@ -71,17 +76,14 @@ def load_robot(
         return robot_from_urdf(source, gravity=gravity, joints=joints)
     shipped = isinstance(source, str) and source in shipped_robots()
     path = shipped_path(str(source)) if shipped else Path(source).expanduser()
-    if not path.is_file():
+    if not os.path.lexists(path):
         raise RobotError(
             f'{source}: neither a file nor a shipped robot; shipped are '
             f'{", ".join(shipped_robots())}'
         )
-    try:
-        text = path.read_text(encoding='utf-8')
-    except (OSError, UnicodeDecodeError) as error:
-        raise RobotError(f'{path}: cannot be read as text: {error}') from None
+    text = read_text(path, RobotError)
     if path.suffix == '.xacro' or '<xacro:' in text:
-        text = _expand_xacro(path, xacro_arguments or {})
+        text = expand_xacro(path, xacro_arguments or {})
     elif xacro_arguments:
         raise RobotError(f'{path}: not a xacro file, so it takes no arguments')
     return robot_from_urdf(text, gravity=gravity, joints=joints, source=str(source), path=path)
@@ -115,9 +117,10 @@ def robot_from_urdf(
         If the description cannot be used.
 
     """
-    description = parse_description(parse_xml(text, source), source)
-    driven = driven_joints(description, joints, source)
-    model, locked = _kinematic_model(description, driven)
+    with reading(source, RobotError):
+        description = parse_description(parse_xml(text, source), source)
+        driven = driven_joints(description, joints, source)
+        model, locked = _kinematic_model(description, driven, source)
     model.gravity = pin.Motion(parse_gravity(gravity), np.zeros(3))
     by_name = {joint.name: joint for joint in driven}
     driven = tuple(by_name[name] for name in list(model.names)[1:])
@@ -139,31 +142,25 @@ def robot_from_urdf(
         notes=description.notes + locked,
         path=path,
     )
+    if not np.isfinite(robot.rigid_parameters).all():
+        raise RobotError(f'{source}: its masses, lengths and inertias are beyond all numbers')
     return replace(robot, notes=robot.notes + _inertia_notes(robot))
 
 
-def _expand_xacro(path: Path, arguments: Mapping[str, str]) -> str:
-    try:
-        import xacro
-    except ImportError:
-        raise RobotError(f'{path}: a xacro file needs the Python package xacro') from None
-    try:
-        return str(xacro.process_file(str(path), mappings=dict(arguments)).toxml())
-    except Exception as error:  # xacro evaluates Python expressions: anything can come out
-        reason = ' '.join(str(error).split()) or type(error).__name__
-        raise RobotError(f'{path}: xacro: {reason}') from None
-
-
 def _kinematic_model(
-    description: Description, driven: Sequence[Joint]
+    description: Description, driven: Sequence[Joint], source: str
 ) -> tuple[pin.Model, tuple[str, ...]]:
     """Build the model of the driven joints; also say where the others are locked."""
+    moving = {joint.name for joint in driven}
     positions = {
         joint.name: standing_position(description, joint)
         for joint in description.movable()
-        if joint not in driven
+        if joint.name not in moving
     }
-    model = pin.buildModelFromXML(_kinematic_urdf(description, positions))
+    try:
+        model = pin.buildModelFromXML(_kinematic_urdf(description, positions))
+    except (RuntimeError, ValueError) as error:
+        raise RobotError(f'{source}: {" ".join(str(error).split())}') from error
     units = {
         joint.name: 'm' if joint.kind == 'prismatic' else 'rad' for joint in description.joints
     }

@@ -19,6 +19,7 @@ import os
 from pathlib import Path
 
 from armid_ros.errors import RobotError
+from armid_ros.files import is_file
 from armid_ros.motion import FloatArray
 import coal
 import numpy as np
@@ -44,7 +45,7 @@ def find_mesh(name: str, urdf: Path | None) -> Path | None:
     else:
         beside = Path() if urdf is None else urdf.resolve().parent
         candidates = [beside / name.removeprefix('file://')]
-    return next((path for path in candidates if path.is_file()), None)
+    return next((path for path in candidates if is_file(path)), None)
 
 
 def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry, ...]:

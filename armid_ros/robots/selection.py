@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from armid_ros.errors import RobotError
 from armid_ros.robots.description import Description, Joint
 
+#: Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70.
+MAX_DRIVEN = 150
 GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
 
 
@@ -40,20 +42,33 @@ def driven_joints(
             )
     if not chosen:
         raise RobotError(f'{source}: no joint can be driven; a robot needs one at least')
+    if len(chosen) > MAX_DRIVEN:
+        raise RobotError(
+            f'{source}: {len(chosen)} joints are driven; {MAX_DRIVEN} are the most that can be '
+            'identified together: name those of one arm with --joints'
+        )
     return chosen
 
 
 def standing_position(description: Description, joint: Joint) -> float:
     """Position [rad or m] at which a joint that is not driven stands: 0 or what is nearest."""
-    if joint.mimic:
-        masters = [other for other in description.joints if other.name == joint.mimic.joint]
-        leader = standing_position(description, masters[0]) if masters else 0.0
-        return joint.mimic.multiplier * leader + joint.mimic.offset
-    return min(max(0.0, joint.lower), joint.upper)
+    multiplier, offset = 1.0, 0.0
+    followed = {joint.name}
+    while joint.mimic:
+        offset += multiplier * joint.mimic.offset
+        multiplier *= joint.mimic.multiplier
+        leader = description.by_name.get(joint.mimic.joint)
+        if leader is None:
+            return offset
+        if leader.name in followed:
+            raise RobotError(f"joint '{leader.name}' mimics itself, by way of others or not")
+        followed.add(leader.name)
+        joint = leader
+    return multiplier * min(max(0.0, joint.lower), joint.upper) + offset
 
 
 def _by_name(description: Description, names: Sequence[str], source: str) -> tuple[Joint, ...]:
-    known = {joint.name: joint for joint in description.joints}
+    known, named = description.by_name, set[str]()
     free = ', '.join(joint.name for joint in description.movable() if not joint.mimic)
     for name in names:
         if name not in known:
@@ -65,9 +80,10 @@ def _by_name(description: Description, names: Sequence[str], source: str) -> tup
                 f"{source}: joint '{name}' mimics another one and cannot be driven; "
                 f'joints to drive: {free}'
             )
-        if list(names).count(name) > 1:
+        if name in named:
             raise RobotError(f"{source}: joint '{name}' is named twice among the driven joints")
-    return tuple(joint for joint in description.joints if joint.name in names)
+        named.add(name)
+    return tuple(joint for joint in description.joints if joint.name in named)
 
 
 def _by_default(description: Description) -> tuple[Joint, ...]:
@@ -75,12 +91,21 @@ def _by_default(description: Description) -> tuple[Joint, ...]:
     led = {joint.mimic.joint for joint in description.joints if joint.mimic}
     gripper = {joint.name for joint in free if joint.name in led or _says_gripper(joint)}
 
-    def carries_arm(joint: Joint) -> bool:
-        beyond = description.beyond(joint)
-        return any(other in free and other.name not in gripper for other in beyond)
-
-    driven = tuple(joint for joint in free if joint.name not in gripper or carries_arm(joint))
+    carriers = _carriers(description, [joint for joint in free if joint.name not in gripper])
+    driven = tuple(j for j in free if j.name not in gripper or j.name in carriers)
     return driven or tuple(joint for joint in free if joint.name not in led)
+
+
+def _carriers(description: Description, joints: Sequence[Joint]) -> set[str]:
+    """Return the joints that carry one of these."""
+    by_child = {joint.child: joint for joint in description.joints}
+    found: set[str] = set()
+    for joint in joints:
+        carrier = by_child.get(joint.parent)
+        while carrier is not None and carrier.name not in found:
+            found.add(carrier.name)
+            carrier = by_child.get(carrier.parent)
+    return found
 
 
 def _says_gripper(joint: Joint) -> bool:

@@ -12,11 +12,11 @@ from types import MappingProxyType
 from typing import Any
 
 from armid_ros.errors import RobotError
+from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots.robot import Robot
 import numpy as np
 import pinocchio as pin
-import yaml
 
 ROBOT = 'two_link_elastic'
 
@@ -175,9 +175,11 @@ def two_link_set(name: str = 'after', path: Path | None = None) -> TwoLinkSet:
     """
     default = resources.files('armid_ros.robots').joinpath(ROBOT, 'parameters.yaml')
     path = path or Path(str(default))
-    content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    if name not in content['sets']:
-        raise RobotError(f"{path}: no set '{name}'; there are {', '.join(content['sets'])}")
-    assumed = {key: entry['value'] for key, entry in content['assumptions'].items()}
-    parameters = TwoLinkParameters(**content['sets'][name], **content['drive'])
+    text = read_text(path, RobotError)
+    with reading(path, RobotError):
+        content = load_yaml(text)
+        if name not in content['sets']:
+            raise RobotError(f"no set '{name}'; there are {', '.join(content['sets'])}")
+        assumed = {key: entry['value'] for key, entry in content['assumptions'].items()}
+        parameters = TwoLinkParameters(**content['sets'][name], **content['drive'])
     return TwoLinkSet(parameters, MappingProxyType(assumed))

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from armid_ros.errors import TrajectoryError
+from armid_ros.files import read_text
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots.assumptions import leg_pair_file
 import numpy as np
@@ -110,10 +111,7 @@ def read_gait(path: Path | None = None) -> Gait:
 
     """
     path = path or leg_pair_file('human_legs/gait.csv')
-    try:
-        text = path.read_text(encoding='utf-8')
-    except OSError as error:
-        raise TrajectoryError(f'{path}: {error.strerror}; give a gait as CSV') from None
+    text = read_text(path, TrajectoryError)
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith('#')]
     head = [name.strip() for name in lines[0].split(',')] if lines else []
     if head != _COLUMNS:
@@ -122,6 +120,8 @@ def read_gait(path: Path | None = None) -> Gait:
         rows = np.array([[float(cell) for cell in line.split(',')] for line in lines[1:]])
     except ValueError as error:
         raise TrajectoryError(f'{path}: {error}; every row is four numbers') from None
+    if rows.shape[1:] != (len(_COLUMNS),) or not np.isfinite(rows).all():
+        raise TrajectoryError(f'{path}: every row is four finite numbers')
     if len(rows) < 2 * _HARMONICS + 1:
         raise TrajectoryError(
             f'{path}: {len(rows)} rows; a cycle takes at least {2 * _HARMONICS + 1}'

@@ -73,6 +73,20 @@ def test_a_file_without_shapes_takes_the_defaults(robot, tmp_path):
         (lambda d: d['effects'][0]['shapes'].pop(), "'stribeck_exponent' of joint 'wrist_pitch'"),
         (lambda d: d['effects'][0]['shapes'][0].update(value=-1.0), 'has to be from'),
         (lambda d: d.pop('gravity'), 'gravity'),
+        (
+            lambda d: d['effects'][0]['parameters'][0].update(value=float('nan')),
+            "'stribeck_torque' of joint 'shoulder_pitch' has to be a finite number",
+        ),
+        (
+            lambda d: d['rigid_parameters'][3].update(value=float('inf')),
+            'has to be a finite number',
+        ),
+        (lambda d: d['effects'][0]['shapes'][0].update(value='nan'), 'has to be a finite number'),
+        (
+            lambda d: d['rigid_parameters'].append(d['rigid_parameters'][0]),
+            "parameter 'm1' of joint 'shoulder_pitch' is given twice",
+        ),
+        (lambda d: d.update(gravity=[0, 0, float('nan')]), 'three finite numbers'),
     ],
 )
 def test_what_is_wrong_is_named(robot, tmp_path, change, message):

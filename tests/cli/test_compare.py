@@ -4,6 +4,7 @@ import json
 
 from armid_ros.cli import main
 from armid_ros.cli.commands import COMMANDS
+from armid_ros.files import result_folder
 from click.testing import CliRunner
 import pytest
 
@@ -73,3 +74,33 @@ def test_bad_input_is_one_line_and_code_2(tmp_path):
     assert 'nothing' in result.output
     assert len(result.output.strip().splitlines()) == 1
     assert not (tmp_path / 'out').exists()
+
+
+def test_results_are_not_written_over_those_of_another_kind_unless_forced(tmp_path):
+    first, second = identified(tmp_path / 'a', 0.08), identified(tmp_path / 'b', 0.1)
+    before = (first / 'identification.json').read_text()
+    refused = armid('compare', first, second, '--out', first)
+    assert refused.exit_code == 2
+    assert 'holds armid/identification/1, not armid/comparison/1' in refused.stderr
+    assert '--force' in refused.stderr and len(refused.stderr.splitlines()) == 1
+    assert not (first / 'report.html').exists()
+    assert armid('compare', first, second, '--out', first, '--force').exit_code == 0
+    assert (first / 'identification.json').read_text() == before
+    assert armid('compare', first, second, '--out', tmp_path / 'c').exit_code == 0
+    assert armid('compare', second, first, '--out', tmp_path / 'c').exit_code == 0
+
+
+def test_an_escape_sequence_in_a_name_does_not_reach_the_terminal(tmp_path):
+    first, second = identified(tmp_path / 'a', 0.08), identified(tmp_path / 'b', 0.1)
+    for folder in (first, second):
+        path = folder / 'identification.json'
+        path.write_text(path.read_text().replace('elbow', r'elb\u001b[2Jow'))
+    result = armid('compare', first, second, '--out', tmp_path / 'out')
+    assert '\x1b' not in result.output and r'elb\x1b[2Jow' in result.output
+
+
+def test_a_second_run_in_one_folder_is_refused(tmp_path):
+    first, second = identified(tmp_path / 'a', 0.08), identified(tmp_path / 'b', 0.1)
+    with result_folder(tmp_path / 'out', 'armid/comparison/1'):
+        refused = armid('compare', first, second, '--out', tmp_path / 'out')
+    assert refused.exit_code == 2 and 'another run is writing into it' in refused.stderr

@@ -220,6 +220,11 @@ def test_environment_file_is_read(tmp_path):
         ('- {name: floor, kind: plane, position: [0, 0]}', 'position is 3 numbers'),
         ('- {name: rock, kind: mesh}', 'has a file'),
         ('- [', 'cell.yaml'),
+        ('- {name: 3, kind: plane}', 'name, kind and the links to ignore are texts'),
+        ('- {name: [a], kind: plane}', 'name, kind and the links to ignore are texts'),
+        ('- {name: floor, kind: plane, ignore: [2001-01-01]}', 'are texts'),
+        ('- {name: floor, kind: {a: b}}', 'are texts'),
+        ('- {name: floor, kind: plane, ignore: 3}', 'obstacle 1'),
     ],
 )
 def test_bad_environment_is_refused_with_the_entry(text, message, tmp_path):

@@ -132,3 +132,41 @@ def test_bad_file_is_refused_with_its_name(name, text, message, tmp_path):
 def test_coefficients_that_are_no_numbers_are_refused_with_the_joint():
     with pytest.raises(TrajectoryError, match='a of joint elbow'):
         FourierTrajectory(('elbow',), 1.0, np.zeros(1), np.full((1, 2), np.nan), np.zeros((1, 2)))
+
+
+@pytest.mark.parametrize('number', ['1e12', '10000000000000', '2.5', '.nan', '2001-01-01', '0'])
+def test_a_run_of_more_than_a_day_or_of_no_whole_number_of_periods_is_refused(
+    make_run_file, number
+):
+    path = make_run_file('n_periods: 2', f'n_periods: {number}')
+    with pytest.raises(
+        TrajectoryError, match=r'run.yaml: .*(a day is the most|n_periods|periods)'
+    ):
+        load_excitation(path)
+
+
+@pytest.fixture
+def make_run_file(tmp_path):
+    """Return a function that writes an excitation with a text replaced."""
+
+    def make(old, new):
+        series = FourierTrajectory(('a',), 4.0, np.zeros(1), np.ones((1, 2)), np.ones((1, 2)))
+        save_excitation(Excitation(series, 2, 1.0), tmp_path / 'run.yaml')
+        text = (tmp_path / 'run.yaml').read_text()
+        assert old in text
+        (tmp_path / 'run.yaml').write_text(text.replace(old, new))
+        return tmp_path / 'run.yaml'
+
+    return make
+
+
+@pytest.mark.parametrize(
+    'rows',
+    ['joint', 'joint\n1\n2\n', 'joint,q0,a1,b1,start\na,0\n', '', 'joint,q0,ax,b1\na,0,0,0\n'],
+)
+def test_a_table_without_its_columns_is_refused(tmp_path, rows):
+    path = tmp_path / 'run.csv'
+    head = '# armid/excitation/1\n# period [s],4.0\n# n_periods,2\n# run_in [s],1.0\n'
+    path.write_text(head + rows)
+    with pytest.raises(TrajectoryError, match=r'run.csv: '):
+        load_excitation(path)

@@ -188,3 +188,35 @@ class TestRefusals:
         path.write_text(json.dumps(document))
         with pytest.raises(ModelError, match='name'):
             read_parameters(path)
+
+
+def written(tmp_path, **changes):
+    """Write an identification of one parameter, with some of its numbers changed."""
+    row = {'name': 'Izz1', 'joint': 'a', 'value': 1.0, 'std': 0.1, 'unit': 'kg m^2'}
+    document = {
+        'schema': 'armid/identification/1',
+        'robot': 'arm',
+        'parameters': [{**row, **{k: v for k, v in changes.items() if k in row}}],
+        'covariance': [[changes.get('variance', 0.01)]],
+        'training': {'relative_error_percent': changes.get('error', 5.0)},
+    }
+    (tmp_path / 'identification.json').write_text(json.dumps(document))
+    return tmp_path / 'identification.json'
+
+
+@pytest.mark.parametrize(
+    ('changes', 'message'),
+    [
+        ({'value': float('nan')}, 'Izz1 of joint a has to be a finite number'),
+        ({'value': 10**400}, 'has to be a finite number'),
+        ({'std': float('inf')}, 'the std of Izz1 of joint a has to be a finite number'),
+        ({'std': -0.1}, 'the std of Izz1 of joint a is negative'),
+        ({'variance': -0.01}, 'a negative variance'),
+        ({'variance': float('nan')}, 'not finite'),
+        ({'error': 'x'}, 'relative_error_percent'),
+    ],
+)
+def test_numbers_that_no_estimate_has_are_refused(tmp_path, changes, message):
+    assert read_parameters(written(tmp_path)).std == [0.1]
+    with pytest.raises(ModelError, match=rf'identification.json: .*{message}'):
+        read_parameters(written(tmp_path, **changes))

@@ -24,6 +24,7 @@ LAYERS = (
     ('robots',),
     ('estimate',),
     ('motion',),
+    ('files',),
     ('errors',),
 )
 

@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+import re
 from typing import Any
 
 from armid_ros.errors import RobotError
 from armid_ros.robots import load_robot, parse_gravity, robot_from_urdf
+from armid_ros.robots.xacro_expansion import expand_xacro
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -332,3 +335,113 @@ def test_an_unknown_joint_is_answered_with_those_that_exist() -> None:
     assert arm.index('elbow') == 1
     with pytest.raises(RobotError, match='its driven joints are shoulder, elbow'):
         arm.index('elbo')
+
+
+def star(n_links: int, kind: str = 'fixed') -> str:
+    """Return a description of many links, a few deep."""
+    body = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+    links = ''.join(f'<link name="l{k}">{body}</link>' for k in range(n_links))
+    joints = ''.join(
+        f'<joint name="j{k}" type="{"continuous" if k == 1 else kind}"><parent link="l{k // 4}"/>'
+        f'<child link="l{k}"/><limit velocity="1" effort="1" lower="-1" upper="1"/></joint>'
+        for k in range(1, n_links)
+    )
+    return f'<robot name="star">{links}{joints}</robot>'
+
+
+def chain(n_links: int) -> str:
+    """Return a description of many links, each carried by the one before it."""
+    links = ''.join(f'<link name="l{k}"/>' for k in range(n_links))
+    joints = ''.join(
+        f'<joint name="j{k}" type="fixed"><parent link="l{k - 1}"/><child link="l{k}"/></joint>'
+        for k in range(1, n_links)
+    )
+    return f'<robot name="chain">{links}{joints}</robot>'
+
+
+class TestSizes:
+    """Large descriptions are read or refused; none ends the process."""
+
+    def test_thousands_of_links_are_read(self) -> None:
+        assert load_robot(star(3000)).n_joints == 1
+
+    def test_a_chain_too_long_for_recursion_is_refused(self) -> None:
+        with pytest.raises(RobotError, match="link 'l19999' is 19999 joints from the base"):
+            load_robot(chain(20_000))
+
+    def test_more_driven_joints_than_memory_has_room_for_are_refused(self) -> None:
+        with pytest.raises(RobotError, match='999 joints are driven; 150 are the most'):
+            load_robot(star(1000, 'revolute'))
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'message'),
+    [
+        (
+            '<mass value="1"/>',
+            '<mass value="inf"/>',
+            "link 'l0': value='inf' of <mass> is not fin",
+        ),
+        ('ixx="1"', 'ixx="-inf"', "link 'l0': ixx='-inf' of <inertia> is not finite"),
+        ('<mass value="1"/>', '<origin xyz="0 0 inf"/><mass value="1"/>', 'not three finite'),
+        (
+            '<child',
+            '<axis xyz="nan 0 1"/><child',
+            "joint 'j1': xyz='nan 0 1' of <axis> is not three",
+        ),
+        ('<child', '<axis xyz="1.7e308 1.7e308 0"/><child', "axis of joint 'j1' is longer"),
+        ('<child', '<origin xyz="0 1e999 0"/><child', "joint 'j1': xyz='0 1e999 0' of <origin>"),
+        ('<child', '<dynamics damping="inf"/><child', "damping='inf' of <dynamics> is not finite"),
+        (
+            '<mass value="1"/>',
+            '<origin xyz="1e200 0 0"/><mass value="1e200"/>',
+            'beyond all numbers',
+        ),
+    ],
+)
+def test_a_number_that_is_not_finite_is_refused_by_name(old: str, new: str, message: str) -> None:
+    with pytest.raises(RobotError, match=re.escape(message)):
+        load_robot(star(3).replace(old, new))
+
+
+def test_joints_that_mimic_each_other_are_refused() -> None:
+    text = star(6, 'revolute')
+    for one, other in (('j2', 'j3'), ('j3', 'j2')):
+        text = text.replace(
+            f'<joint name="{one}" type="revolute">',
+            f'<joint name="{one}" type="revolute"><mimic joint="{other}"/>',
+        )
+    with pytest.raises(RobotError, match='mimics itself'):
+        load_robot(text)
+
+
+class TestXacroIsAProgram:
+    """It has a limit of time, and only a file that a person names is expanded."""
+
+    def test_one_without_end_is_stopped(self, tmp_path: Path) -> None:
+        path = tmp_path / 'endless.xacro'
+        path.write_text(
+            '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">'
+            '<xacro:property name="x" value="${[0] * 10**8}"/>'
+            f'<xacro:include filename="{tmp_path}/fifo"/></robot>'
+        )
+        os.mkfifo(tmp_path / 'fifo')
+        with pytest.raises(RobotError, match=r'endless.xacro: xacro: not expanded within 0.5 s'):
+            expand_xacro(path, {}, time_limit=0.5)
+
+    def test_one_that_takes_all_memory_is_stopped(self, tmp_path: Path) -> None:
+        path = tmp_path / 'large.xacro'
+        path.write_text(
+            '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">'
+            '<xacro:property name="x" value="${\'x\' * 10**10}"/><link name="${x}"/></robot>'
+        )
+        with pytest.raises(RobotError, match=r'large.xacro: xacro: '):
+            load_robot(path)
+
+    def test_a_text_is_never_expanded(self, tmp_path: Path) -> None:
+        text = (
+            '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><link name="l"/>'
+            '<xacro:include filename="/etc/passwd"/></robot>'
+        )
+        with pytest.raises(RobotError, match='no joint can be driven'):
+            load_robot(text)

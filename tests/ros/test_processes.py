@@ -112,6 +112,28 @@ def test_what_a_killed_recorder_leaves_is_read(bench, processes, tmp_path):
     assert len(recording) > 100 and recording.report.damage
 
 
+def test_a_recorder_whose_terminal_is_closed_completes_its_bag(bench, processes, tmp_path):
+    bag = tmp_path / 'bag'
+    recorder = processes.start('recorder', f'bag:={bag}', 'topics:=[joint_states]')
+    processes.start('simulated_arm', 'rate:=1000.0')
+    bench.spin_until(
+        lambda: any(f.stat().st_size > 50_000 for f in bag.glob('*.mcap')), 'the recording'
+    )
+    errors = processes.end(recorder, signal.SIGHUP)
+    assert recorder.returncode == 1
+    assert errors.strip().splitlines()[-1] == 'ended by SIGHUP, as by a terminal that is closed'
+    assert read_recording(bag, joints=load_robot('humanoid_arm').joints).report.clean
+
+
+@pytest.mark.parametrize('name', ['bag.mcap', 'bag.db3', 'bag.mcap.zstd'])
+def test_a_player_refuses_a_fifo_at_once(processes, tmp_path, name):
+    os.mkfifo(tmp_path / name)
+    process = processes.start('bag_player', f'bag:={tmp_path / name}')
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 2
+    assert f'{name}: cannot be read: a FIFO, and no file' in errors
+
+
 @pytest.mark.parametrize(
     ('node', 'parameter', 'line'),
     [

@@ -4,6 +4,10 @@
 
 from __future__ import annotations
 
+import resource
+import shutil
+
+from armid_ros.errors import RecordingError
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.recording import iter_raw, read_recording, topics
 from builtin_interfaces.msg import Time
@@ -117,3 +121,65 @@ def test_a_wanted_topic_that_nobody_publishes_is_reported(bench, tmp_path):
     recorder = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), topics=['nothing'])
     status = bench.diagnose(recorder, diagnostics)
     assert status.message == 'nobody publishes /nothing'
+
+
+def keep_publishing(bench, publisher):
+    """Publish until the recorder ends with an error, and return that."""
+    with pytest.raises(RecordingError) as refusal:
+        for k in range(100_000):
+            publisher.publish(joint_state(k % 1000))
+            bench.settle()
+    return str(refusal.value)
+
+
+@pytest.fixture
+def file_size_limit():
+    """Return a function that limits the size of files, as a disk that is full does."""
+    old = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, old[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, old)
+
+
+def test_a_disk_that_is_full_ends_the_recording_with_all_that_was_written(
+    bench, tmp_path, file_size_limit
+):
+    bag = tmp_path / 'bag'
+    recorder = bench.add(
+        RecorderNode, bag=str(bag), topics=['joint_states'], compression='none', chunk_age=0.01
+    )
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    record(bench, recorder, publisher, 10)
+    file_size_limit(20_000)
+    reason = keep_publishing(bench, publisher)
+    assert f'{bag / "bag_0.mcap"}: cannot be written' in reason and 'armid recover' in reason
+    assert not recorder.recording
+    recording = read_recording(bag / 'bag_0.mcap', joints=JOINTS)
+    assert f'{recording.report.messages} messages are in' in reason
+    assert recording.report.messages >= 10
+
+
+def test_a_bag_that_is_deleted_ends_the_recording(bench, tmp_path):
+    bag = tmp_path / 'bag'
+    bench.add(RecorderNode, bag=str(bag), topics=['joint_states'])
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    shutil.rmtree(bag)
+    assert f'{bag / "bag_0.mcap"}: was deleted or moved' in keep_publishing(bench, publisher)
+    assert not bag.exists()
+
+
+def test_a_disk_that_is_almost_full_ends_the_recording_in_good_order(bench, tmp_path, monkeypatch):
+    bag = tmp_path / 'bag'
+    recorder = bench.add(RecorderNode, bag=str(bag), topics=['joint_states'], min_free=10.0)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    record(bench, recorder, publisher, 100)
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, 'disk_usage', lambda _: usage._replace(free=10_000_100))
+    recorder.watch()
+    assert 'will be full in less than' in recorder.complaints.latest
+    monkeypatch.setattr(shutil, 'disk_usage', lambda _: usage._replace(free=9_000_000))
+    with pytest.raises(
+        RecordingError, match='9 MB are left on the disk; recording ends: 100 mess'
+    ):
+        recorder.watch()
+    recording = read_recording(bag, joints=JOINTS)
+    assert recording.report.clean and len(recording) == 100

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 
+from armid_ros.files import write_file
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -36,7 +38,11 @@ def new_figure(height: float) -> Figure:
 
 def save_figure(figure: Figure, path: str | Path) -> None:
     """Write a figure; the suffix of the path, .png, .svg or .pdf, chooses the format."""
-    figure.savefig(path, dpi=_DPI, metadata={'Date': None} if str(path).endswith('.svg') else None)
+    kind = Path(path).suffix.removeprefix('.')
+    content = BytesIO()
+    metadata = {'Date': None} if kind == 'svg' else None
+    figure.savefig(content, dpi=_DPI, format=kind, metadata=metadata)
+    write_file(path, content.getvalue())
 
 
 def plain(axes: Axes, title: str = '', *, xlabel: str = '', ylabel: str = '') -> None:

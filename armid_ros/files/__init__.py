@@ -1,0 +1,32 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Files as untrusted input, and as output that is whole or absent.
+
+Every reader of text goes through `read_text` (no FIFO, no device, a bounded size), `load_yaml` or
+`load_json` (bounded depth and expansion) and `reading`, which turns what a parser raises into the
+error of the package with the path. Every writer of results goes through `write_file`, inside the
+`result_folder` of its command.
+
+"""
+
+from armid_ros.files.documents import finite, load_json, load_yaml, reading
+from armid_ros.files.limits import available_memory, default_memory_limit, size_text
+from armid_ros.files.output import json_text, result_folder, write_file
+from armid_ros.files.regular import is_file, open_regular, read_text
+
+__all__ = [
+    'is_file',
+    'open_regular',
+    'read_text',
+    'load_yaml',
+    'load_json',
+    'reading',
+    'finite',
+    'write_file',
+    'json_text',
+    'result_folder',
+    'available_memory',
+    'default_memory_limit',
+    'size_text',
+]

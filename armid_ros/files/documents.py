@@ -1,0 +1,159 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Documents in YAML and JSON, whatever is in them.
+
+The parser of a document sees nothing deeper or larger than a document of this package can be, and
+what it raises for content it did not expect becomes one error that names the file.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import csv
+import json
+import math
+from pathlib import Path
+import struct
+from typing import Any
+
+from armid_ros.errors import ArmidError
+import yaml
+
+#: Nesting beyond which a text is no document of this package; theirs have six levels at most.
+MAX_DEPTH = 64
+#: Nodes of a document with its aliases written out; a model of 1,000 joints has 200,000.
+MAX_NODES = 2_000_000
+
+# The parser in C, where there is one, is ten times as fast.
+_LOADER: type[Any] = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+#: What code that walks over a document raises when the document is not what it takes it for.
+_UNEXPECTED = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    RecursionError,
+    TypeError,
+    ValueError,
+    csv.Error,
+    struct.error,
+    yaml.YAMLError,
+)
+
+
+@contextmanager
+def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
+    """
+    Turn what a parser raises for the content of a file into one error that names the file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, for the message.
+    error : type of ArmidError
+        What to raise.
+
+    Raises
+    ------
+    ArmidError
+        In place of any error that content can cause; one of the package is given the path.
+
+    """
+    try:
+        yield
+    except ArmidError as problem:
+        if str(problem).startswith(f'{path}:'):
+            raise
+        raise error(f'{path}: {problem}') from problem
+    except _UNEXPECTED as problem:
+        raise error(f'{path}: {_said(problem)}') from problem
+
+
+def finite(value: Any, what: str) -> float:
+    """Return a number of a document; ValueError when it is none, or not finite."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f'{what} has to be a finite number, not {str(value)[:40]!r}')
+    return number
+
+
+def load_yaml(text: str) -> Any:
+    """
+    Return what a text in YAML says, as plain types.
+
+    Raises
+    ------
+    ValueError or yaml.YAMLError
+        It is no YAML, is nested too deep, or grows beyond all measure when its aliases are
+        written out.
+
+    """
+    _check_size(text)
+    return yaml.load(text, Loader=_LOADER)
+
+
+def load_json(text: str) -> Any:
+    """
+    Return what a text in JSON says, as plain types.
+
+    Raises
+    ------
+    ValueError or RecursionError
+        It is no JSON, or is nested too deep.
+
+    """
+    return json.loads(text)
+
+
+def _check_size(text: str) -> None:
+    """Refuse a YAML text by its events, before anything is built of it."""
+    open_nodes: list[tuple[str | None, int]] = []
+    sizes: dict[str, int] = {}
+    total = 0
+    for event in yaml.parse(text, Loader=_LOADER):
+        if isinstance(event, yaml.AliasEvent):
+            if event.anchor not in sizes:
+                raise ValueError(f"line {_line(event)}: the alias '{event.anchor}' has no anchor")
+            total += sizes[event.anchor]
+        elif isinstance(event, (yaml.SequenceStartEvent, yaml.MappingStartEvent)):
+            total += 1
+            open_nodes.append((event.anchor, total))
+            if len(open_nodes) > MAX_DEPTH:
+                raise ValueError(f'line {_line(event)}: nested more than {MAX_DEPTH} levels deep')
+        elif isinstance(event, (yaml.SequenceEndEvent, yaml.MappingEndEvent)):
+            anchor, begin = open_nodes.pop()
+            if anchor:
+                sizes[anchor] = total - begin + 1
+        elif isinstance(event, yaml.ScalarEvent):
+            total += 1
+            if event.anchor:
+                sizes[event.anchor] = 1
+        if total > MAX_NODES:
+            raise ValueError(
+                f'line {_line(event)}: more than {MAX_NODES} nodes, aliases written out'
+            )
+
+
+def _line(event: yaml.Event) -> int:
+    return 0 if event.start_mark is None else int(event.start_mark.line) + 1
+
+
+def _said(problem: BaseException) -> str:
+    """Say what a parser met, in one line."""
+    if isinstance(problem, RecursionError):
+        return 'nested too deep'
+    if isinstance(problem, MemoryError):
+        return 'too large for the memory'
+    if isinstance(problem, KeyError) and problem.args:
+        return f'no {problem.args[0]}'
+    text = ' '.join(str(problem).split())
+    name = '' if isinstance(problem, (ValueError, yaml.YAMLError)) else type(problem).__name__
+    return ': '.join(filter(None, (name, text))) or type(problem).__name__

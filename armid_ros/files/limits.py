@@ -1,0 +1,39 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How much memory an input may take before it is refused."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import resource
+
+#: Share of the memory that one input may take by default.
+_SHARE = 4
+_CONTROL_GROUP = Path('/sys/fs/cgroup/memory.max')
+
+
+def available_memory() -> int:
+    """Return the memory that this process may use [bytes]: of the machine or of its limits."""
+    bounds = [os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES')]
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY:
+        bounds.append(limit)
+    try:
+        bounds.append(int(_CONTROL_GROUP.read_text(encoding='ascii')))
+    except (OSError, ValueError):  # no control group, or 'max'
+        pass
+    return min(bounds)
+
+
+def default_memory_limit() -> int:
+    """Return what one input may take when nothing else is said [bytes]: a quarter of memory."""
+    return available_memory() // _SHARE
+
+
+def size_text(size: int) -> str:
+    """Return a number of bytes as a person reads it."""
+    for unit, scale in (('GB', 10**9), ('MB', 10**6), ('kB', 10**3)):
+        if size >= scale:
+            return f'{size / scale:.3g} {unit}'
+    return f'{size} bytes'

@@ -1,0 +1,171 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Results as files: each whole or absent, and none of another run lost unawares.
+
+A file is written beside its place and moved there, which also means that a symbolic link in the
+folder is replaced and not followed. The folder is locked as long as a command works on it; the
+system lets go of the lock when the process ends, however it ends.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+import fcntl
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import OutputError
+from armid_ros.files.documents import load_json, reading
+from armid_ros.files.regular import read_text
+
+#: Files by whose schema a folder is known; each is the one that its command writes last.
+_RESULTS = (
+    'identification.json',
+    'diagnosis.json',
+    'excitation.json',
+    'elastic.json',
+    'exo.json',
+    'comparison.json',
+)
+
+
+def write_file(path: str | Path, content: str | bytes) -> None:
+    """
+    Write a file beside its place and move it there, so that it is whole or absent.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; one that exists is replaced, a symbolic link itself and not what it points to.
+    content : str or bytes
+        All of it; text is written in UTF-8.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written; what was there before is as it was.
+
+    """
+    path = Path(path)
+    beside = path.with_name(f'.{path.name}.part')
+    data = content.encode('utf-8', 'backslashreplace') if isinstance(content, str) else content
+    try:
+        beside.unlink(missing_ok=True)
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+        with os.fdopen(os.open(beside, flags, 0o666), 'wb') as stream:
+            stream.write(data)
+        beside.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            beside.unlink(missing_ok=True)
+        raise OutputError(f'{path}: cannot be written: {error.strerror}') from error
+
+
+def json_text(document: Any, indent: int | None = None) -> str:
+    """Return a document as JSON; a number that is not finite, which JSON has not, is null."""
+    return json.dumps(_representable(document), indent=indent, allow_nan=False)
+
+
+@contextmanager
+def result_folder(
+    path: Path, schema: str, robot: str = '', *, force: bool = False
+) -> Iterator[Path]:
+    """
+    Hold a folder for the results of one command.
+
+    Parameters
+    ----------
+    path : Path
+        The folder; made if it is not there.
+    schema : str
+        Of the results, such as 'armid/identification/1'.
+    robot : str
+        What the results call the robot; empty where they have none.
+    force : bool
+        Whether to write over results of another kind or robot.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written to, another run works on it, or it has results of another
+        kind or robot.
+
+    """
+    made = [one for one in (path, *path.parents) if not os.path.lexists(one)]
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except OSError as error:
+        raise OutputError(f'{path}: cannot be made or opened: {error.strerror}') from error
+    try:
+        _lock(path, descriptor)
+        _try_to_write(path)
+        if not force:
+            _refuse_other_results(path, schema, robot)
+        yield path
+    finally:
+        os.close(descriptor)
+        with suppress(OSError):  # what failed before it wrote anything leaves no folder behind
+            for one in made:
+                one.rmdir()
+
+
+def _lock(path: Path, descriptor: int) -> None:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise OutputError(
+            f'{path}: another run is writing into it; wait for its end or name another folder'
+        ) from error
+    except OSError:  # a file system without locks
+        pass
+
+
+def _try_to_write(path: Path) -> None:
+    """Find out before the work, not after it, that a folder is read-only or full."""
+    probe = path / '.armid-probe'
+    write_file(probe, b'0' * 4096)
+    with suppress(OSError):
+        probe.unlink()
+
+
+def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
+    for name in _RESULTS:
+        if not os.path.lexists(path / name):
+            continue
+        try:
+            with reading(path / name, OutputError):
+                found = load_json(read_text(path / name, OutputError))
+                kind, other = str(found['schema']), str(found.get('robot', ''))
+        except OutputError:
+            kind, other = f'{name}, which cannot be read', ''
+        if kind != schema:
+            raise OutputError(f'{path}: holds {kind}, not {schema}; {_HINT}')
+        if robot and other and not _same(robot, other):
+            raise OutputError(f'{path}: holds {kind} of {other}, not of {robot}; {_HINT}')
+
+
+_HINT = 'name another folder, or write over it with --force'
+
+
+def _same(robot: str, other: str) -> bool:
+    """Tell whether two names mean one robot: shipped names, or paths of one file."""
+    if '-' in (robot, other):  # that of the bag, whichever it is
+        return True
+    return robot == other or Path(robot).absolute() == Path(other).absolute()
+
+
+def _representable(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _representable(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_representable(part) for part in value]
+    return value

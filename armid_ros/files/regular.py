@@ -1,0 +1,103 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Regular files, opened without waiting.
+
+Opening a FIFO waits for a writer, and reading a device may never end; neither is an input of this
+package, so both are refused at once.
+
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import stat
+from typing import BinaryIO
+
+from armid_ros.errors import ArmidError
+
+#: The largest document in text [bytes]; a description of 10,000 links has 6 MB.
+TEXT_LIMIT = 64 << 20
+
+_KINDS = (
+    (stat.S_ISDIR, 'a folder'),
+    (stat.S_ISFIFO, 'a FIFO'),
+    (stat.S_ISCHR, 'a device'),
+    (stat.S_ISBLK, 'a device'),
+    (stat.S_ISSOCK, 'a socket'),
+)
+
+
+def is_file(path: str | Path) -> bool:
+    """Tell whether there is a regular file; a name that no file can have is none."""
+    try:
+        return stat.S_ISREG(os.stat(path).st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+def open_regular(path: str | Path, error: type[ArmidError]) -> BinaryIO:
+    """
+    Open a file for reading.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    error : type of ArmidError
+        What to raise.
+
+    Raises
+    ------
+    ArmidError
+        The file cannot be opened, or is a folder, a FIFO, a device or a socket.
+
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except (OSError, ValueError) as problem:
+        raise error(f'{path}: cannot be read: {problem_text(problem)}') from problem
+    mode = os.fstat(descriptor).st_mode
+    if not stat.S_ISREG(mode):
+        os.close(descriptor)
+        kind = next((name for is_kind, name in _KINDS if is_kind(mode)), 'something else')
+        raise error(f'{path}: cannot be read: {kind}, and no file')
+    return os.fdopen(descriptor, 'rb')
+
+
+def read_text(path: str | Path, error: type[ArmidError], limit: int = TEXT_LIMIT) -> str:
+    """
+    Return the content of a text file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, in UTF-8.
+    error : type of ArmidError
+        What to raise.
+    limit : int
+        The largest size [bytes].
+
+    Raises
+    ------
+    ArmidError
+        The file cannot be opened, is no regular file, is too large, or is no text.
+
+    """
+    with open_regular(path, error) as stream:
+        try:
+            content = stream.read(limit + 1)
+        except OSError as problem:
+            raise error(f'{path}: cannot be read: {problem_text(problem)}') from problem
+    if len(content) > limit:
+        raise error(f'{path}: larger than {limit >> 20} MiB, which no text of its kind is')
+    try:
+        return content.decode('utf-8-sig')
+    except UnicodeDecodeError as problem:
+        raise error(f'{path}: cannot be read as text: {problem}') from problem
+
+
+def problem_text(problem: OSError | ValueError) -> str:
+    """Return why the system refused, without the path that the message has already."""
+    return (problem.strerror if isinstance(problem, OSError) else None) or str(problem)

@@ -1,0 +1,141 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Decompression within bounds.
+
+A few bytes can be compressed from any size, so a stated size is a bound: what does not come to
+exactly that is damaged, and nothing is unpacked beyond it.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import BinaryIO
+
+from armid_ros.errors import RecordingError
+import lz4.frame
+import zstandard
+
+_Buffer = bytes | memoryview
+#: What the decompressors raise for rubbish.
+CORRUPT = (zstandard.ZstdError, RuntimeError, MemoryError, OverflowError, ValueError)
+_STEP = 1 << 20
+_PARTIAL_STEP = 1024
+
+
+def stated_size(stored: _Buffer, compression: str) -> int | None:
+    """Return the size that a compressed frame says it has; None when it says nothing."""
+    if compression == 'zstd':
+        size = int(zstandard.frame_content_size(stored))
+        return size if size >= 0 else None
+    size = int(lz4.frame.get_frame_info(stored)['content_size'])
+    return size or None
+
+
+def decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
+    """
+    Return the content of a frame.
+
+    Parameters
+    ----------
+    stored : buffer
+        The frame.
+    compression : {'zstd', 'lz4'}
+        Its kind.
+    size : int
+        What its content has to have [bytes].
+
+    Raises
+    ------
+    RecordingError
+        The frame is damaged, or its content has another size.
+
+    """
+    try:
+        said = stated_size(stored, compression)
+        if said is not None and said != size:
+            raise RecordingError(f'holds {said} bytes where {size} are stated')
+        if not size:
+            return b''
+        if compression == 'zstd':
+            content = zstandard.ZstdDecompressor().decompress(stored, max_output_size=size)
+        else:
+            content = _lz4(stored, size)
+    except CORRUPT as error:
+        raise RecordingError(str(error) or 'it cannot be decompressed') from error
+    if len(content) != size:
+        raise RecordingError(f'holds {len(content)} bytes where {size} are stated')
+    return content
+
+
+def _lz4(stored: _Buffer, size: int) -> bytes:
+    decompressor = lz4.frame.LZ4FrameDecompressor()
+    content = bytes(decompressor.decompress(stored, max_length=size))
+    if not decompressor.eof and decompressor.decompress(b'', max_length=1):
+        raise RecordingError(f'holds more than the {size} bytes stated')
+    return content
+
+
+def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
+    """Return what can be had of a frame that is cut off, at most a number of bytes."""
+    if compression == 'zstd':
+        decompressor = zstandard.ZstdDecompressor().decompressobj()
+    elif compression == 'lz4':
+        decompressor = lz4.frame.LZ4FrameDecompressor()
+    else:
+        return bytes(stored[:size])
+    content = bytearray()
+    try:
+        for at in range(0, len(stored), _PARTIAL_STEP):
+            # Compressors write blocks that stand on their own.
+            content += decompressor.decompress(bytes(stored[at : at + _PARTIAL_STEP]))
+            if len(content) >= size:
+                break
+    except (*CORRUPT, EOFError):
+        pass
+    return bytes(content[:size])
+
+
+def unpacked(stream: BinaryIO) -> Iterator[bytes]:
+    """
+    Yield the content of a zstd file, a piece at a time.
+
+    Raises
+    ------
+    RecordingError
+        The file is damaged, or ends within a frame.
+
+    """
+    try:
+        with zstandard.ZstdDecompressor().stream_reader(
+            stream, read_across_frames=True
+        ) as content:
+            while piece := content.read(_STEP):
+                yield piece
+    except CORRUPT as error:
+        raise RecordingError(f'the compressed file is damaged: {error}') from error
+
+
+def message_content(data: bytes, limit: int) -> bytes:
+    """
+    Return a message that rosbag2 compressed on its own, at most a number of bytes.
+
+    Not every writer puts the size of the content into the frame.
+
+    Raises
+    ------
+    RecordingError
+        It is damaged, or larger.
+
+    """
+    decompressor = zstandard.ZstdDecompressor().decompressobj()
+    content = bytearray()
+    try:
+        for at in range(0, len(data), _PARTIAL_STEP):
+            content += decompressor.decompress(data[at : at + _PARTIAL_STEP])
+            if len(content) > limit:
+                raise RecordingError(f'a compressed message takes more than {limit} bytes')
+    except (*CORRUPT, EOFError) as error:
+        raise RecordingError(f'a compressed message is damaged: {error}') from error
+    return bytes(content)

@@ -1,0 +1,98 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The content of the chunks of an MCAP file: unpacked, and compared with its checksum."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+import mmap
+from typing import NamedTuple
+import zlib
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.compression import (
+    CORRUPT,
+    decompressed,
+    partly_decompressed,
+    stated_size,
+)
+from armid_ros.recording.mcap_records import Chunk, FileMap
+from armid_ros.recording.settings import ReadSettings
+
+_COMPRESSIONS = ('', 'zstd', 'lz4')
+
+
+class Content(NamedTuple):
+    """What holds the content of a chunk, and where in it."""
+
+    data: bytes | mmap.mmap
+    begin: int
+    end: int
+
+
+class Contents:
+    """The contents of the chunks of a file; what is wrong with them is noted there."""
+
+    def __init__(self, found: FileMap, settings: ReadSettings) -> None:
+        self._found = found
+        self._settings = settings
+        # A writer makes checksums or does not.
+        self._has_crc = settings.check_crc and any(chunk.crc for chunk in found.chunks)
+
+    def of(self, chunks: Iterable[Chunk]) -> Iterator[tuple[Chunk, Content]]:
+        """
+        Yield the contents of some chunks, in their order, without damaged ones.
+
+        Raises
+        ------
+        RecordingError
+            A chunk takes more memory than the settings allow.
+
+        """
+        for chunk in chunks:
+            try:
+                yield chunk, self._checked(chunk)
+            except _DamagedChunk as problem:
+                span = self._found.span(chunk)
+                self._found.damage.add(f'{problem}: messages {span} are left out')
+
+    def _checked(self, chunk: Chunk) -> Content:
+        """Return a content whose checksum is right."""
+        content = self._unpacked(chunk)
+        if chunk.whole and self._has_crc:
+            if zlib.crc32(memoryview(content.data)[content.begin : content.end]) != chunk.crc:
+                raise _DamagedChunk(f'the checksum of the chunk at byte {chunk.begin} is wrong')
+        return content
+
+    def _unpacked(self, chunk: Chunk) -> Content:
+        where = f'{chunk.compression} chunk' if chunk.compression else 'chunk'
+        where = f'the {where} at byte {chunk.begin}'
+        if chunk.compression not in _COMPRESSIONS:
+            raise _DamagedChunk(
+                f"{where} is compressed with '{chunk.compression}'; zstd and lz4 can be read"
+            )
+        stored = memoryview(self._found.data)[chunk.begin : chunk.end]
+        if not chunk.compression:
+            if chunk.whole and len(stored) != chunk.size:
+                raise _DamagedChunk(f'{where} is damaged')
+            end = chunk.begin + min(len(stored), chunk.size)
+            return Content(self._found.data, chunk.begin, end)
+        if not chunk.whole:
+            size = min(chunk.size, self._settings.memory_limit)
+            content = partly_decompressed(stored, chunk.compression, size)
+            return Content(content, 0, len(content))
+        try:
+            said = stated_size(stored, chunk.compression)
+        except CORRUPT as error:
+            raise _DamagedChunk(f'{where} is damaged: {error}') from error
+        if said is None or said == chunk.size:
+            self._settings.require(chunk.size, where)
+        try:
+            content = decompressed(stored, chunk.compression, chunk.size)
+        except RecordingError as error:
+            raise _DamagedChunk(f'{where} is damaged: {error}') from error
+        return Content(content, 0, len(content))
+
+
+class _DamagedChunk(Exception):
+    """A chunk whose content is not to be had."""

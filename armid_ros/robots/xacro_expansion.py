@@ -1,0 +1,87 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Expansion of xacro, which is a program more than a document.
+
+A xacro file can include any file that its reader may read, ask for environment variables, and
+repeat itself without end. It is therefore expanded in a process of its own, with a limit of time
+and memory, and only where a person names the file: a description that comes over a topic or out of
+a bag is never expanded.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import json
+from pathlib import Path
+import subprocess
+import sys
+from typing import Any
+
+from armid_ros.errors import RobotError
+from armid_ros.files.regular import TEXT_LIMIT
+
+#: The longest that an expansion may take [s]; the largest descriptions take one or two.
+TIME_LIMIT = 20.0
+#: The most memory [bytes].
+MEMORY_LIMIT = 2 << 30
+
+
+def expand_xacro(
+    path: Path, arguments: Mapping[str, str], *, time_limit: float = TIME_LIMIT
+) -> str:
+    """
+    Return what a xacro file expands to.
+
+    Parameters
+    ----------
+    path : Path
+        The file; it is trusted as a program is, except for time and memory.
+    arguments : mapping of str to str
+        Values of <xacro:arg>.
+    time_limit : float
+        The longest that it may take [s].
+
+    Raises
+    ------
+    RobotError
+        It cannot be expanded, or not within the limits.
+
+    """
+    request = {
+        'path': str(path),
+        'arguments': dict(arguments),
+        'seconds': time_limit,
+        'memory': MEMORY_LIMIT,
+        'characters': TEXT_LIMIT,
+    }
+    command = [sys.executable, '-P', str(Path(__file__).with_name('xacro_process.py'))]
+    try:
+        done = subprocess.run(
+            command,
+            input=json.dumps(request),
+            capture_output=True,
+            encoding='utf-8',
+            errors='replace',
+            timeout=time_limit,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise RobotError(f'{path}: xacro: not expanded within {time_limit:g} s') from error
+    except OSError as error:
+        raise RobotError(f'{path}: xacro: cannot be started: {error.strerror}') from error
+    answer = _answer(done.stdout)
+    if 'text' not in answer:
+        reason = answer.get('error') or f'not expanded within {MEMORY_LIMIT >> 20} MiB'
+        raise RobotError(f'{path}: xacro: {reason}')
+    return str(answer['text'])
+
+
+def _answer(text: str) -> dict[str, Any]:
+    """Return the answer of the process; nothing if it died before it gave one."""
+    try:
+        answer: dict[str, Any] = json.loads(text)
+    except ValueError:
+        return {}
+    return answer

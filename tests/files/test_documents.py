@@ -1,0 +1,55 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Documents are bounded before they are built, and what a parser raises names the file."""
+
+from armid_ros.errors import ModelError, visible
+from armid_ros.files import finite, load_json, load_yaml, reading
+import pytest
+
+
+def test_plain_documents_are_what_they_say():
+    assert load_yaml('a: [1, 2.5, x]\nb: &one {c: null}\nd: *one') == {
+        'a': [1, 2.5, 'x'],
+        'b': {'c': None},
+        'd': {'c': None},
+    }
+    assert load_json('{"a": [1, 2.5, null]}') == {'a': [1, 2.5, None]}
+
+
+def test_aliases_that_grow_beyond_measure_are_refused():
+    lines = ['l0: &l0 [x, x, x, x, x, x, x, x, x, x]']
+    lines += [f'l{k}: &l{k} [{", ".join([f"*l{k - 1}"] * 10)}]' for k in range(1, 10)]
+    with pytest.raises(ValueError, match='nodes, aliases written out'):
+        load_yaml('\n'.join(lines))
+
+
+def test_an_alias_of_what_it_is_in_is_refused():
+    with pytest.raises(ValueError, match='has no anchor'):
+        load_yaml('a: &a [*a]')
+
+
+@pytest.mark.parametrize(
+    ('problem', 'said'),
+    [
+        (KeyError('name'), 'no name'),
+        (RecursionError(), 'nested too deep'),
+        (MemoryError(), 'too large'),
+        (OverflowError('too big'), 'OverflowError: too big'),
+        (ModelError('of the arm'), 'of the arm'),
+    ],
+)
+def test_what_a_parser_raises_names_the_file(problem, said):
+    with pytest.raises(ModelError, match=f'^model.yaml: {said}'):
+        with reading('model.yaml', ModelError):
+            raise problem
+
+
+@pytest.mark.parametrize('value', ['nan', float('inf'), 10**4000, None, [1], '2001-01-01'])
+def test_a_number_is_finite(value):
+    with pytest.raises(ValueError, match='mass has to be a finite number'):
+        finite(value, 'mass')
+
+
+def test_an_escape_sequence_in_a_name_is_spelled_out():
+    assert visible('elbow\x1b[2J\u202e') == 'elbow\\x1b[2J\\u202e'
+    assert str(ModelError("joint '\x1b]0;x\x07'")) == "joint '\\x1b]0;x\\x07'"

@@ -1,0 +1,121 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Results are whole or absent, and no run takes the place of another unawares."""
+
+import errno
+import json
+import multiprocessing
+import os
+
+from armid_ros.errors import OutputError
+from armid_ros.files import json_text, result_folder, write_file
+import pytest
+
+SCHEMA = 'armid/identification/1'
+
+
+def test_a_file_is_written_and_replaced(tmp_path):
+    write_file(tmp_path / 'a.json', 'old')
+    write_file(tmp_path / 'a.json', 'new \N{GREEK SMALL LETTER TAU}')
+    assert (tmp_path / 'a.json').read_text() == 'new \N{GREEK SMALL LETTER TAU}'
+    assert [path.name for path in tmp_path.iterdir()] == ['a.json']
+
+
+def test_a_link_is_replaced_and_not_followed(tmp_path):
+    (tmp_path / 'out').mkdir()
+    (tmp_path / 'precious').write_text('kept')
+    for name in ('a.json', '.a.json.part'):
+        (tmp_path / 'out' / name).symlink_to(tmp_path / 'precious')
+    write_file(tmp_path / 'out' / 'a.json', 'result')
+    assert (tmp_path / 'precious').read_text() == 'kept'
+    assert (tmp_path / 'out' / 'a.json').read_text() == 'result'
+    assert not (tmp_path / 'out' / 'a.json').is_symlink()
+
+
+def test_a_disk_that_is_full_leaves_the_old_file(tmp_path, monkeypatch):
+    write_file(tmp_path / 'a.json', 'old')
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    monkeypatch.setattr('armid_ros.files.output.os.fdopen', full)
+    with pytest.raises(OutputError, match=r'a.json: cannot be written: No space left'):
+        write_file(tmp_path / 'a.json', 'new')
+    monkeypatch.undo()
+    assert [path.name for path in tmp_path.iterdir()] == ['a.json']
+    assert (tmp_path / 'a.json').read_text() == 'old'
+
+
+def write_for_ever(folder, begun):
+    for k in range(10**9):
+        write_file(folder / 'a.json', json.dumps([k] * 20_000))
+        begun.set()
+
+
+def test_a_writer_that_is_killed_leaves_a_whole_file(tmp_path):
+    context = multiprocessing.get_context('fork')
+    for _ in range(20):
+        begun = context.Event()
+        writer = context.Process(target=write_for_ever, args=(tmp_path, begun))
+        writer.start()
+        begun.wait()
+        writer.kill()
+        writer.join()
+        assert len(json.loads((tmp_path / 'a.json').read_text())) == 20_000
+
+
+def test_json_has_null_for_what_is_no_number():
+    assert json.loads(json_text({'a': [1.5, float('nan')], 'b': float('inf')})) == {
+        'a': [1.5, None],
+        'b': None,
+    }
+
+
+def test_a_second_run_in_one_folder_is_refused(tmp_path):
+    with result_folder(tmp_path, SCHEMA):
+        with pytest.raises(OutputError, match='another run is writing'):
+            with result_folder(tmp_path, SCHEMA):
+                pass
+    with result_folder(tmp_path, SCHEMA):
+        pass
+
+
+@pytest.mark.parametrize(
+    ('content', 'refusal'),
+    [
+        ({'schema': SCHEMA, 'robot': 'ur5'}, None),
+        ({'schema': SCHEMA, 'robot': 'panda'}, 'of panda, not of ur5; .*--force'),
+        ({'schema': 'armid/diagnosis/1'}, 'holds armid/diagnosis/1, not armid/ident.*--force'),
+        ('rubbish', 'identification.json, which cannot be read'),
+    ],
+)
+def test_results_of_another_kind_or_robot_are_kept_unless_forced(tmp_path, content, refusal):
+    (tmp_path / 'identification.json').write_text(json.dumps(content))
+    if refusal:
+        with pytest.raises(OutputError, match=refusal):
+            with result_folder(tmp_path, SCHEMA, 'ur5'):
+                pass
+    with result_folder(tmp_path, SCHEMA, 'ur5', force=refusal is not None):
+        pass
+
+
+def test_what_fails_before_it_writes_leaves_no_folder(tmp_path):
+    with pytest.raises(RuntimeError):
+        with result_folder(tmp_path / 'a' / 'b', SCHEMA):
+            raise RuntimeError
+    assert not (tmp_path / 'a').exists()
+
+
+def test_a_folder_that_cannot_be_written_is_said_before_the_work(tmp_path, monkeypatch):
+    def read_only(*_):
+        raise OSError(errno.EROFS, 'Read-only file system')
+
+    monkeypatch.setattr('armid_ros.files.output.os.fdopen', read_only)
+    with pytest.raises(OutputError, match='cannot be written: Read-only file system'):
+        with result_folder(tmp_path, SCHEMA):
+            pytest.fail('the work began')
+    (tmp_path / 'file').touch()
+    with pytest.raises(OutputError, match=f'{tmp_path / "file" / "out"}: cannot be made'):
+        with result_folder(tmp_path / 'file' / 'out', SCHEMA):
+            pytest.fail('the work began')
+    assert os.listdir(tmp_path) == ['file']

@@ -1,0 +1,75 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every reader refuses what is no regular file at once, with its name."""
+
+import os
+
+from armid_ros.arm import load_model
+from armid_ros.errors import ArmidError, RobotError
+from armid_ros.excitation import load_environment, load_excitation
+from armid_ros.files import read_text
+from armid_ros.identification.parameters_file import read_parameters
+from armid_ros.recording import Bag, read_recording, recover
+from armid_ros.robots import collision_model, load_robot
+from armid_ros.robots.assumptions import read_assumptions
+from armid_ros.robots.two_link import two_link_set
+from armid_ros.simulation.gait import read_gait
+import pytest
+
+READERS = {
+    'model.yaml': load_model,
+    'identification.json': read_parameters,
+    'excitation.yaml': load_excitation,
+    'excitation.csv': load_excitation,
+    'environment.yaml': load_environment,
+    'robot.urdf': load_robot,
+    'robot.urdf.xacro': load_robot,
+    'gait.csv': read_gait,
+    'assumptions.yaml': read_assumptions,
+    'parameters.yaml': lambda path: two_link_set('after', path),
+    'robot.srdf': lambda path: collision_model(load_robot('humanoid_arm'), srdf=path),
+    'bag.mcap': Bag,
+    'bag.db3': Bag,
+    'bag.mcap.zstd': Bag,
+    'bag.db3.zstd': lambda path: read_recording(path, joints=['a']),
+    'cut.mcap': lambda path: recover(path, path.parent / 'out'),
+    'metadata.yaml': lambda path: Bag(path.parent),
+}
+
+
+@pytest.mark.parametrize('name', READERS)
+@pytest.mark.parametrize('kind', ['a FIFO', 'a device', 'a folder'])
+def test_what_is_no_file_is_refused_without_waiting(tmp_path, name, kind):
+    path = tmp_path / name
+    if kind == 'a FIFO':
+        os.mkfifo(path)
+    elif kind == 'a device':
+        path.symlink_to('/dev/zero')
+    else:
+        path.mkdir()
+    with pytest.raises(ArmidError, match=name) as refusal:
+        READERS[name](path)
+    assert kind in str(refusal.value) or kind == 'a folder'
+
+
+@pytest.mark.parametrize('name', READERS)
+@pytest.mark.parametrize(
+    'content',
+    [b'\xff\xfe\x00rubbish', b'[' * 5000, b'{"a":' * 5000, b'a: ' + b'9' * 5000, b'2001-99-99'],
+)
+def test_rubbish_in_any_file_is_refused_with_its_name(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ArmidError, match=name):
+        READERS[name](tmp_path / name)
+
+
+def test_a_text_has_a_largest_size(tmp_path):
+    (tmp_path / 'large.urdf').write_text('x' * 101)
+    with pytest.raises(RobotError, match=r'large.urdf: larger than'):
+        read_text(tmp_path / 'large.urdf', RobotError, 100)
+
+
+@pytest.mark.parametrize('name', ['a' * 5000, 'a\0b'])
+def test_a_name_that_no_file_can_have_is_that_of_no_robot(name):
+    with pytest.raises(RobotError, match='neither a file nor a shipped robot'):
+        load_robot(name)

@@ -1,0 +1,304 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Damaged bags: what is read of them is what was recorded, or it is said."""
+
+from pathlib import Path
+import sqlite3
+import struct
+import zlib
+
+from armid_ros.errors import ArmidError
+from armid_ros.recording import (
+    iter_raw,
+    read_recording,
+    ReadSettings,
+    Recording,
+    recover,
+    write_recording,
+)
+from armid_ros.recording.compression import decompressed
+from armid_ros.recording.mcap_records import map_file
+from hypothesis import given
+from hypothesis import strategies as st
+import lz4.frame
+import numpy as np
+import pytest
+import yaml
+import zstandard
+
+from tests.fuzz.mutants import (
+    BYTE_EDIT,
+    edited_bytes,
+    edited_records,
+    edited_text,
+    edited_tree,
+    INTEGERS,
+    PLACE,
+    RECORD_EDIT,
+    TEXT_EDIT,
+    to_yaml,
+    TREE_EDIT,
+)
+from tests.fuzz.property import judge
+
+JOINTS = ('shoulder', 'elbow')
+SETTINGS = ReadSettings(memory_limit=200_000_000)
+SAMPLES = 120
+COMPRESSIONS = ('none', 'zstd', 'lz4')
+
+
+def swing():
+    t = np.arange(SAMPLES) * 1e-3
+    rates = 2.0 + np.arange(len(JOINTS))
+    wave = np.outer(t, rates)
+    return Recording(
+        joints=JOINTS,
+        t=t,
+        q=np.sin(wave),
+        dq=rates * np.cos(wave),
+        tau=np.cos(wave),
+        start_ns=10**18,
+    )
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    """Return a folder with a bag of each compression and a database of the same recording."""
+    folder = tmp_path_factory.mktemp('fuzz')
+    for compression in COMPRESSIONS:
+        write_recording(folder / compression, swing(), compression=compression, chunk_size=4000)
+    make_database(folder / 'bag.db3', folder / 'none')
+    (folder / 'work').mkdir()
+    return folder
+
+
+def make_database(path, bag):
+    with sqlite3.connect(path) as database:
+        database.executescript(
+            'CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);'
+            'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, '
+            'serialization_format TEXT, offered_qos_profiles TEXT, type_description_hash TEXT);'
+            'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, '
+            'data BLOB); CREATE INDEX timestamp_idx ON messages (timestamp ASC);'
+            'CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT, '
+            'encoding TEXT, encoded_message_definition TEXT, type_description_hash TEXT);'
+            "INSERT INTO topics VALUES (1, '/joint_states', 'sensor_msgs/msg/JointState', 'cdr', "
+            "'', '');"
+        )
+        rows = [(m.log_time_ns, m.cdr) for m in iter_raw(bag)]
+        database.executemany('INSERT INTO messages VALUES (NULL, 1, ?, ?)', rows)
+    database.close()
+
+
+def read(path):
+    """Read a bag in both ways, and as it is recovered."""
+    recording = read_recording(path, joints=JOINTS, settings=SETTINGS)
+    count = sum(1 for _ in iter_raw(path, SETTINGS))
+    return recording, count
+
+
+def agrees(answer, whole):
+    """Compare a recording with the undamaged one."""
+    recording, _ = answer
+    assert np.isfinite(recording.q).all()
+    assert (np.diff(recording.t) > 0).all()
+    same = (
+        len(recording) == len(whole)
+        and recording.start_ns == whole.start_ns
+        and all(
+            getattr(recording, name) is not None
+            and np.array_equal(getattr(recording, name), getattr(whole, name))
+            for name in ('q', 'dq', 'tau')
+        )
+    )
+    if same:
+        return 'same'
+    return 'said' if not recording.report.clean else 'other numbers without a word'
+
+
+def any_answer(answer, whole):
+    """Accept what cannot be told from another file that is whole."""
+    verdict = agrees(answer, whole)
+    return verdict if verdict in ('same', 'said') else 'other'
+
+
+def fewer_are_said(answer, whole):
+    """Accept other numbers, of which there is no checksum, but not fewer."""
+    verdict = any_answer(answer, whole)
+    if verdict == 'other' and len(answer[0]) < len(whole):
+        return f'{len(answer[0])} samples without a word'
+    return verdict
+
+
+@given(
+    compression=st.sampled_from(COMPRESSIONS),
+    edits=st.lists(BYTE_EDIT, min_size=1, max_size=4),
+)
+def test_mcap_bytes(folder, compression, edits):
+    content = (folder / compression / f'{compression}_0.mcap').read_bytes()
+    path = folder / 'work' / 'bytes.mcap'
+    path.write_bytes(edited_bytes(content, edits))
+    judge('MCAP, bytes', read, path, swing(), agrees)
+
+
+@given(
+    compression=st.sampled_from(COMPRESSIONS),
+    edits=st.lists(RECORD_EDIT, min_size=1, max_size=3),
+)
+def test_mcap_records(folder, compression, edits):
+    content = (folder / compression / f'{compression}_0.mcap').read_bytes()
+    path = folder / 'work' / 'records.mcap'
+    path.write_bytes(edited_records(content, edits))
+    judge('MCAP, records', read, path, swing(), agrees)
+
+
+FIELD = st.tuples(PLACE, PLACE, st.sampled_from(INTEGERS), st.sampled_from([1, 2, 4, 8]))
+
+
+@given(compression=st.sampled_from(COMPRESSIONS), fields=st.lists(FIELD, min_size=1, max_size=4))
+def test_mcap_chunks_with_right_checksums(folder, compression, fields):
+    path = folder / compression / f'{compression}_0.mcap'
+    content = path.read_bytes()
+    chunk = map_file(content, path).chunks[1]
+    stored = content[chunk.begin : chunk.end]
+    plain = bytearray(
+        decompressed(stored, chunk.compression, chunk.size) if chunk.compression else stored
+    )
+    for message, place, value, width in fields:
+        at = min(int(message * len(plain)) + int(place * 40), len(plain) - width)
+        plain[at : at + width] = (value & (2 ** (8 * width) - 1)).to_bytes(width, 'little')
+    packed = {'none': bytes, 'zstd': zstandard.compress, 'lz4': lz4.frame.compress}[compression](
+        plain
+    )
+    name = chunk.compression.encode()
+    head = struct.pack(
+        f'<QQQII{len(name)}sQ',
+        chunk.start_time, chunk.end_time, len(plain), zlib.crc32(plain),
+        len(name), name, len(packed),
+    )  # fmt: skip
+    begin = chunk.begin - len(head) - 9
+    mutant = folder / 'work' / 'chunk.mcap'
+    record = b'\x06' + struct.pack('<Q', len(head) + len(packed)) + head + packed
+    mutant.write_bytes(content[:begin] + record + content[chunk.end :])
+    judge('MCAP, within chunks', read, mutant, swing(), any_answer)
+
+
+@given(
+    compression=st.sampled_from(COMPRESSIONS),
+    edits=st.lists(st.one_of(RECORD_EDIT), min_size=1, max_size=3),
+    number=st.integers(0, 10**9),
+)
+def test_recovered(folder, compression, edits, number):
+    content = (folder / compression / f'{compression}_0.mcap').read_bytes()
+    path, out = folder / 'work' / 'crashed.mcap', folder / 'work' / 'recovered'
+    path.write_bytes(edited_records(content, edits))
+
+    def recovered(path):
+        try:
+            report = recover(path, out, SETTINGS)
+            try:
+                again = read_recording(out, joints=JOINTS, settings=SETTINGS)
+            except ArmidError as error:
+                raise type(error)(f'{path.name}: {error}') from error
+        finally:
+            remove(out)
+        return again, report
+
+    def whole(answer, whole):
+        verdict = agrees(answer, whole)
+        return 'said' if answer[1].damage and verdict not in ('same', 'said') else verdict
+
+    judge('recover', recovered, path, swing(), whole)
+
+
+def remove(bag):
+    if bag.exists():
+        for file in bag.iterdir():
+            file.unlink()
+        bag.rmdir()
+
+
+CELLS = ('NULL', "'text'", '3.5', '-1', '9223372036854775807', "x''", "x'00'",
+         "CAST(x'ff' AS TEXT)", 'zeroblob(1000000)', "'9e99'", '0', '1')  # fmt: skip
+COLUMNS = (
+    *(('messages', column) for column in ('id', 'topic_id', 'timestamp', 'data')),
+    *(('topics', column) for column in ('id', 'name', 'type', 'serialization_format',
+                                        'offered_qos_profiles', 'type_description_hash')),
+)  # fmt: skip
+SQL_EDIT = st.tuples(
+    st.sampled_from(['cell', 'cell', 'cells', 'delete', 'twice', 'drop', 'rename', 'view']),
+    st.sampled_from(COLUMNS),
+    st.integers(1, SAMPLES),
+    st.sampled_from(CELLS),
+)
+
+
+def edit_database(path, edits):
+    database = sqlite3.connect(path, isolation_level=None)
+    for operation, (table, column), row, value in edits:
+        one = f'WHERE rowid = (SELECT rowid FROM {table} LIMIT 1 OFFSET {row % 100})'
+        statement = {
+            'cell': f'UPDATE {table} SET {column} = {value} {one}',
+            'cells': f'UPDATE {table} SET {column} = {value}',
+            'delete': f'DELETE FROM {table} {one}',
+            'twice': f'INSERT INTO {table} SELECT * FROM {table} {one}',
+            'drop': f'ALTER TABLE {table} DROP COLUMN {column}',
+            'rename': f'ALTER TABLE {table} RENAME COLUMN {column} TO other',
+            'view': f'ALTER TABLE {table} RENAME TO old',
+        }[operation]
+        try:
+            database.execute(statement)
+            if operation == 'view':
+                database.execute(f'CREATE VIEW {table} AS SELECT * FROM old')
+        except sqlite3.Error:
+            continue
+    database.close()
+
+
+@given(edits=st.lists(SQL_EDIT, min_size=1, max_size=3))
+def test_sqlite_cells(folder, edits):
+    path = folder / 'work' / 'cells'
+    path.mkdir(exist_ok=True)
+    text = (folder / 'none' / 'metadata.yaml').read_text()
+    (path / 'metadata.yaml').write_text(text.replace('none_0.mcap', 'bag.db3'))
+    (path / 'bag.db3').write_bytes((folder / 'bag.db3').read_bytes())
+    edit_database(path / 'bag.db3', edits)
+    judge('SQLite, cells', read, path, swing(), fewer_are_said)
+
+
+@given(edits=st.lists(BYTE_EDIT, min_size=1, max_size=4), head=st.booleans())
+def test_sqlite_bytes(folder, edits, head):
+    path = folder / 'work' / 'pages'
+    path.mkdir(exist_ok=True)
+    text = (folder / 'none' / 'metadata.yaml').read_text()
+    (path / 'metadata.yaml').write_text(text.replace('none_0.mcap', 'bag.db3'))
+    content = (folder / 'bag.db3').read_bytes()
+    size = 4096 * 6 if head else len(content)
+    mutant = edited_bytes(content[:size], edits) + content[size:]
+    (path / 'bag.db3').write_bytes(mutant)
+    judge('SQLite, bytes', read, path, swing(), fewer_are_said)
+
+
+@given(edits=st.lists(TEXT_EDIT, min_size=1, max_size=3))
+def test_metadata_text(folder, edits):
+    bag = metadata_bag(folder)
+    text = (folder / 'zstd' / 'metadata.yaml').read_text()
+    (bag / 'metadata.yaml').write_text(edited_text(text, edits), errors='surrogatepass')
+    judge('metadata.yaml, text', read, bag, swing(), agrees)
+
+
+@given(edits=st.lists(TREE_EDIT, min_size=1, max_size=3))
+def test_metadata_tree(folder, edits):
+    bag = metadata_bag(folder)
+    tree = yaml.safe_load((folder / 'zstd' / 'metadata.yaml').read_text())
+    (bag / 'metadata.yaml').write_text(to_yaml(edited_tree(tree, edits)))
+    judge('metadata.yaml, tree', read, bag, swing(), agrees)
+
+
+def metadata_bag(folder):
+    bag = folder / 'work' / 'described'
+    if not bag.exists():
+        bag.mkdir()
+        content = (folder / 'zstd' / 'zstd_0.mcap').read_bytes()
+        Path(bag / 'zstd_0.mcap').write_bytes(content)
+    return bag

@@ -1,0 +1,241 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Damaged descriptions, models, excitations and results: refused, or with finite numbers."""
+
+import json
+
+from armid_ros.arm import ArmModel, load_model, save_model
+from armid_ros.effects import make_effect
+from armid_ros.errors import RobotError
+from armid_ros.excitation import Excitation, load_excitation, save_excitation
+from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.files import json_text
+from armid_ros.identification.comparison import compare
+from armid_ros.identification.parameters_file import read_parameters
+from armid_ros.robots import load_robot
+from armid_ros.robots.shipped import shipped_path
+from armid_ros.robots.xacro_process import expanded
+from hypothesis import given
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+import yaml
+
+from tests.fuzz.mutants import (
+    edited_text,
+    edited_tree,
+    edited_xml,
+    TEXT_EDIT,
+    to_json,
+    to_yaml,
+    TREE_EDIT,
+    XML_EDIT,
+)
+from tests.fuzz.property import judge
+
+ROBOT = 'two_link_elastic'
+EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset', 'stribeck_friction', 'payload')
+TEXT_EDITS = st.lists(TEXT_EDIT, min_size=1, max_size=3)
+TREE_EDITS = st.lists(TREE_EDIT, min_size=1, max_size=3)
+XML_EDITS = st.lists(XML_EDIT, min_size=1, max_size=4)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    """Return a folder to write mutants to."""
+    return tmp_path_factory.mktemp('fuzz')
+
+
+@pytest.fixture(scope='module')
+def robot():
+    """Return a robot of two joints."""
+    return load_robot(ROBOT)
+
+
+@pytest.fixture(scope='module')
+def model(robot, folder):
+    """Return a model.yaml as text."""
+    arm = ArmModel(robot)
+    for name in EFFECTS:
+        arm = arm.with_effect(make_effect(name, robot))
+    save_model(folder / 'whole.yaml', arm, ROBOT)
+    return (folder / 'whole.yaml').read_text()
+
+
+@pytest.fixture(scope='module')
+def excitation(folder):
+    """Return an excitation.yaml and an excitation.csv as texts."""
+    series = FourierTrajectory(
+        ('a', 'b'), 4.0, np.zeros(2), np.full((2, 3), 0.1), np.full((2, 3), 0.2)
+    )
+    run = Excitation(series, 2, 1.0, np.array([0.1, 0.2]))
+    save_excitation(run, folder / 'whole_run.yaml')
+    save_excitation(run, folder / 'whole_run.csv')
+    return {suffix: (folder / f'whole_run{suffix}').read_text() for suffix in ('.yaml', '.csv')}
+
+
+def identification():
+    """Return an identification.json as a document."""
+    names = [('Izz1', 'a', 'kg m^2'), ('mx2', 'b', 'kg m')]
+    names += [('viscous_coefficient', joint, 'N m s/rad') for joint in 'ab']
+    values = [1.0, 0.2, 0.3, 0.4]
+    covariance = 1e-4 * (np.eye(4) + 0.3)
+    return {
+        'schema': 'armid/identification/1',
+        'robot': 'r',
+        'gravity': [0.0, 0.0, -9.81],
+        'parameters': [
+            {'name': n, 'joint': j, 'value': v, 'std': float(np.sqrt(covariance[0, 0])), 'unit': u}
+            for (n, j, u), v in zip(names, values, strict=True)
+        ],
+        'covariance': [row[: k + 1].tolist() for k, row in enumerate(covariance)],
+        'grouping': [{name: 1.0} for name, _, _ in names],
+        'condition_number': 3.0,
+        'training': {'bags': ['x'], 'relative_error_percent': 5.0, 'rms': {'a': 0.1, 'b': 0.1}},
+        'validation': [{'bag': 'y', 'relative_error_percent': 6.0, 'rms': {'a': 0.1, 'b': 0.1}}],
+        'model': 'model.yaml',
+    }
+
+
+def finite(*arrays):
+    """Say what is wrong with numbers; 'other' if nothing is, for a text has no checksum."""
+    return 'other' if all(np.isfinite(array).all() for array in arrays) else 'not finite'
+
+
+def sound_robot(robot, _):
+    """Check a robot."""
+    q = np.zeros(robot.n_joints)
+    assert robot.n_joints > 0
+    assert (robot.lower <= robot.upper).all()
+    assert not np.isnan(np.concatenate([robot.lower, robot.upper, robot.torque_limit, q])).any()
+    return finite(robot.rigid_parameters, robot.gravity, robot.urdf_damping, robot.urdf_friction)
+
+
+@given(edits=XML_EDITS)
+def test_urdf_elements(folder, edits):
+    path = folder / 'robot.urdf'
+    text = shipped_path('humanoid_arm').read_text()
+    path.write_text(edited_xml(text, edits), errors='replace')
+    judge('URDF, elements', load_robot, path, None, sound_robot)
+
+
+@given(edits=TEXT_EDITS)
+def test_urdf_text(folder, edits):
+    path = folder / 'robot_text.urdf'
+    text = shipped_path('humanoid_arm').read_text()
+    path.write_text(edited_text(text, edits), errors='replace')
+    judge('URDF, text', load_robot, path, None, sound_robot)
+
+
+XACRO = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">
+<xacro:arg name="mass" default="1.5"/>
+<xacro:property name="m" value="$(arg mass)"/>
+<xacro:property name="n" value="${2 * m}"/>
+<xacro:macro name="link" params="name mass:=1 *origin">
+<link name="${name}"><inertial><xacro:insert_block name="origin"/><mass value="${mass}"/>
+<inertia ixx="${mass / 10}" iyy="${mass / 10}" izz="${mass * 0.1}"/></inertial></link>
+</xacro:macro>
+<link name="base"/>
+<xacro:link name="one" mass="${n}"><origin xyz="0 0 ${0.1 + m}"/></xacro:link>
+<xacro:if value="${n > 2}"><xacro:link name="two"><origin xyz="0 0 0.1"/></xacro:link></xacro:if>
+<joint name="a" type="revolute"><parent link="base"/><child link="one"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="${radians(60)}" effort="10" velocity="1"/></joint>
+<joint name="b" type="continuous"><parent link="one"/><child link="two"/><axis xyz="0 1 0"/>
+</joint>
+</robot>"""
+
+
+def read_xacro(path):
+    """Expand in this process, which is what the process of the package does."""
+    answer = expanded({'path': str(path), 'arguments': {}, 'characters': 10**7})
+    if 'text' not in answer:
+        raise RobotError(f'{path}: {answer["error"]}')
+    try:
+        return load_robot(answer['text'])
+    except RobotError as error:
+        raise RobotError(f'{path}: {error}') from error
+
+
+@given(
+    edits=st.one_of(
+        XML_EDITS.map(lambda e: (edited_xml, e)), TEXT_EDITS.map(lambda e: (edited_text, e))
+    )
+)
+def test_xacro(folder, edits):
+    path = folder / 'robot.urdf.xacro'
+    edit, what = edits
+    path.write_text(edit(XACRO, what), errors='replace')
+    judge('xacro', read_xacro, path, None, sound_robot)
+
+
+@given(edits=TREE_EDITS)
+def test_model_tree(folder, robot, model, edits):
+    path = folder / 'model.yaml'
+    path.write_text(to_yaml(edited_tree(yaml.safe_load(model), edits)))
+    judge('model.yaml, tree', lambda p: load_model(p, robot), path, None, sound_model)
+
+
+@given(edits=TEXT_EDITS)
+def test_model_text(folder, robot, model, edits):
+    path = folder / 'model_text.yaml'
+    path.write_text(edited_text(model, edits), errors='replace')
+    judge('model.yaml, text', lambda p: load_model(p, robot), path, None, sound_model)
+
+
+def sound_model(arm, _):
+    """Check an arm model."""
+    return finite(arm.theta, arm.robot.gravity, *(e.shape_values for e in arm.effects if e.shapes))
+
+
+@given(edits=TREE_EDITS)
+def test_excitation_tree(folder, excitation, edits):
+    path = folder / 'excitation.yaml'
+    path.write_text(to_yaml(edited_tree(yaml.safe_load(excitation['.yaml']), edits)))
+    judge('excitation.yaml, tree', load_excitation, path, None, sound_excitation)
+
+
+@given(edits=TEXT_EDITS, suffix=st.sampled_from(['.yaml', '.csv']))
+def test_excitation_text(folder, excitation, edits, suffix):
+    path = folder / f'excitation_text{suffix}'
+    path.write_text(edited_text(excitation[suffix], edits), errors='replace')
+    judge(f'excitation{suffix}, text', load_excitation, path, None, sound_excitation)
+
+
+def sound_excitation(run, _):
+    """Check an excitation at some of its times; what is beyond all numbers is for the limits."""
+    with np.errstate(all='ignore'):
+        motion = run.at(np.linspace(0.0, run.duration, 11))
+    assert motion.q.shape == (11, len(run.joints))
+    return finite(run.trajectory.q0, run.trajectory.a, run.trajectory.b, run.duration)
+
+
+@given(edits=TREE_EDITS)
+def test_identification_tree(folder, edits):
+    path = folder / 'identification.json'
+    path.write_text(to_json(edited_tree(identification(), edits)))
+    judge('identification.json', compared, path, None, sound_comparison)
+
+
+@given(edits=TEXT_EDITS)
+def test_identification_text(folder, edits):
+    path = folder / 'identification_text.json'
+    path.write_text(edited_text(to_json(identification()), edits), errors='replace')
+    judge('identification.json, text', compared, path, None, sound_comparison)
+
+
+def compared(path):
+    """Compare a mutant with what is whole."""
+    whole = path.with_name('whole_identification.json')
+    if not whole.exists():
+        whole.write_text(to_json(identification()))
+    return compare(read_parameters(whole), read_parameters(path)).document()
+
+
+def sound_comparison(document, _):
+    """Check what is written of a comparison."""
+    assert json.loads(json_text(document))['schema'] == 'armid/comparison/1'
+    try:
+        json.dumps(document, allow_nan=False)
+    except ValueError as error:
+        return f'not finite: {error}'
+    return 'other'

@@ -1,0 +1,222 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Nothing damaged passes for data: it is left out, and said with its time."""
+
+import sqlite3
+import struct
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording import iter_raw, read_recording, ReadSettings, recover, write_recording
+from armid_ros.recording.mcap_content import walk
+from armid_ros.recording.mcap_records import map_file, MESSAGE
+import numpy as np
+import pytest
+
+JOINTS = ('shoulder', 'elbow', 'wrist')
+
+
+@pytest.fixture(params=['none', 'zstd', 'lz4'])
+def bag(request, make_swing, tmp_path):
+    """Return a recording of 300 samples, and its bag of several chunks."""
+    recording = make_swing(300)
+    write_recording(tmp_path / 'bag', recording, compression=request.param, chunk_size=10_000)
+    return recording, tmp_path / 'bag' / 'bag_0.mcap'
+
+
+def chunks_of(path):
+    return map_file(path.read_bytes(), path).chunks
+
+
+def change(path, at, value=None):
+    """Flip the bits of a byte, or write bytes over it."""
+    content = bytearray(path.read_bytes())
+    new = bytes([content[at] ^ 0xFF]) if value is None else value
+    content[at : at + len(new)] = new
+    path.write_bytes(content)
+
+
+def test_a_damaged_chunk_is_left_out_and_said_with_its_time(bag):
+    recording, path = bag
+    chunk = chunks_of(path)[2]
+    change(path, chunk.end - 40)
+    got = read_recording(path, joints=JOINTS)
+    begin, end = (
+        (time - recording.start_ns) * 1e-9 for time in (chunk.start_time, chunk.end_time)
+    )
+    assert f'messages from {begin:.3f} to {end:.3f} s' in got.report.damage
+    assert 'where the writer counted 300' in got.report.damage
+    left = (recording.t < begin - 1e-6) | (recording.t > end + 1e-6)
+    assert 0 < left.sum() < 300
+    np.testing.assert_array_equal(got.q, recording.q[left])
+    assert len(list(iter_raw(path))) == left.sum()
+
+
+def test_checksums_are_not_compared_for_who_does_not_want_it(make_swing, tmp_path):
+    write_recording(tmp_path / 'bag', make_swing(300), compression='none')
+    path = tmp_path / 'bag' / 'bag_0.mcap'
+    change(path, chunks_of(path)[0].end - 40)
+    got = read_recording(path, joints=JOINTS, settings=ReadSettings(check_crc=False))
+    assert len(got) + got.report.nan == 300
+
+
+@pytest.mark.parametrize('entry', [-1, 0, 2**63 - 1])
+def test_an_index_that_lies_costs_no_message(bag, entry):
+    recording, path = bag
+    chunk = chunks_of(path)[1]
+    (at, count) = chunk.indexes[1]
+    change(path, at + 16 * (count // 2) + 8, struct.pack('<q', entry))
+    got = read_recording(path, joints=JOINTS)
+    np.testing.assert_array_equal(got.q, recording.q)
+    assert got.report.clean
+
+
+def test_an_index_record_that_is_lost_costs_no_message_or_is_said(bag):
+    _, path = bag
+    at, _ = chunks_of(path)[1].indexes[1]
+    change(path, at - 6, struct.pack('<H', 77))  # the index of a channel that does not exist
+    got = read_recording(path, joints=JOINTS)
+    assert len(got) == 300 or 'where the writer counted 300' in got.report.damage
+
+
+def test_messages_that_are_lost_with_their_chunk_record_are_missed(bag):
+    _, path = bag
+    chunk = chunks_of(path)[1]
+    name = len(chunk.compression)
+    opcode = chunk.begin - 8 - name - 32 - 9
+    assert path.read_bytes()[opcode] == 6
+    change(path, opcode, b'\x0c')
+    got = read_recording(path, joints=JOINTS)
+    assert len(got) < 300 and 'where the writer counted 300' in got.report.damage
+
+
+def test_a_summary_that_is_damaged_is_not_believed(bag):
+    recording, path = bag
+    content = path.read_bytes()
+    change(path, content.rindex(b'/joint_states') + 3)
+    got = read_recording(path, joints=JOINTS)
+    assert 'the checksum of the index at the end is wrong' in got.report.damage
+    assert got.topic == '/joint_states'
+    np.testing.assert_array_equal(got.q, recording.q)
+
+
+def test_counts_of_metadata_are_compared(make_swing, tmp_path):
+    write_recording(tmp_path / 'bag', make_swing(300))
+    metadata = tmp_path / 'bag' / 'metadata.yaml'
+    metadata.write_text(metadata.read_text().replace('message_count: 300', 'message_count: 310'))
+    got = read_recording(tmp_path / 'bag', joints=JOINTS)
+    assert 'metadata.yaml counts 310 messages of /joint_states, there are 300' in got.report.damage
+
+
+def test_a_topic_of_metadata_that_the_files_do_not_have_is_said(make_swing, tmp_path):
+    write_recording(tmp_path / 'bag', make_swing(300))
+    metadata = tmp_path / 'bag' / 'metadata.yaml'
+    metadata.write_text(metadata.read_text().replace('name: /joint_states', 'name: /other'))
+    got = read_recording(tmp_path / 'bag', joints=JOINTS)
+    assert 'counts 300 messages of /other, there are none' in got.report.damage
+
+
+def test_a_message_of_2_63_bytes_or_less_than_its_head_is_no_message(make_swing, tmp_path):
+    write_recording(tmp_path / 'bag', make_swing(300), compression='none')
+    path = tmp_path / 'bag' / 'bag_0.mcap'
+    content = path.read_bytes()
+    begin = chunks_of(path)[0].begin
+    first = int(walk(content, begin, len(content))[0][0])
+    for length in (2**63 - 1, 2**64 - 1, 21, 0):
+        change(path, first + 1, struct.pack('<Q', length))
+        for check_crc in (True, False):
+            settings = ReadSettings(check_crc=check_crc)
+            with pytest.raises(RecordingError, match=r'bag_0.mcap'):
+                read_recording(path, joints=JOINTS, settings=settings)
+    loose = content[:8] + b'\x05' + struct.pack('<Q', 10) + bytes(10)
+    path.write_bytes(loose)
+    with pytest.raises(RecordingError, match='too short for one'):
+        read_recording(path, joints=JOINTS)
+
+
+def test_a_message_logged_after_2262_is_left_out_and_said(make_swing, tmp_path):
+    write_recording(tmp_path / 'bag', make_swing(300), compression='none')
+    path = tmp_path / 'bag' / 'bag_0.mcap'
+    content = path.read_bytes()
+    chunk = chunks_of(path)[0]
+    fifth = int(walk(content, chunk.begin, chunk.end)[0][5])
+    for field in (15, 23):
+        path.write_bytes(content)
+        change(path, fifth + field, b'\xff' * 8)
+        crc = chunk.begin - 8 - len(chunk.compression) - 8
+        change(path, crc, bytes(4))  # no checksum
+        report = recover(path, tmp_path / f'out{field}')
+        assert report.messages == 299 and 'after the year 2262' in report.damage
+        assert len(read_recording(path, joints=JOINTS)) == 299
+
+
+def sqlite_bag(path, recording, messages):
+    database = sqlite3.connect(path)
+    database.executescript(
+        'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, '
+        'serialization_format TEXT, offered_qos_profiles TEXT);'
+        'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, '
+        'data BLOB);'
+        "INSERT INTO topics VALUES (1, '/joint_states', 'sensor_msgs/msg/JointState', 'cdr', '');"
+    )
+    database.executemany(
+        'INSERT INTO messages(topic_id, timestamp, data) VALUES (1, ?, ?)',
+        [(time, cdr) for _, cdr, time in messages],
+    )
+    database.commit()
+    return database
+
+
+@pytest.mark.parametrize('value', ['NULL', "'text'", '3.5', "CAST(x'ff' AS TEXT)"])
+@pytest.mark.parametrize('column', ['timestamp', 'data', 'topic_id'])
+def test_rows_that_are_no_messages_are_left_out_and_said(
+    swinging, stamps, messages_of, tmp_path, column, value
+):
+    path = tmp_path / 'bag.db3'
+    with sqlite_bag(path, swinging, messages_of(swinging, stamps)) as database:
+        database.execute(f'UPDATE messages SET {column} = {value} WHERE id = 10')
+    got = read_recording(path, joints=JOINTS)
+    assert len(got) == 499 and '1 rows of messages have no' in got.report.damage
+    assert len(list(iter_raw(path))) == 499
+
+
+@pytest.mark.parametrize('value', ['NULL', "x'ff00'", '3.5', "CAST(x'ff' AS TEXT)"])
+@pytest.mark.parametrize(
+    'column', ['name', 'type', 'serialization_format', 'offered_qos_profiles']
+)
+def test_topics_that_are_no_texts_are_refused_or_read(
+    swinging, stamps, messages_of, tmp_path, column, value
+):
+    path = tmp_path / 'bag.db3'
+    with sqlite_bag(path, swinging, messages_of(swinging, stamps)) as database:
+        database.execute(f'UPDATE topics SET {column} = {value}')
+    try:
+        assert len(read_recording(path, joints=JOINTS)) == 500
+    except RecordingError as refusal:
+        assert str(path) in str(refusal)
+
+
+def test_a_view_in_place_of_a_table_is_refused(swinging, stamps, messages_of, tmp_path):
+    path = tmp_path / 'bag.db3'
+    with sqlite_bag(path, swinging, messages_of(swinging, stamps)) as database:
+        database.executescript(
+            'DROP TABLE messages; CREATE VIEW messages AS WITH RECURSIVE n(i) AS '
+            '(SELECT 1 UNION ALL SELECT i + 1 FROM n) '
+            "SELECT i AS id, 1 AS topic_id, i AS timestamp, x'00' AS data FROM n"
+        )
+    with pytest.raises(RecordingError, match='not of rosbag2'):
+        read_recording(path, joints=JOINTS)
+
+
+def test_a_damaged_page_of_a_database_is_said(swinging, stamps, messages_of, tmp_path):
+    path = tmp_path / 'bag.db3'
+    sqlite_bag(path, swinging, messages_of(swinging, stamps)).close()
+    size = path.stat().st_size
+    change(path, 4096 * (size // 4096 // 2) + 8, b'\xff' * 64)
+    try:
+        assert 'the database is damaged' in read_recording(path, joints=JOINTS).report.damage
+    except RecordingError as refusal:
+        assert str(path) in str(refusal)
+
+
+def test_the_head_of_a_message_is_that_of_the_specification():
+    assert MESSAGE.itemsize == 31
