@@ -246,7 +246,7 @@ def compress(
 
     """
     columns = np.concatenate([part.columns for part in problem])
-    tau = np.concatenate([part.tau for part in problem])
+    tau = np.concatenate([part.target for part in problem])
     factors = []
     for rows in np.array_split(np.arange(len(tau)), blocks):
         scaled = weights[rows, :, np.newaxis] * columns[rows]
