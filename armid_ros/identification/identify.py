@@ -14,7 +14,7 @@ from armid_ros.identification.checks import check_motion, check_torque
 from armid_ros.identification.excited import excited
 from armid_ros.identification.identifiability import Unidentified, unidentified
 from armid_ros.identification.least_squares import Method
-from armid_ros.identification.nonlinear import fit_values
+from armid_ros.identification.nonlinear import fit_values, FittedValues
 from armid_ros.identification.physical import PhysicalSettings
 from armid_ros.identification.physical_certificate import PhysicalCertificate
 from armid_ros.identification.physical_fit import fit_to_bodies
@@ -229,12 +229,14 @@ def identify(
         )
     base, problem = excited(theory, columns)
     notes += check_torque(arm, recordings, problem)
-    if base.rank < theory.rank:
+    fit = fit_values(arm, base, problem, recordings, used, settings.method)
+    if _hidden(arm, theory):
+        theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings.method, rng)
+    if fit.base.rank < theory.rank:
         notes += (
-            f'the motion tells {base.rank} of {theory.rank} parameters apart; '
+            f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
             'the others are grouped',
         )
-    fit = fit_values(arm, base, problem, recordings, used, settings.method)
     if fit.solution.outliers:
         notes += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
     certificate = None
@@ -265,3 +267,30 @@ def identify(
         physical=certificate,
         passes=fit.passes,
     )
+
+
+def _hidden(arm: ArmModel, theory: BaseParameters) -> bool:
+    """Tell whether an effect has a parameter that no motion of the arm as it is shows."""
+    rigid = len(arm.robot.rigid_parameters)
+    return not bool(np.all(np.any(theory.grouping[:, rigid:], axis=0)))
+
+
+def _with_what_shows_now(
+    theory: BaseParameters,
+    fit: FittedValues,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    method: Method,
+    rng: np.random.Generator,
+) -> tuple[BaseParameters, FittedValues]:
+    """
+    Fit again with what the fitted arm shows and the described one did not.
+
+    Such as a saturation that the torques of the description never reach.
+
+    """
+    now = fit.arm.base_parameters(rng)
+    if now.rank <= theory.rank:
+        return theory, fit
+    columns = regressions(fit.arm, now.independent, recordings, used)
+    return now, fit_values(fit.arm, *excited(now, columns), recordings, used, method)

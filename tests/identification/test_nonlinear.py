@@ -154,3 +154,13 @@ def test_chunks_of_a_long_stretch_join(robot):
         rng=np.random.default_rng(0),
     )
     assert error(result.training) < 1e-3
+
+
+def test_what_the_described_torque_never_reaches_is_found_where_the_fitted_one_does(robot):
+    """Springs that the description does not know of take drives beyond their level."""
+    truth, _, result = fitted(robot, ['actuator_saturation', 'joint_spring'], seed=1)
+    levels = np.array(truth.effects[1].shape)
+    assert np.any(np.abs(result.training[0].motion.tau).max(axis=0) > levels)
+    np.testing.assert_allclose(
+        result.joint_std, NOISE * np.linalg.norm(result.used.taps()), rtol=0.3
+    )
