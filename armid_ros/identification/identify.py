@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
@@ -14,10 +14,11 @@ from armid_ros.identification.checks import check_motion, check_torque
 from armid_ros.identification.excited import excited
 from armid_ros.identification.identifiability import Unidentified, unidentified
 from armid_ros.identification.least_squares import Method
-from armid_ros.identification.nonlinear import fit_values, FittedValues
+from armid_ros.identification.nonlinear import fit_values, FittedValues, through, torques
 from armid_ros.identification.physical import PhysicalSettings
 from armid_ros.identification.physical_certificate import PhysicalCertificate
 from armid_ros.identification.physical_fit import fit_to_bodies
+from armid_ros.identification.quasi_static import free_directions, with_uncertain_inertia
 from armid_ros.identification.regression import predictions, regressions
 from armid_ros.identification.signals import Conditioning, conditioning, SignalSettings
 from armid_ros.model import BaseParameters
@@ -219,7 +220,10 @@ def identify(
     used = conditioning(list(recordings), settings.signals)
     notes = check_motion(arm.robot, recordings, used)
     theory = arm.base_parameters(rng)
-    columns = regressions(arm, theory.independent, recordings, used, progress)
+    # inertia of a motion that is taken as slow: as described, unless bodies are fitted to weight
+    described = arm.quasi_static and settings.physical is None
+    whole = replace(arm, quasi_static=False) if described else arm
+    columns = regressions(whole, theory.independent, recordings, used, progress)
     samples = sum(len(part.motion) for part in columns)
     if samples * arm.robot.n_joints < 2 * theory.rank:
         raise IdentificationError(
@@ -229,8 +233,15 @@ def identify(
         )
     base, problem = excited(theory, columns)
     notes += check_torque(arm, recordings, problem)
-    fit = fit_values(arm, base, problem, recordings, used, settings.method)
-    if _hidden(arm, theory):
+    if described:
+        problem = through(problem, torques(whole, recordings, used), base.values(whole.theta))
+        free = free_directions(whole, rng)
+        fit = fit_values(whole, base, problem, recordings, used, settings.method, free)
+        fit, said = with_uncertain_inertia(whole, fit, recordings, used)
+        notes += said
+    else:
+        fit = fit_values(arm, base, problem, recordings, used, settings.method)
+    if not described and _hidden(arm, theory):
         theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings.method, rng)
     if fit.base.rank < theory.rank:
         notes += (

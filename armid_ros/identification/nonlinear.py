@@ -6,13 +6,13 @@ Least squares of an arm whose torque need not be linear in its parameters, by Ga
 Friction in proportion to the load, gains of torque sensors, zeros of encoders, gravity and
 elasticity change the columns of everything else. A fit at the columns of the description is the
 first step only: the arm is linearised again at what was found, until the torque that the linear
-model promises is the torque of the arm. Steps that make the fit worse are halved.
+model promises is the torque of the arm. Steps that make the fit worse are damped (Marquardt 1963).
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
@@ -36,8 +36,18 @@ AGREED = 1e-4
 _EXACT = 1e-8
 #: Linearisations; fits that settle take three to eight.
 MOST_PASSES = 20
-#: Times that a step is halved before it is given up.
-_HALVINGS = 8
+#: Torque that is left below this share is none.
+_FINE = 1e-6
+#: A gain in squares of residuals that is less than one standard deviation of one parameter.
+_NOTHING = 1.0
+#: A step that gains less than this of the same is the last.
+_LITTLE = 0.1
+#: Share of the squares that a model with corners promises in vain where it can get no better.
+_STUCK = 0.05
+#: Shares of the squared columns that damp a step.
+_DAMPINGS = tuple(10.0 ** np.arange(-8.0, 3.0))
+#: A step keeps its promise if it leaves at most so many times the squares.
+_KEPT = 2.0
 
 Torques = tuple[FloatArray, ...]
 
@@ -85,6 +95,7 @@ def fit_values(
     recordings: Sequence[Recording],
     used: Conditioning,
     method: Method,
+    free: FloatArray | None = None,
 ) -> FittedValues:
     """
     Fit base parameters, again and again where the torque is not linear in them.
@@ -103,19 +114,27 @@ def fit_values(
         Filters.
     method : {'ols', 'wls', 'irls'}
         As of ``solve``.
+    free : ndarray, shape (10 n, k), optional
+        Orthonormal directions of the rigid parameters that change no torque, where they are not
+        all those that base does not tell apart.
 
     """
     solution = solve(problem, method, bounds(arm, base))
     motions = [part.motion for part in problem]
-    reached = moved(arm, base, solution.values)
+    chosen = _ungrouped(arm, base) if free is None else free
+    reached = moved(arm, base, solution.values, chosen)
     bare = arm.with_theta(np.where(np.arange(len(arm.theta)) < _rigid(arm), arm.theta, 0.0))
     if curved(bare, arm, motions):
         problem, _ = linearised(arm, base, recordings, used)
     elif not curved(arm, reached, motions):
-        found = arm.with_theta(base.lift(solution.values, arm.theta))
         predicted = tuple(part.torque(solution.values) for part in problem)
+        found = (
+            reached
+            if free is not None
+            else _lifted(arm, base, problem, solution, reached, recordings, used)
+        )
         return FittedValues(found, base, solution.values, tuple(problem), solution, predicted)
-    return _iterate(arm, base, problem, recordings, used, method)
+    return _iterate(arm, base, problem, recordings, used, method, chosen)
 
 
 def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool:
@@ -142,18 +161,28 @@ def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool
     return False
 
 
-def moved(arm: ArmModel, base: BaseParameters, values: FloatArray) -> ArmModel:
+def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatArray) -> ArmModel:
     """
     Return an arm with other base parameters.
 
     Of what no motion tells apart, effects stay where they are and rigid parameters move as little
     as may be: what is grouped with rigid parameters alone is so wherever the effects are.
 
+    Parameters
+    ----------
+    arm : ArmModel
+        Where to begin.
+    base : BaseParameters
+        What is told apart.
+    values : ndarray, shape (r,)
+        Base parameters that the arm is to have.
+    free : ndarray, shape (10 n, k)
+        Orthonormal directions of the rigid parameters that change no torque.
+
     """
     change = np.zeros(len(arm.theta))
     change[base.independent] = values - base.values(arm.theta)
     rigid = _rigid(arm)
-    free = scipy.linalg.null_space(base.grouping[:, :rigid])
     change[:rigid] -= free @ (free.T @ change[:rigid])
     return arm.with_theta(arm.theta + change)
 
@@ -208,36 +237,134 @@ def _iterate(
     recordings: Sequence[Recording],
     used: Conditioning,
     method: Method,
+    free: FloatArray,
 ) -> FittedValues:
-    """Take Gauss-Newton steps until linear model and arm agree."""
+    """Take Gauss-Newton steps, damped where they lead astray, until linear model and arm agree."""
     limits = bounds(arm, base)
-    values = base.values(arm.theta)
-    predicted = tuple(part.torque(values) for part in problem)
-    found, passes = arm, 0
+    now = _State(arm, base.values(arm.theta), problem)
+    passes, settled = 0, True
     while True:
         passes += 1
-        solution = solve(problem, method, limits)
-        weights = solution.weights
-        promised = tuple(part.torque(solution.values) for part in problem)
-        floor = _EXACT * _size(weights, [part.tau for part in problem])
-        enough = _cost(problem, weights, predicted) + floor**2
-        for halved in range(_HALVINGS):
-            reached = values + 0.5**halved * (solution.values - values)
-            trial = moved(arm, base, reached)
-            torque = torques(trial, recordings, used)
-            if _cost(problem, weights, torque) <= enough:
-                found, values, predicted = trial, reached, torque
-                break
-        else:
-            halved = _HALVINGS
-        settled = agree(problem, weights, promised, predicted)
-        if settled or halved == _HALVINGS or passes == MOST_PASSES:
+        solution = solve(now.problem, method, limits)
+        promised = tuple(part.torque(solution.values) for part in now.problem)
+        if passes > 1 and now.gain(promised) < _NOTHING:
             break
-        fresh = regressions(found, base.independent, recordings, used)
-        problem = through(fresh, predicted, values)
+        steps = (now.damped(damping, limits) for damping in _DAMPINGS)
+        trial = _best_step(now, solution.values, promised, steps, base, free, recordings, used)
+        if trial is None:
+            settled = now.gain(promised) < _STUCK * now.cost(now.predicted)
+            break
+        settled = agree(now.problem, solution.weights, promised, trial.predicted)
+        settled = settled or now.gain(trial.predicted) < _LITTLE
+        if settled or passes == MOST_PASSES:
+            now = trial
+            break
+        fresh = regressions(trial.arm, base.independent, recordings, used)
+        now = _State(trial.arm, trial.values, through(fresh, trial.predicted, trial.values))
     return FittedValues(
-        found, base, values, tuple(problem), solution, predicted, max(passes, 2), settled
+        now.arm, base, now.values, now.problem, solution, now.predicted, max(passes, 2), settled
     )
+
+
+def _best_step(
+    now: _State,
+    straight: FloatArray,
+    promised: Torques,
+    damped: Iterable[FloatArray],
+    base: BaseParameters,
+    free: FloatArray,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+) -> _State | None:
+    """Go straight to a solution that keeps its promise, else by the best of damped steps."""
+    best = None
+    for values in (straight, *damped):
+        arm = moved(now.arm, base, values, free)
+        predicted = torques(arm, recordings, used)
+        if now.cost(predicted) <= now.cost(now.predicted if best is None else best.predicted):
+            best = _State(arm, values, through(now.problem, predicted, values))
+        if values is straight and now.cost(predicted) <= _KEPT * now.cost(promised):
+            break
+    return best
+
+
+class _State:
+    """
+    Where an iteration is: an arm, its values, its linear model, and what that leaves.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The arm.
+    values : ndarray, shape (r,)
+        Its base parameters.
+    problem : sequence of Regression
+        Linear models that have its torque at its values.
+
+    """
+
+    def __init__(self, arm: ArmModel, values: FloatArray, problem: Sequence[Regression]) -> None:
+        self.arm, self.values, self.problem = arm, values, tuple(problem)
+        self.predicted = tuple(part.torque(values) for part in problem)
+        self._tau = np.concatenate([part.tau for part in problem])
+        self._used = np.concatenate([part.informative for part in problem])
+        self._left = self._tau - np.concatenate(self.predicted)
+        counts = np.maximum(self._used.sum(axis=0), 1)
+        rms = np.sqrt(np.sum(self._left**2, axis=0, where=self._used) / counts)
+        self._weights = self._used / np.maximum(rms, _EXACT * max(rms.max(), 1e-100))
+
+    def gain(self, predicted: Torques) -> float:
+        """
+        Return the squares of residuals that torques take away, in deviations of each joint.
+
+        Far below zero, which is infinite here, where a solution is not to be believed.
+
+        """
+        cost = self.cost(self.predicted)
+        gain = cost - self.cost(predicted)
+        if np.linalg.norm(self._used * self._left) <= _FINE * np.linalg.norm(
+            self._used * self._tau
+        ):
+            return 0.0
+        return gain if gain > -_STUCK * cost else np.inf
+
+    def damped(self, damping: float, limits: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Return the values after a step of Levenberg and Marquardt, within limits."""
+        columns = np.concatenate([part.columns for part in self.problem])
+        w = (self._weights[:, :, np.newaxis] * columns).reshape(-1, len(self.values))
+        size = np.linalg.norm(w, axis=0)
+        scaled = w / np.where(size > 0.0, size, 1.0)
+        normal = scaled.T @ scaled + damping * np.eye(len(size))
+        step = np.linalg.solve(normal, scaled.T @ (self._weights * self._left).ravel())
+        return np.clip(self.values + step / np.where(size > 0.0, size, np.inf), *limits)
+
+    def cost(self, predicted: Torques) -> float:
+        """Return the sum of squares that torques leave, in what is left now of each joint."""
+        left = self._weights * (self._tau - np.concatenate(predicted))
+        return float(np.sum(left**2))
+
+
+def _lifted(
+    arm: ArmModel,
+    base: BaseParameters,
+    problem: Sequence[Regression],
+    solution: Solution,
+    reached: ArmModel,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+) -> ArmModel:
+    """Return the arm nearest to the description that has the fitted torque along this motion."""
+    found = arm.with_theta(base.lift(solution.values, arm.theta))
+    if np.allclose(found.theta[_rigid(arm) :], reached.theta[_rigid(arm) :]):
+        return found
+    promised = tuple(part.torque(solution.values) for part in problem)
+    same = agree(problem, solution.weights, promised, torques(found, recordings, used))
+    return found if same else reached
+
+
+def _ungrouped(arm: ArmModel, base: BaseParameters) -> FloatArray:
+    """Return directions of the rigid parameters that change no base parameter, (10 n, k)."""
+    return np.asarray(scipy.linalg.null_space(base.grouping[:, : _rigid(arm)]))
 
 
 def _rigid(arm: ArmModel) -> int:
