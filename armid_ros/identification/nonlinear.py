@@ -43,7 +43,7 @@ _NOTHING = 1.0
 #: A step that gains less than this of the same is the last.
 _LITTLE = 0.1
 #: Share of the squares that a model with corners promises in vain where it can get no better.
-_STUCK = 0.05
+_STUCK = 0.5
 #: Shares of the squared columns that damp a step.
 _DAMPINGS = tuple(10.0 ** np.arange(-8.0, 3.0))
 #: A step keeps its promise if it leaves at most so many times the squares.
@@ -247,12 +247,12 @@ def _iterate(
         passes += 1
         solution = solve(now.problem, method, limits)
         promised = tuple(part.torque(solution.values) for part in now.problem)
-        if passes > 1 and now.gain(promised) < _NOTHING:
+        if passes > 1 and abs(now.gain(promised)) < _NOTHING:
             break
-        steps = (now.damped(damping, limits) for damping in _DAMPINGS)
+        steps = [now.damped(damping, limits) for damping in _DAMPINGS]
         trial = _best_step(now, solution.values, promised, steps, base, free, recordings, used)
         if trial is None:
-            settled = now.gain(promised) < _STUCK * now.cost(now.predicted)
+            settled = all(now.gain(now.linear(values)) < _STUCK * now.cost() for values in steps)
             break
         settled = agree(now.problem, solution.weights, promised, trial.predicted)
         settled = settled or now.gain(trial.predicted) < _LITTLE
@@ -281,7 +281,7 @@ def _best_step(
     for values in (straight, *damped):
         arm = moved(now.arm, base, values, free)
         predicted = torques(arm, recordings, used)
-        if now.cost(predicted) <= now.cost(now.predicted if best is None else best.predicted):
+        if now.cost(predicted) <= now.cost(None if best is None else best.predicted):
             best = _State(arm, values, through(now.problem, predicted, values))
         if values is straight and now.cost(predicted) <= _KEPT * now.cost(promised):
             break
@@ -314,19 +314,16 @@ class _State:
         self._weights = self._used / np.maximum(rms, _EXACT * max(rms.max(), 1e-100))
 
     def gain(self, predicted: Torques) -> float:
-        """
-        Return the squares of residuals that torques take away, in deviations of each joint.
-
-        Far below zero, which is infinite here, where a solution is not to be believed.
-
-        """
-        cost = self.cost(self.predicted)
-        gain = cost - self.cost(predicted)
+        """Return the squares of residuals that torques take away; none where nothing is left."""
         if np.linalg.norm(self._used * self._left) <= _FINE * np.linalg.norm(
             self._used * self._tau
         ):
             return 0.0
-        return gain if gain > -_STUCK * cost else np.inf
+        return self.cost() - self.cost(predicted)
+
+    def linear(self, values: FloatArray) -> Torques:
+        """Return what the linear models take the torque for."""
+        return tuple(part.torque(values) for part in self.problem)
 
     def damped(self, damping: float, limits: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Return the values after a step of Levenberg and Marquardt, within limits."""
@@ -338,8 +335,10 @@ class _State:
         step = np.linalg.solve(normal, scaled.T @ (self._weights * self._left).ravel())
         return np.clip(self.values + step / np.where(size > 0.0, size, np.inf), *limits)
 
-    def cost(self, predicted: Torques) -> float:
+    def cost(self, predicted: Torques | None = None) -> float:
         """Return the sum of squares that torques leave, in what is left now of each joint."""
+        if predicted is None:
+            return float(np.sum((self._weights * self._left) ** 2))
         left = self._weights * (self._tau - np.concatenate(predicted))
         return float(np.sum(left**2))
 

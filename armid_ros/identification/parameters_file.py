@@ -10,9 +10,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-from armid_ros.errors import ModelError
+from armid_ros.errors import ArmidError, ModelError
 from armid_ros.estimate import ParameterName
+from armid_ros.identification.description import kinematics_digest
 from armid_ros.motion import FloatArray
+from armid_ros.robots import load_robot
 import numpy as np
 import yaml
 
@@ -40,6 +42,10 @@ class Parameters:
         Of the values in their order; None if the file does not have it.
     terms : mapping of ParameterName to (mapping of str to float)
         Factors of the standard parameters that each value groups, where the file has them.
+    joints : tuple of str
+        Joints of the robot, where the file has them.
+    kinematics : str
+        What is the same for descriptions of one robot; empty where the file does not have it.
 
     """
 
@@ -49,6 +55,8 @@ class Parameters:
     error_percent: float | None
     covariance: FloatArray | None = None
     terms: Mapping[ParameterName, Mapping[str, float]] = field(default_factory=dict)
+    joints: tuple[str, ...] = ()
+    kinematics: str = ''
 
     @property
     def std(self) -> FloatArray:
@@ -127,9 +135,21 @@ def read_parameters(path: str | Path) -> Parameters:
     if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
         raise ModelError(f"{path}: its 'schema' has to be {' or '.join(_SCHEMAS)}")
     try:
-        return parameters_of(str(path), document)
+        read = parameters_of(str(path), document)
     except (KeyError, TypeError, ValueError) as error:
         raise ModelError(f'{path}: {type(error).__name__} {error} is missing or wrong') from error
+    return read if read.kinematics else _with_robot(read, path)
+
+
+def _with_robot(found: Parameters, path: Path) -> Parameters:
+    """Look up the robot that a file without its kinematics names, where it is still there."""
+    beside = path.parent / found.robot
+    source = str(beside) if beside.is_file() else found.robot
+    try:
+        robot = load_robot(source)
+    except ArmidError:
+        return found
+    return replace(found, joints=robot.joints, kinematics=kinematics_digest(robot))
 
 
 def parameters_of(source: str, document: dict[str, Any]) -> Parameters:
@@ -157,7 +177,17 @@ def parameters_of(source: str, document: dict[str, Any]) -> Parameters:
     terms = dict(zip(values, document.get('grouping', []), strict=False))
     scores = [*document.get('validation', []), document.get('training')]
     error = scores[0]['relative_error_percent'] if scores[0] else None
-    return Parameters(source, str(document['robot']), values, error, covariance, terms)
+    about = document.get('description', {})
+    return Parameters(
+        source,
+        str(document['robot']),
+        values,
+        error,
+        covariance,
+        terms,
+        tuple(about.get('joints', ())),
+        str(about.get('kinematics', '')),
+    )
 
 
 def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatArray:
