@@ -268,7 +268,8 @@ def _require_inertia(robot: Robot, moved: FloatArray) -> None:
 def middle_position(robot: Robot) -> FloatArray:
     """Return the middle of the range of every joint, 0 where there is none, shape (n,)."""
     limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-    return np.asarray(np.where(limited, np.where(limited, robot.lower + robot.upper, 0.0) / 2, 0))
+    lower, upper = (np.where(limited, end, 0.0) for end in (robot.lower, robot.upper))
+    return np.asarray((lower + upper) / 2)
 
 
 def _split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFriction, FloatArray]:
