@@ -12,7 +12,6 @@ from armid_ros.arm import ArmModel, save_model
 from armid_ros.cli import options
 from armid_ros.cli.terminal import ConvergenceTable, progress, say
 from armid_ros.effects import make_effect
-from armid_ros.errors import RecordingError
 from armid_ros.excitation import design, DesignSettings, Excitation, save_excitation
 from armid_ros.files import json_text
 from armid_ros.identification import identification_document, identify, Score, write_document
@@ -118,9 +117,7 @@ def _make_room(out: Path) -> None:
     """Take away what a demo left; refuse a folder with anything else in it."""
     ours = {*OUTPUTS, *(path.name for path in out.glob('*.png'))}
     ours |= {f'.{name}.part' for name in ours}  # of a demo that was killed
-    foreign = sorted(path.name for path in out.iterdir() if path.name not in ours)
-    if foreign:
-        raise RecordingError(f'{out}: holds {foreign[0]}, which no demo wrote; name a new folder')
+    options.require_own(out, ours, 'demo')
     for path in out.iterdir():
         if path.is_dir():
             shutil.rmtree(path)

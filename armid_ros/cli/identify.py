@@ -33,6 +33,16 @@ from armid_ros.report import identification_report
 import click
 import numpy as np
 
+#: Files that a folder to be filled may hold already, from an identification before.
+OUTPUTS = (
+    'model.yaml',
+    'identification.json',
+    'report.html',
+    'identified.urdf',
+    'identified.mjcf.xml',
+    'robot.urdf',
+)
+
 
 @click.command(epilog='Example: armid identify run.mcap --robot ur10.urdf --out result')
 @click.argument('bags', nargs=-1, required=True, type=click.Path(path_type=Path))
@@ -107,6 +117,7 @@ def identify(
 ) -> None:
     """Fit a model with uncertainties to recordings."""
     options.hold(out, SCHEMA, robot_source)
+    options.require_own(out, OUTPUTS, 'identify')
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
     if not physical and (total_mass is not None or boxes):

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.errors import RobotError
+from armid_ros.errors import RecordingError, RobotError
 from armid_ros.files import default_memory_limit, result_folder, write_file
 from armid_ros.motion import FloatArray
 from armid_ros.recording import (
@@ -164,6 +164,24 @@ def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
             f"{', '.join(robot.joints)}; not '{text}'"
         )
     return np.broadcast_to(values, robot.n_joints).copy()
+
+
+def require_own(folder: Path, ours: Collection[str], command: str) -> None:
+    """
+    Refuse a folder that holds what a command does not write.
+
+    Raises
+    ------
+    RecordingError
+        Naming the folder and what is in it.
+
+    """
+    inside = folder.iterdir() if folder.is_dir() else ()
+    foreign = sorted(path.name for path in inside if path.name not in ours)
+    if foreign:
+        raise RecordingError(
+            f'{folder}: holds {foreign[0]}, which no {command} wrote; name a new folder'
+        )
 
 
 def read(bags: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:

@@ -9,14 +9,17 @@ from pathlib import Path
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import options
 from armid_ros.cli.terminal import progress, say, Tick
-from armid_ros.effects import parse_effect
+from armid_ros.effects import Effect, parse_effect
+from armid_ros.errors import ModelError
 from armid_ros.excitation import design, DesignSettings, load_excitation
 from armid_ros.identification.two_inertia import write_runs
+from armid_ros.motion import FloatArray
 from armid_ros.recording import read_waypoints, write_recording
 from armid_ros.recording import recover as recover_bag
 from armid_ros.robots import collision_model, Robot
 from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run
+from armid_ros.simulation.bodies import require_masses
 from armid_ros.simulation.elastic_arm import ElasticArm, record
 from armid_ros.simulation.elastic_setup import (
     elastic_joints,
@@ -85,9 +88,11 @@ def simulate(
     """
     rng = np.random.default_rng(seed)
     robot = options.open_robot(robot_source, gravity, joints)
+    if model is None:
+        require_masses(robot)
     arm, drives = (load_model(model, robot), None) if model else shipped_arm(robot)
     for text in texts:
-        arm = arm.with_effect(*parse_effect(text, robot))
+        arm = arm.with_effect(*_of_some_size(text, robot))
     springs, rotorless = elastic_joints(arm)
     if rotorless:
         say(no_rotor(rotorless))
@@ -111,6 +116,21 @@ def simulate(
             write_recording(out, measured, robot_description=robot.urdf)
             samples, sides = len(measured.t), ''
     say(f'{out}: {samples} samples of {robot.n_joints} joints{sides}, {reference.duration:.1f} s')
+
+
+def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
+    """Read --effect; refuse one of no size, which would change nothing."""
+    effect, values = parse_effect(text, robot)
+    if not np.any(values):
+        sizes = ', '.join(f'{q.name} [{q.unit or "1"}]' for q in effect.quantities)
+        shapes = ', '.join(f'{s.name} [{s.unit or "1"}]' for s in effect.shapes)
+        first = effect.quantities[0].name
+        raise ModelError(
+            f"--effect '{text}' has no size and would change nothing: it takes {sizes}"
+            + (f', and the shape {shapes}' if shapes else '')
+            + f'; write {text.partition(":")[0]}:{first}=0.1'
+        )
+    return effect, values
 
 
 def _reference(robot: Robot, path: Path | None, rng: np.random.Generator) -> Reference:

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+import threading
+import time
 from typing import Any, Self
 
 from armid_ros.errors import visible
@@ -30,12 +32,20 @@ def say(text: str) -> None:
 
 @contextmanager
 def progress(what: str) -> Iterator[Tick]:
-    """Show a bar while work goes on; yields tick(share, what=None)."""
-    columns = (TextColumn('{task.description}'), BarColumn(), TimeElapsedColumn())
+    """
+    Show a bar while work goes on; yields tick(share, what=None).
+
+    Without a terminal there is a line on stderr every ten seconds.
+
+    """
     console = Console(stderr=True)
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
+    if not console.is_terminal:
+        lines = ProgressLines(what, lambda line: click.echo(line, err=True), time.monotonic)
+        with lines.watched():
+            yield lines.tick
+        return
+    columns = (TextColumn('{task.description}'), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(what, total=1.0)
 
         def tick(share: float, what: str | None = None) -> None:
@@ -44,6 +54,62 @@ def progress(what: str) -> Iterator[Tick]:
             bar.update(task, completed=share)
 
         yield tick
+
+
+class ProgressLines:
+    """
+    Progress as a line of text every ten seconds, for logs and pipes.
+
+    Parameters
+    ----------
+    what : str
+        What is being done.
+    write : callable
+        Is given each line.
+    clock : callable
+        Returns the time [s].
+
+    """
+
+    #: Time between two lines [s].
+    EVERY = 10.0
+
+    def __init__(
+        self, what: str, write: Callable[[str], None], clock: Callable[[], float]
+    ) -> None:
+        self._what, self._share = what, 0.0
+        self._write, self._clock = write, clock
+        self._start = self._last = clock()
+
+    def tick(self, share: float, what: str | None = None) -> None:
+        """Take the share that is done, and what is being done now."""
+        self._share = share
+        if what is not None:
+            self._what = what
+
+    def look(self) -> None:
+        """Write a line if it is time for one."""
+        now = self._clock()
+        if now - self._last >= self.EVERY:
+            self._last = now
+            self._write(f'{self._what}: {100.0 * self._share:.0f} %, {now - self._start:.0f} s')
+
+    @contextmanager
+    def watched(self) -> Iterator[None]:
+        """Look every second, beside the work, which may be silent for long."""
+        done = threading.Event()
+
+        def watch() -> None:
+            while not done.wait(1.0):
+                self.look()
+
+        thread = threading.Thread(target=watch, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            done.set()
+            thread.join()
 
 
 def print_rows(rows: Sequence[dict[str, Any]], as_json: bool, right: Sequence[str] = ()) -> None:

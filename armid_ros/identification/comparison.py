@@ -188,9 +188,10 @@ def compare(before: Parameters, after: Parameters) -> Comparison:
     Raises
     ------
     ModelError
-        If they have no parameter in common.
+        If they are of two robots, or have no parameter in common.
 
     """
+    _require_one_robot(before, after)
     first, second = max(
         ((before.told_as(after), after), (before, after.told_as(before))),
         key=lambda pair: len(pair[0].values.keys() & pair[1].values.keys()),
@@ -241,6 +242,23 @@ def compare(before: Parameters, after: Parameters) -> Comparison:
         tuple(name for name in after.values if name not in first.values),
         found,
         load,
+    )
+
+
+def _require_one_robot(before: Parameters, after: Parameters) -> None:
+    """Refuse robots whose joints differ, wherever their files are."""
+    known = before.kinematics and after.kinematics
+    if not known or before.kinematics == after.kinematics:
+        return
+    apart = set(before.joints).symmetric_difference(after.joints)
+    how = (
+        f'only one of them has {", ".join(sorted(apart))}'
+        if apart
+        else ('their joints are of the same names, and in other places')
+    )
+    raise ModelError(
+        f'{before.source} and {after.source} are of different robots, {before.robot} and '
+        f'{after.robot}: {how}; what changed can be said of one robot only'
     )
 
 

@@ -25,6 +25,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.least_squares import noise_products, solve
+from armid_ros.identification.nonlinear import linearised
 from armid_ros.identification.regression import Regression, regressions
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -151,13 +152,13 @@ def check_noise(
     """
     if repeats < 2:
         raise IdentificationError(f'{repeats} simulations do not tell a mean from chance: take 2')
-    independent, used = result.base.independent, result.used
+    used = result.used
     tick = _steps(repeats + 2, progress)
-    problem = regressions(result.arm, independent, recordings, used)
+    problem = _about(result, recordings)
     tick()
     solution = solve(problem, result.settings.method)
     calm = [_calm(recording, INSTRUMENT_SHARE * used.cutoff_hz) for recording in recordings]
-    instruments = regressions(result.arm, independent, calm, used)
+    instruments = _about(result, calm)
     tick()
     statistic, freedom, values, covariance = _hausman(problem, instruments, solution.weights)
 
@@ -214,7 +215,7 @@ def _hausman(
     """
     rank = problem[0].columns.shape[2]
     w, z = (np.concatenate([p.columns for p in parts]) for parts in (problem, instruments))
-    tau = np.concatenate([part.tau for part in problem])
+    tau = np.concatenate([part.target for part in problem])
     scale = np.linalg.norm((weights[:, :, np.newaxis] * w).reshape(-1, rank), axis=0)
     scaled = [replace(part, columns=part.columns / scale) for part in problem]
     weighted_w = (weights[:, :, np.newaxis] * w / scale).reshape(-1, rank)
@@ -265,21 +266,36 @@ def _simulated_bias(
     Return how much noisy positions change a fit, and the standard error of that.
 
     A fit with noisy columns V to the torque W beta of exact ones finds M beta, M = V^+ W; what was
-    found is M beta of the truth, so the bias is beta_hat - M^-1 beta_hat.
+    found is M beta of the truth, so the bias is beta_hat - M^-1 beta_hat, or M^-1 V^+ times the
+    difference of the torques of what was found along the exact and the noisy motion.
 
     """
     scale = np.where(result.estimate.std > 0.0, result.estimate.std, 1.0)
     w = _weighted(exact, weights, scale)
-    found = result.estimate.values / scale
+    found = _torque(exact, weights, result.estimate.values)
     biases = []
     for _ in range(repeats):
         noisy = [replace(r, q=r.q + noise * rng.normal(size=r.q.shape)) for r in calm]
-        again = regressions(result.arm, result.base.independent, noisy, result.used)
-        gain = np.linalg.lstsq(_weighted(again, weights, scale), w, rcond=None)[0]
-        biases.append(found - np.linalg.solve(gain, found))
+        again = _about(result, noisy)
+        off = found - _torque(again, weights, result.estimate.values)
+        both = np.column_stack([w, off])
+        gain = np.linalg.lstsq(_weighted(again, weights, scale), both, rcond=None)[0]
+        biases.append(np.linalg.solve(gain[:, :-1], gain[:, -1]))
         tick()
     spread = np.std(biases, axis=0, ddof=1) / np.sqrt(repeats)
     return scale * np.mean(biases, axis=0), scale * spread
+
+
+def _about(result: Identification, recordings: Sequence[Recording]) -> Sequence[Regression]:
+    """Linearise the identified arm along recordings, with a constant where it is not linear."""
+    if result.passes > 1:
+        return linearised(result.arm, result.base, recordings, result.used)[0]
+    return regressions(result.arm, result.base.independent, recordings, result.used)
+
+
+def _torque(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the weighted torque of linear models, shape (N n,)."""
+    return np.asarray((weights * np.concatenate([p.torque(values) for p in problem])).ravel())
 
 
 def _weighted(problem: Sequence[Regression], weights: FloatArray, scale: FloatArray) -> FloatArray:

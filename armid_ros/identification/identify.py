@@ -5,27 +5,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.checks import check_motion, check_torque
+from armid_ros.identification.excited import excited
 from armid_ros.identification.identifiability import Unidentified, unidentified
-from armid_ros.identification.least_squares import joint_triangles, Method, solve
-from armid_ros.identification.physical import fit_bodies, PhysicalSettings
+from armid_ros.identification.least_squares import Method
+from armid_ros.identification.nonlinear import fit_values, FittedValues, through, torques
+from armid_ros.identification.physical import PhysicalSettings
 from armid_ros.identification.physical_certificate import PhysicalCertificate
-from armid_ros.identification.regression import Regression, regressions
+from armid_ros.identification.physical_fit import fit_to_bodies
+from armid_ros.identification.quasi_static import free_directions, with_uncertain_inertia
+from armid_ros.identification.regression import predictions, regressions
 from armid_ros.identification.signals import Conditioning, conditioning, SignalSettings
-from armid_ros.model import BaseParameters, group_columns, regroup
+from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
-
-#: Parameters whose column the data separate from the others by less than this share are grouped
-#: with them: 1e-4 of a column's length is far below what noise leaves of it.
-EXCITATION_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -144,6 +144,8 @@ class Identification:
         What a person should know: joints at rest, outliers, grouped parameters.
     physical : PhysicalCertificate or None
         What shows that the links are bodies, where that was asked.
+    passes : int
+        Linearisations of the arm that the fit took; 1 if its torque is linear in its parameters.
 
     """
 
@@ -158,6 +160,7 @@ class Identification:
     settings: IdentificationSettings
     notes: tuple[str, ...]
     physical: PhysicalCertificate | None = None
+    passes: int = 1
 
     @property
     def unidentified(self) -> tuple[Unidentified, ...]:
@@ -166,13 +169,15 @@ class Identification:
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
         """Predict the torques of other recordings, filtered like the training data."""
-        problem = regressions(self.arm, self.base.independent, recordings, self.used)
-        if not problem:
+        found = predictions(self.arm, recordings, self.used)
+        if not found:
             raise IdentificationError(
                 f'{recordings[0].source}: no stretch is long enough to be filtered at '
                 f'{self.used.cutoff_hz:g} Hz'
             )
-        return _fits(problem, self.estimate.values)
+        return tuple(
+            Fit(part.source, part.motion, part.torque, part.informative) for part in found
+        )
 
 
 def identify(
@@ -215,74 +220,88 @@ def identify(
     used = conditioning(list(recordings), settings.signals)
     notes = check_motion(arm.robot, recordings, used)
     theory = arm.base_parameters(rng)
-    problem = regressions(arm, theory.independent, recordings, used, progress)
-    samples = sum(len(part.motion) for part in problem)
+    # inertia of a motion that is taken as slow: as described, unless bodies are fitted to weight
+    described = arm.quasi_static and settings.physical is None
+    whole = replace(arm, quasi_static=False) if described else arm
+    columns = regressions(whole, theory.independent, recordings, used, progress)
+    samples = sum(len(part.motion) for part in columns)
     if samples * arm.robot.n_joints < 2 * theory.rank:
         raise IdentificationError(
             f'{recordings[0].source}: {samples} samples remain after filtering at '
             f'{used.cutoff_hz:g} Hz and decimation by {used.decimation}; {theory.rank} parameters '
             'need more: record longer'
         )
-    base = _excited(theory, problem)
-    problem = [part.restrict(_positions(theory, base)) for part in problem]
+    base, problem = excited(theory, columns)
     notes += check_torque(arm, recordings, problem)
-    if base.rank < theory.rank:
+    if described:
+        problem = through(problem, torques(whole, recordings, used), base.values(whole.theta))
+        free = free_directions(whole, rng)
+        fit = fit_values(whole, base, problem, recordings, used, settings.method, free)
+        fit, said = with_uncertain_inertia(whole, fit, recordings, used)
+        notes += said
+    else:
+        fit = fit_values(arm, base, problem, recordings, used, settings.method)
+    if not described and _hidden(arm, theory):
+        theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings.method, rng)
+    if fit.base.rank < theory.rank:
         notes += (
-            f'the motion tells {base.rank} of {theory.rank} parameters apart; '
+            f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
             'the others are grouped',
         )
-    solution = solve(problem, settings.method, _bounds(arm, base))
-    if solution.outliers:
-        notes += (f'{solution.outliers} torque samples were weighted down as outliers',)
-    estimate = Estimate(base.parameters, solution.values, solution.covariance)
-    theta, certificate = base.lift(solution.values, arm.theta), None
+    if fit.solution.outliers:
+        notes += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
+    certificate = None
     if settings.physical is not None:
-        theta, certificate = fit_bodies(
-            arm, base, problem, solution.weights, estimate, settings.physical
+        fit, certificate = fit_to_bodies(
+            arm, fit, recordings, used, settings.method, settings.physical, rng
         )
-        estimate = Estimate(base.parameters, base.values(theta), solution.covariance)
         notes += certificate.sentences()
+    if not fit.settled:
+        notes += (
+            f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
+            'change one another too much in these data; leave some out, or record more',
+        )
     return Identification(
-        arm=arm.with_theta(theta),
+        arm=fit.arm,
         theory=theory,
-        base=base,
-        estimate=estimate,
-        condition_number=solution.condition_number,
-        joint_std=solution.joint_std,
-        training=_fits(problem, estimate.values),
+        base=fit.base,
+        estimate=Estimate(fit.base.parameters, fit.values, fit.solution.covariance),
+        condition_number=fit.solution.condition_number,
+        joint_std=fit.solution.joint_std,
+        training=tuple(
+            Fit(part.source, part.motion, torque, part.informative)
+            for part, torque in zip(fit.problem, fit.predicted, strict=True)
+        ),
         used=used,
         settings=settings,
         notes=notes,
         physical=certificate,
+        passes=fit.passes,
     )
 
 
-def _fits(problem: Sequence[Regression], values: FloatArray) -> tuple[Fit, ...]:
-    return tuple(
-        Fit(part.source, part.motion, part.columns @ values, part.informative) for part in problem
-    )
+def _hidden(arm: ArmModel, theory: BaseParameters) -> bool:
+    """Tell whether an effect has a parameter that no motion of the arm as it is shows."""
+    rigid = len(arm.robot.rigid_parameters)
+    return not bool(np.all(np.any(theory.grouping[:, rigid:], axis=0)))
 
 
-def _bounds(arm: ArmModel, base: BaseParameters) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of base parameters; one that stands for a group has none."""
-    free = np.full(len(arm.robot.rigid_parameters), np.inf)
-    effects = [effect.bounds() for effect in arm.effects]
-    lower = np.concatenate([-free, *(bounds[0] for bounds in effects)])[base.independent]
-    upper = np.concatenate([free, *(bounds[1] for bounds in effects)])[base.independent]
-    alone = np.count_nonzero(base.grouping, axis=1) == 1
-    return np.where(alone, lower, -np.inf), np.where(alone, upper, np.inf)
+def _with_what_shows_now(
+    theory: BaseParameters,
+    fit: FittedValues,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    method: Method,
+    rng: np.random.Generator,
+) -> tuple[BaseParameters, FittedValues]:
+    """
+    Fit again with what the fitted arm shows and the described one did not.
 
+    Such as a saturation that the torques of the description never reach.
 
-def _positions(theory: BaseParameters, base: BaseParameters) -> list[int]:
-    order = {int(column): position for position, column in enumerate(theory.independent)}
-    return [order[int(column)] for column in base.independent]
-
-
-def _excited(theory: BaseParameters, problem: Sequence[Regression]) -> BaseParameters:
-    """Group further what this motion does not tell apart, such as the links of a joint at rest."""
-    w = joint_triangles(problem)[:, :, :-1].reshape(-1, theory.rank)
-    names = tuple(theory.standard[column] for column in theory.independent)
-    data = group_columns(w, names, tolerance=EXCITATION_TOLERANCE)
-    if data.rank == theory.rank:
-        return theory
-    return regroup(theory, data)
+    """
+    now = fit.arm.base_parameters(rng)
+    if now.rank <= theory.rank:
+        return theory, fit
+    columns = regressions(fit.arm, now.independent, recordings, used)
+    return now, fit_values(fit.arm, *excited(now, columns), recordings, used, method)

@@ -147,7 +147,7 @@ def joint_triangles(
     triangles = np.zeros((n_joints, rank + 1, rank + 1))
     for joint in range(n_joints):
         rows = np.concatenate(
-            [np.column_stack([part.columns[:, joint], part.tau[:, joint]]) for part in problem]
+            [np.column_stack([part.columns[:, joint], part.target[:, joint]]) for part in problem]
         )
         active = np.flatnonzero(rows.any(axis=0))
         stacked = rows[:, active] * weights[:, joint, np.newaxis]
@@ -158,7 +158,7 @@ def joint_triangles(
 
 
 def _residual(problem: Sequence[Regression], values: FloatArray) -> FloatArray:
-    parts: list[FloatArray] = [part.tau - part.columns @ values for part in problem]
+    parts: list[FloatArray] = [part.target - part.columns @ values for part in problem]
     return np.concatenate(parts)
 
 

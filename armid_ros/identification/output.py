@@ -12,6 +12,7 @@ from typing import Any
 from armid_ros.arm import parameter_table
 from armid_ros.files import json_text, write_file
 from armid_ros.identification.consistency import NoiseCheck
+from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.identify import Fit, Identification, Score
 from armid_ros.identification.verification import Verification
 from armid_ros.motion import FloatArray
@@ -45,6 +46,10 @@ def identification_document(
     document = {
         'schema': SCHEMA,
         'robot': robot,
+        'description': {
+            'joints': list(result.arm.robot.joints),
+            'kinematics': kinematics_digest(result.arm.robot),
+        },
         'gravity': [float(g) for g in result.arm.robot.gravity],
         'parameters': parameter_table(estimate.parameters, estimate.values, list(estimate.std)),
         'covariance': [row[: k + 1].tolist() for k, row in enumerate(estimate.covariance)],

@@ -9,10 +9,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from armid_ros.errors import ModelError
+from armid_ros.errors import ArmidError, ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.files import finite, is_file, load_json, load_yaml, read_text, reading
+from armid_ros.identification.description import kinematics_digest
 from armid_ros.motion import FloatArray
+from armid_ros.robots import load_robot
 import numpy as np
 import yaml
 
@@ -42,6 +44,10 @@ class Parameters:
         Of the values in their order; None if the file does not have it.
     terms : mapping of ParameterName to (mapping of str to float)
         Factors of the standard parameters that each value groups, where the file has them.
+    joints : tuple of str
+        Joints of the robot, where the file has them.
+    kinematics : str
+        What is the same for descriptions of one robot; empty where the file does not have it.
 
     """
 
@@ -51,6 +57,8 @@ class Parameters:
     error_percent: float | None
     covariance: FloatArray | None = None
     terms: Mapping[ParameterName, Mapping[str, float]] = field(default_factory=dict)
+    joints: tuple[str, ...] = ()
+    kinematics: str = ''
 
     @property
     def std(self) -> FloatArray:
@@ -127,7 +135,19 @@ def read_parameters(path: str | Path) -> Parameters:
             raise ModelError(f'neither JSON nor YAML: {reason}') from error
         if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
             raise ModelError(f"its 'schema' has to be {' or '.join(_SCHEMAS)}")
-        return parameters_of(str(path), document)
+        read = parameters_of(str(path), document)
+    return read if read.kinematics else _with_robot(read, path)
+
+
+def _with_robot(found: Parameters, path: Path) -> Parameters:
+    """Look up the robot that a file without its kinematics names, where it is still there."""
+    beside = path.parent / found.robot
+    source = str(beside) if is_file(beside) else found.robot
+    try:
+        robot = load_robot(source)
+    except ArmidError:
+        return found
+    return replace(found, joints=robot.joints, kinematics=kinematics_digest(robot))
 
 
 def parameters_of(source: str, document: dict[str, Any]) -> Parameters:
@@ -158,7 +178,17 @@ def parameters_of(source: str, document: dict[str, Any]) -> Parameters:
     error = None
     if scores[0]:
         error = finite(scores[0]['relative_error_percent'], 'relative_error_percent')
-    return Parameters(source, str(document['robot']), values, error, covariance, terms)
+    about = document.get('description', {})
+    return Parameters(
+        source,
+        str(document['robot']),
+        values,
+        error,
+        covariance,
+        terms,
+        tuple(str(joint) for joint in about.get('joints', ())),
+        str(about.get('kinematics', '')),
+    )
 
 
 def _value(row: Mapping[str, Any], name: ParameterName) -> tuple[float, float]:

@@ -29,11 +29,14 @@ from armid_ros.model.pseudo_inertia import (
     pseudo_inertia,
 )
 from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
 import numpy as np
 import scipy.linalg
 
 #: A fit better than this share of the torque is taken as that good: there is always some noise.
 FINEST_FIT = 1e-4
+#: A mass beyond so many times the described one is said.
+HEAVY = 3.0
 #: Weights of the divergence that are tried. The fit is a mean of squares of about one.
 WEIGHTS = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
 #: The heaviest weight is taken whose held-out error is within this share of the least one.
@@ -157,7 +160,23 @@ def fit_bodies(
         tried=tried,
         unconstrained=unconstrained,
         misfit_ratio=max(misfit / least, 1.0),
-        notes=notes,
+        notes=(*notes, *_heavy(arm.robot, rigid)),
+    )
+
+
+def _heavy(robot: Robot, rigid: FloatArray) -> tuple[str, ...]:
+    """Say which links are far heavier than described, shape (n, 10)."""
+    described = robot.rigid_parameters[::PER_LINK]
+    named = [
+        f'{link} {found:.3g} kg, described {mass:.3g} kg'
+        for link, found, mass in zip(robot.links, rigid[:, 0], described, strict=True)
+        if found > HEAVY * mass > 0.0
+    ]
+    if not named:
+        return ()
+    return (
+        f'more than {HEAVY:g} times as heavy as described: {"; ".join(named)}; look for what is '
+        'not the links, such as rotor_inertia, joint_spring or payload, or correct the masses',
     )
 
 
@@ -246,7 +265,7 @@ def compress(
 
     """
     columns = np.concatenate([part.columns for part in problem])
-    tau = np.concatenate([part.tau for part in problem])
+    tau = np.concatenate([part.target for part in problem])
     factors = []
     for rows in np.array_split(np.arange(len(tau)), blocks):
         scaled = weights[rows, :, np.newaxis] * columns[rows]

@@ -43,6 +43,9 @@ class Regression:
         False where a joint that dry friction may hold is at rest: its torque says nothing.
     source : str
         The recording it comes from.
+    constant : ndarray, shape (M, n), or None
+        Filtered torque that the linear model has where all values are zero; None for none, as of
+        a model that is linear in all its parameters.
 
     """
 
@@ -50,6 +53,7 @@ class Regression:
     columns: FloatArray
     informative: npt.NDArray[np.bool_]
     source: str
+    constant: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Freeze the columns."""
@@ -60,6 +64,16 @@ class Regression:
         """Filtered measured torque, shape (M, n)."""
         assert self.motion.tau is not None
         return self.motion.tau
+
+    @property
+    def target(self) -> FloatArray:
+        """What columns times values have to be, shape (M, n)."""
+        return self.tau if self.constant is None else self.tau - self.constant
+
+    def torque(self, values: FloatArray) -> FloatArray:
+        """Return the torque of the linear model for values of the columns, shape (M, n)."""
+        linear = self.columns @ values
+        return np.asarray(linear if self.constant is None else linear + self.constant)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> Regression:
         """Return the problem in some of its columns."""
@@ -107,13 +121,82 @@ def regressions(
     result = []
     for recording in recordings:
         for motion in segments(recording, used):
-            kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
-            assert motion.tau is not None
-            decimated = motion.select(kept).with_torque(decimate(motion.tau, used))
-            informative = ~_at_rest(arm, motion)[kept]
+            decimated, informative = _rows(arm, motion, used)
             stacked = filtered_columns(arm, columns, motion, used, tick)
             result.append(Regression(decimated, stacked, informative, recording.source))
     return result
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """
+    The torque of an arm along one unbroken stretch of motion, filtered like the measured one.
+
+    Attributes
+    ----------
+    motion : Motion
+        Decimated motion of M samples with the filtered measured torque.
+    torque : ndarray, shape (M, n)
+        Filtered torque of the arm [N m].
+    informative : ndarray of bool, shape (M, n)
+        False where a joint that dry friction may hold is at rest.
+    source : str
+        The recording it comes from.
+
+    """
+
+    motion: Motion
+    torque: FloatArray
+    informative: npt.NDArray[np.bool_]
+    source: str
+
+
+def predictions(
+    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
+) -> list[Prediction]:
+    """Return what the torque of an arm is along recordings, one per unbroken stretch."""
+    return [
+        Prediction(*_rows_with_torque(arm, motion, used), recording.source)
+        for recording in recordings
+        for motion in segments(recording, used)
+    ]
+
+
+def filtered_torque(arm: ArmModel, motion: Motion, used: Conditioning) -> FloatArray:
+    """
+    Filter and decimate the torque of an arm along one unbroken stretch.
+
+    Returns
+    -------
+    ndarray, shape (M, n)
+
+    """
+    if not all(effect.instantaneous for effect in arm.effects):
+        return decimate(arm.torque(motion), used)
+    margin = arm.neighbours(1.0 / used.rate_hz)
+    blocks = []
+    for samples in _overlapping(len(motion), used):
+        around = slice(max(0, samples.start - margin), samples.stop + margin)
+        inside = slice(samples.start - around.start, samples.stop - around.start)
+        blocks.append(decimate(arm.torque(motion.select(around))[inside], used))
+    return np.concatenate(blocks)
+
+
+def _rows(
+    arm: ArmModel, motion: Motion, used: Conditioning
+) -> tuple[Motion, npt.NDArray[np.bool_]]:
+    """Return the rows of a stretch: decimated motion and torque, and which say something."""
+    kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
+    assert motion.tau is not None
+    decimated = motion.select(kept).with_torque(decimate(motion.tau, used))
+    return decimated, ~_at_rest(arm, motion)[kept]
+
+
+def _rows_with_torque(
+    arm: ArmModel, motion: Motion, used: Conditioning
+) -> tuple[Motion, FloatArray, npt.NDArray[np.bool_]]:
+    decimated, informative = _rows(arm, motion, used)
+    return decimated, filtered_torque(arm, motion, used), informative
 
 
 def filtered_columns(

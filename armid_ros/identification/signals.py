@@ -25,6 +25,10 @@ import numpy.typing as npt
 from scipy import signal
 from scipy.interpolate import CubicSpline
 
+#: Samples per second below which no motion of an arm is followed [Hz].
+SLOWEST = 2.0
+#: Rates at which arms are recorded [Hz].
+USUAL_RATES = (20.0, 20_000.0)
 #: A step of this many nominal periods is a hole that interpolation must not bridge.
 GAP_PERIODS = 5.0
 #: Stamps within this share of a period of an even grid are taken as even.
@@ -134,6 +138,8 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     the velocities' power lies, and are decimated to 2.5 samples per period of that.
 
     """
+    for recording in recordings:
+        _require_rate(recording)
     rate = float(np.median([sampling_rate(recording) for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
@@ -152,6 +158,24 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
 def sampling_rate(recording: Recording) -> float:
     """Return the rate of a recording, from the median time between samples [Hz]."""
     return float(1.0 / np.median(np.diff(recording.t)))
+
+
+def _require_rate(recording: Recording) -> None:
+    """Raise an IdentificationError where samples are so far apart that stamps are no seconds."""
+    rate = sampling_rate(recording)
+    if rate >= SLOWEST:
+        return
+    units = (('milliseconds', 1e3), ('microseconds', 1e6), ('nanoseconds', 1e9))
+    likely = [
+        f'; the stamps seem to be {unit} in place of seconds, {factor * rate:.4g} samples/s: '
+        'write them in seconds'
+        for unit, factor in units
+        if USUAL_RATES[0] <= factor * rate <= USUAL_RATES[1]
+    ]
+    raise IdentificationError(
+        f'{recording.source}: {len(recording)} samples in {recording.duration:.4g} s, one every '
+        f'{1.0 / rate:.4g} s, follow no motion' + (likely[0] if likely else '')
+    )
 
 
 def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:

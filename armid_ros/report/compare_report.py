@@ -171,10 +171,11 @@ def _beware(comparison: Comparison) -> tuple[str, ...]:
                 f'{given.source} has deviations without covariance: parameters are compared one '
                 'by one alone, and changes that only show in several of them go unseen.'
             )
-    if comparison.before.robot != comparison.after.robot:
+    known = comparison.before.kinematics and comparison.after.kinematics  # one robot, then
+    if not known and comparison.before.robot != comparison.after.robot:
         lines.append(
-            f'The robots have different names: {comparison.before.robot} and '
-            f'{comparison.after.robot}.'
+            f'The robots have different names, {comparison.before.robot} and '
+            f'{comparison.after.robot}, and nothing shows that they are one.'
         )
     return tuple(lines)
 

@@ -15,8 +15,9 @@ from __future__ import annotations
 
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
+from armid_ros.simulation.bodies import no_body
 from armid_ros.simulation.box_complementarity import Modes, solve_box_complementarity
-from armid_ros.simulation.plant import Contacts, NO_BODY, Plant, State
+from armid_ros.simulation.plant import Contacts, Plant, State
 import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dposv
@@ -61,7 +62,7 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
         contacts = contacts.under(load)
     inertia = mass + plant.inertia
 
-    solution = _solve(inertia, force, contacts.directions)
+    solution = _solve(plant, inertia, force, contacts.directions)
     dq_next, modes = dq + dt * solution[:, 0], state.modes
     if modes:
         dq_next, modes = _rub(contacts, dt * solution[:, 1:], dq_next, modes)
@@ -74,14 +75,16 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
     return State(steps, steps * plant.dt, q_next, dq_next, (dq_next - dq) / dt, modes, memory)
 
 
-def _solve(inertia: FloatArray, force: FloatArray, directions: FloatArray) -> FloatArray:
+def _solve(
+    plant: Plant, inertia: FloatArray, force: FloatArray, directions: FloatArray
+) -> FloatArray:
     """Return the inverse inertia times (force, directions^T), shape (n, 1 + m)."""
     right = np.empty((1 + len(directions), len(force)))
     right[0] = force
     right[1:] = directions
     _, solution, failed = dposv(inertia, right.T, 0, 0, 1)
     if failed:
-        raise ModelError(NO_BODY)
+        raise ModelError(no_body(plant.robot))
     return np.asarray(solution)
 
 
@@ -138,7 +141,7 @@ def _stop(
         contacts = plant.contacts_at(at_lower, at_upper)
         if load is not None:
             contacts = contacts.under(load)
-        solution = _solve(inertia, force, contacts.directions)
+        solution = _solve(plant, inertia, force, contacts.directions)
         dq_free = state.dq + plant.dt * solution[:, 0]
         guess = state.modes + (0,) * (len(contacts.axes) - count)
         dq, modes = _rub(contacts, plant.dt * solution[:, 1:], dq_free, guess)

@@ -12,6 +12,7 @@ from armid_ros.effects import Action, DryFriction, TorqueLaw
 from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
+from armid_ros.simulation.bodies import no_body
 from armid_ros.simulation.box_complementarity import BoxLaw, Modes
 import numpy as np
 import numpy.typing as npt
@@ -20,11 +21,6 @@ from scipy.linalg import eigh, LinAlgError
 
 #: How far beyond a limit is rounding, as a share of the range between the limits.
 LIMIT_TOLERANCE = 1e-6
-
-NO_BODY = (
-    'the inertia matrix of the arm is not positive definite, so its rigid-body parameters and '
-    'rotor inertias are not those of bodies: correct them, or estimate physically consistent ones'
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +165,7 @@ class Plant:
         data = robot.model.createData()
         pin.crba(robot.model, data, middle_position(robot))
         _require_inertia(robot, np.diag(np.array(data.M) + inertia))
-        weight = _damping_weight(np.array(data.M) + inertia, damping, self.dt)
+        weight = _damping_weight(robot, np.array(data.M) + inertia, damping, self.dt)
         values = {
             'robot': robot,
             'contacts': Contacts.of(friction),
@@ -272,7 +268,8 @@ def _require_inertia(robot: Robot, moved: FloatArray) -> None:
 def middle_position(robot: Robot) -> FloatArray:
     """Return the middle of the range of every joint, 0 where there is none, shape (n,)."""
     limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-    return np.asarray(np.where(limited, np.where(limited, robot.lower + robot.upper, 0.0) / 2, 0))
+    lower, upper = (np.where(limited, end, 0.0) for end in (robot.lower, robot.upper))
+    return np.asarray((lower + upper) / 2)
 
 
 def _split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFriction, FloatArray]:
@@ -312,7 +309,7 @@ def _axis(direction: FloatArray) -> int:
     return int(joints[0]) if len(joints) == 1 else -1
 
 
-def _damping_weight(inertia: FloatArray, damping: FloatArray, dt: float) -> float:
+def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:
     """
     Return the share of the end of a step in the velocity that damping acts on.
 
@@ -324,7 +321,7 @@ def _damping_weight(inertia: FloatArray, damping: FloatArray, dt: float) -> floa
     try:
         rates = eigh((damping + damping.T) / 2, inertia, eigvals_only=True)
     except LinAlgError:
-        raise ModelError(NO_BODY) from None
+        raise ModelError(no_body(robot)) from None
     z = dt * float(rates[-1])
     if z < 1e-3:
         return 0.5

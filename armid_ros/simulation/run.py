@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.simulation.closed_loop import command, run, Targets
+from armid_ros.robots import Robot
+from armid_ros.simulation.closed_loop import command, run, Targets, Trace
 from armid_ros.simulation.controller import ComputedTorque, Controller
 from armid_ros.simulation.plant import Plant
 from armid_ros.simulation.readings import readings
@@ -20,6 +21,8 @@ import numpy as np
 
 #: Steps between two calls of the progress callback, about 50 ms.
 _BLOCK = 1000
+#: A simulated joint that is faster has left all bounds [rad/s or m/s].
+_LOST = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +108,8 @@ def simulate(
     plant = arm if isinstance(arm, Plant) else Plant(arm)
     controller = controller or ComputedTorque(plant.arm)
     sensors = sensors or Sensors()
+    if not rate > 0.0:
+        raise ModelError(f'a rate of {rate:g} Hz: samples per second have to be positive')
     stride = whole_steps(1.0 / rate, plant.dt, f'a rate of {rate:g} Hz')
     curve = reference if isinstance(reference, Reference) else Reference.of(reference)
     curve = curve.for_robot(plant.robot)
@@ -121,7 +126,9 @@ def simulate(
     pieces = []
     while state.steps <= last:
         count = min(_BLOCK, last + 1 - state.steps)
-        trace = run(plant, controller, state, torque, targets(state.steps + 1, count))
+        with np.errstate(over='ignore', invalid='ignore'):  # looked for below
+            trace = run(plant, controller, state, torque, targets(state.steps + 1, count))
+        _require_motion(plant.robot, trace)
         pieces.append(trace)
         state, torque = trace.state, trace.torque
         if progress is not None:
@@ -142,6 +149,18 @@ def simulate(
     truth = truth.select(rows)
     desired = curve.sample(truth.t)
     return SimulatedRun(truth.joints, truth.t, *measured, truth, desired, saturated)
+
+
+def _require_motion(robot: Robot, trace: Trace) -> None:
+    """Raise a ModelError if a simulated arm has left all bounds."""
+    lost = ~(np.abs(trace.dq) < _LOST)
+    if np.any(lost):
+        step, joint = np.argwhere(lost)[0]
+        t = trace.state.t * (1.0 - (len(lost) - step) / trace.state.steps)
+        raise ModelError(
+            f'{robot.name}: the simulated arm does not follow; {robot.joints[joint]} is faster '
+            f'than {_LOST:g} rad/s (or m/s) after {t:.3g} s'
+        )
 
 
 def whole_steps(time: float, dt: float, what: str) -> int:

@@ -5,7 +5,7 @@
 import json
 
 from armid_ros.cli.commands import COMMANDS
-from armid_ros.effects import CATALOGUE
+from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.excitation import load_excitation
 from armid_ros.identification.two_inertia import Accelerometers, read_runs
 from armid_ros.recording import read_joint_trajectory, read_recording
@@ -143,3 +143,12 @@ def test_bad_input_is_one_line_with_the_answer(arguments, message, bags, tmp_pat
     assert lines[0].startswith('armid: ')
     assert message.format(bag=bags[0]) in lines[0]
     assert not (tmp_path / 'o').exists()
+
+
+@pytest.mark.parametrize('effect', ['backlash@elbow_pitch', 'viscous_friction'])
+def test_an_effect_without_a_size_is_refused_with_what_it_takes(tmp_path, effect):
+    out = tmp_path / 'bag'
+    text = armid('simulate', '--robot', ROBOT, '--effect', effect, '--out', out, code=2).output
+    assert 'has no size' in text
+    assert make_effect(effect, load_robot(ROBOT)).quantities[0].name in text
+    assert not out.exists()

@@ -5,6 +5,7 @@
 import json
 from pathlib import Path
 import re
+import shutil
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import make_effect
@@ -150,3 +151,26 @@ def test_what_is_not_told_from_zero_is_printed_without_a_value(tmp_path):
     for key in single:
         (line,) = (line for line in lines if tuple(line.split()[:2]) == key)
         assert 'not told from 0' in line
+
+
+def test_a_folder_with_other_files_is_refused_before_any_work(bags, tmp_path):
+    (tmp_path / 'notes.txt').write_text('mine')
+    result = armid('identify', bags[0], '--robot', ROBOT, '--out', tmp_path, code=2)
+    assert 'holds notes.txt, which no identify wrote' in result.output
+    assert [path.name for path in tmp_path.iterdir()] == ['notes.txt']
+
+
+def test_one_robot_by_two_paths_is_one_and_two_robots_are_refused(bags, tmp_path):
+    shutil.copy(load_robot(ROBOT).path, tmp_path / 'here.urdf')
+    for name, robot in (('a', ROBOT), ('b', tmp_path / 'here.urdf')):
+        armid('identify', bags[0], '--robot', robot, '--no-verify', '--out', tmp_path / name)
+    armid('compare', tmp_path / 'a', tmp_path / 'b', '--out', tmp_path / 'compared')
+    assert 'different names' not in (tmp_path / 'compared' / 'report.html').read_text()
+    document = json.loads((tmp_path / 'b' / 'identification.json').read_text())
+    document['description']['kinematics'] = 'another'
+    (tmp_path / 'b' / 'identification.json').write_text(json.dumps(document))
+    text = armid(
+        'compare', tmp_path / 'a', tmp_path / 'b', '--out', tmp_path / 'none', code=2
+    ).output
+    assert 'are of different robots' in text
+    assert not (tmp_path / 'none').exists()

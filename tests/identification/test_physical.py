@@ -3,6 +3,7 @@
 import json
 
 from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
 from armid_ros.errors import IdentificationError, RobotError
 from armid_ros.identification import IdentificationSettings, identify, Score
 from armid_ros.identification.physical import bodily_prior, PhysicalSettings
@@ -179,3 +180,29 @@ class TestRefusals:
 
 def test_links_of_a_robot_are_named(bodies):
     assert tuple(link.link for link in bodies.physical.links) == load_robot('humanoid_arm').links
+
+
+@pytest.fixture(scope='module')
+def geared(arm):
+    """Return a fit without the rotors of an arm whose rotors are most of its inertia."""
+    rotors = np.array([0.3, 0.3, 0.1, 0.1, 0.003, 0.003])
+    truth = arm.with_effect(make_effect('rotor_inertia', arm.robot), rotors)
+    recording = recorded(truth, multisine(arm.robot.joints, 20.0, 100.0, seed=1), 0, 0.02)
+    return run(ArmModel(arm.robot, arm.effects), recording, PhysicalSettings())
+
+
+def test_an_inertia_that_is_not_of_the_links_takes_no_mass_along(arm, geared):
+    """The torques do not show the mass of the first link at all."""
+    masses, described = (r.rigid_parameters[::10] for r in (geared.arm.robot, arm.robot))
+    assert masses[0] == pytest.approx(described[0], rel=0.3)
+    assert np.max(masses / described) < 5.0
+
+
+def test_masses_far_beyond_the_described_are_said(arm, recording):
+    light = arm.robot.rigid_parameters.reshape(-1, 10).copy()
+    light[5] *= 0.1
+    structure = ArmModel(arm.robot.with_inertias(light.ravel()), arm.effects)
+    result = run(structure, recording, PhysicalSettings())
+    (note,) = (n for n in result.notes if 'times as heavy as described' in n)
+    assert arm.robot.links[5] in note
+    assert arm.robot.links[0] not in note

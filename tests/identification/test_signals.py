@@ -1,5 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.signals import (
     Conditioning,
@@ -110,3 +112,11 @@ def test_torque_is_needed():
     recording = Recording(joints=('a',), t=t, q=q, source='run.mcap')
     with pytest.raises(IdentificationError, match=r'run.mcap.*no effort'):
         list(segments(recording, Conditioning(1000.0, 50.0, 10)))
+
+
+@pytest.mark.parametrize(('factor', 'unit'), [(1e3, 'milliseconds'), (1e6, 'microseconds')])
+def test_stamps_that_are_no_seconds_are_named(factor, unit):
+    t, q = sine()
+    recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
+    with pytest.raises(IdentificationError, match=f'bag: .* seem to be {unit}.*1000 samples/s'):
+        conditioning([replace(recording, t=factor * t)], SignalSettings())

@@ -1,0 +1,36 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether two descriptions are of one robot, wherever their files are."""
+
+from __future__ import annotations
+
+import hashlib
+
+from armid_ros.robots import Robot
+import numpy as np
+
+
+def kinematics_digest(robot: Robot) -> str:
+    """
+    Return what is the same for two descriptions exactly if their joints are, in hexadecimal.
+
+    Names, kinds, axes and places of the joints and names of the links count, to a micrometre.
+    Masses and gravity do not: they are what is corrected from one day to the next.
+
+    """
+    digest = hashlib.sha256()
+    model = robot.model
+    for index, (joint, link) in enumerate(zip(robot.joints, robot.links, strict=True), start=1):
+        place = model.jointPlacements[index]
+        numbers = np.concatenate([place.rotation.ravel(), place.translation])
+        rounded = np.round(numbers, 6) + 0.0  # no negative zero
+        kind = model.joints[index].shortname()
+        parts = (
+            joint,
+            link,
+            kind,
+            str(model.parents[index]),
+            ' '.join(f'{x:.6f}' for x in rounded),
+        )
+        digest.update('\n'.join(parts).encode())
+    return digest.hexdigest()[:16]

@@ -1,0 +1,54 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What makes links no bodies, so that no arm of them can be simulated."""
+
+from __future__ import annotations
+
+from armid_ros.errors import ModelError
+from armid_ros.model.pseudo_inertia import PER_LINK, pseudo_inertia
+from armid_ros.robots import Robot
+import numpy as np
+
+NO_BODY = (
+    'the inertia matrix of the arm is not positive definite, so its rigid-body parameters and '
+    'rotor inertias are not those of bodies: correct them, or estimate physically consistent ones'
+)
+
+
+def require_masses(robot: Robot) -> None:
+    """
+    Refuse a robot with links of negative mass.
+
+    Raises
+    ------
+    ModelError
+        Naming the links.
+
+    """
+    negative = _of_negative_mass(robot)
+    if negative:
+        raise ModelError(f'{robot.name}: {negative}; correct the description')
+
+
+def no_body(robot: Robot) -> str:
+    """Say that the inertia matrix is not positive definite, and which links make it so."""
+    links = zip(robot.links, robot.rigid_parameters.reshape(-1, PER_LINK), strict=True)
+    negative = _of_negative_mass(robot)
+    odd = [
+        name
+        for name, values in links
+        if np.any(values) and np.linalg.eigvalsh(pseudo_inertia(values))[0] < 0.0
+    ]
+    if negative or not odd:
+        return f'{negative}; {NO_BODY}' if negative else NO_BODY
+    return f'inertias of {", ".join(odd)} are not those of a body; {NO_BODY}'
+
+
+def _of_negative_mass(robot: Robot) -> str:
+    masses = robot.rigid_parameters[::PER_LINK]
+    named = [
+        f"link '{name}' has a mass of {mass:g} kg"
+        for name, mass in zip(robot.links, masses, strict=True)
+        if mass < 0.0
+    ]
+    return ', '.join(named)

@@ -1,0 +1,89 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What cannot be simulated is refused with its name, and arms of one joint are arms."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import ModelError
+from armid_ros.motion import Motion
+from armid_ros.robots import load_robot, robot_from_urdf
+from armid_ros.simulation import simulate
+from armid_ros.simulation.bodies import require_masses
+from armid_ros.simulation.controller import Controller
+import numpy as np
+import pytest
+
+ONE_JOINT = """
+<robot name="one"><link name="base"/>
+  <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="{mass}"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="hinge" type="{kind}"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" velocity="3" effort="20"/></joint>
+</robot>
+"""
+
+
+def one_joint(kind='revolute', mass=1.0):
+    return robot_from_urdf(ONE_JOINT.format(kind=kind, mass=mass), source='one.urdf')
+
+
+def sine(joints):
+    t = np.arange(300) / 100.0
+    angle = 2.0 * t[:, np.newaxis] + np.arange(len(joints))
+    return Motion(joints, t, 0.1 * np.sin(angle), 0.2 * np.cos(angle), -0.4 * np.sin(angle))
+
+
+@pytest.mark.parametrize('kind', ['revolute', 'continuous'])
+def test_an_arm_of_one_joint_follows(kind):
+    """Without a range there is no middle of it, and no warning either."""
+    robot = one_joint(kind)
+    run = simulate(ArmModel(robot), sine(robot.joints), rng=np.random.default_rng(0))
+    assert np.abs(run.truth.q - run.reference.q).max() < 1e-3
+
+
+@pytest.mark.parametrize('rate', [0.0, -5.0, np.nan])
+def test_a_rate_has_to_be_positive(rate):
+    robot = one_joint()
+    with pytest.raises(ModelError, match=r'rate of .* Hz: samples per second'):
+        simulate(ArmModel(robot), sine(robot.joints), rng=np.random.default_rng(0), rate=rate)
+
+
+def test_a_link_of_negative_mass_is_named():
+    with pytest.raises(ModelError, match=r"link 'arm' has a mass of -1 kg; correct"):
+        require_masses(one_joint(mass=-1.0))
+
+
+@pytest.mark.parametrize('link', [0, 2, 5])
+def test_what_makes_an_inertia_matrix_impossible_is_named(link):
+    robot = load_robot('humanoid_arm')
+    bodies = robot.rigid_parameters.reshape(-1, 10).copy()
+    bodies[link] *= -1.0
+    arm = ArmModel(robot.with_inertias(bodies.ravel()))
+    with pytest.raises(ModelError, match=f"link '{robot.links[link]}' has a mass of -"):
+        simulate(arm, sine(robot.joints), rng=np.random.default_rng(0))
+
+
+class Pushing(Controller):
+    """Always more of what there is."""
+
+    def feedforward(self, desired):
+        """Return no torque."""
+        return np.zeros_like(desired.q)
+
+    def torque(self, q, dq, desired, feedforward):
+        """Return torque along the velocity."""
+        return 1e3 * dq + 1.0
+
+
+def test_an_arm_that_flies_away_does_not_follow_and_warns_of_nothing():
+    robot = one_joint('continuous')
+    robot = robot_from_urdf(
+        ONE_JOINT.format(kind='continuous', mass=1.0).replace('effort="20"', 'effort="1e300"'),
+        source='one.urdf',
+    )
+    with pytest.raises(ModelError, match=r'does not follow; hinge is faster than'):
+        simulate(
+            ArmModel(robot),
+            sine(robot.joints),
+            rng=np.random.default_rng(0),
+            controller=Pushing(),
+        )
