@@ -12,8 +12,8 @@ decides that.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
 from itertools import combinations
 from typing import ClassVar, Literal
 
@@ -47,9 +47,19 @@ class Hypothesis(ABC):
 
     values: ClassVar[int] = 1
 
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What is wrong and where, without by how much."""
+        parts = (getattr(self, part.name) for part in fields(self) if part.compare)  # type: ignore
+        return (type(self).__name__, *(v for v in parts if not isinstance(v, float | tuple)))
+
     def motion(self, motion: Motion) -> Motion:
-        """Return the motion and its torque as they would be without the mistake."""
+        """Return a motion and its torque as they would be without the mistake."""
         return motion
+
+    def stretches(self, stretches: Sequence[Motion]) -> list[Motion]:
+        """Return all of a recording as it would be without the mistake."""
+        return [self.motion(motion) for motion in stretches]
 
     def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
         """
@@ -94,6 +104,21 @@ class AsRecorded(Hypothesis):
 
 
 @dataclass(frozen=True)
+class WithoutBody(Hypothesis):
+    """The description says nothing of this arm: friction and drives take all there is."""
+
+    values: ClassVar[int] = 0
+
+    def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
+        """Leave the body out."""
+        return np.zeros_like(motion.q), np.empty((*motion.q.shape, 0))
+
+    def sentence(self, robot: Robot) -> str:
+        """Say so."""
+        return 'the description says nothing of the torques'
+
+
+@dataclass(frozen=True)
 class Reversed(Hypothesis):
     """Position, torque or both of a joint have the opposite sign."""
 
@@ -108,14 +133,10 @@ class Reversed(Hypothesis):
 
     def sentence(self, robot: Robot) -> str:
         """Name the joint."""
-        verb = 'have' if ' and ' in self.quantity else 'has'
-        return (
-            f'the {self.quantity} of {robot.joints[self.joint]} seems to have the opposite sign: '
-            'negate it'
-            if verb == 'has'
-            else f'position and torque of {robot.joints[self.joint]} seem to have the opposite '
-            'sign: its axis points the other way; negate both'
-        )
+        joint = robot.joints[self.joint]
+        if self.quantity == 'position and torque':
+            return f'position and torque of {joint} seem to have the opposite sign: negate both'
+        return f'the {self.quantity} of {joint} seems to have the opposite sign: negate it'
 
 
 @dataclass(frozen=True)
@@ -135,7 +156,10 @@ class Exchanged(Hypothesis):
     def sentence(self, robot: Robot) -> str:
         """Name the joints."""
         a, b = robot.joints[self.first], robot.joints[self.second]
-        return f'{self.quantity} of {a} and {b} seem to be exchanged: check the names of joints'
+        return (
+            f'the {self.quantity} of {a} and of {b} seem to be exchanged: check the names of '
+            'the joints'
+        )
 
 
 @dataclass(frozen=True)
@@ -174,12 +198,19 @@ class Late(Hypothesis):
     seconds: float
 
     def motion(self, motion: Motion) -> Motion:
-        """Shift the torque back; the end that has none is left out."""
-        assert motion.tau is not None
-        t = motion.t + self.seconds
+        """
+        Take the motion of the time that the torque belongs to.
+
+        The torque stays as it is, for its noise would be less between samples.
+
+        """
+        t = motion.t - self.seconds
         inside = (t >= motion.t[0]) & (t <= motion.t[-1])
-        tau = np.column_stack([np.interp(t, motion.t, column) for column in motion.tau.T])
-        return motion.with_torque(tau).select(inside)
+        q, dq, ddq = (
+            np.column_stack([np.interp(t, motion.t, column) for column in x.T])
+            for x in (motion.q, motion.dq, motion.ddq)
+        )
+        return replace(motion, q=q, dq=dq, ddq=ddq).select(inside)
 
     def nearby(self) -> Iterator[Hypothesis]:
         """Yield times in steps of an eighth."""
@@ -278,26 +309,24 @@ class Faulty(Hypothesis):
     ----------
     what : str
         The first of them, in words.
-    times : tuple of float
-        When [s].
-    reach : float
-        How far filters spread a sample [s].
+    count : int
+        How many there are.
+    without : tuple of Motion
+        The recording without them.
 
     """
 
     what: str
-    times: tuple[float, ...]
-    reach: float
+    count: int
+    without: tuple[Motion, ...] = field(repr=False, compare=False)
 
-    def motion(self, motion: Motion) -> Motion:
-        """Leave out what they have touched."""
-        away = np.abs(motion.t[:, np.newaxis] - np.array(self.times)).min(axis=1) > self.reach
-        return motion.select(away)
+    def stretches(self, stretches: Sequence[Motion]) -> list[Motion]:
+        """Return the recording without faulty samples."""
+        return list(self.without)
 
     def sentence(self, robot: Robot) -> str:
         """Say how many, and where the first is."""
-        count = len(self.times)
-        many = '' if count == 1 else f' and {count - 1} more like it'
+        many = '' if self.count == 1 else f' (the first of {self.count})'
         return f'{self.what}{many}: leave out what is faulty, or record again'
 
 
@@ -354,10 +383,12 @@ def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str
     return direction, ','.join(f'{part:.3g}' for part in size * direction + 0.0)
 
 
-def _changed(motion: Motion, quantity: Quantity, change: object) -> Motion:
-    assert callable(change)
+def _changed(
+    motion: Motion, quantity: Quantity, change: Callable[[FloatArray], FloatArray]
+) -> Motion:
     if quantity != 'torque':
         motion = replace(motion, q=change(motion.q), dq=change(motion.dq), ddq=change(motion.ddq))
     if quantity != 'position':
+        assert motion.tau is not None
         motion = motion.with_torque(change(motion.tau))
     return motion

@@ -11,18 +11,35 @@ that is fitted too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 from armid_ros.effects.timing import within_band
+from armid_ros.identification.faulty_samples import faulty_samples
 from armid_ros.identification.grade_limits import LIMITS
-from armid_ros.identification.hypotheses import AsRecorded, hypotheses, Hypothesis
+from armid_ros.identification.hypotheses import (
+    AsRecorded,
+    Faulty,
+    hypotheses,
+    Hypothesis,
+    OtherGravity,
+    OtherUnit,
+    WithoutBody,
+)
 from armid_ros.identification.prediction_error import (
     described_error,
     fitted_error,
     PredictionError,
 )
+from armid_ros.identification.signals import (
+    Conditioning,
+    decimate,
+    decimated_samples,
+    segments,
+)
 from armid_ros.motion import Motion
+from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -57,8 +74,8 @@ class Mistake:
 
     @property
     def joint(self) -> int:
-        """The joint whose prediction gains most."""
-        return int(np.argmax(self.before.joints.clip(max=1.0) / self.after.joints))
+        """The joint with most of the torque explained."""
+        return int(np.argmax(self.before.joints.clip(max=1.0) - self.after.joints))
 
     def sentence(self, robot: Robot) -> str:
         """Say what seems to be wrong, what to do and what shows it, without a full stop."""
@@ -74,9 +91,7 @@ class Mistake:
         )
 
 
-def find_mistake(
-    robot: Robot, stretches: Sequence[Motion], suspects: Sequence[Hypothesis] = ()
-) -> Mistake | None:
+def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mistake | None:
     """
     Try what may be wrong with a recording.
 
@@ -84,10 +99,10 @@ def find_mistake(
     ----------
     robot : Robot
         The description.
-    stretches : sequence of Motion
-        The recording, filtered and decimated, with torques.
-    suspects : sequence of Hypothesis
-        What this recording suggests beside what any may have.
+    recording : Recording
+        Data with torques.
+    used : Conditioning
+        Filters that the recording is identified with.
 
     Returns
     -------
@@ -95,25 +110,28 @@ def find_mistake(
         None where the data are best as they are.
 
     """
-    slow = [_slow(motion) for motion in stretches]
+    slow = _slow_motions(recording, used)
     if sum(len(motion) for motion in slow) < _FEWEST:
         return None
-    tried = [*suspects, *hypotheses(robot)]
-    found = _best(robot, tried, _described(robot, slow), 1.0, fitted=False)
+    tried = list(hypotheses(robot))
+    faults = faulty_samples(recording)
+    if faults is not None:
+        without = tuple(_slow_motions(recording.select(faults.sound), used))
+        tried.append(Faulty(faults.first, faults.count, without))
+    found = _best(robot, tried, _described(robot, slow), fitted=False)
     if found is not None:
         return found
-    before = fitted_error(robot, _thinned(slow, _ROWS_FITTED))
-    if 100.0 * before.whole < LIMITS.poor and 100.0 * before.joints.max() < LIMITS.unusable:
+    as_recorded = _fitted(robot, slow)(AsRecorded())
+    if as_recorded is None or 100.0 * as_recorded[0].whole < LIMITS.poor:
         return None
-    linear = [one for one in tried if one.torque is Hypothesis.torque]
-    linear = [one for one in tried if type(one).torque is Hypothesis.torque]
-    return _best(robot, linear, _fitted(robot, slow), LIMITS.free_body, fitted=True)
+    changes = [one for one in tried if not isinstance(one, OtherGravity | OtherUnit)]
+    return _best(robot, changes, _fitted(robot, slow), fitted=True)
 
 
 def _described(robot: Robot, slow: Sequence[Motion]) -> Judge:
     def judge(one: Hypothesis) -> tuple[PredictionError, Hypothesis] | None:
-        motion = _thinned([one.motion(part) for part in slow], _ROWS)
-        if len(motion) < _FEWEST:
+        motion = _thinned(one.stretches(slow), _ROWS)
+        if motion is None:
             return None
         error = described_error(motion, *one.torque(robot, motion))
         return error, one.settled(error.shared)
@@ -123,67 +141,92 @@ def _described(robot: Robot, slow: Sequence[Motion]) -> Judge:
 
 def _fitted(robot: Robot, slow: Sequence[Motion]) -> Judge:
     def judge(one: Hypothesis) -> tuple[PredictionError, Hypothesis] | None:
-        motion = _thinned([one.motion(part) for part in slow], _ROWS_FITTED)
-        return None if len(motion) < _FEWEST else (fitted_error(robot, motion), one)
+        motion = _thinned(one.stretches(slow), _ROWS_FITTED)
+        return None if motion is None else (fitted_error(robot, motion), one)
 
     return judge
 
 
 def _best(
-    robot: Robot, tried: Sequence[Hypothesis], judge: Judge, price: float, *, fitted: bool
+    robot: Robot, tried: Sequence[Hypothesis], judge: Judge, *, fitted: bool
 ) -> Mistake | None:
     """Return the hypothesis that gains most, if that is enough for what it is free to choose."""
     as_recorded = judge(AsRecorded())
-    assert as_recorded is not None
+    if as_recorded is None:
+        return None
     before = as_recorded[0]
-    least = LIMITS.gain**price
-    if before.best_gain() < least:
+    nothing = None if fitted else judge(WithoutBody())
+    rival = before if nothing is None else before.least(nothing[0])
+    price = LIMITS.gain if not fitted else LIMITS.gain**LIMITS.free_body
+    if rival.best_gain() < price:
         return None
-    judged = list(_judged(robot, tried, judge))
-    if not judged:
+    rows = _judged(robot, tried, judge, rival, price)
+    if not rows:
         return None
-    nearest = max(judged, key=lambda pair: before.gain(pair[0]) / least ** pair[1].values)
-    judged += _judged(robot, list(nearest[1].nearby()), judge)
-    gains = [before.gain(error) / least**one.values for error, one in judged]
+    nearest = max(rows, key=lambda row: row.surplus)
+    rows += _judged(robot, list(nearest.hypothesis.nearby()), judge, rival, price)
     believed = [
-        (gain * least**one.values, error, one)
-        for gain, (error, one) in zip(gains, judged, strict=True)
-        if gain >= 1.0 and 100.0 * error.whole < LIMITS.unusable
+        row for row in rows if row.surplus >= 1.0 and 100.0 * row.after.whole < LIMITS.unusable
     ]
     if not believed:
         return None
-    _, after, first = max(believed, key=lambda row: row[0] / least ** row[2].values)
-    most = max(gain for gain, _, _ in believed)
-    equal = [
-        one for gain, _, one in believed if LIMITS.gain**0.5 * gain > most and one != first
-    ]
-    kinds = {type(one): one for one in reversed(equal) if type(one) is not type(first)}
-    return Mistake((first, *kinds.values()), before, after, fitted)
+    first = max(believed, key=lambda row: row.surplus)
+    as_good = {
+        type(row.hypothesis): row.hypothesis
+        for row in sorted(believed, key=lambda row: row.gain)
+        if type(row.hypothesis) is not type(first.hypothesis)
+        and row.gain * LIMITS.gain**0.5 > first.gain
+    }
+    return Mistake((first.hypothesis, *as_good.values()), before, first.after, fitted)
+
+
+class _Row(NamedTuple):
+    """A hypothesis, how far it divides the error, and that over what it has to."""
+
+    hypothesis: Hypothesis
+    after: PredictionError
+    gain: float
+    surplus: float
 
 
 def _judged(
-    robot: Robot, tried: Sequence[Hypothesis], judge: Judge
-) -> Iterator[tuple[PredictionError, Hypothesis]]:
+    robot: Robot,
+    tried: Sequence[Hypothesis],
+    judge: Judge,
+    rival: PredictionError,
+    price: float,
+) -> list[_Row]:
+    rows = []
     for one in tried:
         pair = judge(one)
         if pair is not None and pair[1].material(robot, LIMITS):
-            yield pair
+            after, settled = pair
+            gain = rival.gain(after)
+            rows.append(_Row(settled, after, gain, gain / price**settled.values))
+    return rows
 
 
-def _slow(motion: Motion) -> Motion:
-    """Keep of a motion and its torque what is in the band of the motion."""
-    if len(motion) < _FEWEST:
-        return motion
-    parts = (within_band(motion, x) for x in (motion.q, motion.dq, motion.ddq, motion.tau))
-    q, dq, ddq, tau = parts
-    return replace(motion, q=q, dq=dq, ddq=ddq, tau=tau)
+def _slow_motions(recording: Recording, used: Conditioning) -> list[Motion]:
+    """Return the stretches of a recording, with what is in the band of the motion alone."""
+    result = []
+    for motion in segments(recording, used):
+        kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
+        assert motion.tau is not None
+        slow, tau = motion.select(kept), decimate(motion.tau, used)
+        if len(slow) >= _FEWEST:
+            parts = (within_band(slow, x) for x in (slow.q, slow.dq, slow.ddq, tau))
+            result.append(Motion(slow.joints, slow.t, *parts))
+    return result
 
 
-def _thinned(stretches: Sequence[Motion], rows: int) -> Motion:
+def _thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
     """Put stretches one after the other, and keep some of the samples."""
+    if not stretches:
+        return None
     arrays = [
         np.concatenate([getattr(part, name) for part in stretches])
         for name in ('t', 'q', 'dq', 'ddq', 'tau')
     ]
     step = max(1, len(arrays[0]) // rows)
-    return Motion(stretches[0].joints, *(array[::step] for array in arrays))
+    motion = Motion(stretches[0].joints, *(array[::step] for array in arrays))
+    return motion if len(motion) >= _FEWEST else None

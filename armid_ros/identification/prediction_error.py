@@ -56,6 +56,11 @@ class PredictionError:
         ratio = self._counted() / better._counted()
         return float(np.prod(ratio))
 
+    def least(self, other: PredictionError) -> PredictionError:
+        """Return the smaller error of every joint."""
+        joints = np.minimum(self.joints, other.joints)
+        return PredictionError(joints, min(self.whole, other.whole), np.empty(0))
+
     def best_gain(self) -> float:
         """Return the largest gain that anything could have."""
         return float(np.prod(self._counted() / LIMITS.floor))
