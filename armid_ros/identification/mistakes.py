@@ -43,8 +43,9 @@ from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Samples of a recording that are looked at; twenty values for each of thirty free ones.
-_ROWS, _ROWS_FITTED = 600, 300
+#: Samples of a recording that are looked at: a hundred and more for every value that is fitted to
+#: the torque of a joint, and ten and more where the body is fitted too.
+_ROWS, _ROWS_FITTED = 600, 200
 #: Samples below which nothing can be asked.
 _FEWEST = 40
 
