@@ -106,7 +106,8 @@ def _mistakes(
         if len(found) < len(recordings):
             text = f'in {where}: {text}'
         error = 100.0 * float(worst.before.joints[worst.joint])
-        yield _Reason('unusable' if error > LIMITS.unusable else 'poor', _sentence(text))
+        certain = error > LIMITS.unusable and not worst.hypotheses[0].disputable
+        yield _Reason('unusable' if certain else 'poor', _sentence(text))
 
 
 def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[_Reason]:

@@ -42,10 +42,14 @@ class Hypothesis(ABC):
     ----------
     values : int
         Numbers that are chosen to fit the data.
+    disputable : bool
+        Whether a description with other masses would explain as much, so that a person has to
+        say which it is.
 
     """
 
     values: ClassVar[int] = 1
+    disputable: ClassVar[bool] = False
 
     @property
     def kind(self) -> tuple[object, ...]:
@@ -277,6 +281,8 @@ class OtherGravity(Hypothesis):
 class OtherUnit(Hypothesis):
     """Efforts are a factor from N m, the same in all joints: currents, a gear ratio, a unit."""
 
+    disputable: ClassVar[bool] = True
+
     factor: float = np.nan
 
     def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
@@ -296,7 +302,7 @@ class OtherUnit(Hypothesis):
         """Say the factor."""
         return (
             f'the efforts of all joints seem to be {self.factor:.2g} times the torque in N m '
-            '(currents?): convert them'
+            '(currents?): convert them, unless it is the masses of the description'
         )
 
 
