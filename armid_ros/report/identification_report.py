@@ -167,7 +167,7 @@ def _asked(
         (
             'Filter',
             f'positions below {used.cutoff_hz:.3g} Hz of {used.rate_hz:.4g} Hz; torque and model '
-            f'alike, then every {used.decimation}th sample kept ({kept:.3g} Hz)',
+            f'alike, then one sample of {used.decimation} kept ({kept:.3g} Hz)',
         ),
         ('Fitted to', ', '.join(training)),
         ('Held out', ', '.join(validation) or 'nothing'),
