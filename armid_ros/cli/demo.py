@@ -14,7 +14,14 @@ from armid_ros.cli.terminal import ConvergenceTable, progress, say
 from armid_ros.effects import make_effect
 from armid_ros.excitation import design, DesignSettings, Excitation, save_excitation
 from armid_ros.files import json_text
-from armid_ros.identification import identification_document, identify, Score, write_document
+from armid_ros.identification import (
+    grade,
+    identification_document,
+    identify,
+    Score,
+    write_document,
+)
+from armid_ros.identification.agreement import Agreement
 from armid_ros.identification.online import OnlineIdentifier
 from armid_ros.identification.output import SCHEMA
 from armid_ros.motion import FloatArray
@@ -84,12 +91,13 @@ def demo(gravity: str, rate: float, out: Path, seed: int, as_json: bool) -> None
         tick(0.0, 'identifying offline')
         recording = read_recording(out / 'bag', joints=robot.joints)
         result = identify(nominal, [recording], rng=rng, progress=tick)
+        graded = grade(result, nominal, [recording], {})
+    offline = Agreement.of(result.estimate, result.base.values(truth.theta))
+    online = Agreement.of(end.estimate, target)
     document = {
-        **identification_document(result, ROBOT, {}),
-        'truth': _compare(
-            result.estimate.values, result.estimate.std, result.base.values(truth.theta)
-        ),
-        'online': _compare(end.estimate.values, end.estimate.std, target),
+        **identification_document(result, ROBOT, {}, grade=graded),
+        'truth': offline.document(),
+        'online': online.document(),
         'replay_difference': float(np.abs(replay.estimate.values - end.estimate.values).max()),
         'real_time_factor': end.real_time_factor,
         'held_out': _held_out_error(result.arm, truth, rng),
@@ -101,6 +109,9 @@ def demo(gravity: str, rate: float, out: Path, seed: int, as_json: bool) -> None
     if as_json:
         click.echo(json_text(document))
         return
+    say(f'{graded.word}: {graded.reasons[0]}')
+    say(f'online:  {online.sentence()}')
+    say(f'offline: {offline.sentence()}')
     _tell(out, document, Score.of(result.training).relative_error_percent)
 
 
@@ -136,16 +147,6 @@ def _excite(arm: ArmModel, rng: np.random.Generator) -> Excitation:
             progress=lambda now: tick(now.done),
         )
     return result.excitation
-
-
-def _compare(values: FloatArray, std: FloatArray, truth: FloatArray) -> dict[str, Any]:
-    """Return how an estimate agrees with the truth, in its own standard deviations."""
-    sigmas = np.abs(values - truth) / std
-    return {
-        'within_two_deviations': int(np.sum(sigmas < 2.0)),
-        'parameters': len(values),
-        'rms_deviations': float(np.sqrt(np.mean(sigmas**2))),
-    }
 
 
 def _held_out_error(arm: ArmModel, truth: ArmModel, rng: np.random.Generator) -> float:
@@ -185,15 +186,9 @@ def _draw(
 
 
 def _tell(out: Path, document: dict[str, Any], training: float) -> None:
-    online, offline = document['online'], document['truth']
     say(
-        f'online:  {online["within_two_deviations"]} of {online["parameters"]} parameters within '
-        'two standard deviations of the truth'
-    )
-    say(
-        f'offline: {offline["within_two_deviations"]} of {offline["parameters"]}; relative error '
-        f'{training:.2f} % with the noise, {document["held_out"]:.2f} % of the true torque in a '
-        'motion that was never run'
+        f'relative error {training:.2f} % with the noise, {document["held_out"]:.2f} % of the '
+        'true torque in a motion that was never run'
     )
     say(
         f'the bag played back gives the online estimate again, to '

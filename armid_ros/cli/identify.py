@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
 from armid_ros.errors import IdentificationError
 from armid_ros.files import json_text, write_file
 from armid_ros.identification import (
+    Grade,
+    grade,
     Identification,
     identification_document,
     IdentificationSettings,
@@ -29,6 +32,7 @@ from armid_ros.identification import (
     identify as run,
 )
 from armid_ros.identification.output import SCHEMA
+from armid_ros.recording import Recording
 from armid_ros.report import identification_report
 import click
 import numpy as np
@@ -89,6 +93,7 @@ OUTPUTS = (
     show_default=True,
     help='Test for encoder noise and simulate along the held-out bags.',
 )
+@click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
 @click.option('--topic', help='JointState topic, where a bag has several.')
 @options.gravity
 @options.joints
@@ -109,6 +114,7 @@ def identify(
     total_mass: float | None,
     boxes: tuple[str, ...],
     verifies: bool,
+    strict: bool,
     topic: str | None,
     gravity: str,
     joints: str | None,
@@ -135,10 +141,12 @@ def identify(
         tick(0.0, 'identifying')
         result = run(arm, recordings, settings, rng=rng, progress=tick)
         validation = {r.source: result.predict([r]) for r in held_out}
+        tick(1.0, 'grading')
+        graded = grade(result, arm, recordings, validation, held_out)
         verification = (
             verify(result, arm, recordings, held_out, rng=rng, progress=tick) if verifies else None
         )
-    document = identification_document(result, robot_source, validation, verification)
+    document = identification_document(result, robot_source, validation, verification, graded)
     source = options.kept_source(robot_source, robot, out)
     save_model(out / 'model.yaml', result.arm, source, result.estimate)
     exports = _export(result.arm, out) if physical else {}
@@ -150,6 +158,7 @@ def identify(
         validation=validation,
         validation_recordings=held_out,
         verification=verification,
+        grade=graded,
         exports=exports,
         provenance=provenance([*bags, *validate], document['settings'], seed),
     )
@@ -157,13 +166,31 @@ def identify(
     write_document(out / 'identification.json', document)
     if as_json:
         click.echo(json_text(document))
-        return
+    else:
+        _print(out, document, result, graded, [*recordings, *held_out], verification, exports)
+    if strict and graded.word == 'unusable':
+        click.get_current_context().exit(3)
+
+
+def _print(
+    out: Path,
+    document: dict[str, Any],
+    result: Identification,
+    graded: Grade,
+    recordings: Sequence[Recording],
+    verification: Verification | None,
+    exports: dict[str, tuple[str, ...]],
+) -> None:
+    """Print what a person would stop at, then the table, then the rest."""
+    say(f'{graded.word}:')
+    for reason in graded.reasons:
+        say(f'  {reason}')
     print_parameters(document['parameters'])
     if result.physical is not None:
         _print_certificate(result.physical)
-    for recording in (*recordings, *held_out):
+    for recording in recordings:
         say(f'{recording.source}: {recording.report.describe()}')
-    _tell(result, verification, robot.notes, exports)
+    _tell(result, verification, result.arm.robot.notes, exports)
     fitted = document['training']['relative_error_percent']
     say(f'relative error {fitted:.2f} % on the data it was fitted to')
     for entry in document['validation']:

@@ -7,6 +7,7 @@ Identification: recordings in, models with uncertainties out.
 
 """
 
+from armid_ros.identification.grade import Grade, grade
 from armid_ros.identification.identify import (
     Fit,
     Identification,
@@ -23,6 +24,7 @@ from armid_ros.identification.verification import Verification, verify
 __all__ = [
     'Conditioning',
     'Fit',
+    'Grade',
     'Identification',
     'IdentificationSettings',
     'PhysicalCertificate',
@@ -30,6 +32,7 @@ __all__ = [
     'Score',
     'SignalSettings',
     'Verification',
+    'grade',
     'identification_document',
     'identify',
     'verify',

@@ -18,8 +18,9 @@ import numpy as np
 
 #: A joint that stays within this range is at rest [rad or m].
 REST_RANGE = 1e-3
-#: Positions further out of the limits than this [rad or m] are not in the unit of the description.
-LIMIT_EXCESS = 1.0
+#: Positions further out of the limits than this are not in the unit of the description: two turns
+#: of a joint that a controller has let spin [rad], or [m].
+LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
 #: A recording shorter than this holds less than a movement [s].
 SHORTEST = 1.0
 
@@ -100,9 +101,7 @@ def check_torque(
                     f'{source}: torques of {joints} are {factor:g} times what the description '
                     f'takes; they seem to be in {unit}: convert them to N m'
                 )
-    power = sum(float(np.sum(part.tau * part.motion.dq)) for part in problem)
-    activity = sum(float(np.sum(np.abs(part.tau * part.motion.dq))) for part in problem)
-    if power < -0.2 * activity:
+    if _gives_out_energy(problem):
         raise IdentificationError(
             f'{source}: the arm gives out energy throughout, so the torques have the wrong sign; '
             'effort has to be positive along the URDF joint axis: negate it'
@@ -112,14 +111,42 @@ def check_torque(
     return ()
 
 
+def _gives_out_energy(problem: Sequence[Regression]) -> bool:
+    """
+    Whether an arm drives its motors, in all and in every joint, as only a wrong sign can show.
+
+    A short motion may give out energy too, that of weights that went down; friction is what is
+    left of the power where weight and inertia of the joint are taken out.
+
+    """
+    power = sum(float(np.sum(part.tau * part.motion.dq)) for part in problem)
+    activity = sum(float(np.sum(np.abs(part.tau * part.motion.dq))) for part in problem)
+    if power >= -0.2 * activity:
+        return False
+    for joint in range(problem[0].tau.shape[1]):
+        q, dq, ddq, tau = (
+            np.concatenate([array[:, joint] for array in arrays])
+            for arrays in zip(
+                *((p.motion.q, p.motion.dq, p.motion.ddq, p.tau) for p in problem), strict=True
+            )
+        )
+        held = np.column_stack([np.ones(len(q)), np.sin(q), np.cos(q), ddq])
+        pair = np.column_stack([dq, tau])
+        rest = pair - held @ np.linalg.lstsq(held, pair, rcond=None)[0]
+        if rest[:, 0] @ rest[:, 1] > 0.0:
+            return False
+    return True
+
+
 def _check_positions(robot: Robot, recording: Recording) -> None:
     excess = np.maximum(
         robot.lower - recording.q.min(axis=0), recording.q.max(axis=0) - robot.upper
     )
-    worst = int(np.argmax(excess))
-    if excess[worst] > LIMIT_EXCESS:
+    allowed = np.where(robot.prismatic, LIMIT_EXCESS_SLIDING, LIMIT_EXCESS_TURNING)
+    worst = int(np.argmax(excess / allowed))
+    if excess[worst] > allowed[worst]:
         reach = np.abs(recording.q[:, worst]).max()
-        hint = ' (degrees?)' if not robot.prismatic[worst] and reach > 2 * np.pi else ''
+        hint = '' if robot.prismatic[worst] else ' (degrees?)'
         raise IdentificationError(
             f'{recording.source}: {robot.joints[worst]} reaches {reach:.4g}{hint}, its limits are '
             f'{robot.lower[worst]:.4g} to {robot.upper[worst]:.4g}; positions have to be in rad '

@@ -12,6 +12,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.checks import check_motion, check_torque
 from armid_ros.identification.excited import excited
+from armid_ros.identification.halves import halves_error
 from armid_ros.identification.identifiability import Unidentified, unidentified
 from armid_ros.identification.least_squares import Method
 from armid_ros.identification.nonlinear import fit_values, FittedValues, through, torques
@@ -142,6 +143,8 @@ class Identification:
         What was asked.
     notes : tuple of str
         What a person should know: joints at rest, outliers, grouped parameters.
+    halves_error : float
+        Relative torque error when either half of the data predicts the other [%].
     physical : PhysicalCertificate or None
         What shows that the links are bodies, where that was asked.
     passes : int
@@ -159,6 +162,7 @@ class Identification:
     used: Conditioning
     settings: IdentificationSettings
     notes: tuple[str, ...]
+    halves_error: float
     physical: PhysicalCertificate | None = None
     passes: int = 1
 
@@ -275,6 +279,7 @@ def identify(
         used=used,
         settings=settings,
         notes=notes,
+        halves_error=halves_error(problem, solution.weights, base.values(arm.theta)),
         physical=certificate,
         passes=fit.passes,
     )

@@ -13,6 +13,7 @@ from armid_ros.arm import parameter_table
 from armid_ros.files import json_text, write_file
 from armid_ros.identification.consistency import NoiseCheck
 from armid_ros.identification.description import kinematics_digest
+from armid_ros.identification.grade import Grade
 from armid_ros.identification.identify import Fit, Identification, Score
 from armid_ros.identification.verification import Verification
 from armid_ros.motion import FloatArray
@@ -26,6 +27,7 @@ def identification_document(
     robot: str,
     validation: Mapping[str, Sequence[Fit]],
     verification: Verification | None = None,
+    grade: Grade | None = None,
 ) -> dict[str, Any]:
     """
     Return an identification as the document that identification.json holds.
@@ -40,6 +42,8 @@ def identification_document(
         Predictions of recordings that were not used for fitting, by recording.
     verification : Verification, optional
         What the identification was put to.
+    grade : Grade, optional
+        What it is good for.
 
     """
     estimate = result.estimate
@@ -50,6 +54,7 @@ def identification_document(
             'joints': list(result.arm.robot.joints),
             'kinematics': kinematics_digest(result.arm.robot),
         },
+        **({} if grade is None else grade.document()),
         'gravity': [float(g) for g in result.arm.robot.gravity],
         'parameters': parameter_table(estimate.parameters, estimate.values, list(estimate.std)),
         'covariance': [row[: k + 1].tolist() for k, row in enumerate(estimate.covariance)],
@@ -68,6 +73,7 @@ def identification_document(
         'training': {
             'bags': list(dict.fromkeys(fit.source for fit in result.training)),
             **_score(result.training),
+            'halves_error_percent': result.halves_error,
         },
         'validation': [{'bag': bag, **_score(fits)} for bag, fits in validation.items()],
         'residual_std': _by_joint(result, result.joint_std),

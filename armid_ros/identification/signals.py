@@ -187,9 +187,11 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
 
     """
     if recording.tau is None:
+        lacking = [what for what in recording.report.absent if what.startswith('effort')]
         raise IdentificationError(
-            f'{recording.source}: {recording.topic} has no effort; identification needs '
-            'the joint torques in JointState.effort'
+            f'{recording.source}: {recording.topic} has no {"".join(lacking) or "effort"} (absent '
+            'or NaN throughout); identification needs the torque of every joint in '
+            'JointState.effort: fill it in, or leave joints out with --joints'
         )
     positions = recording.q
     if recording.beside is not None:

@@ -27,6 +27,8 @@ import numpy.typing as npt
 # A backward step of the clock of more than this is a restart (a simulation reset, a bag played in
 # a loop), not a late message.
 RESTART_NS = 10**9
+# As many messages in a row, in time that others have had, are no late messages any more.
+_FEWEST_AGAIN = 10
 # A stretch without samples is a gap when it is longer than this many sampling periods.
 GAP_PERIODS = 5.0
 # Beyond these fractions of the messages the header's clock is not believed.
@@ -230,14 +232,34 @@ def _longest_run(stamps: IntArray) -> slice | None:
     """Return the longest stretch between restarts of the clock, None if it never restarted."""
     if len(stamps) < 3:
         return None
-    down = np.diff(stamps) < -RESTART_NS
+    steps = np.diff(stamps)
+    down = steps < -RESTART_NS
     # The message after the step must be early as well; otherwise one message was late.
     down[:-1] &= stamps[2:] - stamps[:-2] < -RESTART_NS
+    for back in np.flatnonzero((steps < 0) & ~down):
+        down[back] = _runs_again(stamps, int(back))
     if not down.any():
         return None
     bounds = [0, *(np.flatnonzero(down) + 1).tolist(), len(stamps)]
     begin = max(range(len(bounds) - 1), key=lambda i: bounds[i + 1] - bounds[i])
     return slice(bounds[begin], bounds[begin + 1])
+
+
+def _runs_again(stamps: IntArray, back: int) -> bool:
+    """
+    Whether the clock runs a second time through what it had been through before a step back.
+
+    Messages that were late fill a hole; together with those before them they are as many as the
+    time holds. A clock that was set back gives twice as many.
+
+    """
+    first, last = stamps[back + 1], stamps[back]
+    steps = np.diff(stamps)
+    period = float(np.median(steps[steps > 0]))
+    before = int(np.count_nonzero(stamps[: back + 1] >= first))
+    after = int(np.argmax(np.append(stamps[back + 1 :], last + 1) > last))
+    expected = float(last - first) / period + 1.0
+    return after >= _FEWEST_AGAIN and before + after > 1.5 * expected
 
 
 def _sorted(series: Series, counts: Counter[str]) -> Series:

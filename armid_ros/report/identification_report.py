@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification import Fit, Identification, Verification
+from armid_ros.identification import Fit, Grade, Identification, Verification
+from armid_ros.identification import grade as graded
 from armid_ros.recording import Recording
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted
@@ -29,7 +30,7 @@ from armid_ros.report.sections.verdict import Verdict
 from armid_ros.report.sections.whiteness import WhitenessSection
 from armid_ros.report.statistics import directions, torque_reach, torque_scale
 
-_TONES = {'good': 'good', 'usable': 'fair', 'unproven': 'fair', 'poor': 'bad'}
+_TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
 
 
 def identification_report(
@@ -41,6 +42,7 @@ def identification_report(
     validation: Mapping[str, Sequence[Fit]],
     validation_recordings: Sequence[Recording] = (),
     verification: Verification | None = None,
+    grade: Grade | None = None,
     exports: Mapping[str, Sequence[str]] | None = None,
     provenance: Provenance | None = None,
 ) -> str:
@@ -63,6 +65,8 @@ def identification_report(
         Those recordings.
     verification : Verification, optional
         What the identification was put to.
+    grade : Grade, optional
+        What it is good for; found out where it is not given.
     exports : mapping of str to sequence of str, optional
         Files for other programs, and what each has no place for.
     provenance : Provenance, optional
@@ -81,6 +85,8 @@ def identification_report(
     held_out = [fit for fits in validation.values() for fit in fits]
     role = 'held-out' if held_out else 'training'
     shown = held_out or list(result.training)
+    if grade is None:
+        grade = graded(result, description, recordings, validation, validation_recordings)
     judgement = judge(result, validation, [*recordings, *validation_recordings], verification)
     quality = [
         *(RecordingQuality.of(r, 'training', training.get(r.source, ())) for r in recordings),
@@ -90,7 +96,9 @@ def identification_report(
         ),
     ]
     sections: list[Section] = [
-        Verdict(judgement.grade, _TONES[judgement.grade], judgement.sentences, judgement.beware),
+        Verdict(
+            grade.word, _TONES[grade.word], _first(grade, judgement.sentences), judgement.beware
+        ),
         Asked(_asked(result, robot, list(training), list(validation))),
         DataQuality(quality, arm.robot),
         FitSection(arm.robot, training, validation, torque_reach(result, shown)),
@@ -114,6 +122,13 @@ def identification_report(
         f'{counted(len(validation), "held-out recording")}'
     )
     return Page(f'Identification of {arm.robot.name}', subtitle, sections).html()
+
+
+def _first(grade: Grade, found: Sequence[str]) -> tuple[str, ...]:
+    """Return what is said first: what a person would stop at, or what was found."""
+    if grade.word == 'good':
+        return (*found, *grade.reasons[1:])
+    return (*grade.reasons, *found)
 
 
 def _forward(result: Identification, verification: Verification | None) -> list[Section]:
@@ -152,7 +167,7 @@ def _asked(
         (
             'Filter',
             f'positions below {used.cutoff_hz:.3g} Hz of {used.rate_hz:.4g} Hz; torque and model '
-            f'alike, then every {used.decimation}th sample kept ({kept:.3g} Hz)',
+            f'alike, then one sample of {used.decimation} kept ({kept:.3g} Hz)',
         ),
         ('Fitted to', ', '.join(training)),
         ('Held out', ', '.join(validation) or 'nothing'),

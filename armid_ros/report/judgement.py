@@ -1,14 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an identification comes to, in words: how good, what to beware of, what to do next."""
+"""What an identification comes to, in words: what was found, what to beware of, what to do."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from armid_ros.identification import Fit, Identification, Score, Verification
+from armid_ros.identification.grade_limits import LIMITS
 from armid_ros.identification.identifiability import told_from_zero
 from armid_ros.recording import Recording
 from armid_ros.report.families import full_label
@@ -16,11 +17,6 @@ from armid_ros.report.notation import counted, digits
 from armid_ros.report.statistics import Trend, Whiteness
 import numpy as np
 
-Grade = Literal['good', 'usable', 'poor', 'unproven']
-
-#: Relative torque error [%] up to which a model is good, and usable: published identifications of
-#: industrial arms reach 4 to 10 %, and above 20 % a rigid model without friction does as well.
-GOOD, USABLE = 10.0, 20.0
 #: Ratio of the held-out to the training error from which the model is fitted to the noise.
 _OVERFIT = 1.3
 #: Condition number from which an excitation is weak; below 100 is the usual advice (Presse and
@@ -48,8 +44,6 @@ class Judgement:
 
     Attributes
     ----------
-    grade : {'good', 'usable', 'poor', 'unproven'}
-        By the error on held-out data; unproven without such data.
     sentences : tuple of str
         What was identified, and how well it predicts.
     beware : tuple of str
@@ -59,7 +53,6 @@ class Judgement:
 
     """
 
-    grade: Grade
     sentences: tuple[str, ...]
     beware: tuple[str, ...]
     next_steps: tuple[str, ...]
@@ -101,7 +94,6 @@ def judge(
     if held_out is not None and not steps:
         steps = ['Nothing stands in the way of using this model in the range it was tested in.']
     return Judgement(
-        grade=_grade(held_out),
         sentences=(
             *_sentences(result, training, held_out, len(validation), len(recordings)),
             *_simulated(verification),
@@ -118,13 +110,6 @@ def _notes(result: Identification) -> list[str]:
         return list(result.notes)
     said = set(given.sentences()) - set(given.activity) - set(given.notes)
     return [note for note in result.notes if note not in said]
-
-
-def _grade(held_out: Score | None) -> Grade:
-    if held_out is None:
-        return 'unproven'
-    error = held_out.relative_error_percent
-    return 'good' if error <= GOOD else 'usable' if error <= USABLE else 'poor'
 
 
 def _sentences(
@@ -195,7 +180,7 @@ def _error_findings(
             )
     errors = (held_out or training).joint_relative_error_percent
     joints = result.arm.robot.joints
-    bad = [(joint, e) for joint, e in zip(joints, errors, strict=True) if e > USABLE]
+    bad = [(joint, e) for joint, e in zip(joints, errors, strict=True) if e > LIMITS.poor]
     if bad:
         findings.append(
             Finding(

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What armid identify writes, prints and shows, and what armid compare makes of two of them."""
 
+from dataclasses import replace
 import json
 from pathlib import Path
 import re
@@ -9,6 +10,7 @@ import shutil
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import make_effect
+from armid_ros.recording import read_recording, write_recording
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -174,3 +176,33 @@ def test_one_robot_by_two_paths_is_one_and_two_robots_are_refused(bags, tmp_path
     ).output
     assert 'are of different robots' in text
     assert not (tmp_path / 'none').exists()
+
+
+def test_what_a_person_would_stop_at_is_said_first_and_ends_a_strict_run(tmp_path):
+    """Recorded on the moon, identified with the gravity of the earth."""
+    moon = ArmModel(load_robot(ROBOT, gravity='moon'))
+    bag, out = bag_of(tmp_path / 'bag', moon, 0), tmp_path / 'out'
+    arguments = ('identify', bag, '--robot', ROBOT, '--no-verify', '--out', out)
+    lines = armid(*arguments).stdout.splitlines()
+    assert lines[0] == 'unusable:'
+    assert 'Gravity seems to act along (0, 0, -1)' in lines[1]
+    assert '--gravity moon' in lines[1]
+    document = json.loads((out / 'identification.json').read_text())
+    assert document['grade'] == 'unusable'
+    assert document['reasons'][0] == lines[1].strip()
+    page = (out / 'report.html').read_text()
+    assert '--gravity moon' in page[: page.index('What was asked</h2>')]
+    armid(*arguments, '--strict', code=3)
+    armid(*arguments, '--strict', '--json', code=3)
+    assert armid(*arguments, '--strict', '--gravity', 'moon').stdout.startswith('good:')
+
+
+def test_a_joint_without_effort_is_named(tmp_path):
+    robot = load_robot(ROBOT)
+    bag = bag_of(tmp_path / 'whole', ArmModel(robot), 0)
+    recording = read_recording(bag, joints=robot.joints)
+    tau = np.array(recording.tau)
+    tau[:, 4] = np.nan
+    write_recording(tmp_path / 'bag', replace(recording, tau=tau))
+    result = armid('identify', tmp_path / 'bag', '--robot', ROBOT, '--out', tmp_path / 'o', code=2)
+    assert 'has no effort of forearm_yaw (absent or NaN throughout)' in result.stderr

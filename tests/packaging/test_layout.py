@@ -159,3 +159,18 @@ def test_manifest_names_what_the_code_imports(root):
     imported = {name for path in sources for name in pattern.findall(path.read_text())}
     used = {name for name in imported if name in known or name.endswith(('_msgs', '_srvs'))}
     assert used <= declared
+
+
+def test_documents_start_nodes_by_executables_that_the_environment_has():
+    """There is no `ros2` in it; where a document names it, it says that it is of a workspace."""
+    root = Path(__file__).parents[2]
+    started = set()
+    for path in (root / 'README.md', *sorted((root / 'docs').glob('*.md'))):
+        for line in path.read_text(encoding='utf-8').splitlines():
+            code = line.startswith('    ') and not line.lstrip().startswith('#')
+            assert not (code and line.split()[:1] == ['ros2']), f'{path.name}: {line.strip()}'
+            if code and line.split()[0] in NODES:
+                started.add(line.split()[0])
+    assert {'excitation_publisher', 'online_identifier', 'recorder'} <= started
+    for node in started:
+        assert Path(sys.executable).with_name(node).is_file()

@@ -367,3 +367,27 @@ def test_joints_asked_for_must_differ(swinging, tmp_path):
     for joints in ([], ['elbow', 'elbow']):
         with pytest.raises(RecordingError, match='joints wanted'):
             read_recording(tmp_path / 'bag', joints=joints)
+
+
+@pytest.mark.parametrize('back_ns', [30_000_000, 100_370_000, 500_000_000, 999_000_000])
+def test_a_clock_set_back_by_less_than_a_second_is_a_restart(
+    make_swing, write_bag, messages_of, assert_same, back_ns
+):
+    """Sorted in, the arm would be in two places at once."""
+    whole = make_swing(3000)
+    log = 10**12 + 1_000_000 * np.arange(3000)
+    header = log - np.where(np.arange(3000) < 1800, 0, back_ns)
+    recording = read_recording(write_bag(messages_of(whole, header, log=log)), joints=JOINTS)
+    assert recording.report.restarted == 1200
+    assert recording.report.out_of_order == 0
+    assert_same(recording, whole, slice(0, 1800))
+
+
+def test_messages_that_a_queue_held_back_are_late_and_no_restart(
+    swinging, stamps, write_bag, messages_of, assert_same
+):
+    messages = messages_of(swinging, stamps)
+    held = [*messages[:100], *messages[150:200], *messages[100:150], *messages[200:]]
+    recording = read_recording(write_bag(held), joints=JOINTS)
+    assert recording.report.restarted == 0
+    assert_same(recording, swinging)

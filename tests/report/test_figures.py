@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures for documents show what they are given, with names and units."""
 
+from dataclasses import replace
 from pathlib import Path
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from armid_ros.report.figures import (
 import matplotlib
 import numpy as np
 import pytest
+import scipy.stats
 
 
 def texts(figure):
@@ -85,3 +87,67 @@ def test_figures_are_saved_without_a_display(case, tmp_path, suffix):
 def test_figures_need_no_global_state():
     code = 'import armid_ros.report.figures, sys; sys.exit("matplotlib.pyplot" in sys.modules)'
     subprocess.run([sys.executable, '-c', code], check=True, cwd=Path(__file__).parents[2])
+
+
+def test_what_is_grey_in_a_torque_figure_is_explained_and_has_no_residual(case):
+    (fits,) = case.validation.values()
+    informative = np.array(fits[0].informative)
+    informative[20:60, 2] = False
+    predicted = np.array(fits[0].predicted)
+    predicted[40, 2] += 1e3
+    figure = torque_figure(
+        case.description.robot, [replace(fits[0], informative=informative, predicted=predicted)]
+    )
+    assert any('at rest: does not count' in text for text in texts(figure))
+    residual = figure.axes[5]
+    assert np.isnan(drawn(residual)[0][20:60]).all()
+    assert residual.get_ylim()[1] < 10.0
+
+
+def cut_off(figure):
+    """Return what is written beyond the edges of a figure."""
+    figure.canvas.draw()
+    renderer = figure.canvas.get_renderer()
+    width, height = figure.canvas.get_width_height()
+    ticks = [
+        label
+        for axes in figure.axes
+        for axis in (axes.xaxis, axes.yaxis)
+        for label in axis.get_ticklabels(which='both')
+    ]
+    written = [text for text in figure.findobj(matplotlib.text.Text) if text.get_text().strip()]
+    boxes = [
+        (text.get_text(), text.get_window_extent(renderer))
+        for text in written
+        if text not in ticks  # those beyond the axes are not drawn
+    ]
+    return [
+        text
+        for text, box in boxes
+        if box.x0 < -1 or box.y0 < -1 or box.x1 > width + 1 or box.y1 > height + 1
+    ]
+
+
+def test_nothing_is_cut_off_at_the_edges(case):
+    (fits,) = case.validation.values()
+    informative = np.array(fits[0].informative)
+    informative[20:60] = False
+    estimate = case.result.estimate
+    t = np.linspace(0.5, 10.0, 20)
+    std = estimate.std * np.sqrt(10.0 / t)[:, np.newaxis]
+    history = t, estimate.values + std, std, estimate.values
+    for number in (0, 10, 20, len(estimate.parameters) - 6):  # any may be the best known
+        known = estimate.values.copy()
+        known[number : number + 6] *= 1e9
+        figure = convergence_figure(*history[:3], known, estimate.parameters)
+        assert cut_off(figure) == []
+    assert cut_off(parameter_figure(estimate, estimate.values)) == []
+    resting = replace(fits[0], informative=informative)
+    assert cut_off(torque_figure(case.description.robot, [resting])) == []
+
+
+def test_parameter_figure_says_what_is_expected_of_all_parameters_together(case):
+    estimate = case.result.estimate
+    written = '\n'.join(texts(parameter_figure(estimate, estimate.values)))
+    lower, upper = scipy.stats.chi2.ppf((0.025, 0.975), len(estimate.values))
+    assert f'in 95 of 100 experiments {lower:.0f} to {upper:.0f}' in written

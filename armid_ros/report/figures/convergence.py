@@ -88,7 +88,7 @@ def _title(name: ParameterName) -> str:
     text = name.name
     if not name.rigid:
         text = f'{text.replace("_", " ").capitalize()}, {name.joint}'
-    return textwrap.fill(textwrap.shorten(text, 50, placeholder=' ...'), 26)
+    return textwrap.fill(textwrap.shorten(text, 44, placeholder=' ...'), 24)
 
 
 def _telling(

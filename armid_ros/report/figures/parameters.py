@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 from armid_ros.estimate import Estimate
+from armid_ros.identification.agreement import Agreement
 from armid_ros.motion import FloatArray
 from armid_ros.report.families import parameter_families, short_label
 from armid_ros.report.figures.style import (
@@ -49,7 +50,7 @@ def parameter_figure(
     families = parameter_families(estimate.parameters)
     columns = _balanced([len(members) for members in families.values()])
     tallest = max(sum(len(list(families.values())[k]) + 3 for k in column) for column in columns)
-    figure = new_figure(0.75 + 0.145 * tallest)
+    figure = new_figure(1.05 + 0.145 * tallest)
     outer = figure.add_gridspec(1, len(columns))
     names = list(families)
     axes = None
@@ -71,9 +72,13 @@ def parameter_figure(
     axes.plot([], [], '|', color=MEASURED, markersize=9, label=reference_label)
     legend(figure, axes)
     inside = np.count_nonzero(_contains(estimate, target))
+    together = Agreement.of(estimate, target)
     figure.supxlabel(
-        f'{inside} of {len(target)} intervals contain the {reference_label}.   '
-        '*: the first of a group that no motion tells apart',
+        f'{inside} of {len(target)} intervals contain the {reference_label}, '
+        f'{0.95 * len(target):.0f} expected; errors of correlated parameters come together.\n'
+        f'Squared distance of all parameters from the {reference_label}: '
+        f'{together.distance:.0f}; in 95 of 100 experiments {together.lower:.0f} to '
+        f'{together.upper:.0f}.\n*: the first of a group that no motion tells apart',
         fontsize=8.0,
     )
     return figure

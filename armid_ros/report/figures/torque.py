@@ -25,6 +25,8 @@ from matplotlib.ticker import MaxNLocator
 import numpy as np
 import numpy.typing as npt
 
+_REST = '#e4e4e4'
+
 
 def torque_figure(robot: Robot, fits: Sequence[Fit], *, title: str = '') -> Figure:
     """
@@ -65,7 +67,10 @@ def torque_figure(robot: Robot, fits: Sequence[Fit], *, title: str = '') -> Figu
         if joint == 0:
             first = torque
             torque.plot([], [], color=RESIDUAL, linewidth=1.0, label='measured - predicted')
-    legend(figure, first)
+    if not all(fit.informative.all() for fit in fits):
+        label = 'at rest: does not count'
+        first.fill_between([], [], color=_REST, linewidth=0, label=label)
+    legend(figure, first, columns=4)
     if title:
         figure.suptitle(title, fontsize=10.5, fontweight='bold')
     return figure
@@ -77,13 +82,16 @@ def _draw(torque: Axes, residual: Axes, fits: Sequence[Fit], joint: int) -> None
         assert tau is not None
         names = ('measured', 'predicted by the model') if number == 0 else ('', '')
         torque.plot(t, tau[:, joint], color=BROAD, linewidth=2.6, label=names[0])
-        torque.plot(t, fit.predicted[:, joint], color=PREDICTED, linewidth=1.0, label=names[1])
-        residual.plot(t, fit.residual[:, joint], color=RESIDUAL, linewidth=0.8)
+        counts = fit.informative[:, joint]
+        predicted = np.where(counts, fit.predicted[:, joint], np.nan)
+        torque.plot(t, predicted, color=PREDICTED, linewidth=1.0, label=names[1])
+        residual.plot(t, np.where(counts, fit.residual[:, joint], np.nan), color=RESIDUAL, lw=0.8)
         for start, stop in _rests(t, fit.informative[:, joint]):
             for axes in (torque, residual):
-                axes.axvspan(start, stop, color='#f0f0f0', linewidth=0, zorder=0)
+                axes.axvspan(start, stop, color=_REST, linewidth=0, zorder=0)
     residual.axhline(0.0, color=FAINT, linewidth=0.8, zorder=1)
-    limit = 1.15 * max(np.abs(fit.residual[:, joint]).max() for fit in fits)
+    counted = [np.abs(fit.residual * fit.informative)[:, joint].max() for fit in fits]
+    limit = 1.15 * max(max(counted), 1e-12)
     residual.set_ylim(-limit, limit)
     residual.yaxis.set_major_locator(MaxNLocator(3, symmetric=True))
     residual.set_xlim(fits[0].motion.t[0], fits[-1].motion.t[-1])

@@ -461,9 +461,7 @@ class Holding(_JointCause):
         n = len(scene.strength)
         j = int(rng.integers(min(n // 2 + 1, n - 1), n))
         point, anchor, middle = _grip(scene, j, rng)
-        return cls(
-            scene.chain.joints[j], j, 0.5 * scene.strength.max(), point, anchor, middle
-        )
+        return cls(scene.chain.joints[j], j, 0.5 * scene.strength.max(), point, anchor, middle)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -1,0 +1,92 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How an estimate agrees with values that are known, and how well it should."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from armid_ros.estimate import Estimate
+from armid_ros.motion import FloatArray
+import numpy as np
+import scipy.stats
+
+#: Standard deviations to either side of what is known.
+WIDTH = 2.0
+#: Share of all experiments in which a right estimate is within the range.
+_COVERED = 0.95
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """
+    An estimate beside the truth.
+
+    The misses of correlated parameters come together, so that their number says little. The
+    distance of all parameters together, in the metric of their covariance, has a distribution
+    that is known: chi-squared, with as many degrees of freedom as there are parameters.
+
+    Attributes
+    ----------
+    parameters : int
+        How many.
+    within : int
+        Of them within two standard deviations of the truth.
+    expected : float
+        How many of them should be, on average.
+    distance : float
+        e' C^-1 e, of the errors e and their covariance C (Mahalanobis 1936).
+    lower, upper : float
+        Between which it is in 95 of 100 experiments.
+
+    """
+
+    parameters: int
+    within: int
+    expected: float
+    distance: float
+    lower: float
+    upper: float
+
+    @staticmethod
+    def of(estimate: Estimate, truth: FloatArray) -> Agreement:
+        """Compare an estimate of P parameters with the truth, shape (P,)."""
+        scaled = (estimate.values - truth) / estimate.std
+        correlation = estimate.covariance / np.outer(estimate.std, estimate.std)
+        count = len(scaled)
+        tail = 0.5 * (1.0 - _COVERED)
+        lower, upper = scipy.stats.chi2.ppf((tail, 1.0 - tail), count)
+        return Agreement(
+            parameters=count,
+            within=int(np.sum(np.abs(scaled) < WIDTH)),
+            expected=float(count * (2.0 * scipy.stats.norm.cdf(WIDTH) - 1.0)),
+            distance=float(scaled @ np.linalg.solve(correlation, scaled)),
+            lower=float(lower),
+            upper=float(upper),
+        )
+
+    @property
+    def holds(self) -> bool:
+        """Whether the errors are as large as the covariance says."""
+        return self.lower <= self.distance <= self.upper
+
+    def sentence(self) -> str:
+        """Say how many agree, how many should, and what all of them say together."""
+        luck = '' if self.holds else '; another seed shows whether that is luck'
+        return (
+            f'{self.within} of {self.parameters} within two standard deviations of the truth '
+            f'({self.expected:.0f} expected); squared distance of all together '
+            f'{self.distance:.0f}, in 95 of 100 experiments {self.lower:.0f} to '
+            f'{self.upper:.0f}{luck}'
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return the numbers for programs to read."""
+        return {
+            'within_two_deviations': self.within,
+            'expected_within_two_deviations': self.expected,
+            'parameters': self.parameters,
+            'squared_distance': self.distance,
+            'squared_distance_95_percent': [self.lower, self.upper],
+        }

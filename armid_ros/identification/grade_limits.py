@@ -1,0 +1,68 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The numbers that grade an identification: all of them, each with its reason.
+
+What happens to the grades of real and simulated recordings when each of them is 30 % larger or
+smaller is measured by ``benchmarks.grade`` and written in docs/identification.md.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class GradeLimits:
+    """
+    What decides between good, poor and unusable, and when a hypothesis is believed.
+
+    Attributes
+    ----------
+    poor : float
+        Relative torque error on data that were not fitted [%]. Published identifications of
+        industrial arms reach 4 to 18 %; feed-forward with more is no better than a payload that
+        is not known.
+    unusable : float
+        The same [%]. A model with more takes less than three quarters of the torque's power:
+        1 - 0.5^2. A hypothesis that leaves more explains nothing either.
+    undetermined : float
+        Ratio of the error between the halves of a recording to that of the fit. With r parameters
+        and N independent rows it is (N + r) / (N - r), about: 3 where each parameter has two
+        rows, so that half of what is fitted is noise.
+    floor : float
+        Share of a joint's torque below which an error does not count. It is what good
+        identifications leave; below it nobody asks for a cause.
+    gain : float
+        Factor by which a hypothesis has to divide the error of one joint, or of several together,
+        for every free value that it has. Two is three quarters of the power, far from what chance
+        makes of data that were not used for the fit.
+    free_body : float
+        As many joints' gains are asked of a hypothesis where the body is fitted too: its ten
+        values a link answer to every change of the data.
+    torque_factor : float
+        Factor between effort and N m from which the description cannot be what is wrong: its
+        masses are rarely off by two, all of them, in the same direction.
+    gravity_change : float
+        Change of the gravity vector as a share of its length from which the description cannot be
+        what is wrong; a quarter is a tilt of 14 degrees.
+    jump : float
+        Ratio of a step between two samples to what 98 % of a recording spans (torque) or to what
+        the top speed of its joint makes in the same time (position), from which a sample is
+        faulty.
+
+    """
+
+    poor: float = 20.0
+    unusable: float = 50.0
+    undetermined: float = 3.0
+    floor: float = 0.05
+    gain: float = 2.0
+    free_body: float = 3.0
+    torque_factor: float = 2.0
+    gravity_change: float = 0.25
+    jump: float = 10.0
+
+
+LIMITS = GradeLimits()
