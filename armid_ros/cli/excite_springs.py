@@ -4,14 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from armid_ros.cli.excitation_files import BAG, require_free
 from armid_ros.cli.terminal import say
-from armid_ros.excitation import load_environment, with_obstacles
+from armid_ros.excitation import Obstacle, with_obstacles
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
-from armid_ros.robots import collision_model, Robot
+from armid_ros.robots import CollisionModel
 from armid_ros.simulation.elastic_courses import multisine_course, step_course
 import click
 import numpy as np
@@ -20,8 +21,8 @@ import numpy as np
 COURSES = {'multisine': multisine_course, 'steps': step_course}
 #: Options that a course takes as well as a design, and that a course alone takes.
 _SHARED = {
-    'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'gravity', 'joints',
-    'seed',
+    'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'floor', 'gravity',
+    'joints', 'seed',
 }  # fmt: skip
 _OWN = {'share'}
 
@@ -38,18 +39,18 @@ def refuse_other_options(context: click.Context) -> None:
 
 def write_course(
     kind: str,
-    robot: Robot,
+    collision: CollisionModel,
     duration: float,
     share: float,
     clearance: float,
-    environment: Path | None,
+    obstacles: Sequence[Obstacle],
     seed: int,
     out: Path,
 ) -> None:
     """Write the trajectory as a bag."""
     require_free(out)
-    obstacles = load_environment(environment) if environment else ()
-    bodies = with_obstacles(collision_model(robot), obstacles)
+    robot = collision.robot
+    bodies = with_obstacles(collision, obstacles)
 
     def clear(q: FloatArray) -> bool:
         inside = np.all((q >= robot.lower) & (q <= robot.upper))

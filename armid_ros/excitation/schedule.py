@@ -110,10 +110,14 @@ class Excitation:
 
         """
         lead = self._run_in_samples(rate)
-        count = 2 * lead + self.n_periods * self._period_samples(rate) + 1
-        t = np.arange(count) / rate
+        t = np.arange(round(self.sampled_duration(rate) * rate) + 1) / rate
         run = self.at(t - lead / rate + self.run_in)
         return Motion(run.joints, t, run.q, run.dq, run.ddq)
+
+    def sampled_duration(self, rate: float) -> float:
+        """Return the time of the last sample of ``motion(rate)`` [s]."""
+        samples = 2 * self._run_in_samples(rate) + self.n_periods * self._period_samples(rate)
+        return samples / rate
 
     def period_slices(self, rate: float) -> tuple[slice, ...]:
         """Return which samples of ``motion(rate)`` belong to each period."""
