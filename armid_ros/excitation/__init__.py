@@ -37,6 +37,7 @@ from armid_ros.excitation.random_trajectory import random_feasible
 from armid_ros.excitation.run import plan_run, Run
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
+from armid_ros.excitation.supervision import brought_back, MeasuredPose, slowed, tracking_fault
 from armid_ros.excitation.transfer import Transfer, transfer_limits, TransferPlanner
 
 __all__ = [
@@ -53,6 +54,7 @@ __all__ = [
     'Information',
     'Limits',
     'LowestPoint',
+    'MeasuredPose',
     'Obstacle',
     'Problem',
     'Progress',
@@ -62,6 +64,7 @@ __all__ = [
     'Transfer',
     'TransferPlanner',
     'Violation',
+    'brought_back',
     'check_limits',
     'design',
     'design_speeds',
@@ -78,6 +81,8 @@ __all__ = [
     'random_feasible',
     'require_within',
     'save_excitation',
+    'slowed',
+    'tracking_fault',
     'trajectory_faults',
     'transfer_limits',
     'used_shares',

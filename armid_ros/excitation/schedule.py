@@ -88,6 +88,26 @@ class Excitation:
             return self._along_orbit(time, before, after)
         return self._blended(time, before, after, self.start)
 
+    def for_joints(self, joints: tuple[str, ...]) -> Excitation:
+        """
+        Return the run with its joints in another order.
+
+        Raises
+        ------
+        TrajectoryError
+            If they are not the same joints.
+
+        """
+        if set(joints) != set(self.joints):
+            raise TrajectoryError(
+                f'moves {", ".join(self.joints)}, but {", ".join(joints)} are to be moved'
+            )
+        order = [self.joints.index(joint) for joint in joints]
+        path = self.trajectory
+        path = FourierTrajectory(joints, path.period, path.q0[order], path.a[order], path.b[order])
+        start = None if self.start is None else self.start[order]
+        return Excitation(path, self.n_periods, self.run_in, start)
+
     def motion(self, rate: float) -> Motion:
         """
         Sample the run.

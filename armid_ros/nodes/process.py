@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 import signal
 import sys
 
@@ -15,6 +16,10 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
+
+#: How often it is looked whether the process is to end [s].
+_LOOK_PERIOD = 0.1
 
 
 def make_executor(kind: str, context: Context | None = None) -> Executor:
@@ -34,6 +39,42 @@ def make_executor(kind: str, context: Context | None = None) -> Executor:
     return SingleThreadedExecutor(context=context)
 
 
+class _Ending:
+    """
+    What SIGINT and SIGTERM do to a process: they end it, but not in the middle of a callback.
+
+    A node that stops an arm has to be able to publish when it is told to end; the handlers of
+    rclpy would have shut down its context by then. While a node is being made there is nothing to
+    stop, and making it may take long: then they end the process at once.
+
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._at_once = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Have signals end the process wherever it is."""
+        self._at_once = True
+        try:
+            yield
+        finally:
+            self._at_once = False
+
+    def _on_signal(self, *_: object) -> None:
+        self.asked = True
+        if self._at_once:
+            self._at_once = False  # `ros2 launch` sends a second one
+            raise _EndedAtOnce
+
+
+class _EndedAtOnce(BaseException):
+    """A signal came while the node was being made; nothing catches it but `run`."""
+
+
 def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -> None:
     """
     Run a node until it is finished, interrupted or told to shut down.
@@ -41,20 +82,22 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
     Raises
     ------
     SystemExit
-        With status 2, after one line on stderr, when the node cannot be made.
+        With status 2, after one line on stderr, when the node cannot be made or failed.
 
     """
     node: ArmidNode | None = None
+    ending = _Ending()
     try:
-        rclpy.init(args=args)
-        node = make_node()
+        with ending.at_once():
+            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+            node = make_node()
         executor = make_executor(node.value('executor'))
         executor.add_node(node)
-        while rclpy.ok() and not node.finished:
-            executor.spin_once(timeout_sec=1.0)  # events: spin() without a time-out hangs
-    except (KeyboardInterrupt, ExternalShutdownException):
+        while rclpy.ok() and not node.finished and not ending.asked:
+            executor.spin_once(timeout_sec=_LOOK_PERIOD)  # events: without a time-out it hangs
+    except (_EndedAtOnce, ExternalShutdownException):
         pass
-    except RCLError:  # a signal that comes between looking at the context and waiting on it
+    except RCLError:  # the context is shut down between looking at it and waiting on it
         if rclpy.ok():
             raise
     except ArmidError as error:
@@ -68,3 +111,6 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
             node.close()
             node.destroy_node()
         rclpy.try_shutdown()
+    if node is not None and node.failure:
+        print(node.failure, file=sys.stderr)
+        raise SystemExit(2)
