@@ -37,7 +37,13 @@ from armid_ros.excitation.random_trajectory import random_feasible
 from armid_ros.excitation.run import plan_run, Run
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
-from armid_ros.excitation.supervision import brought_back, MeasuredPose, slowed, tracking_fault
+from armid_ros.excitation.supervision import (
+    brought_back,
+    jump_fault,
+    MeasuredPose,
+    slowed,
+    tracking_fault,
+)
 from armid_ros.excitation.transfer import Transfer, transfer_limits, TransferPlanner
 
 __all__ = [
@@ -73,6 +79,7 @@ __all__ = [
     'find_floor',
     'fitness',
     'floor_obstacles',
+    'jump_fault',
     'load_environment',
     'load_excitation',
     'not_checked',

@@ -121,6 +121,48 @@ def tracking_fault(
     )
 
 
+def jump_fault(
+    joints: Sequence[str],
+    first: tuple[float, FloatArray],
+    measured: FloatArray,
+    fastest: FloatArray,
+    tolerance: float,
+) -> str:
+    """
+    Say which joint would jump, and how far, if a trajectory began now.
+
+    Parameters
+    ----------
+    joints : sequence of str
+        n joint names.
+    first : tuple of float and ndarray, shape (n,)
+        Time [s] and positions [rad or m] of its first waypoint.
+    measured : ndarray, shape (n,)
+        Where the arm is [rad or m].
+    fastest : ndarray, shape (n,)
+        Largest velocity on the way to a first waypoint later than time 0 [rad/s or m/s].
+    tolerance : float
+        How far the arm may be from a first waypoint at time 0 [rad or m].
+
+    Returns
+    -------
+    str
+        Empty when nothing jumps.
+
+    """
+    time, q = first
+    allowed = tolerance + fastest * max(time, 0.0)
+    distance = q - measured
+    worst = int(np.argmax(np.abs(distance) / allowed))
+    if abs(distance[worst]) <= allowed[worst]:
+        return ''
+    return (
+        f"joint '{joints[worst]}' is at {measured[worst]:.4g} and would have to be at "
+        f'{q[worst]:.4g} after {time:g} s: a jump of {distance[worst]:.4g}, and at most '
+        f'{allowed[worst]:.3g} is allowed'
+    )
+
+
 def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
     """
     Return the way to rest from somewhere on a path, along the path itself.
