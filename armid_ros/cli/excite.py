@@ -35,6 +35,7 @@ from armid_ros.excitation import (
     whole_period,
     with_obstacles,
 )
+from armid_ros.excitation.fitness import FIT
 from armid_ros.excitation.parallel import INTERRUPTED
 from armid_ros.identification.signals import conditioning, segments, SignalSettings
 from armid_ros.motion import FloatArray
@@ -349,7 +350,7 @@ def _tell(
         f'{result.settings.speed}: condition number {document["condition_number"] or np.inf:.1f}, '
         f'{len(document["parameters"])} parameters' + (f', {unseen} not seen' if unseen else '')
     )
-    say(click.style(str(written.fitness), fg='yellow' if written.fitness.unchecked else 'green'))
+    say(click.style(str(written.fitness), fg='green' if written.fitness.word == FIT else 'yellow'))
     whose = 'as given' if given else 'the zero of the description'
     if zero_fault:
         whose = f'the zero of the description is not free: {zero_fault}'

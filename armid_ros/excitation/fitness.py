@@ -17,7 +17,7 @@ from armid_ros.motion import Motion
 from armid_ros.robots import CollisionModel, Robot
 import numpy as np
 
-FIT, PARTLY = 'fit to run', 'not checked in all'
+FIT, PARTLY, UNFIT = 'fit to run', 'not checked in all', 'not to be run'
 #: Names that are listed before the rest is counted.
 _NAMED = 4
 
@@ -47,7 +47,11 @@ class Fitness:
 
     @property
     def word(self) -> str:
-        """The verdict in a few words: `FIT` when everything was checked, or else `PARTLY`."""
+        """The verdict in a few words: `FIT` only when everything was checked and is clear."""
+        if self.nearest is not None and self.nearest.distance < 0.0:
+            return UNFIT
+        if self.floor.height is not None and self.lowest.height < self.floor.height:
+            return UNFIT
         return PARTLY if self.unchecked else FIT
 
     def __str__(self) -> str:

@@ -23,6 +23,7 @@ from armid_ros.excitation import (
     used_shares,
     with_obstacles,
 )
+from armid_ros.excitation.fitness import FIT, UNFIT
 from armid_ros.excitation.heights import vertical
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.report.families import full_label
@@ -169,7 +170,8 @@ def _verdict(design: Design, motion: Motion, checked: Fitness, notes: Sequence[s
         )
     if notes:
         beware.append('Not all bodies were looked at; see Clearance.')
-    tone = 'bad' if unseen else 'fair' if design.stopped or checked.unchecked else 'good'
+    tone = 'good' if checked.word == FIT and not design.stopped else 'fair'
+    tone = 'bad' if unseen or checked.word == UNFIT else tone
     return Verdict('blind' if unseen else checked.word, tone, sentences, beware)
 
 
