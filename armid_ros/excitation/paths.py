@@ -23,6 +23,8 @@ import numpy as np
 _STEP, _INTERVAL = 0.6, 0.1
 #: Poses that are drawn before it is said that there is no way.
 _DRAWS = 800
+#: Corners that are tried to cut of a path that was found.
+_CUTS = 60
 
 #: Whether poses of shape (N, n) may be held.
 Held = Callable[[FloatArray], bool]
@@ -88,7 +90,7 @@ def find_path(
         if reached is not None and far.connect(near.poses[reached]):
             path = [*near.branch(reached)[::-1], *far.branch(len(far.poses) - 1)[1:]]
             path = path if number % 2 == 0 else path[::-1]
-            return np.array(_shortened(path, free))
+            return np.array(_shortened(path, free, rng))
         near, far = far, near
     blocked = clear_line(clearance, margin, start, goal)
     raise PathError(
@@ -165,8 +167,22 @@ class _Tree:
         return poses
 
 
-def _shortened(path: list[FloatArray], free: _Free) -> list[FloatArray]:
-    """Leave out poses that a straight line gets past, the farthest first."""
+def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) -> list[FloatArray]:
+    """Cut corners at random, and leave out poses that a straight line gets past."""
+    path = _skipped(path, free)
+    for _ in range(_CUTS if len(path) > 2 else 0):
+        i, j = np.sort(rng.integers(0, len(path) - 1, 2))
+        if i == j:
+            continue
+        first = path[i] + rng.random() * (path[i + 1] - path[i])
+        second = path[j] + rng.random() * (path[j + 1] - path[j])
+        if free(first, second):
+            path = [*path[: i + 1], first, second, *path[j + 1 :]]
+    return _skipped(path, free)
+
+
+def _skipped(path: list[FloatArray], free: _Free) -> list[FloatArray]:
+    """Go from each pose to the farthest one that a straight line leads to."""
     short, here = [path[0]], 0
     while here < len(path) - 1:
         here = next(

@@ -19,8 +19,9 @@ import numpy.typing as npt
 
 #: Largest velocity and acceleration of a quintic from 0 to 1 in unit time.
 _TOP_VELOCITY, _TOP_ACCELERATION = 1.875, 10.0 / np.sqrt(3.0)
-#: What a joint without limits is moved at: a slow walk of a link of a metre [rad/s or m/s].
-_UNLIMITED_VELOCITY = 0.5
+#: What is slow for a joint whatever its limits are: half a metre a second at the end of an arm of
+#: a metre; and the acceleration that goes with it [rad/s, rad/s^2; m/s, m/s^2].
+_SLOW_VELOCITY, _SLOW_ACCELERATION = 0.5, 1.0
 #: Samples of a way at which its torque is looked at; how it is slowed down, and how often.
 _SAMPLES, _SLOWER, _TRIES = 200, 1.3, 20
 #: How far beyond a position limit a joint may be measured before it is said to be [rad or m].
@@ -244,7 +245,7 @@ class TransferPlanner:
         limits = self.limits
         assert limits is not None
         way = np.abs(np.diff(poses, axis=0))
-        velocity = np.where(np.isfinite(limits.velocity), limits.velocity, _UNLIMITED_VELOCITY)
+        velocity = np.where(np.isfinite(limits.velocity), limits.velocity, _SLOW_VELOCITY)
         needed = np.maximum(
             (_TOP_VELOCITY * way / velocity).max(axis=1),
             np.sqrt(_TOP_ACCELERATION * way / limits.acceleration).max(axis=1),
@@ -277,13 +278,21 @@ def transfer_limits(
         Acceleration limits [rad/s^2 or m/s^2].
 
     """
-    share = SPEED_CLASSES[speed] if isinstance(speed, str) else float(speed)
-    return Limits.of(
+    run = Limits.of(
         robot,
-        speed=min(share, SPEED_CLASSES['slow']),
+        speed=speed,
         torque_fraction=1.0,
         position_margin=0.0,
         acceleration=acceleration,
+    )
+    share = SPEED_CLASSES[speed] if isinstance(speed, str) else float(speed)
+    slow = min(1.0, SPEED_CLASSES['slow'] / share)
+    return replace(
+        run,
+        velocity=np.minimum(run.velocity, np.maximum(slow * run.velocity, _SLOW_VELOCITY)),
+        acceleration=np.minimum(
+            run.acceleration, np.maximum(slow * run.acceleration, _SLOW_ACCELERATION)
+        ),
     )
 
 
