@@ -169,8 +169,8 @@ class TransferPlanner:
         if near is None:
             return ''
         return (
-            f'{near.first} and {near.second} are {near.distance:.4f} m apart, and '
-            f'{self.margin:g} m are to be kept'
+            f'{near.first} and {near.second} are {near.distance:.4f} m apart, less than the '
+            f'clearance of {self.margin:g} m'
         )
 
     def free_start(self) -> tuple[FloatArray, str]:

@@ -37,6 +37,9 @@ import numpy as np
 
 Values = Callable[[str], Any]
 
+#: Samples of a period that a design looks at, and how many a harmonic needs.
+_SAMPLES, _PER_HARMONIC = 100, 8
+
 EXCITATION_PARAMETERS = (
     NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
     NodeParameter('gravity', 'earth', 'earth, moon, or x,y,z in the base frame [m/s^2].'),
@@ -48,8 +51,8 @@ EXCITATION_PARAMETERS = (
     NodeParameter(
         'speed',
         'slow',
-        'Share of the velocity limits used by what is designed; fast by default in a simulation. '
-        'A file keeps its own.',
+        'Share of the velocity limits used by what is designed, and on the way there; fast by '
+        'default in a simulation. A file keeps its own.',
         choices=tuple(SPEED_CLASSES),
     ),
     NodeParameter(
@@ -126,7 +129,9 @@ def make_surroundings(value: Values) -> Surroundings:
     floor = find_floor(collision, value('floor'), around)
     around = (*around, *floor_obstacles(collision, floor, margin))
     clearance = ClearanceModel.of(with_obstacles(collision, around))
-    planner = TransferPlanner(ArmModel(robot), transfer_limits(robot), clearance, margin)
+    planner = TransferPlanner(
+        ArmModel(robot), transfer_limits(robot, value('speed')), clearance, margin
+    )
     limits = Limits.of(robot, speed=1.0)
     unchecked = not_checked(limits, collision, floor, around)
     return Surroundings(robot, collision, around, planner, unchecked)
@@ -161,6 +166,7 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
     settings = DesignSettings(
         period=whole_period(value('duration'), periods, run_in, rate),
         harmonics=value('harmonics'),
+        samples=max(_SAMPLES, _PER_HARMONIC * value('harmonics')),
         n_periods=periods,
         run_in=run_in,
         speed=value('speed'),

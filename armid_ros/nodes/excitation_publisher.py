@@ -104,7 +104,8 @@ class ExcitationPublisherNode(ArmidNode):
         NodeParameter(
             'state_timeout',
             0.5,
-            'The arm is stopped, and not started, without a joint state for so long.',
+            'The arm is stopped, and not started, without a joint state for so long; 5 s by '
+            'default in a simulation.',
             's',
             lower=0.01,
             upper=10.0,
@@ -155,7 +156,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._pose = MeasuredPose.unknown(self._excitation.joints)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._run: Run | None = None
-        self._begun_ns, self._tracked = 0, -math.inf
+        self._begun_ns, self._sent_at, self._tracked = 0, -math.inf, -math.inf
         self._trouble = ''
         self._waiting = bool(self.value('start'))
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
@@ -173,7 +174,8 @@ class ExcitationPublisherNode(ArmidNode):
         table = [p for p in super().parameters() if p is not SIMULATION]
         if not (self.value('simulation') or self.value('use_sim_time')):
             return table
-        lively = {'speed': 'fast', 'start': True}
+        # nothing breaks in a simulation, but it is silent while it works on a long trajectory
+        lively = {'speed': 'fast', 'start': True, 'state_timeout': 5.0}
         return [replace(p, default=lively.get(p.name, p.default)) for p in table]
 
     @property
@@ -204,7 +206,9 @@ class ExcitationPublisherNode(ArmidNode):
     def look(self) -> None:
         """Begin when somebody listens and the arm is heard of; stop it when it is not any more."""
         if self.elapsed is not None:
-            lost = self._staleness()
+            # while the way was planned nothing was received, whatever the arm sent
+            listened = self._now() - self._sent_at > self.value('state_timeout')
+            lost = self._staleness() if listened else ''
             if lost:
                 self._give_up(lost)
         elif self._waiting:
@@ -335,10 +339,10 @@ class ExcitationPublisherNode(ArmidNode):
         return float(clock.now().nanoseconds * 1e-9)
 
     def _send(self, motion: Motion, lead: float) -> None:
-        now = self.get_clock().now()
         message = write_trajectory(motion, lead)
+        now = self.get_clock().now()
         message.header.stamp = now.to_msg()
-        self._begun_ns = now.nanoseconds
+        self._begun_ns, self._sent_at = now.nanoseconds, self._now()
         self._publisher.publish(message)
 
     def _tell(self, text: str) -> str:

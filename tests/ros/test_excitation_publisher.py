@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import json
+
 from armid_ros.arm import ArmModel
 from armid_ros.cli.excite import excite
 from armid_ros.errors import ArmidError
@@ -89,7 +91,8 @@ def free_planner(robot):
 def waiting_publisher(bench, excitation, **parameters):
     """Make a publisher on simulated time, at 100 s, that begins when it is told."""
     planner = free_planner(load_robot('humanoid_arm')) if excitation is not None else None
-    options = {'start': False, 'use_sim_time': True, 'approach': APPROACH, **parameters}
+    options = {'start': False, 'use_sim_time': True, 'approach': APPROACH, 'state_timeout': 0.5}
+    options.update(parameters)
     node = bench.add(ExcitationPublisherNode, excitation, planner, **options)
     bench.tick(100 * SECOND)
     return node
@@ -343,17 +346,20 @@ def test_a_file_is_loaded(bench, plans):
 @pytest.mark.parametrize('speed', ['slow', 'fast'])
 def test_what_armid_excite_writes_is_run_as_its_bag_has_it(bench, arm, plans, robot, speed):
     planned = read_joint_trajectory(plans / speed / 'trajectory', joints=robot.joints)
+    excitation = load_excitation(plans / speed / 'excitation.yaml')
     file = str(plans / speed / 'excitation.yaml')
-    node = waiting_publisher(bench, None, file=file, rate=50.0, approach=0.1)
-    arm.report(100.0, planned.q[0])
+    node = waiting_publisher(bench, None, file=file, rate=50.0)
+    arm.report(100.0)
     node.start()
     _, reference = sent(bench, arm.heard, 1)
-    begin = round(reference.t[0] * 50.0)
-    both = slice(begin, begin + len(reference.t))
-    np.testing.assert_allclose(reference.t, planned.t[both], atol=1e-6)
+    count = round(50.0 * excitation.sampled_duration(50.0)) + 1
+    document = json.loads((plans / speed / 'excitation.json').read_text())
+    begin = round(50.0 * document['approach'])
     for name in ('q', 'dq', 'ddq'):
         np.testing.assert_allclose(
-            getattr(reference, name), getattr(planned, name)[both], atol=1e-6
+            getattr(reference, name)[-count:],
+            getattr(planned, name)[begin : begin + count],
+            atol=1e-6,
         )
 
 

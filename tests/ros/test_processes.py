@@ -131,6 +131,7 @@ def test_a_publisher_that_designs_is_ended_at_once(bench, processes):
         'excitation_publisher', 'design_time:=86400.0', 'duration:=3600.0', 'harmonics:=30'
     )
     bench.spin_until(lambda: any('making' in m.msg for m in log), 'the design')
+    assert excitation.poll() is None
     errors = processes.end(excitation, signal.SIGTERM)
     assert excitation.returncode == 0 and 'Traceback' not in errors, errors
     assert not heard
