@@ -218,7 +218,7 @@ def excite(
     ground = find_floor(collision, floor, around)
     around = (*around, *floor_obstacles(collision, ground, clearance))
     if kind in COURSES:
-        write_course(kind, collision, duration, share, clearance, around, seed, out)
+        write_course(kind, collision, duration, share, clearance, ground, around, seed, out)
         return
     arm = ArmModel(robot) if model is None else load_model(model, robot)
     arm = options.with_effects(arm, effects)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from armid_ros.cli.excitation_files import BAG, require_free
 from armid_ros.cli.terminal import say
-from armid_ros.excitation import Obstacle, with_obstacles
+from armid_ros.excitation import Floor, Limits, not_checked, Obstacle, with_obstacles
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.robots import CollisionModel
@@ -43,6 +43,7 @@ def write_course(
     duration: float,
     share: float,
     clearance: float,
+    floor: Floor,
     obstacles: Sequence[Obstacle],
     seed: int,
     out: Path,
@@ -60,3 +61,10 @@ def write_course(
     out.mkdir(parents=True, exist_ok=True)
     write_joint_trajectory(out / BAG, course, robot_description=robot.urdf)
     say(f'{out / BAG}: {len(course.t)} waypoints, {course.duration:.1f} s')
+    first = ', '.join(
+        f'{joint} {q:.3g} {unit}'
+        for joint, q, unit in zip(robot.joints, course.q[0], robot.position_units, strict=True)
+    )
+    say(f'starts at rest in the middle of the ranges, {first}: bring the arm there first')
+    for missing in not_checked(Limits.of(robot), collision, floor, obstacles):
+        say(click.style(f'not checked: {missing}', fg='yellow'))
