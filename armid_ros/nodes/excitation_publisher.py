@@ -45,8 +45,6 @@ _LOOK_PERIOD = 0.05
 _TRACKING_PERIOD = 0.02
 #: How long the last message may take to arrive when the node ends [s].
 _FAREWELL = 1.0
-#: A stamp further from the node's clock than this is from another clock [s].
-_SAME_CLOCK = 0.5
 
 SIMULATION = NodeParameter(
     'simulation',
@@ -281,8 +279,9 @@ class ExcitationPublisherNode(ArmidNode):
         if elapsed is None or self._run is None or now - self._tracked < _TRACKING_PERIOD:
             return
         self._tracked = now
-        measured_at = (stamp - self._begun_ns) * 1e-9
-        phase = measured_at if abs(measured_at - elapsed) < _SAME_CLOCK else elapsed
+        phase = (stamp - self._begun_ns) * 1e-9
+        if abs(phase - elapsed) > self.value('state_timeout'):
+            phase = elapsed  # without a stamp, or with one of another clock
         fault = tracking_fault(
             self._pose.joints,
             self._planner.arm.robot.position_units,

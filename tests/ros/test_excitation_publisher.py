@@ -293,6 +293,17 @@ def test_an_arm_that_follows_as_well_as_is_tolerated_goes_on(bench, arm, excitat
     assert node.elapsed == pytest.approx(4.0) and len(arm.heard) == 1
 
 
+@pytest.mark.parametrize('late', [0.0, 0.4])
+def test_an_arm_is_compared_with_where_it_should_be_at_the_stamp(bench, arm, excitation, late):
+    """A simulation that cannot keep up, or a slow network, is not an arm that lags."""
+    node = running(bench, arm, excitation, tracking_tolerance=0.02)
+    reference = read_trajectory(arm.heard[0])
+    for time in np.arange(100.2, 104.0, 0.2):
+        bench.tick(round((time + late) * SECOND))
+        arm.report(time, reference.sample(np.array([time - 100.0])).q[0])
+    assert node.elapsed is not None and len(arm.heard) == 1
+
+
 def test_an_arm_that_falls_silent_is_stopped_on_its_path(bench, arm, excitation):
     node, diagnostics = running(bench, arm, excitation), bench.diagnostics()
     follow(bench, arm, 103.0)
