@@ -170,7 +170,8 @@ class ExcitationPublisherNode(ArmidNode):
         """Return the parameters; those of a simulation have defaults of their own."""
         declare(self, (SIMULATION,))
         table = [p for p in super().parameters() if p is not SIMULATION]
-        if not (self.value('simulation') or self.value('use_sim_time')):
+        self._simulated = bool(self.value('simulation') or self.value('use_sim_time'))
+        if not self._simulated:
             return table
         # nothing breaks in a simulation, but it is silent while it works on a long trajectory
         lively = {'speed': 'fast', 'start': True, 'state_timeout': 5.0}
@@ -280,8 +281,9 @@ class ExcitationPublisherNode(ArmidNode):
             return
         self._tracked = now
         phase = (stamp - self._begun_ns) * 1e-9
-        if abs(phase - elapsed) > self.value('state_timeout'):
-            phase = elapsed  # without a stamp, or with one of another clock
+        strange = abs(phase - elapsed) > self.value('state_timeout')
+        if not stamp or (strange and not self._simulated):
+            phase = elapsed  # the stamp is of another clock; a simulation may just be slow
         fault = tracking_fault(
             self._pose.joints,
             self._planner.arm.robot.position_units,
