@@ -16,6 +16,7 @@ def generate_launch_description():
     bag = ParameterValue(LaunchConfiguration('bag'), value_type=str)
     rate = ParameterValue(LaunchConfiguration('rate'), value_type=float)
     duration = ParameterValue(LaunchConfiguration('duration'), value_type=float)
+    floor = ParameterValue(LaunchConfiguration('floor'), value_type=str)
     return LaunchDescription(
         [
             DeclareLaunchArgument(
@@ -32,6 +33,12 @@ def generate_launch_description():
             ),
             DeclareLaunchArgument(
                 'duration', default_value='44.0', description='of the excitation [s]'
+            ),
+            DeclareLaunchArgument(
+                'floor',
+                default_value='',
+                description='height above the origin of the base [m], or none; empty: that of '
+                'the robot',
             ),
             Node(
                 package='armid_ros',
@@ -67,7 +74,15 @@ def generate_launch_description():
             Node(
                 package='armid_ros',
                 executable='excitation_publisher',
-                parameters=[{'robot': robot, 'gravity': gravity, 'duration': duration}],
+                parameters=[
+                    {
+                        'simulation': True,
+                        'robot': robot,
+                        'gravity': gravity,
+                        'duration': duration,
+                        'floor': floor,
+                    }
+                ],
             ),
         ]
     )

@@ -5,25 +5,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from armid_ros.arm import ArmModel
-from armid_ros.errors import RecordingError
+from armid_ros.errors import RecordingError, TrajectoryError
 from armid_ros.excitation import (
     Design,
+    Excitation,
+    Fitness,
+    fitness,
+    Floor,
     Obstacle,
-    obstacles_alone,
+    plan_run,
+    Run,
     save_excitation,
+    TransferPlanner,
     used_shares,
 )
 from armid_ros.files import json_text, write_file
-from armid_ros.motion import Motion
+from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.report.excitation_report import excitation_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import CollisionModel
+import click
 import numpy as np
 
 #: Waypoints per second of the JointTrajectory; controllers interpolate between them.
@@ -46,8 +53,12 @@ class Plan:
         Shipped name or path.
     collision : CollisionModel
         Bodies of the robot.
+    floor : Floor
+        What it stands on.
     obstacles : sequence of Obstacle
-        What stands around it.
+        What stands around it, the floor among it.
+    start : ndarray, shape (n,)
+        Pose to leave from and to return to [rad or m].
     after : sequence of Path
         Bags that it adds to.
     files : sequence of Path
@@ -60,10 +71,33 @@ class Plan:
     arm: ArmModel
     robot: str
     collision: CollisionModel
+    floor: Floor
     obstacles: Sequence[Obstacle]
+    start: FloatArray
     after: Sequence[Path]
     files: Sequence[Path]
     seed: int
+
+
+@dataclass(frozen=True)
+class Written:
+    """
+    What was written.
+
+    Attributes
+    ----------
+    document : dict
+        What is in excitation.json.
+    run : Run
+        What is in the bag.
+    fitness : Fitness
+        What was checked of it.
+
+    """
+
+    document: dict[str, Any]
+    run: Run
+    fitness: Fitness
 
 
 def require_free(folder: Path) -> None:
@@ -72,45 +106,85 @@ def require_free(folder: Path) -> None:
         raise RecordingError(f'{folder / BAG} exists already; name another --out, or delete it')
 
 
-def write_plan(folder: Path, plan: Plan, result: Design) -> dict[str, Any]:
-    """Fill a folder with a design and return what is in excitation.json."""
-    run = result.excitation
-    save_excitation(run, folder / 'excitation.yaml')
-    save_excitation(run, folder / 'excitation.csv')
-    motion = run.motion(WAYPOINT_RATE)
-    write_joint_trajectory(folder / BAG, motion, robot_description=plan.arm.robot.urdf)
-    document = _document(plan, result, motion)
-    page = excitation_report(
-        result,
-        plan.arm,
-        robot=plan.robot,
-        collision=plan.collision,
-        obstacles=plan.obstacles,
-        after=[str(bag) for bag in plan.after],
-        provenance=Provenance(
-            files=hash_files([plan.robot, *plan.after, *plan.files]),
-            versions=versions(),
-            seed=plan.seed,
-        ),
-    )
-    write_file(folder / 'report.html', page)
+def write_plan(folder: Path, plan: Plan, result: Design, planner: TransferPlanner) -> Written:
+    """
+    Fill a folder with a design; what took longest to find is written first.
+
+    Raises
+    ------
+    TrajectoryError
+        If no way leads from the start to the trajectory; its coefficients are written then.
+
+    """
+    _save_coefficients(folder, result.excitation)
+    try:
+        run = plan_run(result.excitation, planner, plan.start, WAYPOINT_RATE, seed=plan.seed)
+    except TrajectoryError as error:
+        raise TrajectoryError(
+            f'{folder / "excitation.yaml"} holds the design, but there is no {BAG}: {error}; '
+            'take another --start, or another --seed'
+        ) from error
+    result = replace(result, excitation=run.excitation)
+    _save_coefficients(folder, result.excitation)
+    write_joint_trajectory(folder / BAG, run.motion(), robot_description=plan.arm.robot.urdf)
+    checked = fitness(run, result.limits, plan.collision, plan.floor, plan.obstacles)
+    document = _document(plan, result, run, checked)
     write_file(folder / 'excitation.json', json_text(document, indent=1))
-    return document
+    _write_page(folder / 'report.html', plan, result, run, checked)
+    return Written(document, run, checked)
 
 
-def _document(plan: Plan, result: Design, motion: Motion) -> dict[str, Any]:
+def _save_coefficients(folder: Path, excitation: Excitation) -> None:
+    for name in ('excitation.yaml', 'excitation.csv'):
+        save_excitation(excitation, folder / name)
+
+
+def _write_page(path: Path, plan: Plan, result: Design, run: Run, checked: Fitness) -> None:
+    """Write the report; what goes wrong there is said, and costs nothing else."""
+    try:
+        page = excitation_report(
+            result,
+            plan.arm,
+            robot=plan.robot,
+            collision=plan.collision,
+            obstacles=plan.obstacles,
+            after=[str(bag) for bag in plan.after],
+            provenance=Provenance(
+                files=hash_files([plan.robot, *plan.after, *plan.files]),
+                versions=versions(),
+                seed=plan.seed,
+            ),
+            run=run,
+            checked=checked,
+        )
+        write_file(path, page)
+    except Exception as error:  # whatever it is, the trajectory is written and good
+        click.echo(f'{path}: not written: {type(error).__name__}: {error}', err=True)
+
+
+def _document(plan: Plan, result: Design, run: Run, checked: Fitness) -> dict[str, Any]:
     information, settings = result.information, result.settings
-    bodies = [plan.collision]
-    if plan.obstacles:
-        bodies.append(obstacles_alone(plan.collision, plan.obstacles))
-    clearance = min(float(one.path_clearance(motion.q).min()) for one in bodies)
+    motion = result.excitation.motion(WAYPOINT_RATE)
     shares = used_shares(result.limits, motion, plan.arm.joint_torque(motion))
+    nearest = checked.nearest
     return {
         'schema': SCHEMA,
         'robot': plan.robot,
+        'verdict': checked.word,
+        'summary': str(checked),
+        'not_checked': list(checked.unchecked),
         'joints': list(result.excitation.joints),
         'duration': result.excitation.duration,
         'period': settings.period,
+        'start': plan.start.tolist(),
+        'approach': run.approach.duration,
+        'trajectory_duration': run.duration,
+        'floor': {'height': plan.floor.height, 'source': plan.floor.source},
+        'lowest_point': {
+            'height': _finite(checked.lowest.height),
+            'link': checked.lowest.link,
+            'time': checked.lowest.time,
+        },
         'speed': settings.speed,
         'criterion': settings.criterion,
         'cost': result.cost,
@@ -119,7 +193,7 @@ def _document(plan: Plan, result: Design, motion: Motion) -> dict[str, Any]:
         'condition_number': _finite(information.condition),
         'log_det': _finite(information.log_det),
         'rank': int(np.count_nonzero(np.isfinite(information.std))),
-        'clearance': _finite(clearance),
+        'clearance': None if nearest is None else nearest.distance,
         'limits_used': {name: share.tolist() for name, share in shares.items()},
         'parameters': [
             {'name': name.name, 'joint': name.joint, 'std': _finite(std), 'unit': name.unit}

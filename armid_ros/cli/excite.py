@@ -10,26 +10,43 @@ from typing import Any
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import options
-from armid_ros.cli.excitation_files import Plan, require_free, SCHEMA, WAYPOINT_RATE, write_plan
+from armid_ros.cli.excitation_files import (
+    Plan,
+    require_free,
+    SCHEMA,
+    WAYPOINT_RATE,
+    write_plan,
+    Written,
+)
 from armid_ros.cli.excite_springs import COURSES, refuse_other_options, write_course
-from armid_ros.cli.terminal import progress, say
+from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.effects import parse_effect
+from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
+    ClearanceModel,
     CRITERIA,
     Design,
     design_speeds,
     DesignSettings,
+    find_floor,
+    floor_obstacles,
     load_environment,
+    Obstacle,
     Problem,
     Progress,
     SPEED_CLASSES,
     TARGETS,
+    transfer_limits,
+    TransferPlanner,
     whole_period,
+    with_obstacles,
 )
+from armid_ros.excitation.fitness import FIT
+from armid_ros.excitation.parallel import INTERRUPTED
 from armid_ros.files import json_text
 from armid_ros.identification.signals import conditioning, segments, SignalSettings
 from armid_ros.motion import FloatArray
-from armid_ros.robots import collision_model
+from armid_ros.robots import collision_model, CollisionModel, Robot
 import click
 import numpy as np
 
@@ -128,7 +145,11 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
 @click.option(
     '--model', type=click.Path(path_type=Path), help='model.yaml with what is known of the arm.'
 )
-@click.option('--start', metavar='Q,...', help='Pose to leave from and return to [rad or m].')
+@click.option(
+    '--start',
+    metavar='Q,...',
+    help='Pose that the trajectory leaves and returns to [rad or m]; zero by default.',
+)
 @click.option(
     '--acceleration',
     metavar='A[,...]',
@@ -142,6 +163,12 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
 @click.option('--clearance', default=0.01, show_default=True, help='Between links [m].')
 @click.option(
     '--environment', type=click.Path(path_type=Path), help='YAML with what stands around the arm.'
+)
+@click.option(
+    '--floor',
+    metavar='Z|none',
+    help='Height of the floor above the origin of the base [m]; without it and without '
+    '--environment, the base plane of an arm that stands.',
 )
 @click.option(
     '--after',
@@ -181,6 +208,7 @@ def excite(
     torque_noise: str | None,
     clearance: float,
     environment: Path | None,
+    floor: str | None,
     after: tuple[Path, ...],
     starts: int,
     iterations: int,
@@ -193,8 +221,12 @@ def excite(
     """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
     refuse_other_options(click.get_current_context())
     robot = options.open_robot(robot_source, gravity, joints, after)
+    collision = collision_model(robot)
+    around = load_environment(environment) if environment else ()
+    ground = find_floor(collision, floor, around)
+    around = (*around, *floor_obstacles(collision, ground, clearance))
     if kind in COURSES:
-        write_course(kind, robot, duration, share, clearance, environment, seed, out)
+        write_course(kind, collision, duration, share, clearance, ground, around, seed, out)
         return
     arm = ArmModel(robot) if model is None else load_model(model, robot)
     arm = options.with_effects(arm, effects)
@@ -211,7 +243,6 @@ def excite(
         criterion=criterion,
         target=target,
         focus=tuple(name.partition('@')[0] for name in focus.split(',') if name),
-        start=options.per_joint(start, robot, '--start'),
         acceleration=options.per_joint(acceleration, robot, '--acceleration'),
         noise=options.per_joint(torque_noise, robot, '--torque-noise'),
         clearance=clearance,
@@ -219,11 +250,17 @@ def excite(
         iterations=iterations,
         time_budget=time_budget,
     )
+    planners = {
+        speed: _planner(arm, settings, speed, collision, around) for speed in dict.fromkeys(speeds)
+    }
+    begin, zero_fault = _start(options.per_joint(start, robot, '--start'), planners[speeds[0]])
     plan = Plan(
         arm,
         robot_source,
-        collision_model(robot),
-        load_environment(environment) if environment else (),
+        collision,
+        ground,
+        around,
+        begin,
         after,
         tuple(filter(None, (model, environment))),
         seed,
@@ -232,33 +269,65 @@ def excite(
     for folder in folders.values():
         options.hold(folder, SCHEMA, robot_source)
         require_free(folder)
-    with progress('designing') as tick:
+    known = _known(arm, settings, after, seed) if after else None
+    missing = list(folders)
+    for number, (speed, folder) in enumerate(folders.items()):
+        with progress('designing') as tick:
 
-        def told(speed: str | float, now: Progress) -> None:
-            done = (speeds.index(speed) + now.done) / len(speeds)
-            tick(done, f'designing {speed}, cost {now.cost:.2f}')
+            def told(
+                speed: str | float, now: Progress, tick: Tick = tick, number: int = number
+            ) -> None:
+                done = (number + now.done) / len(folders)
+                tick(done, f'designing {speed}, cost {now.cost:.2f}')
 
-        designs = design_speeds(
-            arm,
-            settings,
-            np.random.default_rng(seed),
-            speeds=speeds,
-            collision=plan.collision,
-            obstacles=plan.obstacles,
-            prior_information=_known(arm, settings, after, seed) if after else None,
-            rival=other,
-            progress=told,
-        )
-        tick(1.0, 'writing')
-        documents = {speed: write_plan(folders[speed], plan, designs[speed]) for speed in designs}
-    for speed, document in documents.items():
+            result = design_speeds(
+                arm,
+                settings,
+                np.random.default_rng(seed),
+                speeds=[speed],
+                collision=collision,
+                obstacles=around,
+                prior_information=known,
+                rival=other,
+                progress=told,
+            )[speed]
+            tick((number + 1.0) / len(folders), 'writing')
+            written = write_plan(folder, plan, result, planners[speed])
+        missing.remove(speed)
         if as_json:
-            click.echo(json_text(document))
+            click.echo(json_text(written.document))
         else:
-            _tell(folders[speed], designs[speed], document)
-    missing = [str(speed) for speed in speeds if speed not in designs]
+            _tell(folder, result, written, plan.arm.robot, zero_fault, start is not None)
+        if result.stopped == INTERRUPTED:
+            break
     if missing:
-        click.echo(f'interrupted before {", ".join(missing)}', err=True)
+        click.echo(f'interrupted before {", ".join(map(str, missing))}', err=True)
+
+
+def _planner(
+    arm: ArmModel,
+    settings: DesignSettings,
+    speed: str | float,
+    collision: CollisionModel,
+    obstacles: Sequence[Obstacle],
+) -> TransferPlanner:
+    """Return what plans the ways to a run of some speed, and back."""
+    return TransferPlanner(
+        arm,
+        transfer_limits(arm.robot, speed, settings.acceleration),
+        ClearanceModel.of(with_obstacles(collision, obstacles)),
+        settings.clearance,
+    )
+
+
+def _start(given: FloatArray | None, planner: TransferPlanner) -> tuple[FloatArray, str]:
+    """Return the pose to start from, and what is wrong with zero where it is not zero."""
+    if given is None:
+        return planner.free_start()
+    fault = planner.fault(given)
+    if fault:
+        raise TrajectoryError(f'--start: {fault}')
+    return given, ''
 
 
 def _known(arm: ArmModel, settings: DesignSettings, bags: Sequence[Path], seed: int) -> FloatArray:
@@ -276,16 +345,40 @@ def _known(arm: ArmModel, settings: DesignSettings, bags: Sequence[Path], seed: 
     return matrix
 
 
-def _tell(folder: Path, result: Design, document: dict[str, Any]) -> None:
+def _tell(
+    folder: Path,
+    result: Design,
+    written: Written,
+    robot: Robot,
+    zero_fault: str,
+    given: bool,
+) -> None:
+    document, run = written.document, written.run
     unseen = sum(row['std'] is None for row in document['parameters'])
     say(
         f'{result.settings.speed}: condition number {document["condition_number"] or np.inf:.1f}, '
         f'{len(document["parameters"])} parameters' + (f', {unseen} not seen' if unseen else '')
     )
-    if document['clearance'] is None:
-        say('no limit violated; no bodies to keep apart')
-    else:
-        say(f'smallest clearance {1e3 * document["clearance"]:.0f} mm, no limit violated')
+    say(click.style(str(written.fitness), fg='green' if written.fitness.word == FIT else 'yellow'))
+    whose = 'as given' if given else 'the zero of the description'
+    if zero_fault:
+        whose = f'the zero of the description is not free: {zero_fault}'
+    say(
+        f'starts at rest at {_pose(robot, run.approach.q[0])} ({whose}), is on the trajectory '
+        f'after {run.approach.duration:.1f} s and back after {run.duration:.1f} s'
+    )
     if result.stopped:
         say(f'stopped early ({result.stopped}): the best so far, not what the seed would give')
     say(f'{folder}: excitation.yaml, excitation.csv, trajectory (a bag), report.html')
+
+
+def _pose(robot: Robot, q: FloatArray) -> str:
+    """Name the joints that are not at zero."""
+    moved = [
+        f'{joint} {value:.3g} {unit}'
+        for joint, value, unit in zip(robot.joints, q, robot.position_units, strict=True)
+        if value != 0.0
+    ]
+    if not moved:
+        return 'zero'
+    return ', '.join(moved) + (', the others at zero' if len(moved) < len(q) else '')

@@ -4,15 +4,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from armid_ros.cli import options
 from armid_ros.cli.excitation_files import BAG, require_free, SCHEMA
 from armid_ros.cli.terminal import say
-from armid_ros.excitation import load_environment, with_obstacles
+from armid_ros.excitation import Floor, Limits, not_checked, Obstacle, with_obstacles
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
-from armid_ros.robots import collision_model, Robot
+from armid_ros.robots import CollisionModel
 from armid_ros.simulation.elastic_courses import multisine_course, step_course
 import click
 import numpy as np
@@ -21,8 +22,8 @@ import numpy as np
 COURSES = {'multisine': multisine_course, 'steps': step_course}
 #: Options that a course takes as well as a design, and that a course alone takes.
 _SHARED = {
-    'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'gravity', 'joints',
-    'seed', 'force', 'crc', 'memory_limit',
+    'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'floor', 'gravity',
+    'joints', 'seed', 'force', 'crc', 'memory_limit',
 }  # fmt: skip
 _OWN = {'share'}
 
@@ -39,19 +40,20 @@ def refuse_other_options(context: click.Context) -> None:
 
 def write_course(
     kind: str,
-    robot: Robot,
+    collision: CollisionModel,
     duration: float,
     share: float,
     clearance: float,
-    environment: Path | None,
+    floor: Floor,
+    obstacles: Sequence[Obstacle],
     seed: int,
     out: Path,
 ) -> None:
     """Write the trajectory as a bag."""
+    robot = collision.robot
     options.hold(out, SCHEMA, robot.name)
     require_free(out)
-    obstacles = load_environment(environment) if environment else ()
-    bodies = with_obstacles(collision_model(robot), obstacles)
+    bodies = with_obstacles(collision, obstacles)
 
     def clear(q: FloatArray) -> bool:
         inside = np.all((q >= robot.lower) & (q <= robot.upper))
@@ -60,3 +62,10 @@ def write_course(
     course = COURSES[kind](robot, duration, share, np.random.default_rng(seed), clear)
     write_joint_trajectory(out / BAG, course, robot_description=robot.urdf)
     say(f'{out / BAG}: {len(course.t)} waypoints, {course.duration:.1f} s')
+    first = ', '.join(
+        f'{joint} {q:.3g} {unit}'
+        for joint, q, unit in zip(robot.joints, course.q[0], robot.position_units, strict=True)
+    )
+    say(f'starts at rest in the middle of the ranges, {first}: bring the arm there first')
+    for missing in not_checked(Limits.of(robot), collision, floor, obstacles):
+        say(click.style(f'not checked: {missing}', fg='yellow'))

@@ -20,7 +20,10 @@ from armid_ros.excitation.environment import (
 )
 from armid_ros.excitation.feasibility import excitation_faults, Faults, trajectory_faults
 from armid_ros.excitation.files import load_excitation, save_excitation
+from armid_ros.excitation.fitness import Fitness, fitness, not_checked
+from armid_ros.excitation.floor import find_floor, Floor, floor_obstacles
 from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.heights import LowestPoint
 from armid_ros.excitation.limits import (
     check_limits,
     Limits,
@@ -31,8 +34,17 @@ from armid_ros.excitation.limits import (
 )
 from armid_ros.excitation.problem import Problem
 from armid_ros.excitation.random_trajectory import random_feasible
+from armid_ros.excitation.run import plan_run, Run
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
+from armid_ros.excitation.supervision import (
+    brought_back,
+    jump_fault,
+    MeasuredPose,
+    slowed,
+    tracking_fault,
+)
+from armid_ros.excitation.transfer import Transfer, transfer_limits, TransferPlanner
 
 __all__ = [
     'Approach',
@@ -42,27 +54,44 @@ __all__ = [
     'DesignSettings',
     'Excitation',
     'Faults',
+    'Fitness',
+    'Floor',
     'FourierTrajectory',
     'Information',
     'Limits',
+    'LowestPoint',
+    'MeasuredPose',
     'Obstacle',
     'Problem',
     'Progress',
+    'Run',
     'SPEED_CLASSES',
     'TARGETS',
+    'Transfer',
+    'TransferPlanner',
     'Violation',
+    'brought_back',
     'check_limits',
     'design',
     'design_speeds',
     'evaluate',
     'excitation_faults',
+    'find_floor',
+    'fitness',
+    'floor_obstacles',
+    'jump_fault',
     'load_environment',
     'load_excitation',
+    'not_checked',
     'obstacles_alone',
+    'plan_run',
     'random_feasible',
     'require_within',
     'save_excitation',
+    'slowed',
+    'tracking_fault',
     'trajectory_faults',
+    'transfer_limits',
     'used_shares',
     'whole_period',
     'with_obstacles',

@@ -39,6 +39,9 @@ class Capsules:
         From the middle to an end [m].
     radii : ndarray, shape (m,)
         [m]; infinite for a body that has no bounds.
+    normals, offsets : ndarray, shape (m, 3) and (m,)
+        Of those bodies that are half spaces and do not move: the points x with normal x <= offset
+        [m]; NaN for the others.
 
     """
 
@@ -46,6 +49,8 @@ class Capsules:
     centres: FloatArray
     halves: FloatArray
     radii: FloatArray
+    normals: FloatArray
+    offsets: FloatArray
 
     @classmethod
     def of(cls, geometry: pin.GeometryModel) -> Capsules:
@@ -54,14 +59,19 @@ class Capsules:
         joints = np.array([int(body.parentJoint) - 1 for body in bodies], dtype=np.intp)
         centres, halves = np.zeros((len(bodies), 3)), np.zeros((len(bodies), 3))
         radii = np.full(len(bodies), np.inf)
+        normals, offsets = np.full((len(bodies), 3), np.nan), np.full(len(bodies), np.nan)
         for number, body in enumerate(bodies):
+            if isinstance(body.geometry, coal.Halfspace) and joints[number] < 0:
+                normals[number] = body.placement.rotation @ body.geometry.n
+                offsets[number] = body.geometry.d + normals[number] @ body.placement.translation
+                continue
             points, skin = outline(body.geometry)
             if len(points):
                 middle, half, radius = _smallest_capsule(points)
                 centres[number] = body.placement.act(middle)
                 halves[number] = body.placement.rotation @ half
                 radii[number] = radius + skin
-        return cls(joints, centres, halves, radii)
+        return cls(joints, centres, halves, radii, normals, offsets)
 
     def reach(self) -> FloatArray:
         """Return the largest distance of any point from its joint's frame, shape (m,) [m]."""
@@ -101,7 +111,12 @@ class Capsules:
         apart = _segment_distance(
             centre[:, second] - centre[:, first], half[:, first], half[:, second]
         )
-        return apart - self.radii[first] - self.radii[second]
+        bound = apart - self.radii[first] - self.radii[second]
+        for pair in np.flatnonzero(np.isfinite(self.offsets[second])):
+            body, normal = first[pair], self.normals[second[pair]]
+            lowest = centre[:, body] @ normal - np.abs(half[:, body] @ normal)
+            bound[:, pair] = lowest - self.offsets[second[pair]] - self.radii[body]
+        return np.asarray(bound)
 
 
 def _segment_distance(between: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:

@@ -63,7 +63,8 @@ class Chain:
         axes = np.empty((n, 3))
         zero = np.zeros(n)
         for i in range(n):
-            column = pin.computeJointJacobian(model, data, zero, i + 1)[:, i]
+            jacobian = pin.computeJointJacobian(model, data, zero, i + 1)
+            column = jacobian.reshape(6, n)[:, i]  # of one joint it comes without its second axis
             axes[i] = column[:3] if robot.prismatic[i] else column[3:]
         placements = tuple(
             (np.array(m.rotation), np.array(m.translation))

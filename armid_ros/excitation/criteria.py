@@ -248,16 +248,26 @@ class RivalCriterion:
         """Return the cost and its gradient by the matrix."""
         own = np.flatnonzero(self.rival)
         direction = np.array(self.values, dtype=float)
-        block, reach = matrix[np.ix_(own, own)], matrix[own] @ direction
-        scale = np.sqrt(np.diag(block))
-        if not np.all(scale > 0.0):
-            return float(np.inf), np.zeros_like(matrix)
-        fitted = np.linalg.solve(block / np.outer(scale, scale), reach / scale) / scale
-        direction[own] -= fitted
+        direction[own] -= _best_fit(matrix[np.ix_(own, own)], matrix[own] @ direction)
         power = float(direction @ matrix @ direction)
         if power <= 0.0:
             return float(np.inf), np.zeros_like(matrix)
         return float(-np.log(power)), -np.outer(direction, direction) / power
+
+
+def _best_fit(block: FloatArray, reach: FloatArray) -> FloatArray:
+    """
+    Solve the normal equations, also where a motion does not tell all columns apart.
+
+    An arm of one joint that moves with one frequency has fewer independent columns than others.
+
+    """
+    size = np.sqrt(np.maximum(np.diag(block), 0.0))
+    unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+    values, vectors = np.linalg.eigh(block * np.outer(unit, unit))
+    seen = values > _BLIND
+    along = vectors[:, seen]
+    return np.asarray(unit * (along @ ((along.T @ (unit * reach)) / values[seen])))
 
 
 Criterion = SpectralCriterion | SubsetCriterion | RivalCriterion

@@ -114,7 +114,7 @@ class Limits:
         if not 0.0 < share <= 1.0:
             raise TrajectoryError(f'speed: a share of the limits in (0, 1], not {share:g}')
         span = robot.upper - robot.lower
-        margin = np.where(np.isfinite(span), position_margin * span, 0.0)
+        margin = position_margin * np.where(np.isfinite(span), span, 0.0)
         if acceleration is None:
             acceleration = robot.velocity_limit / TIME_TO_TOP_SPEED
         return cls(

@@ -95,6 +95,26 @@ class Excitation:
             return self._along_orbit(time, before, after)
         return self._blended(time, before, after, self.start)
 
+    def for_joints(self, joints: tuple[str, ...]) -> Excitation:
+        """
+        Return the run with its joints in another order.
+
+        Raises
+        ------
+        TrajectoryError
+            If they are not the same joints.
+
+        """
+        if set(joints) != set(self.joints):
+            raise TrajectoryError(
+                f'moves {", ".join(self.joints)}, but {", ".join(joints)} are to be moved'
+            )
+        order = [self.joints.index(joint) for joint in joints]
+        path = self.trajectory
+        path = FourierTrajectory(joints, path.period, path.q0[order], path.a[order], path.b[order])
+        start = None if self.start is None else self.start[order]
+        return Excitation(path, self.n_periods, self.run_in, start)
+
     def motion(self, rate: float) -> Motion:
         """
         Sample the run.
@@ -117,10 +137,14 @@ class Excitation:
 
         """
         lead = self._run_in_samples(rate)
-        count = 2 * lead + self.n_periods * self._period_samples(rate) + 1
-        t = np.arange(count) / rate
+        t = np.arange(round(self.sampled_duration(rate) * rate) + 1) / rate
         run = self.at(t - lead / rate + self.run_in)
         return Motion(run.joints, t, run.q, run.dq, run.ddq)
+
+    def sampled_duration(self, rate: float) -> float:
+        """Return the time of the last sample of ``motion(rate)`` [s]."""
+        samples = 2 * self._run_in_samples(rate) + self.n_periods * self._period_samples(rate)
+        return samples / rate
 
     def period_slices(self, rate: float) -> tuple[slice, ...]:
         """Return which samples of ``motion(rate)`` belong to each period."""

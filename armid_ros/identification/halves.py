@@ -44,8 +44,9 @@ def halves_error(
     step = max(1, sum(len(part.tau) for part in problem) // _ROWS)
     columns = np.concatenate([part.columns for part in problem])[::step]
     tau = np.concatenate([part.tau for part in problem])[::step]
+    target = np.concatenate([part.target for part in problem])[::step]
     told = np.concatenate([part.informative for part in problem])[::step]
-    rest, weight = tau - columns @ described, weights[::step]
+    rest, weight = target - columns @ described, weights[::step]
     middle = len(tau) // 2
     halves = slice(0, middle), slice(middle, None)
     left = np.zeros_like(tau)

@@ -279,7 +279,7 @@ def identify(
         used=used,
         settings=settings,
         notes=notes,
-        halves_error=halves_error(problem, solution.weights, base.values(arm.theta)),
+        halves_error=halves_error(fit.problem, fit.solution.weights, fit.base.values(whole.theta)),
         physical=certificate,
         passes=fit.passes,
     )

@@ -11,13 +11,16 @@ from typing import Any
 
 from armid_ros.errors import RecordingError
 from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.jump_guard import JumpGuard
 from armid_ros.nodes.message_classes import message_class
 from armid_ros.nodes.parameters import names, NodeParameter
 from armid_ros.nodes.process import run
 from armid_ros.nodes.qos import offered
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.message_types import JOINT_TRAJECTORY
 from armid_ros.recording.source import RawMessage
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock as ClockMessage
@@ -26,11 +29,17 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 TICK = 0.001
 #: Messages published in one go; services are answered between.
 _BURST = 1000
+#: How long a trajectory may take to arrive when the node ends [s].
+_FAREWELL = 1.0
 
 
 class BagPlayerNode(ArmidNode):
     """
     Publishes the messages of a bag, serialised as they were recorded.
+
+    A JointTrajectory is sent only if no joint of the arm that publishes joint_states would jump.
+    A recording of an arm, which has joint_states of its own, has its trajectories sent only if no
+    other arm is heard of.
 
     With use_sim_time it keeps step with /clock: a message is due when as much time has passed
     since the first /clock as passed since the first message of the bag.
@@ -66,10 +75,27 @@ class BagPlayerNode(ArmidNode):
         NodeParameter(
             'subscriber_timeout',
             2.0,
-            'How long to wait for every topic to have a subscriber.',
+            'How long to wait for every topic to have a subscriber, and to hear of the arm that '
+            'is to follow a trajectory.',
             's',
             lower=0.0,
             upper=3600.0,
+        ),
+        NodeParameter(
+            'start_tolerance',
+            0.01,
+            'How far a joint may be from the first point of a trajectory.',
+            'rad or m',
+            lower=0.0001,
+            upper=1.0,
+        ),
+        NodeParameter(
+            'state_timeout',
+            0.5,
+            'Age at which a joint state says nothing any more.',
+            's',
+            lower=0.01,
+            upper=60.0,
         ),
     )
 
@@ -85,7 +111,9 @@ class BagPlayerNode(ArmidNode):
                 'use_sim_time follows /clock; it cannot publish it too: clock_rate'
             )
         self._wanted = {self.resolve_topic_name(name) for name in names(self, 'topics')}
+        self._refused = ''
         self._topics = self._make_publishers()
+        self._guard = self._make_guard()
         self._messages = self._from_start()
         self._next: RawMessage | None = next(self._messages, None)
         self._first = self._next.log_time_ns if self._next else 0
@@ -108,6 +136,11 @@ class BagPlayerNode(ArmidNode):
     def finished(self) -> bool:
         """Whether all was played."""
         return self._next is None
+
+    @property
+    def failure(self) -> str:
+        """Why a trajectory was not sent."""
+        return self._refused
 
     @property
     def waiting(self) -> bool:
@@ -149,8 +182,11 @@ class BagPlayerNode(ArmidNode):
         return ('waiting for subscribers' if self.waiting else ''), values
 
     def close(self) -> None:
-        """Let go of the bag."""
+        """Let go of the bag, once trajectories have arrived."""
         self._bag.close()
+        if self._guard is not None and self.context.ok():
+            for topic in self._trajectories:
+                self._topics[topic].wait_for_all_acked(Duration(seconds=_FAREWELL))
 
     def _make_publishers(self) -> dict[str, Publisher]:
         topics = {self.resolve_topic_name(t.name): t for t in self._bag.topics()}
@@ -174,16 +210,48 @@ class BagPlayerNode(ArmidNode):
             raise RecordingError(f'{self._bag.path}: nothing to play')
         return publishers
 
+    def _make_guard(self) -> JumpGuard | None:
+        """Listen to the arm where there is a trajectory to play."""
+        types = {t.name: t.type_name for t in self._bag.topics() if t.name in self._topics}
+        self._trajectories = {n for n, kind in types.items() if kind == JOINT_TRAJECTORY}
+        self._descriptions = {n for n in types if n.endswith('robot_description')}
+        self._states = self.resolve_topic_name('joint_states')
+        self._has_states = any(self.resolve_topic_name(n) == self._states for n in types)
+        if not self._trajectories:
+            return None
+        return JumpGuard(self, self.value('start_tolerance'), self.value('state_timeout'))
+
+    def _objection(self, message: RawMessage) -> str:
+        """Say why a message must not be published; empty when it may."""
+        if self._guard is None or message.topic not in self._trajectories:
+            return ''
+        if not self._has_states:
+            return self._guard.objection(message.cdr)
+        if self.count_publishers(self._states) > 1:
+            return (
+                f'trajectory: the bag is a recording with {self._states} of its own, and somebody '
+                'else publishes them too: an arm that is not where the recorded one was'
+            )
+        return ''
+
     def _from_start(self) -> Iterator[RawMessage]:
         return (m for m in self._bag.messages() if m.topic in self._topics)
 
     def _ready(self) -> bool:
         everyone = all(p.get_subscription_count() for p in self._topics.values())
+        if self._guard is not None and not self._has_states:
+            everyone = everyone and self._guard.hears
         return everyone or time.monotonic() > self._deadline
 
     def _publish(self, message: RawMessage) -> None:
         topic = self._topics[message.topic]
+        if self._guard is not None and message.topic in self._descriptions:
+            self._guard.describe(message.cdr)
         if message.log_time_ns >= self._begin:
+            self._refused = self._objection(message) or self._refused
+            if self._refused and message.topic in self._trajectories:
+                self.complaints.say('trajectory', self._refused)
+                return
             topic.publish(message.cdr)
             self.published[message.topic] += 1
 

@@ -45,14 +45,23 @@ class ArmidNode(Node):
         """Take the keyword arguments of rclpy's Node: context, namespace, overrides and others."""
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
-        declare(self, (*self.table, EXECUTOR))
+        declare(self, self.parameters())
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(1.0, self.publish_diagnostics)
+
+    def parameters(self) -> Sequence[NodeParameter]:
+        """Return the parameters to declare."""
+        return (*self.table, EXECUTOR)
 
     @property
     def finished(self) -> bool:
         """Whether there is nothing left to do, so that the process may end."""
         return False
+
+    @property
+    def failure(self) -> str:
+        """Why the node did not do what it was started for; the process then ends with code 2."""
+        return ''
 
     @property
     def hardware(self) -> str:

@@ -5,30 +5,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
+    ClearanceModel,
     design,
     DesignSettings,
     Excitation,
+    excitation_faults,
+    find_floor,
+    floor_obstacles,
     Limits,
+    load_environment,
     load_excitation,
-    require_within,
+    not_checked,
+    Obstacle,
     SPEED_CLASSES,
+    trajectory_faults,
+    transfer_limits,
+    TransferPlanner,
     whole_period,
+    with_obstacles,
 )
-from armid_ros.motion import Motion
 from armid_ros.nodes.parameters import NodeParameter
-from armid_ros.robots import collision_model, load_robot, Robot
+from armid_ros.robots import collision_model, CollisionModel, load_robot, Robot
 import numpy as np
 
 Values = Callable[[str], Any]
 
-#: Samples a second at which a loaded excitation is compared with the limits [Hz].
-_CHECK_RATE = 200.0
+#: Samples of a period that a design looks at, and how many a harmonic needs.
+_SAMPLES, _PER_HARMONIC = 100, 8
 
 EXCITATION_PARAMETERS = (
     NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
@@ -39,7 +49,11 @@ EXCITATION_PARAMETERS = (
     NodeParameter('run_in', 2.0, 'Of the run-in, and the run-out.', 's', lower=0.1, upper=60.0),
     NodeParameter('harmonics', 5, 'Harmonics of every joint.', lower=1, upper=30),
     NodeParameter(
-        'speed', 'fast', 'Share of the velocity limits used.', choices=tuple(SPEED_CLASSES)
+        'speed',
+        'slow',
+        'Share of the velocity limits used by what is designed, and on the way there; fast by '
+        'default in a simulation. A file keeps its own.',
+        choices=tuple(SPEED_CLASSES),
     ),
     NodeParameter(
         'effects',
@@ -47,6 +61,13 @@ EXCITATION_PARAMETERS = (
         'Effects that are to be seen, beside the rigid body.',
     ),
     NodeParameter('clearance', 0.01, 'Kept between bodies.', 'm', lower=0.0, upper=1.0),
+    NodeParameter(
+        'floor',
+        '',
+        'Height of the floor above the origin of the base [m], or none; empty: what is shipped '
+        'with the robot, or the base plane of an arm that stands.',
+    ),
+    NodeParameter('environment', '', 'YAML with what stands around the arm; empty: nothing.'),
     NodeParameter(
         'design_time', 20.0, 'What the search may take at most.', 's', lower=1.0, upper=86400.0
     ),
@@ -60,7 +81,63 @@ EXCITATION_PARAMETERS = (
 )
 
 
-def make_excitation(value: Values, rate: float) -> Excitation:
+@dataclass(frozen=True)
+class Surroundings:
+    """
+    The arm, and what it must not hit.
+
+    Attributes
+    ----------
+    robot : Robot
+        The arm.
+    collision : CollisionModel
+        Its bodies.
+    obstacles : tuple of Obstacle
+        What stands around it, the floor among it.
+    planner : TransferPlanner
+        Plans the way to an excitation.
+    unchecked : tuple of str
+        What cannot be checked.
+
+    """
+
+    robot: Robot
+    collision: CollisionModel
+    obstacles: tuple[Obstacle, ...]
+    planner: TransferPlanner
+    unchecked: tuple[str, ...]
+
+
+def make_surroundings(value: Values) -> Surroundings:
+    """
+    Load the robot that parameters describe, and what stands around it.
+
+    Parameters
+    ----------
+    value : callable
+        Returns the value of a parameter of `EXCITATION_PARAMETERS`.
+
+    Raises
+    ------
+    ArmidError
+        If there is no such file or robot, or nobody knows where its floor is.
+
+    """
+    robot = load_robot(value('robot'), gravity=value('gravity'))
+    collision, margin = collision_model(robot), value('clearance')
+    around = load_environment(value('environment')) if value('environment') else ()
+    floor = find_floor(collision, value('floor'), around)
+    around = (*around, *floor_obstacles(collision, floor, margin))
+    clearance = ClearanceModel.of(with_obstacles(collision, around))
+    planner = TransferPlanner(
+        ArmModel(robot), transfer_limits(robot, value('speed')), clearance, margin
+    )
+    limits = Limits.of(robot, speed=1.0)
+    unchecked = not_checked(limits, collision, floor, around)
+    return Surroundings(robot, collision, around, planner, unchecked)
+
+
+def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> Excitation:
     """
     Load or design the excitation that parameters describe.
 
@@ -70,16 +147,18 @@ def make_excitation(value: Values, rate: float) -> Excitation:
         Returns the value of a parameter of `EXCITATION_PARAMETERS`.
     rate : float
         Samples per second at which it will be sent [Hz].
+    surroundings : Surroundings
+        The arm, and what it must not hit.
 
     Raises
     ------
     ArmidError
-        If there is no such file or robot, or the excitation does not keep the limits.
+        If there is no such file, or the excitation does not keep the limits or hits something.
 
     """
-    robot = load_robot(value('robot'), gravity=value('gravity'))
+    robot = surroundings.robot
     if value('file'):
-        return _loaded(value('file'), robot, value('clearance'))
+        return _loaded(value('file'), surroundings)
     arm = ArmModel(robot)
     for name in filter(None, value('effects')):
         arm = arm.with_effect(make_effect(name, robot))
@@ -87,6 +166,7 @@ def make_excitation(value: Values, rate: float) -> Excitation:
     settings = DesignSettings(
         period=whole_period(value('duration'), periods, run_in, rate),
         harmonics=value('harmonics'),
+        samples=max(_SAMPLES, _PER_HARMONIC * value('harmonics')),
         n_periods=periods,
         run_in=run_in,
         speed=value('speed'),
@@ -96,20 +176,24 @@ def make_excitation(value: Values, rate: float) -> Excitation:
         processes=1,  # a signal to the node must not leave others behind
     )
     rng = np.random.default_rng(value('seed'))
-    return design(arm, settings, rng, collision=collision_model(robot)).excitation
+    return design(
+        arm,
+        settings,
+        rng,
+        collision=surroundings.collision,
+        obstacles=surroundings.obstacles,
+    ).excitation
 
 
-def _loaded(path: str, robot: Robot, clearance: float) -> Excitation:
+def _loaded(path: str, surroundings: Surroundings) -> Excitation:
+    robot, planner = surroundings.robot, surroundings.planner
     excitation = load_excitation(path)
     if set(excitation.joints) != set(robot.joints):
         raise TrajectoryError(
             f'{path}: moves {", ".join(excitation.joints)}, but {robot.name} has '
             f'{", ".join(robot.joints)}'
         )
-    t = np.arange(0.0, excitation.duration, 1.0 / _CHECK_RATE)
-    run = excitation.at(t)
-    order = [run.joints.index(joint) for joint in robot.joints]
-    motion = Motion(robot.joints, t, run.q[:, order], run.dq[:, order], run.ddq[:, order])
+    excitation = excitation.for_joints(robot.joints)
     limits = Limits.of(
         robot,
         speed=1.0,
@@ -117,12 +201,9 @@ def _loaded(path: str, robot: Robot, clearance: float) -> Excitation:
         position_margin=0.0,
         acceleration=np.full(robot.n_joints, np.inf),  # no description knows it
     )
-    require_within(limits, motion, ArmModel(robot).torque(motion))
-    closest = collision_model(robot).path_clearance(motion.q)
-    worst = int(np.argmin(closest))
-    if closest[worst] < clearance:
-        raise TrajectoryError(
-            f'{path}: {robot.name} comes as near as {closest[worst]:.3g} m to itself at '
-            f'{t[worst]:.2f} s; {clearance:g} m are wanted'
-        )
+    rules = (planner.clearance, planner.margin)
+    faults = trajectory_faults(planner.arm, limits, excitation.trajectory, *rules)
+    faults = faults or excitation_faults(planner.arm, limits, excitation, *rules)
+    if faults:
+        raise TrajectoryError(f'{path}: {faults}')
     return excitation

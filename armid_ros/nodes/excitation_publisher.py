@@ -1,38 +1,72 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The excitation publisher node: a run from rest to rest, as a JointTrajectory."""
+"""The excitation publisher node: takes an arm into an excitation, watches it, and stops it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+import math
 import time
 from typing import Any
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import Excitation
+from armid_ros.excitation import (
+    brought_back,
+    Excitation,
+    MeasuredPose,
+    plan_run,
+    Run,
+    slowed,
+    tracking_fault,
+    TransferPlanner,
+)
+from armid_ros.excitation.supervision import HANDOVER
 from armid_ros.motion import Motion
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.excitation_parameters import EXCITATION_PARAMETERS, make_excitation
-from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.excitation_parameters import (
+    EXCITATION_PARAMETERS,
+    make_excitation,
+    make_surroundings,
+)
+from armid_ros.nodes.parameters import declare, NodeParameter
 from armid_ros.nodes.process import run
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.trajectories import write_trajectory
-import numpy as np
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
-#: How often a subscriber is looked for [s].
+#: How often a subscriber is looked for, and whether the arm is still heard of [s].
 _LOOK_PERIOD = 0.05
-#: How long a controller may take to begin with a trajectory that slows the arm down [s].
-_HANDOVER = 0.05
+#: How often it is looked whether the arm follows [s].
+_TRACKING_PERIOD = 0.02
+#: How long the last message may take to arrive when the node ends [s].
+_FAREWELL = 1.0
+
+SIMULATION = NodeParameter(
+    'simulation',
+    False,
+    'The arm is simulated: by default it begins by itself, and fast. So it is with use_sim_time.',
+)
+START = NodeParameter(
+    'start',
+    False,
+    'Begin without ~/start, as soon as there is a subscriber and the arm is heard of; true by '
+    'default in a simulation only.',
+)
 
 
 class ExcitationPublisherNode(ArmidNode):
     """
     Publishes an excitation for a trajectory controller, real or simulated.
 
-    The message is latched and stamped with the time it begins, so that a controller that comes up
-    later does not set the arm in motion.
+    It begins where joint_states say that the arm is, and goes from there to the excitation slowly,
+    past what stands around. It stops the arm when it is told to, when it ends itself, when the arm
+    does not follow, and when it hears no more of it. The message is latched and stamped with the
+    time it begins, so that a controller that comes up later does not set the arm in motion.
 
     """
 
@@ -40,45 +74,115 @@ class ExcitationPublisherNode(ArmidNode):
         *EXCITATION_PARAMETERS,
         NodeParameter('rate', 100.0, 'Waypoints per second.', 'Hz', lower=1.0, upper=1000.0),
         NodeParameter(
-            'approach', 3.0, 'Time to get to the first point.', 's', lower=0.1, upper=60.0
+            'approach',
+            3.0,
+            'Shortest time to get to the first point; more where distance and limits ask for it.',
+            's',
+            lower=0.1,
+            upper=60.0,
         ),
         NodeParameter(
-            'stopping', 0.5, 'Time in which ~/stop brings it to rest.', 's', lower=0.1, upper=10.0
+            'stopping',
+            0.5,
+            'Time in which the arm is brought to rest.',
+            's',
+            lower=0.1,
+            upper=10.0,
         ),
-        NodeParameter('start', True, 'Begin as soon as there is a subscriber, without ~/start.'),
+        SIMULATION,
+        START,
+        NodeParameter(
+            'tracking_tolerance',
+            0.2,
+            'The arm is stopped when a joint is further from where it should be.',
+            'rad or m',
+            lower=0.001,
+            upper=10.0,
+        ),
+        NodeParameter(
+            'state_timeout',
+            0.5,
+            'The arm is stopped, and not started, without a joint state for so long; 5 s by '
+            'default in a simulation.',
+            's',
+            lower=0.01,
+            upper=10.0,
+        ),
         NodeParameter(
             'subscriber_timeout',
             10.0,
-            'How long to wait for one; then only ~/start begins.',
+            'How long to wait for a subscriber and joint states; then only ~/start begins.',
             's',
             lower=0.0,
             upper=3600.0,
         ),
     )
 
-    def __init__(self, excitation: Excitation | None = None, **kwargs: Any) -> None:
-        """Take the excitation; by default the one the parameters describe."""
+    def __init__(
+        self,
+        excitation: Excitation | None = None,
+        planner: TransferPlanner | None = None,
+        **kwargs: Any,
+    ) -> None:
+        """
+        Make the node.
+
+        Parameters
+        ----------
+        excitation : Excitation, optional
+            What is to be run; by default the one the parameters describe.
+        planner : TransferPlanner, optional
+            Plans the way to it; by default for the robot that the parameters name.
+        **kwargs
+            For rclpy's Node.
+
+        """
         super().__init__('excitation_publisher', **kwargs)
-        rate = self.value('rate')
+        self._rate = float(self.value('rate'))
+        if planner is None:
+            surroundings = make_surroundings(self.value)
+            planner = surroundings.planner
+            if surroundings.unchecked:
+                self.get_logger().warning(f'not checked: {"; ".join(surroundings.unchecked)}')
+            if excitation is None:
+                self.get_logger().info('making the excitation')
+                excitation = make_excitation(self.value, self._rate, surroundings)
         if excitation is None:
-            self.get_logger().info('making the excitation')
-            excitation = make_excitation(self.value, rate)
-        self._excitation = excitation
-        self._motion = excitation.motion(rate)
-        self._begun_ns: int | None = None
+            raise TrajectoryError('a planner needs an excitation to plan the way to')
+        self._planner = planner
+        self._excitation = excitation.for_joints(planner.arm.robot.joints)
+        self._pose = MeasuredPose.unknown(self._excitation.joints)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._run: Run | None = None
+        self._begun_ns, self._sent_at, self._tracked = 0, -math.inf, -math.inf
+        self._trouble = ''
         self._waiting = bool(self.value('start'))
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
         self._publisher = self.create_publisher(JointTrajectory, 'joint_trajectory', LATCHED)
+        self._states = self.create_subscription(
+            JointState, 'joint_states', self._on_joint_states, 10
+        )
         self.offer('~/start', self.start)
         self.offer('~/stop', self.stop)
-        self._timer = self.create_timer(
-            _LOOK_PERIOD, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        self._timer = self.create_timer(_LOOK_PERIOD, self.look, clock=self._steady)
+
+    def parameters(self) -> Sequence[NodeParameter]:
+        """Return the parameters; those of a simulation have defaults of their own."""
+        declare(self, (SIMULATION,))
+        table = [p for p in super().parameters() if p is not SIMULATION]
+        self._simulated = bool(self.value('simulation') or self.value('use_sim_time'))
+        if not self._simulated:
+            return table
+        # nothing breaks in a simulation, but it is silent while it works on a long trajectory
+        lively = {'speed': 'fast', 'start': True, 'state_timeout': 5.0}
+        return [replace(p, default=lively.get(p.name, p.default)) for p in table]
 
     @property
     def duration(self) -> float:
         """Time from the message to the end of the run, approach included [s]."""
-        return float(self.value('approach') + self._motion.t[-1])
+        if self._run is not None:
+            return self._run.duration
+        return float(self.value('approach') + self._excitation.sampled_duration(self._rate))
 
     @property
     def readers(self) -> int:
@@ -86,47 +190,63 @@ class ExcitationPublisherNode(ArmidNode):
         return int(self._publisher.get_subscription_count())
 
     @property
+    def last_stamp_ns(self) -> int:
+        """Stamp of the oldest position that the pose of the arm is made of [ns]."""
+        return min(self._pose.stamps)
+
+    @property
     def elapsed(self) -> float | None:
         """Time since the run began, approach included [s]; None when there is no run."""
-        if self._begun_ns is None:
+        if self._run is None:
             return None
         elapsed = (self.get_clock().now().nanoseconds - self._begun_ns) * 1e-9
-        return elapsed if elapsed < self.duration else None
+        return elapsed if elapsed < self._run.duration else None
 
     def look(self) -> None:
-        """Begin when somebody listens; give up waiting after a while."""
-        if not self._waiting:
-            return
-        if self.readers:
-            self.start()
-        elif time.monotonic() > self._deadline:
-            self._waiting = False
-            self.get_logger().warning(
-                f'nobody subscribes to {self._publisher.topic_name}; call ~/start when they do'
-            )
+        """Begin when somebody listens and the arm is heard of; stop it when it is not any more."""
+        if self.elapsed is not None:
+            # while the way was planned nothing was received, whatever the arm sent
+            listened = self._now() - self._sent_at > self.value('state_timeout')
+            lost = self._staleness() if listened else ''
+            if lost:
+                self._give_up(lost)
+        elif self._waiting:
+            self._look_for_partners()
 
     def start(self) -> str:
-        """Publish the run from its beginning."""
+        """Plan the way from where the arm is, and publish the run."""
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
-        self._send(self._motion, self.value('approach'))
-        return self._tell(f'a run of {self.duration:g} s, sent to {self.readers} subscribers')
+        lost = self._staleness()
+        if lost:
+            raise TrajectoryError(f'{self._states.topic_name}: {lost}; the arm is not started')
+        self._trouble = ''
+        planned = plan_run(
+            self._excitation,
+            self._planner,
+            self._pose.q,
+            self._rate,
+            shortest=self.value('approach'),
+            back=False,
+        )
+        motion = planned.motion()
+        first = max(math.ceil(HANDOVER * self._rate), 1)  # the set point is not where the arm is
+        self._send(motion.select(slice(first, None)), first / self._rate)
+        self._run = planned
+        return self._tell(
+            f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
+            f'there, sent to {self.readers} subscribers'
+        )
 
     def stop(self) -> str:
         """Bring the arm to rest on the path it is on."""
         self._waiting = False
         elapsed = self.elapsed
-        if elapsed is None:
+        if elapsed is None or self._run is None:
             raise TrajectoryError('nothing is under way')
-        phase = elapsed - self.value('approach')
-        if phase < 0.0:
-            rest = self._motion.select(slice(0, 1))
-            self._send(rest, max(-phase, _HANDOVER))
-        else:
-            run_out = slowed(self._excitation, phase, self.value('stopping'), self.value('rate'))
-            self._send(run_out, _HANDOVER)
-        self._begun_ns = None
+        motion = slowed(self._run, elapsed, self.value('stopping'), self._rate)
+        self._end_run(motion)
         return self._tell(f'stopped {elapsed:.2f} s after the start')
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
@@ -137,54 +257,98 @@ class ExcitationPublisherNode(ArmidNode):
             'elapsed': elapsed or 0.0,
             'duration': self.duration,
         }
-        return ('waiting for a subscriber' if self._waiting else ''), values
+        waiting = 'waiting for a subscriber and joint states' if self._waiting else ''
+        return self._trouble or waiting, values
+
+    def close(self) -> None:
+        """Stop the arm, and see to it that the message arrives."""
+        if self.elapsed is None or not self.context.ok():
+            return
+        self.stop()
+        self._publisher.wait_for_all_acked(Duration(seconds=_FAREWELL))
+
+    def destroy_node(self) -> None:
+        """Stop the arm before the node is gone, whoever destroys it."""
+        self.close()
+        super().destroy_node()
+
+    def _on_joint_states(self, message: JointState) -> None:
+        stamp = Time.from_msg(message.header.stamp).nanoseconds
+        self._pose = self._pose.updated(message.name, message.position, stamp, self._now())
+        now = self._now()
+        elapsed = self.elapsed
+        if elapsed is None or self._run is None or now - self._tracked < _TRACKING_PERIOD:
+            return
+        self._tracked = now
+        phase = (stamp - self._begun_ns) * 1e-9
+        strange = abs(phase - elapsed) > self.value('state_timeout')
+        if not stamp or (strange and not self._simulated):
+            phase = elapsed  # the stamp is of another clock; a simulation may just be slow
+        fault = tracking_fault(
+            self._pose.joints,
+            self._planner.arm.robot.position_units,
+            self._run.at([phase]).q[0],
+            self._pose.q,
+            self.value('tracking_tolerance'),
+        )
+        if fault:
+            self._give_up(fault, follows=False)
+
+    def _look_for_partners(self) -> None:
+        lost = self._staleness()
+        if self.readers and not lost:
+            try:
+                self.start()
+            except TrajectoryError as error:
+                self._say_trouble(f'not started: {error}')
+        elif time.monotonic() > self._deadline:
+            self._waiting = False
+            missing = (
+                f'{self._states.topic_name}: {lost}'
+                if lost
+                else f'nobody subscribes to {self._publisher.topic_name}'
+            )
+            self.get_logger().warning(f'{missing}; call ~/start when that has changed')
+
+    def _give_up(self, reason: str, *, follows: bool = True) -> None:
+        """Stop the arm: on its path where it follows, else where it was measured."""
+        elapsed, stopping = self.elapsed, self.value('stopping')
+        if elapsed is None or self._run is None:
+            return
+        if follows:
+            motion = slowed(self._run, elapsed, stopping, self._rate)
+        else:
+            fastest = self._planner.arm.robot.velocity_limit
+            motion = brought_back(self._run, elapsed, self._pose.q, fastest, stopping, self._rate)
+        self._end_run(motion)
+        self._say_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
+
+    def _end_run(self, motion: Motion) -> None:
+        self._send(motion, HANDOVER)
+        self._run = None
+
+    def _say_trouble(self, text: str) -> None:
+        self._trouble = text
+        self.get_logger().error(text)
+
+    def _staleness(self) -> str:
+        return self._pose.staleness(self._now(), self.value('state_timeout'))
+
+    def _now(self) -> float:
+        """Return the time that ages are measured in: simulated, or steady [s]."""
+        clock = self.get_clock() if self.value('use_sim_time') else self._steady
+        return float(clock.now().nanoseconds * 1e-9)
 
     def _send(self, motion: Motion, lead: float) -> None:
-        now = self.get_clock().now()
         message = write_trajectory(motion, lead)
+        now = self.get_clock().now()
         message.header.stamp = now.to_msg()
-        self._begun_ns = now.nanoseconds
+        self._begun_ns, self._sent_at = now.nanoseconds, self._now()
         self._publisher.publish(message)
 
     def _tell(self, text: str) -> str:
         self.get_logger().info(text)
         return text
-
-
-def slowed(excitation: Excitation, phase: float, duration: float, rate: float) -> Motion:
-    """
-    Return the way to rest from somewhere in an excitation, along its own path.
-
-    Parameters
-    ----------
-    excitation : Excitation
-        The run that is left.
-    phase : float
-        Where it is, time since its start [s].
-    duration : float
-        Time to come to rest [s].
-    rate : float
-        Samples per second [Hz].
-
-    Returns
-    -------
-    Motion
-        From the handover on; the speed along the path falls from 1 to 0 as half a cosine.
-
-    """
-    count = int(np.ceil(duration * rate)) + 1
-    t = np.linspace(min(_HANDOVER, duration / 2.0), duration, count)
-    x = np.pi * t / duration
-    path = excitation.at(phase + (t + np.sin(x) * duration / np.pi) / 2.0)
-    speed = ((1.0 + np.cos(x)) / 2.0)[:, np.newaxis]
-    change = (-np.pi * np.sin(x) / (2.0 * duration))[:, np.newaxis]
-    return Motion(
-        path.joints,
-        t,
-        path.q,
-        speed * path.dq,
-        speed**2 * path.ddq + change * path.dq,
-    )
 
 
 def main(args: Sequence[str] | None = None) -> None:

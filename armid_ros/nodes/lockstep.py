@@ -18,9 +18,10 @@ from pathlib import Path
 import time
 from typing import Any, TypeVar
 
+from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
 from armid_ros.estimate import Estimate
-from armid_ros.excitation import Excitation
+from armid_ros.excitation import Excitation, TransferPlanner
 from armid_ros.identification.online import OnlineIdentifier
 from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode
@@ -145,11 +146,16 @@ def run_lockstep(
         )
         learner = stage.add(OnlineIdentifierNode, identifier)
         recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
-        publisher = stage.add(ExcitationPublisherNode, excitation, start=False, approach=approach)
+        # The simulated arm looks at the limits, and nothing in a simulation can be hit.
+        planner = TransferPlanner(ArmModel(arm.plant.robot), None, None, 0.0)
+        publisher = stage.add(
+            ExcitationPublisherNode, excitation, planner, start=False, approach=approach
+        )
         stage.connect(plant, learner, recorder, publisher)
-        watch = _Watch(learner, publisher.duration + _REST, on_progress, period)
-        stage.step(plant, learner, recorder)
+        stamp = stage.step(plant, learner, recorder)
+        stage.spin_until(lambda: publisher.last_stamp_ns == stamp, 'joint_states')
         publisher.start()
+        watch = _Watch(learner, publisher.duration + _REST, on_progress, period)
         stage.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
         while watch.t < watch.duration:
             watch.see(stage.step(plant, learner, recorder) - start_ns)
@@ -280,7 +286,7 @@ class _Stage:
             return (
                 not recorder.missing
                 and _matched(learner)
-                and plant.readers >= 2
+                and plant.readers >= 3
                 and publisher.readers >= 1
                 and all(n.get_clock().now().nanoseconds for n in (learner, recorder, publisher))
             )

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 import signal
 import sys
 
@@ -16,6 +16,10 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
+
+#: How often it is looked whether the process is to end [s].
+_LOOK_PERIOD = 0.1
 
 
 def make_executor(kind: str, context: Context | None = None) -> Executor:
@@ -35,30 +39,68 @@ def make_executor(kind: str, context: Context | None = None) -> Executor:
     return SingleThreadedExecutor(context=context)
 
 
+class _Ending:
+    """
+    What SIGINT and SIGTERM do to a process: they end it, but not in the middle of a callback.
+
+    A node that stops an arm has to be able to publish when it is told to end; the handlers of
+    rclpy would have shut down its context by then. While a node is being made there is nothing to
+    stop, and making it may take long: then they end the process at once.
+
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._at_once = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Have signals end the process wherever it is."""
+        self._at_once = True
+        try:
+            yield
+        finally:
+            self._at_once = False
+
+    def _on_signal(self, *_: object) -> None:
+        self.asked = True
+        if self._at_once:
+            self._at_once = False  # `ros2 launch` sends a second one
+            raise _EndedAtOnce
+
+
+class _EndedAtOnce(BaseException):
+    """A signal came while the node was being made; nothing catches it but `run`."""
+
+
 def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -> None:
     """
-    Run a node until it is finished, interrupted, told to shut down or hung up.
+    Run a node until it is finished, told to end or hung up.
 
     Raises
     ------
     SystemExit
-        After one line on stderr: with status 2 when the node cannot be made, with status 1 when
-        it cannot go on, or was hung up as by a terminal that is closed.
+        After one line on stderr: with status 2 when the node cannot be made or refuses what it is
+        asked, with status 1 when it cannot go on, or was hung up as by a terminal that is closed.
 
     """
     node: ArmidNode | None = None
     trouble: list[str] = []
+    ending = _Ending()
     hung_up = _note_hang_up()
     try:
-        rclpy.init(args=args)
-        node = make_node()
+        with ending.at_once():
+            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+            node = make_node()
         executor = make_executor(node.value('executor'))
         executor.add_node(node)
-        while rclpy.ok() and not node.finished and not hung_up:
-            executor.spin_once(timeout_sec=1.0)  # events: spin() without a time-out hangs
-    except (KeyboardInterrupt, ExternalShutdownException):
+        while rclpy.ok() and not (node.finished or ending.asked or hung_up):
+            executor.spin_once(timeout_sec=_LOOK_PERIOD)  # events: without a time-out it hangs
+    except (_EndedAtOnce, ExternalShutdownException):
         pass
-    except RCLError:  # a signal that comes between looking at the context and waiting on it
+    except RCLError:  # the context is shut down between looking at it and waiting on it
         if rclpy.ok():
             raise
     except ArmidError as error:
@@ -72,10 +114,13 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
         rclpy.try_shutdown()
     if hung_up:
         trouble.append('ended by SIGHUP, as by a terminal that is closed')
+    refused = node is None or bool(node.failure)
+    if node is not None and node.failure:
+        trouble.append(node.failure)
     if trouble:
         with suppress(OSError):  # the terminal may be gone
             print('; '.join(trouble), file=sys.stderr)
-        raise SystemExit(2 if node is None else 1)
+        raise SystemExit(2 if refused else 1)
 
 
 def _note_hang_up() -> list[int]:

@@ -147,8 +147,8 @@ class SimulatedArmNode(ArmidNode):
     def step(self) -> int:
         """Move on to the next sample, publish it, and return its stamp [ns]."""
         if self._pending is not None and self._pending[0] <= self.stamp_ns:
-            reference, self._pending = self._pending[1], None
-            self._begin(reference)
+            (start_ns, reference), self._pending = self._pending, None
+            self._begin(reference.remaining((self.stamp_ns - start_ns) * 1e-9))
         sample = self._arm.advance(self._stride)
         message, stamp_ns = self._message, self.stamp_ns
         stamp = message.header.stamp

@@ -9,17 +9,22 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import (
-    ClearanceModel,
     CRITERIA,
     Design,
     DesignSettings,
+    Fitness,
+    fitness,
+    Floor,
     Obstacle,
     obstacles_alone,
+    Run,
     SPEED_CLASSES,
     TARGETS,
     used_shares,
     with_obstacles,
 )
+from armid_ros.excitation.fitness import FIT, UNFIT
+from armid_ros.excitation.heights import vertical
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, digits, pretty, torque_unit
@@ -51,6 +56,8 @@ def excitation_report(
     obstacles: Sequence[Obstacle] = (),
     after: Sequence[str] = (),
     provenance: Provenance | None = None,
+    run: Run | None = None,
+    checked: Fitness | None = None,
 ) -> str:
     """
     Return report.html of a design.
@@ -71,6 +78,10 @@ def excitation_report(
         Recordings that the design adds to.
     provenance : Provenance, optional
         Files, versions, settings, seed.
+    run : Run, optional
+        The design with the way there and back; by default the excitation alone.
+    checked : Fitness, optional
+        What was checked of it; by default it is looked at here, without a floor.
 
     Returns
     -------
@@ -78,8 +89,12 @@ def excitation_report(
         One HTML file that loads nothing.
 
     """
-    run, limits = design.excitation, design.limits
-    motion = run.at(np.linspace(0.0, run.duration, _SAMPLES))
+    excitation, limits = design.excitation, design.limits
+    whole_run = run or excitation
+    motion = whole_run.at(np.linspace(0.0, whole_run.duration, _SAMPLES))
+    if checked is None:
+        floor = Floor(None, vertical(arm.robot.gravity), 'environment' if obstacles else 'given')
+        checked = fitness(motion, limits, collision, floor, obstacles)
     torque = arm.joint_torque(motion)
     motion = replace(motion, tau=torque)
     bodies = {'links from each other': collision}
@@ -91,34 +106,33 @@ def excitation_report(
         if len(model.geometry.collisionPairs)
     }
     whole = with_obstacles(collision, obstacles)
-    instants = run.run_in + np.arange(_POSES) * run.trajectory.period / _POSES
+    instants = excitation.run_in + np.arange(_POSES) * excitation.trajectory.period / _POSES
     sections: list[Section] = [
-        _verdict(design, motion, ClearanceModel.of(whole), collision.notes),
-        Asked(_asked(design, arm, robot, obstacles, after)),
+        _verdict(design, motion, checked, collision.notes),
+        Asked(_asked(design, arm, robot, obstacles, after, run)),
         ArmPoses(
             draw_silhouettes(
                 whole,
-                run.at(instants).q,
+                excitation.at(instants).q,
                 [f'{t:.1f} s' for t in instants],
-                run.trajectory.one_period(_WAY).q,
+                excitation.trajectory.one_period(_WAY).q,
             ),
             ', '.join(obstacle.name for obstacle in obstacles),
         ),
         Foreseen(design),
         PlannedMotion(limits, motion, used_shares(limits, motion, torque)),
         PlannedClearance(motion.t, curves, design.settings.clearance, collision.notes),
-        Harmonics(run.trajectory),
+        Harmonics(excitation.trajectory),
         Origin(provenance or Provenance()),
     ]
     subtitle = (
-        f'{robot} · {run.duration:.4g} s · {run.n_periods} periods · {design.settings.speed}'
+        f'{robot} · {whole_run.duration:.4g} s · {excitation.n_periods} periods · '
+        f'{design.settings.speed}'
     )
     return Page(f'Excitation of {arm.robot.name}', subtitle, sections).html()
 
 
-def _verdict(
-    design: Design, motion: Motion, clearance: ClearanceModel, notes: Sequence[str]
-) -> Verdict:
+def _verdict(design: Design, motion: Motion, checked: Fitness, notes: Sequence[str]) -> Verdict:
     """Say how much is seen, what is known worst, and that nothing is hit."""
     information, settings = design.information, design.settings
     std, names = information.std, information.parameters
@@ -135,7 +149,7 @@ def _verdict(
             f'Known worst will be {full_label(names[worst])}: ± {digits(float(std[worst]))} '
             f'{pretty(names[worst].unit)}.'
         )
-    sentences.append(_kept(design, motion, clearance))
+    sentences.insert(0, _kept(design, motion, checked))
     beware = []
     if unseen:
         beware.append(f'Not seen at all: {", ".join(unseen)}.')
@@ -149,14 +163,6 @@ def _verdict(
             'A URDF has no acceleration limits; each joint was taken to reach its top speed in '
             '0.25 s.'
         )
-    free = [
-        f'{name} of {joint}'
-        for name, bound in (('velocity', design.limits.velocity), ('torque', design.limits.torque))
-        for joint, limit in zip(design.limits.joints, bound, strict=True)
-        if not np.isfinite(limit)
-    ]
-    if free:
-        beware.append(f'The description has no limit to the {", ".join(free)}.')
     if settings.noise is None:
         beware.append(
             'The deviations are for a torque noise of 1 % of the torque limits, which nobody has '
@@ -164,24 +170,30 @@ def _verdict(
         )
     if notes:
         beware.append('Not all bodies were looked at; see Clearance.')
-    tone = 'bad' if unseen else 'fair' if design.stopped else 'good'
-    return Verdict('blind' if unseen else 'fit to run', tone, sentences, beware)
+    tone = 'good' if checked.word == FIT and not design.stopped else 'fair'
+    tone = 'bad' if unseen or checked.word == UNFIT else tone
+    return Verdict('blind' if unseen else checked.word, tone, sentences, beware)
 
 
-def _kept(design: Design, motion: Motion, clearance: ClearanceModel) -> str:
-    """Say that limits and clearance are kept, and where it is tightest."""
+def _kept(design: Design, motion: Motion, checked: Fitness) -> str:
+    """Say that limits and clearance are kept, where it is tightest, and what was not checked."""
     assert motion.tau is not None
     shares = used_shares(design.limits, motion, motion.tau)
     name, share = max(shares.items(), key=lambda item: float(item[1].max()))
     joint = design.limits.joints[int(share.argmax())]
     text = f'It keeps every limit, nearest is the {name} of {joint} at {100.0 * share.max():.0f} %'
-    nearest = clearance.closest(motion)
-    if nearest is None:
-        return f'{text}.'
-    return (
-        f'{text}; nothing comes closer than {nearest.first} and {nearest.second}, '
-        f'{100.0 * nearest.distance:.1f} cm apart at {nearest.time:.1f} s.'
-    )
+    nearest = checked.nearest
+    if nearest is not None:
+        text += (
+            f'; nothing comes closer than {nearest.first} and {nearest.second}, '
+            f'{100.0 * nearest.distance:.1f} cm apart at {nearest.time:.1f} s'
+        )
+    if checked.lowest.link:
+        text += f'; {checked.height()} at {checked.lowest.time:.1f} s'
+    if checked.unchecked:
+        missing = '; '.join(checked.unchecked)
+        text += f'; it is fit to run only if this is right, which was not checked: {missing}'
+    return f'{text}.'
 
 
 def _asked(
@@ -190,11 +202,17 @@ def _asked(
     robot: str,
     obstacles: Sequence[Obstacle],
     after: Sequence[str],
+    whole: Run | None,
 ) -> list[tuple[str, str]]:
     settings, run = design.settings, design.excitation
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
     focus = f'; above all {", ".join(settings.focus)}' if settings.focus else ''
     start = 'the trajectory itself' if run.start is None else _numbers(run.start)
+    if whole is not None:
+        start = (
+            f'{_numbers(whole.approach.q[0])}, from where it takes '
+            f'{whole.approach.duration:.1f} s to get to it'
+        )
     return [
         ('Robot', robot),
         ('Joints', ', '.join(run.joints)),

@@ -12,6 +12,7 @@ Robots: what a URDF says of an arm, and the robots that come with the package.
 from armid_ros.robots.collision import Clearance, collision_model, CollisionModel
 from armid_ros.robots.gravity import GRAVITIES, parse_gravity
 from armid_ros.robots.load import load_robot, robot_from_urdf
+from armid_ros.robots.mounting import Mounting, read_mounting
 from armid_ros.robots.robot import PARAMETERS_PER_BODY, Robot
 from armid_ros.robots.shipped import shipped_robots
 
@@ -26,4 +27,6 @@ __all__ = [
     'collision_model',
     'CollisionModel',
     'Clearance',
+    'Mounting',
+    'read_mounting',
 ]

@@ -52,12 +52,18 @@ class CollisionModel:
         Collision bodies and pairs; never changed.
     notes : tuple of str
         Bodies left out and pairs not checked, for a person to read.
+    left_out : tuple of str
+        Links with a body that was left out, because its mesh was not found.
+    touching : tuple of (str, str)
+        Pairs of links that are not checked, because they touch at zero.
 
     """
 
     robot: Robot
     geometry: pin.GeometryModel = field(repr=False)
     notes: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+    touching: tuple[tuple[str, str], ...] = ()
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -147,7 +153,7 @@ def collision_model(robot: Robot, *, srdf: str | Path | None = None) -> Collisio
         If a file cannot be read or a collision body is not valid.
 
     """
-    geometry, notes = collision_geometry(robot)
+    geometry, missing = collision_geometry(robot)
     disabled = _disabled_pairs(robot, Path(srdf) if srdf is not None else _find_srdf(robot))
     description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
     joined = {frozenset((joint.parent, joint.child)) for joint in description.joints}
@@ -156,14 +162,17 @@ def collision_model(robot: Robot, *, srdf: str | Path | None = None) -> Collisio
         links = frozenset((_link(robot, first), _link(robot, second)))
         if first.parentJoint != second.parentJoint and links not in joined | disabled:
             geometry.addCollisionPair(pin.CollisionPair(i, j))
-    if not disabled:
-        notes += _leave_out_touching(robot, geometry)
+    touching = () if disabled else _leave_out_touching(robot, geometry)
     _leave_out_separate(robot, geometry)
-    return CollisionModel(robot=robot, geometry=geometry, notes=notes)
+    doubts = (
+        f"links '{first}' and '{second}' touch at zero and there is no SRDF; not checked"
+        for first, second in touching
+    )
+    return CollisionModel(robot, geometry, (*missing.values(), *doubts), tuple(missing), touching)
 
 
-def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[str, ...]:
-    """Remove the pairs of links that touch at zero; say which."""
+def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tuple[str, str], ...]:
+    """Remove the pairs of links that touch at zero; return them in alphabetical order."""
     data, placed = robot.model.createData(), geometry.createData()
     pin.computeDistances(robot.model, data, geometry, placed, _zero(robot))
     touching = {
@@ -179,10 +188,7 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[str,
             if _links(robot, geometry, number) not in touching
         ],
     )
-    return tuple(
-        f"links '{first}' and '{second}' touch at zero and there is no SRDF; not checked"
-        for first, second in sorted(touching)
-    )
+    return tuple(sorted(touching))
 
 
 def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:

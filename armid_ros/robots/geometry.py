@@ -18,7 +18,7 @@ import pinocchio as pin
 _Meshes = dict[tuple[Path, tuple[float, float, float]], tuple[coal.CollisionGeometry, ...]]
 
 
-def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]]:
+def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, dict[str, str]]:
     """
     Return the collision bodies of a robot, and notes on those that had to be left out.
 
@@ -29,8 +29,8 @@ def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]
     -------
     geometry : pinocchio.GeometryModel
         The bodies, without collision pairs.
-    notes : tuple of str
-        What was left out.
+    notes : dict of str to str
+        Links whose mesh was not found, each with a note on it.
 
     Raises
     ------
@@ -38,7 +38,8 @@ def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]
         If a <collision> has no geometry or numbers that are none, or a mesh cannot be read.
 
     """
-    geometry, notes = pin.GeometryModel(), []
+    geometry = pin.GeometryModel()
+    notes: dict[str, str] = {}
     meshes: _Meshes = {}
     frames = {
         frame.name: index
@@ -58,7 +59,7 @@ def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]
                     f'sphere, cylinder or mesh with its numbers'
                 ) from None
             if missing:
-                notes.append(f"link '{name}': collision mesh {missing} not found; left out")
+                notes[name] = f"link '{name}': collision mesh {missing} not found; left out"
             for piece, shape in enumerate(shapes):
                 geometry.addGeometryObject(
                     pin.GeometryObject(
@@ -69,7 +70,7 @@ def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]
                         shape,
                     )
                 )
-    return geometry, tuple(notes)
+    return geometry, notes
 
 
 def _shapes(

@@ -170,6 +170,27 @@ class Reference:
         )
         return Reference(robot.joints, self.t, self.q[:, order], dq, ddq, tau)
 
+    def remaining(self, late: float) -> Reference:
+        """
+        Return what is left of the reference when it was to begin some time ago.
+
+        Waypoints that are past are left out, and as long again, in which the arm catches up; where
+        that leaves none, the reference is returned as it is.
+
+        Parameters
+        ----------
+        late : float
+            How long ago it was to begin [s].
+
+        """
+        left = self.t > 2.0 * late
+        if late <= 0.0 or not left.any():
+            return self
+        dq, ddq, tau = (
+            None if values is None else values[left] for values in (self.dq, self.ddq, self.tau)
+        )
+        return Reference(self.joints, self.t[left] - late, self.q[left], dq, ddq, tau)
+
     def after(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Reference:
         """
         Return the reference with the way to its first point, from where the arm is at time zero.

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small arms and problems for the excitation tests."""
 
+from importlib.metadata import files
+from pathlib import Path
+
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.excitation import DesignSettings
@@ -110,3 +113,14 @@ def quick():
         iterations=30,
         processes=1,
     )
+
+
+@pytest.fixture(scope='session')
+def example_robot():
+    """Return a function that finds a URDF of example-robot-data by its name."""
+    paths = [entry for entry in files('example-robot-data') if entry.suffix == '.urdf']
+
+    def find(name):
+        return next(Path(str(p.locate())) for p in paths if p.name == name)
+
+    return find

@@ -107,6 +107,22 @@ def test_rival_is_judged_by_its_best_fit(w):
     assert RivalCriterion(rival, values).cost(w.T @ w) == pytest.approx(-np.log(residual[0]))
 
 
+@pytest.mark.parametrize('spoil', ['equal', 'idle', 'all idle'])
+def test_rival_columns_that_a_motion_does_not_tell_apart_are_no_reason_to_stop(w, spoil):
+    """One joint that moves slowly: of the rival's columns some are equal, or nothing happens."""
+    w = w.copy()
+    w[:, 1] = w[:, 0] if spoil == 'equal' else 0.0
+    if spoil == 'all idle':
+        w[:, :3] = 0.0
+    values = np.array([0.0, 0.0, 0.0, 0.7, -2.0])
+    torque = w @ values
+    fitted = w[:, :3] @ np.linalg.lstsq(w[:, :3], torque, rcond=None)[0]
+    criterion = RivalCriterion(np.array([1.0, 1.0, 1.0, 0.0, 0.0]), values)
+    cost, gradient = criterion.smooth(w.T @ w)
+    assert cost == pytest.approx(-np.log(np.sum((torque - fitted) ** 2)))
+    assert np.all(np.isfinite(gradient))
+
+
 def test_models_that_no_motion_can_tell_apart_are_refused(two_link, with_effects):
     arm = with_effects(two_link, 'torque_offset')
     with pytest.raises(TrajectoryError, match=r'no motion can tell .* torque_offset'):

@@ -8,12 +8,15 @@ from armid_ros.errors import ArmidError
 from armid_ros.motion import Motion
 from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.recording import write_recording
+from armid_ros.recording import write_joint_trajectory, write_recording
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.writer import BagWriter
 import numpy as np
 import pytest
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from trajectory_msgs.msg import JointTrajectory
 
 SECOND = 10**9
 JOINTS = ('a', 'b')
@@ -95,3 +98,69 @@ def test_what_cannot_be_played_is_said(bench, bag, parameters, message):
         parameters = {'bag': bag, **parameters}
     with pytest.raises(ArmidError, match=message):
         bench.add(BagPlayerNode, **parameters)
+
+
+@pytest.fixture
+def plan(tmp_path):
+    """Write a trajectory that begins at rest at (0.1, -0.2), and moves a joint by 1 rad."""
+    t = np.arange(101) * 0.02
+    x = t / t[-1]
+    q = np.column_stack([0.1 + x**3 * (10.0 - 15.0 * x + 6.0 * x**2), -0.2 + 0.0 * x])
+    dq = np.gradient(q, t, axis=0)
+    write_joint_trajectory(tmp_path / 'plan', Motion(JOINTS, t, q, dq, 0.0 * dq))
+    return str(tmp_path / 'plan')
+
+
+def played(bench, plan, states, **parameters):
+    """Play a plan to an arm that reports some states, and return the player and what was sent."""
+    heard = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+    player = bench.add(BagPlayerNode, bag=plan, **{'subscriber_timeout': 0.5, **parameters})
+    drivers = bench.probe.create_publisher(JointState, 'joint_states', 10)
+    bench.spin_until(drivers.get_subscription_count, 'joint_states')
+    for names, positions in states:
+        drivers.publish(JointState(name=names, position=positions))
+    bench.spin_until(lambda: player.finished)
+    bench.settle()
+    return player, heard
+
+
+def test_a_trajectory_is_sent_to_an_arm_that_is_where_it_begins(bench, plan):
+    player, heard = played(bench, plan, [(['b', 'a'], [-0.2, 0.1])], subscriber_timeout=60.0)
+    assert len(heard) == 1 and not player.failure
+
+
+@pytest.mark.parametrize(
+    ('states', 'words'),
+    [
+        ([(['a', 'b'], [0.1, 0.3])], "'b' is at 0.3 and would have to be at -0.2"),
+        ([(['a'], [0.1])], "no position of joint 'b'"),
+        ([], "no position of joint 'a'"),
+    ],
+    ids=['a jump', 'a joint unknown', 'no arm'],
+)
+def test_a_trajectory_that_would_make_an_arm_jump_is_refused(bench, plan, states, words):
+    player, heard = played(bench, plan, states)
+    assert not heard and words in player.failure
+    assert player.complaints.counts['trajectory'] == 1
+
+
+def test_the_trajectory_of_a_recording_is_kept_from_another_arm(bench, bag, plan, tmp_path):
+    """A bag with joint states of its own was recorded with an arm that is not this one."""
+    topics = ('joint_states', 'joint_trajectory')
+    whole = tmp_path / 'whole'
+    with BagWriter(whole) as writer:
+        for source in (bag, plan):
+            with Bag(source) as read:
+                for topic in read.topics():
+                    if topic.name.lstrip('/') in topics:
+                        writer.add_topic(topic.name, topic.type_name, qos=topic.qos)
+                        for message in read.messages():
+                            if message.topic == topic.name:
+                                writer.write(topic.name, message.cdr, 7 * SECOND)
+    heard = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+    bench.probe.create_publisher(JointState, 'joint_states', 10)
+    player = bench.add(BagPlayerNode, bag=str(whole), subscriber_timeout=0.0, rate=100.0)
+    bench.spin_until(lambda: player.finished)
+    bench.settle()
+    assert not heard and 'somebody else publishes' in player.failure
+    assert player.published['/joint_states'] == 100

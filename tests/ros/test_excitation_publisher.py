@@ -1,8 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The excitation publisher sends whole runs, and stops them on their own path."""
+"""The excitation publisher begins where the arm is, watches it, and stops it."""
 
 from __future__ import annotations
+
+import json
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli.excite import excite
@@ -13,15 +15,20 @@ from armid_ros.excitation import (
     load_excitation,
     random_feasible,
     save_excitation,
+    slowed,
+    transfer_limits,
+    TransferPlanner,
 )
-from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode, slowed
+from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.trajectories import read_trajectory
 from armid_ros.recording import read_joint_trajectory
 from armid_ros.robots import load_robot
+from builtin_interfaces.msg import Time
 from click.testing import CliRunner
 import numpy as np
 import pytest
+from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
 SECOND = 10**9
@@ -51,12 +58,63 @@ def plans(tmp_path_factory):
     return out
 
 
+class StandIn:
+    """Stands in for the drivers of an arm: publishes joint states, and hears trajectories."""
+
+    def __init__(self, bench, joints, q):
+        self._bench = bench
+        self.joints, self.q = tuple(joints), np.array(q, dtype=float)
+        self._publisher = bench.probe.create_publisher(JointState, 'joint_states', 10)
+        self.heard = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+
+    def report(self, seconds, q=None, joints=None):
+        """Publish a joint state with a stamp, and let it be taken."""
+        self._bench.spin_until(lambda: self._publisher.get_subscription_count(), 'joint_states')
+        nanoseconds = round(seconds * SECOND)
+        message = JointState(name=list(joints or self.joints))
+        message.header.stamp = Time(sec=nanoseconds // SECOND, nanosec=nanoseconds % SECOND)
+        message.position = [float(x) for x in (self.q if q is None else q)]
+        self._publisher.publish(message)
+        self._bench.settle()
+
+
+@pytest.fixture
+def arm(bench, robot):
+    return StandIn(bench, robot.joints, (robot.lower + robot.upper) / 2.0)
+
+
+def free_planner(robot):
+    """Plan without bodies: the excitations here are drawn without looking at any."""
+    return TransferPlanner(ArmModel(robot), transfer_limits(robot, 1.0), None, 0.0)
+
+
 def waiting_publisher(bench, excitation, **parameters):
     """Make a publisher on simulated time, at 100 s, that begins when it is told."""
-    options = {'start': False, 'use_sim_time': True, 'approach': APPROACH, **parameters}
-    node = bench.add(ExcitationPublisherNode, excitation, **options)
+    planner = free_planner(load_robot('humanoid_arm')) if excitation is not None else None
+    options = {'start': False, 'use_sim_time': True, 'approach': APPROACH, 'state_timeout': 0.5}
+    options.update(parameters)
+    node = bench.add(ExcitationPublisherNode, excitation, planner, **options)
     bench.tick(100 * SECOND)
     return node
+
+
+def running(bench, arm, excitation, **parameters):
+    """Make a publisher that has sent a run at 100 s."""
+    node = waiting_publisher(bench, excitation, **parameters)
+    arm.report(100.0)
+    node.start()
+    sent(bench, arm.heard, 1)
+    return node
+
+
+def follow(bench, arm, until, off=0.0, step=0.2):
+    """Let the arm follow what it heard last from 100 s on, off by something at the end."""
+    reference = read_trajectory(arm.heard[0])
+    times = np.arange(100.0 + step, until + 1e-9, step)
+    for time in times:
+        bench.tick(round(time * SECOND))
+        q = reference.sample(np.array([time - 100.0])).q[0]
+        arm.report(time, q + (off if time == times[-1] else 0.0))
 
 
 def sent(bench, messages, count):
@@ -65,73 +123,220 @@ def sent(bench, messages, count):
     return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec, read_trajectory(message)
 
 
-def test_start_sends_the_run_stamped_with_its_beginning(bench, excitation):
-    messages = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+def test_start_sends_the_way_from_where_the_arm_is_and_the_run(bench, arm, excitation, robot):
     node = waiting_publisher(bench, excitation)
+    arm.report(100.0)
     assert bench.call('excitation_publisher/start').success
-    stamp, reference = sent(bench, messages, 1)
-    assert stamp == 100.0
-    assert reference.t[0] == APPROACH and reference.duration == pytest.approx(node.duration)
-    run = excitation.at(reference.t - APPROACH)
-    np.testing.assert_allclose(reference.q, run.q, atol=1e-9)
-    np.testing.assert_allclose(reference.dq, run.dq, atol=1e-9)
-    np.testing.assert_allclose(reference.dq[[0, -1]], 0.0, atol=1e-9)
+    stamp, reference = sent(bench, arm.heard, 1)
+    assert stamp == 100.0 and reference.t[0] > 0.0
+    curve = reference.for_robot(robot).after(arm.q, np.zeros(6), np.zeros(6))
+    assert np.abs(curve.q[1] - curve.q[0]).max() < 0.01
+    curve.require_limits(robot, 0.001)
+    assert reference.duration == pytest.approx(node.duration, abs=1e-6)
+    way = node.duration - excitation.duration
+    assert way >= APPROACH
+    late = reference.t >= way
+    run = excitation.at(reference.t[late] - way)
+    np.testing.assert_allclose(reference.q[late], run.q, atol=1e-6)
+    np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
     again = bench.call('excitation_publisher/start')
     assert not again.success and 'under way' in again.message
 
 
-def test_it_begins_by_itself_when_somebody_listens(bench, excitation):
+def test_the_way_takes_the_time_that_distance_and_limits_ask_for(bench, arm, excitation, robot):
+    slow = TransferPlanner(ArmModel(robot), transfer_limits(robot, 0.05), None, 0.0)
+    node = bench.add(ExcitationPublisherNode, excitation, slow, use_sim_time=True, start=False)
+    bench.tick(100 * SECOND)
+    arm.report(100.0)
+    node.start()
+    _, reference = sent(bench, arm.heard, 1)
+    way = node.duration - excitation.duration
+    speed = np.abs(reference.dq[reference.t < way]).max(axis=0) / robot.velocity_limit
+    assert speed.max() == pytest.approx(0.05, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ('report', 'words'),
+    [
+        (lambda bench, arm: None, "no position of joint 'shoulder_pitch' was received"),
+        (lambda bench, arm: arm.report(99.0, arm.q[:5], arm.joints[:5]), "'wrist_pitch'"),
+        (lambda bench, arm: arm.report(99.0, [*arm.q[:5], np.nan]), "'wrist_pitch'"),
+        (lambda bench, arm: arm.report(100.0) or bench.tick(102 * SECOND), '2.00 s ago'),
+    ],
+    ids=['none', 'a joint missing', 'a joint not a number', 'an old one'],
+)
+def test_without_a_fresh_joint_state_it_does_not_start(bench, arm, excitation, report, words):
+    waiting_publisher(bench, excitation)
+    report(bench, arm)
+    answer = bench.call('excitation_publisher/start')
+    assert not answer.success and words in answer.message and not arm.heard
+
+
+def test_a_joint_state_that_is_sent_again_is_not_fresh(bench, arm, excitation):
+    waiting_publisher(bench, excitation)
+    arm.report(100.0)
+    bench.tick(101 * SECOND)
+    arm.report(100.0)
+    answer = bench.call('excitation_publisher/start')
+    assert not answer.success and '1.00 s ago' in answer.message
+
+
+def test_joint_states_of_two_publishers_make_one_pose(bench, arm, excitation):
+    waiting_publisher(bench, excitation)
+    arm.report(100.0, arm.q[:2], arm.joints[:2])
+    arm.report(100.0, arm.q[:1:-1], arm.joints[:1:-1])
+    assert bench.call('excitation_publisher/start').success
+
+
+def test_from_a_pose_that_is_not_free_it_does_not_start(bench, arm, robot, plans):
+    file = str(plans / 'slow' / 'excitation.yaml')
+    waiting_publisher(bench, None, file=file, rate=50.0, floor='-0.3')
+    arm.report(100.0, [np.pi / 2, -np.pi / 2, 0, 0, 0, 0])
+    answer = bench.call('excitation_publisher/start')
+    assert not answer.success and 'floor' in answer.message and not arm.heard
+
+
+def test_beyond_a_limit_it_does_not_start_and_names_the_joint(bench, arm, excitation):
+    waiting_publisher(bench, excitation)
+    arm.report(100.0, arm.q + 9.0 * (np.arange(6) == 3))
+    answer = bench.call('excitation_publisher/start')
+    assert not answer.success and 'elbow_pitch' in answer.message and not arm.heard
+
+
+def test_it_begins_by_itself_only_in_a_simulation(bench, arm, excitation, robot):
+    for name, parameters, begins in (
+        ('hardware', {}, False),
+        ('marked', {'simulation': True}, True),
+        ('clocked', {'use_sim_time': True}, True),
+        ('told', {'simulation': True, 'start': False}, False),
+    ):
+        node = bench.add(
+            lambda *a, **kw: ExcitationPublisherNode(*a, **kw),
+            excitation,
+            free_planner(robot),
+            namespace=f'/{name}',
+            **parameters,
+        )
+        assert node.value('start') is begins
+        assert node.value('speed') == ('fast' if parameters else 'slow')
+
+
+def test_on_hardware_nothing_is_sent_until_it_is_asked_for(bench, arm, excitation, robot):
+    node = bench.add(ExcitationPublisherNode, excitation, free_planner(robot))
+    arm.report(1.0)
+    for _ in range(3):
+        node.look()
+    bench.settle()
+    assert not arm.heard
+    arm.report(2.0)
+    assert bench.call('excitation_publisher/start').success
+    sent(bench, arm.heard, 1)
+
+
+def test_it_begins_by_itself_when_somebody_listens_and_the_arm_is_heard_of(
+    bench, robot, excitation
+):
     node = waiting_publisher(bench, excitation, start=True)
     bench.settle()
     assert node.elapsed is None
-    messages = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
-    sent(bench, messages, 1)
+    arm = StandIn(bench, robot.joints, (robot.lower + robot.upper) / 2.0)
+    bench.spin_until(lambda: node.readers)
+    node.look()
+    assert node.elapsed is None
+    arm.report(100.0)
+    node.look()
+    sent(bench, arm.heard, 1)
 
 
-def test_who_comes_late_gets_the_run_with_the_stamp_it_began_at(bench, excitation):
-    waiting_publisher(bench, excitation).start()
-    bench.tick(103 * SECOND)
+def test_who_comes_late_gets_the_run_with_the_stamp_it_began_at(bench, arm, excitation):
+    running(bench, arm, excitation)
+    follow(bench, arm, 103.0)
     messages = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
     stamp, _ = sent(bench, messages, 1)
     assert stamp == 100.0
 
 
-def test_stop_brings_it_to_rest_on_the_path(bench, excitation, robot):
-    messages = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
-    node = waiting_publisher(bench, excitation)
-    node.start()
-    sent(bench, messages, 1)
-    bench.tick(104 * SECOND)
+@pytest.mark.parametrize('seconds', [1.0, 4.0], ids=['on the way there', 'in the excitation'])
+def test_stop_brings_it_to_rest_on_the_path(bench, arm, excitation, robot, seconds):
+    node = running(bench, arm, excitation)
+    _, path = sent(bench, arm.heard, 1)
+    follow(bench, arm, 100.0 + seconds)
     assert bench.call('excitation_publisher/stop').success
-    _, reference = sent(bench, messages, 2)
-    phase = 104.0 - 100.0 - APPROACH
-    ahead = excitation.at(phase + np.linspace(0.0, 1.0, 2001)).q
+    _, reference = sent(bench, arm.heard, 2)
+    ahead = path.sample(seconds + np.linspace(0.0, 1.0, 2001)).q
     for q in reference.q[::10]:
         assert np.abs(ahead - q).max(axis=1).min() < 2e-3
     np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
+    assert reference.duration < 1.0
     reference.for_robot(robot).require_limits(robot, 0.001)
     assert node.elapsed is None
     refused = bench.call('excitation_publisher/stop')
     assert not refused.success and 'nothing' in refused.message
 
 
-def test_stop_on_the_way_there_ends_at_the_first_point(bench, excitation):
-    messages = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
-    node = waiting_publisher(bench, excitation)
-    node.start()
-    sent(bench, messages, 1)
-    bench.tick(101 * SECOND)
-    node.stop()
-    _, reference = sent(bench, messages, 2)
-    assert len(reference.t) == 1 and reference.t[0] == pytest.approx(APPROACH - 1.0)
-    np.testing.assert_allclose(reference.q[0], excitation.at([0.0]).q[0])
+def test_an_arm_that_does_not_follow_is_stopped_where_it_is(bench, arm, excitation, robot):
+    node, diagnostics = running(bench, arm, excitation), bench.diagnostics()
+    off = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
+    follow(bench, arm, 104.0, off=off)
+    stamp, reference = sent(bench, arm.heard, 2)
+    where = read_trajectory(arm.heard[0]).sample(np.array([4.0])).q[0] + off
+    assert stamp == 104.0 and node.elapsed is None
+    np.testing.assert_allclose(reference.q[-1], where, atol=1e-6)
+    np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
+    status = bench.diagnose(node, diagnostics)
+    assert f"'{robot.joints[2]}' is 0.3 rad from where it should be" in status.message
 
 
-def test_after_the_end_it_can_start_again(bench, excitation):
-    node = waiting_publisher(bench, excitation)
-    node.start()
-    bench.tick(round((100.0 + node.duration + 0.1) * SECOND))
+def test_an_arm_that_follows_as_well_as_is_tolerated_goes_on(bench, arm, excitation):
+    node = running(bench, arm, excitation, tracking_tolerance=0.4)
+    follow(bench, arm, 104.0, off=0.3)
+    assert node.elapsed == pytest.approx(4.0) and len(arm.heard) == 1
+
+
+@pytest.mark.parametrize('late', [0.0, 0.4])
+def test_an_arm_is_compared_with_where_it_should_be_at_the_stamp(bench, arm, excitation, late):
+    """A simulation that cannot keep up, or a slow network, is not an arm that lags."""
+    node = running(bench, arm, excitation, tracking_tolerance=0.02)
+    reference = read_trajectory(arm.heard[0])
+    for time in np.arange(100.2, 104.0, 0.2):
+        bench.tick(round((time + late) * SECOND))
+        arm.report(time, reference.sample(np.array([time - 100.0])).q[0])
+    assert node.elapsed is not None and len(arm.heard) == 1
+
+
+def test_an_arm_that_falls_silent_is_stopped_on_its_path(bench, arm, excitation):
+    node, diagnostics = running(bench, arm, excitation), bench.diagnostics()
+    follow(bench, arm, 103.0)
+    bench.tick(round(103.4 * SECOND))
+    node.look()
+    assert node.elapsed is not None
+    bench.tick(round(103.6 * SECOND))
+    node.look()
+    _, reference = sent(bench, arm.heard, 2)
+    np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
+    assert node.elapsed is None
+    assert '0.60 s ago, more than 0.5 s' in bench.diagnose(node, diagnostics).message
+
+
+@pytest.mark.parametrize('end', ['close', 'destroy_node'])
+def test_a_node_that_ends_stops_the_arm(bench, arm, excitation, end):
+    node = running(bench, arm, excitation)
+    follow(bench, arm, 104.0)
+    if end == 'destroy_node':
+        bench.executor.remove_node(node)
+    getattr(node, end)()
+    _, reference = sent(bench, arm.heard, 2)
+    np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
+    assert reference.duration < 1.0
+
+
+def test_after_the_end_it_can_start_again(bench, arm, excitation):
+    node = running(bench, arm, excitation)
+    end = 100.0 + node.duration + 0.1
+    bench.tick(round(end * SECOND))
+    arm.report(end)
     assert bench.call('excitation_publisher/start').success
+    node.close()
 
 
 def test_slowing_down_is_the_derivative_of_where_it_is(excitation):
@@ -142,23 +347,38 @@ def test_slowing_down_is_the_derivative_of_where_it_is(excitation):
     np.testing.assert_allclose(motion.ddq, numeric, atol=0.05)
 
 
-def test_a_file_is_loaded(bench, excitation, tmp_path):
-    save_excitation(excitation, tmp_path / 'run.yaml')
-    node = bench.add(ExcitationPublisherNode, file=str(tmp_path / 'run.yaml'), start=False)
-    assert node.duration == pytest.approx(3.0 + excitation.duration)
-    assert load_excitation(tmp_path / 'run.yaml').joints == excitation.joints
+def test_a_file_is_loaded(bench, plans):
+    file = plans / 'slow' / 'excitation.yaml'
+    excitation = load_excitation(file)
+    node = bench.add(ExcitationPublisherNode, file=str(file), rate=50.0)
+    assert node.duration == pytest.approx(3.0 + excitation.sampled_duration(50.0))
 
 
 @pytest.mark.parametrize('speed', ['slow', 'fast'])
-def test_what_armid_excite_writes_is_run_as_its_bag_has_it(bench, plans, robot, speed):
+def test_what_armid_excite_writes_is_run_as_its_bag_has_it(bench, arm, plans, robot, speed):
     planned = read_joint_trajectory(plans / speed / 'trajectory', joints=robot.joints)
-    messages = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+    excitation = load_excitation(plans / speed / 'excitation.yaml')
     file = str(plans / speed / 'excitation.yaml')
-    waiting_publisher(bench, None, file=file, rate=50.0).start()
-    _, reference = sent(bench, messages, 1)
-    np.testing.assert_allclose(reference.t - APPROACH, planned.t, atol=1e-6)
+    node = waiting_publisher(bench, None, file=file, rate=50.0)
+    arm.report(100.0)
+    node.start()
+    _, reference = sent(bench, arm.heard, 1)
+    count = round(50.0 * excitation.sampled_duration(50.0)) + 1
+    document = json.loads((plans / speed / 'excitation.json').read_text())
+    begin = round(50.0 * document['approach'])
     for name in ('q', 'dq', 'ddq'):
-        np.testing.assert_allclose(getattr(reference, name), getattr(planned, name), atol=1e-9)
+        np.testing.assert_allclose(
+            getattr(reference, name)[-count:],
+            getattr(planned, name)[begin : begin + count],
+            atol=1e-6,
+        )
+
+
+def test_a_file_that_hits_the_floor_is_refused(bench, plans):
+    with pytest.raises(ArmidError, match=r'excitation\.yaml: .*floor'):
+        bench.add(
+            ExcitationPublisherNode, file=str(plans / 'fast' / 'excitation.yaml'), floor='-0.05'
+        )
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
+from trajectory_msgs.msg import JointTrajectory
 
 PATIENCE = 120.0
 
@@ -75,7 +76,9 @@ def test_arm_identifier_recorder_and_player_work_together(bench, processes, tmp_
     recorder = processes.start('recorder', f'bag:={bag}', 'topics:=[joint_states]')
     identifier = processes.start('online_identifier')
     save_excitation(short_excitation(), tmp_path / 'run.yaml')
-    excitation = processes.start('excitation_publisher', f'file:={tmp_path / "run.yaml"}')
+    excitation = processes.start(
+        'excitation_publisher', f'file:={tmp_path / "run.yaml"}', 'simulation:=true'
+    )
     arm = processes.start('simulated_arm', 'rate:=200.0')
 
     def recorded():
@@ -98,6 +101,40 @@ def test_arm_identifier_recorder_and_player_work_together(bench, processes, tmp_
     player = processes.start('bag_player', f'bag:={bag}', 'rate:=20.0', 'subscriber_timeout:=0.0')
     _, errors = player.communicate(timeout=PATIENCE)
     assert player.returncode == 0, errors
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_publisher_that_is_ended_stops_the_arm(bench, processes, tmp_path, number):
+    """What the arm hears last brings it to rest, long before the run would have ended."""
+    save_excitation(short_excitation(), tmp_path / 'run.yaml')
+    heard = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+    processes.start('simulated_arm', 'rate:=200.0')
+    excitation = processes.start(
+        'excitation_publisher',
+        f'file:={tmp_path / "run.yaml"}',
+        'simulation:=true',
+        'approach:=60.0',
+    )
+    bench.spin_until(lambda: heard, 'the run')
+    errors = processes.end(excitation, number, number)
+    assert excitation.returncode == 0 and 'Traceback' not in errors, errors
+    bench.spin_until(lambda: len(heard) == 2, 'the way to rest')
+    last = heard[1].points[-1]
+    assert last.time_from_start.sec < 2 and np.allclose(last.velocities, 0.0)
+
+
+def test_a_publisher_that_designs_is_ended_at_once(bench, processes):
+    """The design would take a day; nothing is published, and nothing is said but what it does."""
+    log = bench.rosout()
+    heard = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+    excitation = processes.start(
+        'excitation_publisher', 'design_time:=86400.0', 'duration:=3600.0', 'harmonics:=30'
+    )
+    bench.spin_until(lambda: any('making' in m.msg for m in log), 'the design')
+    assert excitation.poll() is None
+    errors = processes.end(excitation, signal.SIGTERM)
+    assert excitation.returncode == 0 and 'Traceback' not in errors, errors
+    assert not heard
 
 
 def test_what_a_killed_recorder_leaves_is_read(bench, processes, tmp_path):

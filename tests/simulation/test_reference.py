@@ -141,3 +141,14 @@ def test_lower_and_velocity_limits_are_named(humanoid) -> None:
     fast = Reference(humanoid.joints, np.array([0.0, 0.1]), q)
     with pytest.raises(TrajectoryError, match=r"'shoulder_pitch' reaches 5 rad/s .* velocity"):
         fast.require_limits(humanoid, 1e-3)
+
+
+def test_what_was_to_begin_some_time_ago_is_joined_where_it_is_by_now():
+    t = np.linspace(0.0, 4.0, 41)
+    q = np.sin(t)[:, np.newaxis]
+    whole = Reference(('a',), t, q, np.cos(t)[:, np.newaxis])
+    late = whole.remaining(0.55)
+    ahead = np.linspace(late.t[0], late.t[-1], 50)
+    np.testing.assert_allclose(late.sample(ahead).q, whole.sample(ahead + 0.55).q, atol=1e-9)
+    assert 0.5 < late.t[0] < 0.7
+    assert whole.remaining(0.0) is whole and whole.remaining(3.0) is whole

@@ -1,0 +1,146 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""All that an arm does for an excitation: the way there, the excitation, and the way back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation.schedule import Excitation
+from armid_ros.excitation.transfer import Transfer, TransferPlanner
+from armid_ros.excitation.unwinding import unwound
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+import numpy.typing as npt
+
+#: How far the end of the way there may be from the start of the excitation [rad or m].
+_GAP = 1e-9
+
+
+@dataclass(frozen=True)
+class Run:
+    """
+    The way to an excitation, the excitation, and the way back to where the arm was.
+
+    Attributes
+    ----------
+    approach : Transfer
+        Ends where the excitation begins.
+    excitation : Excitation
+        What is to be seen.
+    back : Transfer or None
+        Begins where the excitation ends; None: the arm stays there.
+    rate : float
+        Samples per second [Hz]; a period is a whole number of samples.
+
+    """
+
+    approach: Transfer
+    excitation: Excitation
+    back: Transfer | None
+    rate: float
+
+    def __post_init__(self) -> None:
+        """Make the ways whole numbers of samples long, and check that they meet."""
+        ends = self.excitation.at([0.0, self.excitation.duration]).q
+        for way, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
+            if way is not None and np.abs(way.q[own] - ends[end]).max() > _GAP:
+                raise TrajectoryError('run: the way and the excitation do not meet')
+        for name in ('approach', 'back'):
+            way = getattr(self, name)
+            if way is not None:
+                whole = max(math.ceil(way.duration * self.rate - 1e-6), 1)
+                object.__setattr__(self, name, way.lasting(whole / self.rate))
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joint names."""
+        return self.excitation.joints
+
+    @property
+    def duration(self) -> float:
+        """Duration from rest to rest [s]."""
+        back = 0.0 if self.back is None else self.back.duration
+        return self.approach.duration + self._lasts + back
+
+    @property
+    def _lasts(self) -> float:
+        """Duration of the excitation in whole samples [s]."""
+        return self.excitation.sampled_duration(self.rate)
+
+    def at(self, t: npt.ArrayLike) -> Motion:
+        """Evaluate the run at times of shape (N,) [s]; at rest before its start and after it."""
+        time = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
+        begin, lasts = self.approach.duration, self._lasts
+        early = 0.5 * (lasts - self.excitation.duration)
+        parts = [self.approach.at(time), self.excitation.at(time - begin - early)]
+        choice = (time > begin).astype(int)
+        if self.back is not None:
+            parts.append(self.back.at(time - begin - lasts))
+            choice += time > begin + lasts
+        q, dq, ddq = (
+            np.choose(choice[:, np.newaxis], [getattr(part, name) for part in parts])
+            for name in ('q', 'dq', 'ddq')
+        )
+        return Motion(self.joints, time, q, dq, ddq)
+
+    def motion(self) -> Motion:
+        """Sample the whole run, from time 0 on."""
+        ways = [self._sampled(self.approach), self.excitation.motion(self.rate)]
+        if self.back is not None:
+            ways.append(self._sampled(self.back))
+        q, dq, ddq = (
+            np.vstack([getattr(way, name)[min(number, 1) :] for number, way in enumerate(ways)])
+            for name in ('q', 'dq', 'ddq')
+        )
+        return Motion(self.joints, np.arange(len(q)) / self.rate, q, dq, ddq)
+
+    def _sampled(self, way: Transfer) -> Motion:
+        count = round(way.duration * self.rate) + 1
+        return way.at(np.arange(count) / self.rate)
+
+
+def plan_run(
+    excitation: Excitation,
+    planner: TransferPlanner,
+    start: FloatArray,
+    rate: float,
+    *,
+    shortest: float = 0.0,
+    back: bool = True,
+    seed: int = 0,
+) -> Run:
+    """
+    Plan how an arm gets from where it stands into an excitation, and back.
+
+    Parameters
+    ----------
+    excitation : Excitation
+        What is to be run; its joints may be turned by whole turns.
+    planner : TransferPlanner
+        What the ways have to keep.
+    start : ndarray, shape (n,)
+        Where the arm stands [rad or m].
+    rate : float
+        Samples per second [Hz].
+    shortest : float
+        Time of a way at least [s].
+    back : bool
+        Whether it returns to where it stood.
+    seed : int
+        Of the search for a way.
+
+    Raises
+    ------
+    TrajectoryError
+        If there is no way; names what stands in it.
+
+    """
+    if planner.limits is not None:
+        excitation = unwound(excitation, planner.arm, planner.limits, start)
+    first, last = excitation.at([0.0, excitation.duration]).q
+    there = planner(start, first, shortest, seed)
+    home = planner(start, last, shortest, seed).reversed() if back else None
+    return Run(there, excitation, home, rate)

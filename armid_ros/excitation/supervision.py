@@ -1,0 +1,263 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where an arm is while it runs, whether it follows, and how it is brought to rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+import math
+from typing import Protocol
+
+from armid_ros.motion import FloatArray, Motion, read_only
+import numpy as np
+import numpy.typing as npt
+
+#: How long a controller may take to begin with a trajectory that slows the arm down [s].
+HANDOVER = 0.05
+#: Factor by which coming to rest is made longer where it would be too fast, and how often.
+_LONGER, _TRIES = 1.3, 12
+
+
+class Path(Protocol):
+    """What an arm follows: a `Run`, an `Excitation` or a `Transfer`."""
+
+    def at(self, t: npt.ArrayLike) -> Motion:
+        """Evaluate it at times [s]."""
+
+
+@dataclass(frozen=True)
+class MeasuredPose:
+    """
+    Where the joints of an arm were measured to be, whoever published them.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        n joint names.
+    q : ndarray, shape (n,)
+        Latest positions [rad or m]; NaN where none came.
+    seen : ndarray, shape (n,)
+        When each of them came [s]; minus infinity where none came.
+    stamps : tuple of int
+        Their stamps [ns]; a stamp that comes again is no news.
+
+    """
+
+    joints: tuple[str, ...]
+    q: FloatArray
+    seen: FloatArray
+    stamps: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        object.__setattr__(self, 'q', read_only(self.q))
+        object.__setattr__(self, 'seen', read_only(self.seen))
+
+    @classmethod
+    def unknown(cls, joints: tuple[str, ...]) -> MeasuredPose:
+        """Return the pose of an arm that was not heard of yet."""
+        n = len(joints)
+        return cls(joints, np.full(n, np.nan), np.full(n, -np.inf), (0,) * n)
+
+    def updated(
+        self, names: Sequence[str], positions: Sequence[float], stamp_ns: int, now: float
+    ) -> MeasuredPose:
+        """
+        Take a message into account.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Joints that it names, in any order; others than the arm's are passed over.
+        positions : sequence of float
+            Their positions [rad or m]; those that are no numbers are passed over.
+        stamp_ns : int
+            Its stamp [ns]; 0 where it has none.
+        now : float
+            When it came [s].
+
+        """
+        q, seen, stamps = self.q.copy(), self.seen.copy(), list(self.stamps)
+        for name, position in zip(names, positions, strict=False):
+            if name not in self.joints or not math.isfinite(position):
+                continue
+            j = self.joints.index(name)
+            if stamp_ns and stamp_ns == stamps[j]:
+                continue
+            q[j], seen[j], stamps[j] = position, now, stamp_ns
+        return replace(self, q=q, seen=seen, stamps=tuple(stamps))
+
+    def staleness(self, now: float, timeout: float) -> str:
+        """Say which joint was not heard of for longer than a timeout [s]; empty when none."""
+        age = now - self.seen
+        oldest = int(np.argmax(age))
+        if age[oldest] <= timeout:
+            return ''
+        joint = self.joints[oldest]
+        if not np.isfinite(age[oldest]):
+            return f"no position of joint '{joint}' was received"
+        return (
+            f"the last new position of joint '{joint}' came {age[oldest]:.2f} s ago, more than "
+            f'{timeout:g} s'
+        )
+
+
+def tracking_fault(
+    joints: Sequence[str],
+    units: Sequence[str],
+    wanted: FloatArray,
+    measured: FloatArray,
+    tolerance: float,
+) -> str:
+    """Say which joint is how far from where it should be, each (n,); empty within tolerance."""
+    error = measured - wanted
+    worst = int(np.argmax(np.abs(error)))
+    if abs(error[worst]) <= tolerance:
+        return ''
+    return (
+        f"joint '{joints[worst]}' is {error[worst]:.3g} {units[worst]} from where it should be, "
+        f'more than {tolerance:g} {units[worst]}'
+    )
+
+
+def jump_fault(
+    joints: Sequence[str],
+    first: tuple[float, FloatArray],
+    measured: FloatArray,
+    fastest: FloatArray,
+    tolerance: float,
+) -> str:
+    """
+    Say which joint would jump, and how far, if a trajectory began now.
+
+    Parameters
+    ----------
+    joints : sequence of str
+        n joint names.
+    first : tuple of float and ndarray, shape (n,)
+        Time [s] and positions [rad or m] of its first waypoint.
+    measured : ndarray, shape (n,)
+        Where the arm is [rad or m].
+    fastest : ndarray, shape (n,)
+        Largest velocity on the way to a first waypoint later than time 0 [rad/s or m/s].
+    tolerance : float
+        How far the arm may be from a first waypoint at time 0 [rad or m].
+
+    Returns
+    -------
+    str
+        Empty when nothing jumps.
+
+    """
+    time, q = first
+    allowed = tolerance + fastest * max(time, 0.0)
+    distance = q - measured
+    worst = int(np.argmax(np.abs(distance) / allowed))
+    if abs(distance[worst]) <= allowed[worst]:
+        return ''
+    return (
+        f"joint '{joints[worst]}' is at {measured[worst]:.4g} and would have to be at "
+        f'{q[worst]:.4g} after {time:g} s: a jump of {distance[worst]:.4g}, and at most '
+        f'{allowed[worst]:.3g} is allowed'
+    )
+
+
+def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
+    """
+    Return the way to rest from somewhere on a path, along the path itself.
+
+    Parameters
+    ----------
+    path : Run, Excitation or Transfer
+        What is left of it.
+    phase : float
+        Where it is, time since its start [s].
+    duration : float
+        Time to come to rest [s].
+    rate : float
+        Samples per second [Hz].
+
+    Returns
+    -------
+    Motion
+        From the handover on; the speed along the path falls from 1 to 0 as half a cosine.
+
+    """
+    count = int(np.ceil(duration * rate)) + 1
+    t = np.linspace(min(HANDOVER, duration / 2.0), duration, count)
+    x = np.pi * t / duration
+    motion = path.at(phase + (t + np.sin(x) * duration / np.pi) / 2.0)
+    speed = ((1.0 + np.cos(x)) / 2.0)[:, np.newaxis]
+    change = (-np.pi * np.sin(x) / (2.0 * duration))[:, np.newaxis]
+    return Motion(
+        motion.joints,
+        t,
+        motion.q,
+        speed * motion.dq,
+        speed**2 * motion.ddq + change * motion.dq,
+    )
+
+
+def brought_back(
+    path: Path,
+    phase: float,
+    measured: FloatArray,
+    fastest: FloatArray,
+    duration: float,
+    rate: float,
+) -> Motion:
+    """
+    Return the way of the set point to where an arm was measured that does not follow.
+
+    Parameters
+    ----------
+    path : Run, Excitation or Transfer
+        What the arm should follow.
+    phase : float
+        Where it should be, time since the start [s].
+    measured : ndarray, shape (n,)
+        Where it is [rad or m].
+    fastest : ndarray, shape (n,)
+        Velocity limits [rad/s or m/s].
+    duration : float
+        Time to come to rest at least [s]; longer where that would be too fast.
+    rate : float
+        Samples per second [Hz].
+
+    Returns
+    -------
+    Motion
+        From the handover on: a quintic from the motion it should have, to rest.
+
+    """
+    now = path.at([phase])
+    fastest = np.maximum(fastest, np.abs(now.dq[0]))
+    motion = _quintic(now, measured, duration, rate)
+    for _ in range(_TRIES):
+        if np.all(np.abs(motion.dq) <= fastest):
+            break
+        duration *= _LONGER
+        motion = _quintic(now, measured, duration, rate)
+    return motion
+
+
+def _quintic(now: Motion, goal: FloatArray, duration: float, rate: float) -> Motion:
+    """Go from a moving state, one sample, to rest at a goal, shape (n,)."""
+    count = int(np.ceil(duration * rate)) + 1
+    t = np.linspace(min(HANDOVER, duration / 2.0), duration, count)
+    x = (t / duration)[:, np.newaxis]
+    v, a = now.dq[0] * duration, 0.5 * now.ddq[0] * duration**2
+    way = goal - now.q[0]
+    c = (
+        now.q[0],
+        v,
+        a,
+        10.0 * way - 6.0 * v - 3.0 * a,
+        -15.0 * way + 8.0 * v + 3.0 * a,
+        6.0 * way - 3.0 * v - a,
+    )
+    q = sum(c[k] * x**k for k in range(6))
+    dq = sum(k * c[k] * x ** (k - 1) for k in range(1, 6)) / duration
+    ddq = sum(k * (k - 1) * c[k] * x ** (k - 2) for k in range(2, 6)) / duration**2
+    return Motion(now.joints, t, np.asarray(q), np.asarray(dq), np.asarray(ddq))

@@ -1,0 +1,301 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The way of an arm from one pose to another, from rest to rest, past what stands around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation.clearance import ClearanceModel
+from armid_ros.excitation.heights import zero_pose
+from armid_ros.excitation.limits import check_limits, Limits, SPEED_CLASSES
+from armid_ros.excitation.paths import clear_line, find_path, PathError
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+
+#: Largest velocity and acceleration of a quintic from 0 to 1 in unit time.
+_TOP_VELOCITY, _TOP_ACCELERATION = 1.875, 10.0 / np.sqrt(3.0)
+#: What is slow for a joint whatever its limits are: half a metre a second at the end of an arm of
+#: a metre; and the acceleration that goes with it [rad/s, rad/s^2; m/s, m/s^2].
+_SLOW_VELOCITY, _SLOW_ACCELERATION = 0.5, 1.0
+#: Samples of a way at which its torque is looked at; how it is slowed down, and how often.
+_SAMPLES, _SLOWER, _TRIES = 200, 1.3, 20
+#: How far beyond a position limit a joint may be measured before it is said to be [rad or m].
+_BEYOND = 0.01
+#: Poses about zero that are tried, at each of these distances, where zero itself is not free.
+_NEARBY, _DISTANCES = 200, (0.1, 0.2, 0.4, 0.8, 1.6)
+#: Digits of a pose that was found, so that a person can type it.
+_DIGITS = 2
+_SEED = 0
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """
+    Straight lines in joint space from pose to pose, with a stop at each.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        n joint names.
+    t : ndarray, shape (K,)
+        When it is at each pose, from 0 on [s].
+    q : ndarray, shape (K, n)
+        Poses [rad or m].
+
+    """
+
+    joints: tuple[str, ...]
+    t: FloatArray
+    q: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        object.__setattr__(self, 't', read_only(self.t))
+        object.__setattr__(self, 'q', read_only(self.q))
+
+    @property
+    def duration(self) -> float:
+        """From rest to rest [s]."""
+        return float(self.t[-1])
+
+    def at(self, t: npt.ArrayLike) -> Motion:
+        """Evaluate the way at times of shape (N,) [s]; at rest before its start and after it."""
+        time = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
+        if len(self.t) == 1:
+            q = np.broadcast_to(self.q[0], (len(time), len(self.joints)))
+            return Motion(self.joints, time, q, np.zeros_like(q), np.zeros_like(q))
+        k = np.clip(np.searchsorted(self.t, time, side='right') - 1, 0, len(self.t) - 2)
+        span = np.diff(self.t)[k][:, np.newaxis]
+        x = (time - self.t[k])[:, np.newaxis] / span
+        way = np.diff(self.q, axis=0)[k]
+        return Motion(
+            self.joints,
+            time,
+            self.q[k] + way * x**3 * (10.0 - 15.0 * x + 6.0 * x**2),
+            way / span * 30.0 * x**2 * (1.0 - x) ** 2,
+            way / span**2 * 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
+        )
+
+    def lasting(self, duration: float) -> Transfer:
+        """Return the same way in another time [s]."""
+        if self.duration == 0.0:
+            return replace(self, t=np.array([0.0, duration]), q=np.vstack([self.q, self.q]))
+        return replace(self, t=self.t * (duration / self.duration))
+
+    def reversed(self) -> Transfer:
+        """Return the way back."""
+        return replace(self, t=self.duration - self.t[::-1], q=self.q[::-1])
+
+
+@dataclass(frozen=True)
+class TransferPlanner:
+    """
+    What a way has to keep.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        Prior model, for the torque.
+    limits : Limits or None
+        Limits in force; None: none is looked at, and the time is the shortest asked for.
+    clearance : ClearanceModel or None
+        Bodies to keep apart, the floor among them.
+    margin : float
+        Clearance to keep [m].
+
+    """
+
+    arm: ArmModel
+    limits: Limits | None
+    clearance: ClearanceModel | None
+    margin: float
+
+    def __call__(
+        self, start: FloatArray, goal: FloatArray, shortest: float = 0.0, seed: int = 0
+    ) -> Transfer:
+        """
+        Plan a way.
+
+        Parameters
+        ----------
+        start, goal : ndarray, shape (n,)
+            Poses [rad or m].
+        shortest : float
+            Time to take at least [s].
+        seed : int
+            Of the search for a way around what stands in the straight one.
+
+        Raises
+        ------
+        TrajectoryError
+            If the start or the goal is not allowed, or no way was found; names the limit or the
+            bodies in the way.
+
+        """
+        joints = self.arm.robot.joints
+        if self.limits is None:
+            return Transfer(joints, np.array([0.0, shortest]), np.vstack([start, goal]))
+        start = self._within(start)
+        for name, q in (('it would leave from', start), ('it would go to', goal)):
+            fault = self.fault(q)
+            if fault:
+                raise TrajectoryError(f'the pose that {name} is not free: {fault}')
+        try:
+            poses = find_path(
+                self.clearance,
+                self.margin,
+                (start, goal),
+                (self.limits.lower, self.limits.upper),
+                lambda q: not self._overload(q),
+                np.random.default_rng(seed),
+            )
+        except PathError as error:
+            raise TrajectoryError(f'no way to the trajectory was found: {error}') from None
+        return self._timed(poses, shortest)
+
+    def fault(self, q: FloatArray) -> str:
+        """Say why an arm may not stand in a pose, shape (n,); empty where it may."""
+        assert self.limits is not None
+        violations = check_limits(self.limits, _still(self.limits.joints, q[np.newaxis]))
+        overload = self._overload(q[np.newaxis])
+        if violations or overload:
+            return '; '.join([*map(str, violations), *filter(None, [overload])])
+        near = clear_line(self.clearance, self.margin, q, q)
+        if near is None:
+            return ''
+        return (
+            f'{near.first} and {near.second} are {near.distance:.4f} m apart, less than the '
+            f'clearance of {self.margin:g} m'
+        )
+
+    def free_start(self) -> tuple[FloatArray, str]:
+        """
+        Return the zero of the description, or the pose nearest to it that is free.
+
+        Returns
+        -------
+        q : ndarray, shape (n,)
+            The pose [rad or m].
+        reason : str
+            What is wrong with zero; empty where the pose is zero.
+
+        Raises
+        ------
+        TrajectoryError
+            If no pose about zero is free.
+
+        """
+        assert self.limits is not None
+        zero = zero_pose(self.arm.robot)
+        reason = self.fault(zero)
+        if not reason:
+            return zero, ''
+        rng = np.random.default_rng(_SEED)
+        for distance in _DISTANCES:
+            about = zero + distance * rng.uniform(-1.0, 1.0, (_NEARBY, len(zero)))
+            about = np.clip(about, self.limits.lower, self.limits.upper)
+            about = about[np.argsort(np.linalg.norm(about - zero, axis=1))]
+            for q in about:
+                if not self.fault(q):
+                    return self._simplified(q, zero), reason
+        raise TrajectoryError(
+            f'the zero of {self.arm.robot.name} is not free, nor is a pose about it: {reason}; '
+            'give a pose to start from, --start'
+        )
+
+    def _simplified(self, q: FloatArray, zero: FloatArray) -> FloatArray:
+        """Put joints back to zero that need not leave it, and round the others."""
+        for j in np.argsort(np.abs(q - zero)):
+            other = q.copy()
+            other[j] = zero[j]
+            if not self.fault(other):
+                q = other
+        rounded = np.where(q == zero, zero, np.round(q, _DIGITS))
+        return q if self.fault(rounded) else rounded
+
+    def _within(self, q: FloatArray) -> FloatArray:
+        """Put a pose that is measured a little beyond a limit onto it."""
+        assert self.limits is not None
+        inside = np.clip(q, self.limits.lower, self.limits.upper)
+        return np.where(np.abs(q - inside) <= _BEYOND, inside, q)
+
+    def _overload(self, q: FloatArray) -> str:
+        """Say which joint cannot hold some of the poses, shape (N, n)."""
+        assert self.limits is not None
+        if not np.isfinite(self.limits.torque).any():
+            return ''
+        torque = np.abs(self.arm.joint_torque(_still(self.limits.joints, q)))
+        excess = (torque - self.limits.torque).max(axis=0)
+        worst = int(np.argmax(excess))
+        if excess[worst] <= 0.0:
+            return ''
+        return (
+            f'joint {self.limits.joints[worst]}: holding still takes '
+            f'{torque[:, worst].max():.4g} of {self.limits.torque[worst]:.4g} '
+            f'{self.limits.unit("torque", worst)}'
+        )
+
+    def _timed(self, poses: FloatArray, shortest: float) -> Transfer:
+        """Give a path the time that the limits ask for."""
+        limits = self.limits
+        assert limits is not None
+        way = np.abs(np.diff(poses, axis=0))
+        velocity = np.where(np.isfinite(limits.velocity), limits.velocity, _SLOW_VELOCITY)
+        needed = np.maximum(
+            (_TOP_VELOCITY * way / velocity).max(axis=1),
+            np.sqrt(_TOP_ACCELERATION * way / limits.acceleration).max(axis=1),
+        )
+        t = np.append(0.0, np.cumsum(needed))
+        transfer = Transfer(limits.joints, t, poses)
+        transfer = transfer.lasting(max(transfer.duration, shortest))
+        for _ in range(_TRIES):
+            motion = transfer.at(np.linspace(0.0, transfer.duration, _SAMPLES))
+            violations = check_limits(limits, motion, self.arm.joint_torque(motion))
+            if not violations:
+                return transfer
+            transfer = transfer.lasting(_SLOWER * transfer.duration)
+        raise TrajectoryError(f'no way to the trajectory keeps the limits: {violations[0]}')
+
+
+def transfer_limits(
+    robot: Robot, speed: str | float = 'slow', acceleration: FloatArray | None = None
+) -> Limits:
+    """
+    Return the limits of a way, which has nothing to show and so is slow.
+
+    Parameters
+    ----------
+    robot : Robot
+        Gives the limits; its whole range may be used, for the arm may stand at the end of it.
+    speed : str or float
+        Of the run: a way is never faster than that.
+    acceleration : ndarray, shape (n,), optional
+        Acceleration limits [rad/s^2 or m/s^2].
+
+    """
+    run = Limits.of(
+        robot,
+        speed=speed,
+        torque_fraction=1.0,
+        position_margin=0.0,
+        acceleration=acceleration,
+    )
+    share = SPEED_CLASSES[speed] if isinstance(speed, str) else float(speed)
+    slow = min(1.0, SPEED_CLASSES['slow'] / share)
+    return replace(
+        run,
+        velocity=np.minimum(run.velocity, np.maximum(slow * run.velocity, _SLOW_VELOCITY)),
+        acceleration=np.minimum(
+            run.acceleration, np.maximum(slow * run.acceleration, _SLOW_ACCELERATION)
+        ),
+    )
+
+
+def _still(joints: tuple[str, ...], q: FloatArray) -> Motion:
+    rest = np.zeros_like(q)
+    return Motion(joints, np.arange(len(q), dtype=float), q, rest, rest)

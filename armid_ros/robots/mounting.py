@@ -1,0 +1,63 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How a robot is mounted: what a file beside its description says of the floor below it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import RobotError
+from armid_ros.robots.robot import Robot
+import yaml
+
+#: Of the file beside NAME.urdf or NAME.urdf.xacro.
+SUFFIX = '.mounting.yaml'
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """
+    Where a robot stands.
+
+    Attributes
+    ----------
+    floor : float or None
+        Height of the floor above the origin of the base [m]; None: there is none within reach.
+    path : Path
+        The file that says so.
+
+    """
+
+    floor: float | None
+    path: Path
+
+
+def read_mounting(robot: Robot) -> Mounting | None:
+    """
+    Read NAME.mounting.yaml beside the description of a robot; None where there is none.
+
+    Raises
+    ------
+    RobotError
+        If the file cannot be read, or does not say `floor: HEIGHT` or `floor: none`.
+
+    """
+    if robot.path is None:
+        return None
+    stem = robot.path.name.removesuffix('.xacro').removesuffix('.urdf')
+    path = robot.path.with_name(stem + SUFFIX)
+    if not path.is_file():
+        return None
+    try:
+        content: Any = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise RobotError(f'{path}: {error}') from error
+    floor = content.get('floor') if isinstance(content, dict) else None
+    if floor == 'none':
+        return Mounting(None, path)
+    if isinstance(floor, bool) or not isinstance(floor, int | float) or not math.isfinite(floor):
+        raise RobotError(f'{path}: has to say floor: HEIGHT [m], or floor: none')
+    return Mounting(float(floor), path)

@@ -1,0 +1,180 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A plan begins where the arm stands, stays above its floor, and says what was not checked."""
+
+from importlib.metadata import files
+import json
+
+from armid_ros.arm import ArmModel
+import armid_ros.cli.excitation_files as excitation_files
+from armid_ros.excitation import check_limits, ClearanceModel, Limits, load_excitation
+from armid_ros.excitation.heights import lowest_point
+from armid_ros.recording import read_joint_trajectory, read_recording
+from armid_ros.robots import collision_model, load_robot
+import numpy as np
+import pytest
+
+from .conftest import armid, ROBOT
+
+QUICK = ('--duration', 8, '--starts', 1, '--iterations', 3)
+Z = np.array([0.0, 0.0, 1.0])
+HINGE = (
+    '<robot name="hinge"><link name="base"/><link name="rod"><inertial><origin xyz="0.1 0 0.4"/>'
+    '<mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial>'
+    '<collision><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.03" length="0.4"/></geometry>'
+    '</collision></link><joint name="hinge" type="{kind}"><origin xyz="0 0 0.5"/>'
+    '<parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>'
+    '<limit lower="-1.5" upper="1.5" velocity="2" effort="20"/></joint></robot>'
+)
+
+
+def example(name):
+    paths = [p for p in files('example-robot-data') if p.name == f'{name}.urdf']
+    return str(paths[0].locate())
+
+
+def excite(robot, out, *options, code=0):
+    return armid('excite', '--robot', robot, *QUICK, *options, '--out', out, code=code)
+
+
+def plan_of(robot, out):
+    return read_joint_trajectory(out / 'trajectory', joints=load_robot(robot).joints)
+
+
+@pytest.fixture(scope='module')
+def ur5(tmp_path_factory):
+    """Plan for an arm that stands, and return its folder and what was said."""
+    out = tmp_path_factory.mktemp('ur5') / 'plan'
+    return out, excite(example('ur5_robot'), out, '--seed', 2).stdout
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_an_arm_that_stands_stays_above_its_base_plane(tmp_path, seed):
+    name = example('ur5_robot')
+    result = excite(name, tmp_path / 'plan', '--seed', seed)
+    motion = plan_of(name, tmp_path / 'plan')
+    lowest = lowest_point(collision_model(load_robot(name)), Z, motion)
+    assert lowest.height > 0.0099
+    assert f'lowest point {lowest.height:.3f} m above the floor ({lowest.link})' in result.stdout
+    document = json.loads((tmp_path / 'plan' / 'excitation.json').read_text())
+    assert document['floor'] == {'height': 0.0, 'source': 'base plane'}
+    assert document['lowest_point']['height'] == pytest.approx(lowest.height, abs=1e-9)
+    assert document['not_checked'] == [] and document['verdict'] == 'fit to run'
+
+
+def test_an_arm_whose_zero_is_on_the_floor_starts_beside_it_and_says_so(ur5):
+    out, said = ur5
+    first = plan_of(example('ur5_robot'), out).q[0]
+    assert 0.0 < np.abs(first).max() < 0.2
+    assert 'the zero of the description is not free: wrist_3_link and floor' in said
+
+
+def test_an_arm_that_hangs_is_asked_for_its_floor(tmp_path):
+    name = example('talos_left_arm')
+    refused = excite(name, tmp_path / 'plan', code=2).stderr
+    assert '--floor Z, or --floor none' in refused and len(refused.strip().splitlines()) == 1
+    assert not (tmp_path / 'plan').exists()
+    said = excite(name, tmp_path / 'none', '--floor', 'none').stdout
+    assert 'not checked in all: ' in said and 'the floor (none is given)' in said
+    assert 'fit to run' not in said
+    page = (tmp_path / 'none' / 'report.html').read_text()
+    assert 'class="verdict fair"' in page and 'the floor (none is given)' in page
+
+
+def test_a_floor_that_is_given_is_kept(tmp_path):
+    excite(ROBOT, tmp_path / 'plan', '--floor', -0.4)
+    motion = plan_of(ROBOT, tmp_path / 'plan')
+    assert lowest_point(collision_model(load_robot(ROBOT)), Z, motion).height > -0.3901
+
+
+@pytest.mark.parametrize('start', [None, '0.3,-0.2,0.1,0.5,0,0'])
+@pytest.mark.parametrize('speed', ['slow', 'fast'])
+def test_a_trajectory_begins_and_ends_at_rest_where_the_arm_stands(tmp_path, start, speed):
+    """All of it is inside the limits and clear, the way there and back as well."""
+    options = () if start is None else ('--start', start)
+    said = excite(ROBOT, tmp_path / 'plan', '--speed', speed, *options).stdout
+    motion, robot = plan_of(ROBOT, tmp_path / 'plan'), load_robot(ROBOT)
+    pose = np.zeros(6) if start is None else np.array([float(x) for x in start.split(',')])
+    assert motion.t[0] == 0.0
+    np.testing.assert_allclose(motion.q[[0, -1]], [pose, pose], atol=1e-9)
+    np.testing.assert_allclose(motion.dq[[0, -1]], 0.0, atol=1e-9)
+    assert ('the zero of the description' in said) is (start is None)
+    limits = Limits.of(robot, speed=speed, position_margin=0.0, torque_fraction=1.0)
+    assert check_limits(limits, motion, ArmModel(robot).torque(motion)) == ()
+    assert ClearanceModel.of(collision_model(robot)).smallest(motion.q).min() >= 0.0099
+    excitation = load_excitation(tmp_path / 'plan' / 'excitation.yaml')
+    document = json.loads((tmp_path / 'plan' / 'excitation.json').read_text())
+    begin = round(document['approach'] * 50.0)
+    first, second = (motion.q[begin:][s] for s in excitation.period_slices(50.0))
+    np.testing.assert_allclose(first, second, atol=1e-9)
+
+
+def test_a_start_that_is_not_allowed_is_refused_before_the_design(tmp_path):
+    refused = excite(ROBOT, tmp_path / 'plan', '--start', '9,0,0,0,0,0', code=2).stderr
+    assert '--start: joint shoulder_pitch: upper position' in refused
+    assert not (tmp_path / 'plan').exists()
+
+
+def test_a_simulated_arm_follows_the_plan_from_its_first_point(tmp_path):
+    excite(ROBOT, tmp_path / 'plan')
+    arguments = ('--robot', ROBOT, '--rate', 200, '--trajectory', tmp_path / 'plan' / 'trajectory')
+    armid('simulate', *arguments, '--out', tmp_path / 'run')
+    recording = read_recording(tmp_path / 'run', joints=load_robot(ROBOT).joints)
+    motion = plan_of(ROBOT, tmp_path / 'plan')
+    np.testing.assert_allclose(recording.q[0], motion.q[0], atol=1e-6)
+    assert recording.t[-1] == pytest.approx(motion.t[-1], abs=0.01)
+
+
+def test_a_report_that_fails_costs_nothing_else(tmp_path, monkeypatch):
+    def fail(*_, **__):
+        raise ZeroDivisionError('no picture')
+
+    monkeypatch.setattr(excitation_files, 'excitation_report', fail)
+    result = excite(ROBOT, tmp_path / 'plan')
+    assert 'report.html: not written: ZeroDivisionError: no picture' in result.stderr
+    for name in ('excitation.yaml', 'excitation.csv', 'excitation.json', 'trajectory'):
+        assert (tmp_path / 'plan' / name).exists()
+
+
+def test_a_design_that_fails_does_not_cost_the_one_before_it(tmp_path, monkeypatch):
+    """The second of two speeds cannot be written; the first one is there, whole."""
+    (tmp_path / 'plan').mkdir()
+    (tmp_path / 'plan' / 'fast').write_text('in the way')
+    arguments = ('--robot', ROBOT, *QUICK, '--speed', 'slow,fast', '--out', tmp_path / 'plan')
+    with pytest.raises(AssertionError):
+        armid('excite', *arguments)
+    assert plan_of(ROBOT, tmp_path / 'plan' / 'slow').t[0] == 0.0
+    assert (tmp_path / 'plan' / 'slow' / 'report.html').is_file()
+
+
+def test_the_design_is_kept_where_no_way_leads_to_it(tmp_path, monkeypatch):
+    from armid_ros.errors import TrajectoryError
+
+    def nothing(*_, **__):
+        raise TrajectoryError('walled in')
+
+    monkeypatch.setattr(excitation_files, 'plan_run', nothing)
+    refused = excite(ROBOT, tmp_path / 'plan', code=2).stderr
+    assert 'excitation.yaml holds the design' in refused and 'walled in' in refused
+    assert load_excitation(tmp_path / 'plan' / 'excitation.yaml').n_periods == 2
+
+
+@pytest.mark.parametrize('kind', ['revolute', 'continuous', 'prismatic'])
+@pytest.mark.parametrize('criterion', ['D', 'A', 'E', 'condition', 'T'])
+@pytest.mark.filterwarnings('error')
+def test_an_arm_of_one_joint_is_excited(tmp_path, kind, criterion):
+    urdf = tmp_path / 'hinge.urdf'
+    urdf.write_text(HINGE.format(kind=kind))
+    options = ('--criterion', criterion)
+    if criterion == 'T':
+        size = ('--effect', 'quadratic_friction:quadratic_coefficient=0.05')
+        options += (*size, '--effects', '', '--rival', 'viscous_friction,coulomb_friction')
+    excite(urdf, tmp_path / 'plan', *options)
+    motion = plan_of(urdf, tmp_path / 'plan')
+    assert np.ptp(motion.q) > 0.05
+    assert (tmp_path / 'plan' / 'report.html').is_file()
+
+
+@pytest.mark.filterwarnings('error::RuntimeWarning')
+def test_joints_that_turn_without_end_give_no_warnings(tmp_path):
+    excite(example('double_pendulum_continuous'), tmp_path / 'plan')

@@ -1,0 +1,107 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A verdict is only given with what was not checked, and never without."""
+
+from dataclasses import replace
+import re
+
+from armid_ros.excitation import fitness, Floor, Limits, not_checked, Obstacle
+from armid_ros.excitation.fitness import FIT, PARTLY, UNFIT
+from armid_ros.motion import Motion
+from armid_ros.robots import collision_model, robot_from_urdf
+import numpy as np
+import pytest
+
+from .conftest import urdf
+
+JOINTS = (
+    ('shoulder', 'revolute', 'base', 'upper', '0 0 0.5', '0 1 0', -2.5, 2.5, 60),
+    ('elbow', 'revolute', 'upper', 'lower', '0 0 0.4', '1 0 0', -2.5, 2.5, 30),
+)
+GROUND = Floor(0.0, np.array([0.0, 0.0, 1.0]), 'base plane')
+PLANE = (Obstacle('floor', 'plane'),)
+
+
+def unchecked(text=None, floor=GROUND, obstacles=PLANE, **limits):
+    robot = robot_from_urdf(text or urdf(*JOINTS))
+    bound = replace(Limits.of(robot), **limits)
+    return not_checked(bound, collision_model(robot), floor, obstacles)
+
+
+def without(tag):
+    return re.sub(f'<{tag}>.*?</{tag}>', '', urdf(*JOINTS), count=1)
+
+
+MESH = '<mesh filename="nowhere/link.stl"/>'
+CASES = {
+    'floor': (
+        {'floor': Floor(None, GROUND.up, 'given'), 'obstacles': ()},
+        r'the floor \(none is given\)',
+    ),
+    'environment': (
+        {
+            'floor': Floor(None, GROUND.up, 'environment'),
+            'obstacles': (Obstacle('post', 'sphere', (0.1,), (5.0, 0.0, 0.0)),),
+        },
+        'the environment has no plane',
+    ),
+    'mesh': (
+        {'text': urdf(*JOINTS).replace('<cylinder radius="0.04" length="0.3"/>', MESH, 1)},
+        r'bodies of upper \(mesh not found\)',
+    ),
+    'collision': ({'text': without('collision')}, r'bodies of upper \(no collision body\)'),
+    'inertia': ({'text': without('inertial')}, r'the weight of upper \(no inertia\)'),
+    'velocity': (
+        {'velocity': np.array([np.inf, 1.0])},
+        r'the velocity of shoulder \(no limit\)',
+    ),
+    'torque': ({'torque': np.array([1.0, np.inf])}, r'the torque of elbow \(no limit\)'),
+}
+
+
+def test_of_a_whole_description_everything_is_checked():
+    assert unchecked() == ()
+
+
+@pytest.mark.parametrize('case', CASES)
+def test_what_is_missing_is_named(case):
+    options, words = CASES[case]
+    (found,) = unchecked(**options)
+    assert re.search(words, found)
+
+
+@pytest.mark.parametrize('case', CASES)
+def test_the_verdict_says_it_in_the_same_sentence_with_the_lowest_point(case):
+    options, words = CASES[case]
+    options = {'floor': GROUND, 'obstacles': PLANE, 'text': urdf(*JOINTS), **options}
+    robot = robot_from_urdf(options['text'])
+    bound = {k: v for k, v in options.items() if k not in ('floor', 'obstacles', 'text')}
+    rest = np.zeros((2, 2))
+    motion = Motion(robot.joints, np.arange(2.0), rest, rest, rest)
+    surroundings = (collision_model(robot), options['floor'], options['obstacles'])
+    result = fitness(motion, replace(Limits.of(robot), **bound), *surroundings)
+    assert result.word == PARTLY and FIT not in str(result)
+    assert re.search(
+        f'^{PARTLY}: .*lowest point .* m above the .*; not checked: .*{words}', str(result)
+    )
+
+
+def swung(angle):
+    """Look at an arm that swings down from zero to an angle of its shoulder."""
+    robot = robot_from_urdf(urdf(*JOINTS))
+    q = np.column_stack([np.linspace(0.0, angle, 50), np.zeros(50)])
+    motion = Motion(robot.joints, np.linspace(0.0, 1.0, 50), q, 0.0 * q, 0.0 * q)
+    return fitness(motion, Limits.of(robot), collision_model(robot), GROUND, PLANE)
+
+
+def test_a_verdict_without_reserve_has_the_lowest_point_above_the_floor():
+    result = swung(1.6)
+    assert result.word == FIT
+    assert result.lowest.link == 'lower' and result.lowest.time == 1.0
+    assert result.lowest.height == pytest.approx(result.nearest.distance, abs=1e-6)
+    assert f'lowest point {result.lowest.height:.3f} m above the floor (lower)' in str(result)
+
+
+def test_what_goes_through_the_floor_is_never_fit_to_run():
+    result = swung(2.2)
+    assert result.word == UNFIT and 'm below the floor (lower)' in str(result)

@@ -1,0 +1,63 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where an arm is known to be, whether it follows, and how its set point comes to rest."""
+
+from armid_ros.excitation import brought_back, jump_fault, MeasuredPose, tracking_fault, Transfer
+import numpy as np
+import pytest
+
+JOINTS = ('a', 'b')
+
+
+def test_a_pose_is_put_together_by_name_from_any_messages():
+    pose = MeasuredPose.unknown(JOINTS)
+    assert "joint 'a'" in pose.staleness(0.0, 1.0)
+    pose = pose.updated(['gripper', 'b'], [9.0, 2.0], 5, 10.0)
+    assert "no position of joint 'a'" in pose.staleness(10.0, 1.0)
+    pose = pose.updated(['a'], [1.0], 6, 10.5)
+    np.testing.assert_array_equal(pose.q, [1.0, 2.0])
+    assert pose.staleness(10.9, 1.0) == ''
+    assert "joint 'b' came 1.20 s ago" in pose.staleness(11.2, 1.0)
+
+
+@pytest.mark.parametrize(('stamp', 'position'), [(5, 1.0), (7, np.nan), (7, np.inf)])
+def test_a_stamp_again_or_no_number_is_no_news(stamp, position):
+    pose = MeasuredPose.unknown(JOINTS).updated(JOINTS, [0.0, 0.0], 5, 10.0)
+    pose = pose.updated(JOINTS, [position, position], stamp, 20.0)
+    np.testing.assert_array_equal(pose.q, 0.0)
+    np.testing.assert_array_equal(pose.seen, 10.0)
+
+
+def test_messages_without_stamps_are_news_every_time():
+    pose = MeasuredPose.unknown(JOINTS).updated(JOINTS, [0.0, 0.0], 0, 10.0)
+    assert pose.updated(JOINTS, [0.0, 0.0], 0, 20.0).staleness(20.0, 0.1) == ''
+
+
+def test_the_joint_that_lags_most_is_named_with_how_far():
+    wanted, measured = np.array([1.0, 1.0]), np.array([0.9, 1.3])
+    assert tracking_fault(JOINTS, ('rad', 'm'), wanted, measured, 0.31) == ''
+    assert "'b' is 0.3 m" in tracking_fault(JOINTS, ('rad', 'm'), wanted, measured, 0.2)
+
+
+@pytest.mark.parametrize(('time', 'faulty'), [(0.0, True), (0.2, True), (0.3, False)])
+def test_a_first_waypoint_needs_the_time_to_get_there(time, faulty):
+    fault = jump_fault(JOINTS, (time, np.array([0.0, 0.5])), np.zeros(2), np.full(2, 2.0), 0.01)
+    assert bool(fault) is faulty
+    if faulty:
+        assert "joint 'b'" in fault and '0.5' in fault
+
+
+def test_the_set_point_is_brought_back_smoothly_to_where_the_arm_is():
+    path = Transfer(JOINTS, np.array([0.0, 2.0]), np.array([[0.0, 0.0], [1.0, -1.0]]))
+    now, measured, fastest = path.at([0.8]), np.array([0.1, -0.3]), np.array([0.6, 5.0])
+    motion = brought_back(path, 0.8, measured, fastest, 0.5, 1000.0)
+    np.testing.assert_allclose(motion.q[-1], measured, atol=1e-9)
+    np.testing.assert_allclose(motion.dq[-1], 0.0, atol=1e-9)
+    np.testing.assert_allclose(motion.ddq[-1], 0.0, atol=1e-9)
+    lead = motion.t[0]
+    np.testing.assert_allclose(motion.q[0], now.q[0] + lead * now.dq[0], atol=0.03)
+    np.testing.assert_allclose(
+        motion.dq, np.gradient(motion.q, motion.t, axis=0, edge_order=2), atol=1e-3
+    )
+    allowed = np.maximum(fastest, np.abs(now.dq[0]))
+    assert np.all(np.abs(motion.dq) <= allowed * (1.0 + 1e-9)) and motion.t[-1] >= 0.5
