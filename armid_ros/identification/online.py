@@ -15,6 +15,7 @@ from armid_ros.identification.causal import CausalFilter, CausalMotion, TripleLa
 from armid_ros.identification.change import Change, change_candidates
 from armid_ros.identification.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.friction_beside import by_joint, FrictionBeside
+from armid_ros.identification.online_checks import StreamChecks
 from armid_ros.identification.online_settings import OnlineSettings
 from armid_ros.identification.recursive import RecursiveLeastSquares
 from armid_ros.identification.row_noise import Misfit, RowNoise, sensor_noise
@@ -117,6 +118,7 @@ class OnlineIdentifier:
             prismatic=robot.prismatic,
         )
         self._gate = _gate(arm, settings)
+        self._checks = StreamChecks(robot)
         self.latest: tuple[OnlineSample, ...] = ()
         self._row_filter = TripleLag(settings.cutoff)
         self._row_period = 1.0 / settings.rows_per_second()
@@ -153,6 +155,7 @@ class OnlineIdentifier:
         """Forget everything that was learned, and set the counters to zero."""
         self._filter.reset()
         self._misfit.reset()
+        self._checks.reset()
         self.latest = ()
         if self._gate is not None:
             self._gate.reset()
@@ -194,6 +197,8 @@ class OnlineIdentifier:
 
     def _take(self, t: float, signal: FloatArray) -> tuple[OnlineSample, ...]:
         """Learn from a good sample; return what it brought, if anything."""
+        n = self.arm.robot.n_joints
+        self._checks.take(t, signal[:n], signal[-n:])
         motion = self._filter.advance(t, signal)
         if motion is None:
             return ()
@@ -205,7 +210,8 @@ class OnlineIdentifier:
             return ()
         self._last_row = motion.t
         used = motion.t - useless > _FORGOTTEN / self._row_filter.pole
-        return (self._learn(motion, step, used),)
+        usable = not (self._checks.silent or self._checks.error)
+        return (self._learn(motion, step, used & usable),)
 
     def estimate(self) -> Estimate:
         """Return values and covariance of the base parameters, errors that last included."""
@@ -237,6 +243,11 @@ class OnlineIdentifier:
         """Joint states left out, by reason; see CausalFilter and SpikeGate."""
         damaged = Counter() if self._gate is None else self._gate.rejected
         return Counter(self._filter.rejected) + damaged
+
+    @property
+    def error(self) -> str:
+        """Why nothing can be learned, such as torques that are absent; empty when all is well."""
+        return self._checks.error
 
     @property
     def spikes(self) -> Mapping[tuple[str, str], int]:

@@ -323,9 +323,11 @@ class _Reader:
         try:
             x, y, z = (float(number) for number in text.split())
         except ValueError:
+            x = y = z = math.nan
+        if not all(map(math.isfinite, (x, y, z))):
             raise RobotError(
                 f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is not three numbers"
-            ) from None
+            )
         return x, y, z
 
     def number(

@@ -332,3 +332,18 @@ def test_an_unknown_joint_is_answered_with_those_that_exist() -> None:
     assert arm.index('elbow') == 1
     with pytest.raises(RobotError, match='its driven joints are shoulder, elbow'):
         arm.index('elbo')
+
+
+@pytest.mark.parametrize(
+    ('element', 'name'),
+    [('<axis xyz="nan 0 1"/>', 'xyz'), ('<origin xyz="inf 0 0"/>', 'xyz'),
+     ('<origin rpy="0 0 nan"/>', 'rpy')],
+)  # fmt: skip
+def test_vectors_are_three_finite_numbers(element: str, name: str) -> None:
+    """Of a direction that is none the whole chain becomes NaN, and nobody says which joint."""
+    text = (
+        '<robot name="one"><link name="base"/><link name="bob"/><joint name="hinge" '
+        f'type="continuous"><parent link="base"/><child link="bob"/>{element}</joint></robot>'
+    )
+    with pytest.raises(RobotError, match=f"joint 'hinge': {name}='.*' of .* is not three numbers"):
+        load_robot(text)

@@ -133,6 +133,9 @@ def bench() -> Iterator[Bench]:
         bench = Bench(context)
         yield bench
         for node in list(bench.executor.get_nodes()):
+            # a callback that fails ends no node, but is an error of the node all the same
+            complaints = getattr(node, 'complaints', None)
+            assert complaints is None or complaints.defects == 0, complaints.latest
             bench.executor.remove_node(node)
             if hasattr(node, 'close'):
                 node.close()
