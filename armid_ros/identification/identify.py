@@ -11,6 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.checks import check_motion, check_torque
+from armid_ros.identification.damage import without_damage
 from armid_ros.identification.identifiability import Unidentified, unidentified
 from armid_ros.identification.least_squares import joint_triangles, Method, solve
 from armid_ros.identification.physical import fit_bodies, PhysicalSettings
@@ -166,6 +167,8 @@ class Identification:
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
         """Predict the torques of other recordings, filtered like the training data."""
+        signals = SignalSettings(self.used.cutoff_hz, self.used.decimation)
+        recordings, _ = without_damage(recordings, signals)
         problem = regressions(self.arm, self.base.independent, recordings, self.used)
         if not problem:
             raise IdentificationError(
@@ -212,8 +215,9 @@ def identify(
 
     """
     settings = settings or IdentificationSettings()
+    recordings, damage = without_damage(recordings, settings.signals)
     used = conditioning(list(recordings), settings.signals)
-    notes = check_motion(arm.robot, recordings, used)
+    notes = tuple(map(str, damage)) + check_motion(arm.robot, recordings, used)
     theory = arm.base_parameters(rng)
     problem = regressions(arm, theory.independent, recordings, used, progress)
     samples = sum(len(part.motion) for part in problem)

@@ -15,6 +15,8 @@ from scipy import signal
 #: Noise of a torque sensor relative to the torque limit of its joint, when nobody gives it; only
 #: the ratios between joints matter, as the residuals then say how large it is.
 _NOISE_OF_LIMIT = 0.01
+#: The same relative to how much a torque varies, before anything has been fitted to it.
+NOISE_OF_TORQUE = 0.01
 
 
 @dataclass(frozen=True)

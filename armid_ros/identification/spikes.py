@@ -160,6 +160,48 @@ class SpikeGate:
         self._restart([])
         return waiting
 
+    def furthest_off(
+        self, t: FloatArray, x: FloatArray, floor: FloatArray | float = 0.0
+    ) -> FloatArray:
+        """
+        Return how far off its prediction every sample of a whole stream is, over the limit.
+
+        Quick, for streams of which most have no damage: where nothing is above 1 by the noise of
+        the loudest part of the whole, there is none.
+
+        Parameters
+        ----------
+        t : ndarray, shape (N,)
+            Stamps [s].
+        x : ndarray, shape (N, m)
+            Signals.
+        floor : ndarray, shape (m,), or float
+            As for `take`.
+
+        Returns
+        -------
+        ndarray, shape (N, m)
+
+        """
+        dt, moves = np.diff(t), np.diff(x, axis=0)
+        turn = np.where(self._turn > 0.0, self._turn, np.inf)
+        moves -= np.rint(moves / turn) * self._turn
+        ratio, period = dt[1:] / dt[:-1], float(np.median(dt))
+        noise = np.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)
+        growth = np.maximum(noise, 0.5 * dt[1:] * (dt[1:] + dt[:-1]) / period**2)
+        error = np.abs(moves[1:] - ratio[:, np.newaxis] * moves[:-1]) / growth[:, np.newaxis]
+        windows = np.array_split(error, max(1, len(error) // WINDOW))
+        usual = np.max([_usual_size(window, _USUAL) for window in windows], axis=0)
+        limit = self._quantile_of(period) * np.maximum(usual, floor)
+        off = np.zeros(x.shape)
+        off[2:] = error / np.maximum(limit, _TINY)
+        return off
+
+    def _quantile_of(self, period: float) -> float:
+        """Return how many standard deviations normal noise exceeds with so small a chance."""
+        chance = period / self._false_alarm_time / len(self._turn)
+        return float(stats.norm.isf(min(chance, 0.5) / 2.0))
+
     def _restart(self, first: list[StreamSample]) -> None:
         """Begin a new stretch with some samples; what is usual stays known."""
         self._first: list[StreamSample] | None = first
@@ -209,8 +251,7 @@ class SpikeGate:
         """Learn from the first samples, and judge them."""
         first, self._first = self._first or [], None
         self._period = float(np.median(np.diff([s.t for s in first])))
-        chance = self._period / self._false_alarm_time / len(self._turn)
-        self._quantile = float(stats.norm.isf(min(chance, 0.5) / 2.0))
+        self._quantile = self._quantile_of(self._period)
         missed = [self._missed(first[k : k + 2], first[k + 2]) for k in range(FIRST - 2)]
         self._see_steps(np.abs(np.diff([s.x for s in first], axis=0)))
         if not self._usual:
@@ -326,7 +367,7 @@ class SpikeGate:
         return np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
 
 
-def _usual_size(missed: Sequence[FloatArray], share: float) -> FloatArray:
+def _usual_size(missed: Sequence[FloatArray] | FloatArray, share: float) -> FloatArray:
     """Return the standard deviation of which a normal variable exceeds so few of the errors."""
     size = np.quantile(np.array(missed), share, axis=0)
     return np.asarray(size / stats.norm.ppf(0.5 + share / 2.0))

@@ -389,8 +389,8 @@ def test_a_spike_is_said_with_the_joint_and_costs_nothing(bench, arm, samples, e
     spoiled[600, 1] += 1000.0
     publish(bench, node, publisher, messages(arm, (t, q, dq, spoiled)))
     state = statuses(bench, node)['state']
-    assert "effort of 'elbow' jumps for single samples" in state.message
-    assert state.level == DiagnosticStatus.WARN
+    assert node.complaints.counts['spike'] == 1
+    assert "effort of 'elbow' jumps for single samples" in node.complaints.latest
     assert {v.key: v.value for v in state.values}['left out spike'] == '1'
     np.testing.assert_allclose(
         node.identifier.estimate().values, expected.estimate().values, rtol=1e-3, atol=1e-4
