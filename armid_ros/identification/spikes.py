@@ -9,11 +9,12 @@ too far from the prediction waits for those after it. When they return to where 
 do not go on from it, it was damaged and is left out; otherwise the arm has changed, and all are
 used. So damage costs the samples that are damaged, and no change is lost, however large.
 
-Three things say how far is too far. The noise: what predictions usually miss by, as much as in the
-loudest part of the last minute, since an arm at rest must not forget what it is like in motion.
-The resolution: the smallest step that a signal makes. The consequence: what a single sample may be
-off by before an estimate shows it (``floor``). The largest of them, times the quantile of a normal
-distribution at the chance of one false alarm in `false_alarm_time`, is the limit.
+Three things say how far is too far; the largest of them counts. The noise: what predictions
+usually miss by, as much as in the loudest part of the last minute, since an arm at rest must not
+forget what it is like in motion, times the quantile of a normal distribution at the chance of one
+false alarm in `false_alarm_time`. The resolution, times the same: the smallest step that a signal
+makes. The consequence (``floor``): what one sample has to be off by to move what is estimated from
+it by as much as noise does.
 
 """
 
@@ -143,7 +144,7 @@ class SpikeGate:
         x : ndarray, shape (m,)
             Finite numbers.
         floor : ndarray, shape (m,), or float
-            Standard deviation of what a sample may be off by without consequence.
+            What a sample may be off by without consequence.
 
         """
         sample = StreamSample(t, self._unwrapped(x))
@@ -192,7 +193,7 @@ class SpikeGate:
         error = np.abs(moves[1:] - ratio[:, np.newaxis] * moves[:-1]) / growth[:, np.newaxis]
         windows = np.array_split(error, max(1, len(error) // WINDOW))
         usual = np.max([_usual_size(window, _USUAL) for window in windows], axis=0)
-        limit = self._quantile_of(period) * np.maximum(usual, floor)
+        limit = np.maximum(self._quantile_of(period) * usual, floor)
         off = np.zeros(x.shape)
         off[2:] = error / np.maximum(limit, _TINY)
         return off
@@ -347,7 +348,7 @@ class SpikeGate:
             self._see_steps(np.abs(np.diff(signals, axis=0)))
 
     def _limit(self, floor: FloatArray | float) -> FloatArray:
-        return np.asarray(self._quantile * np.maximum(self._scale, floor))
+        return np.maximum(self._quantile * self._scale, floor)
 
     def _learn(self) -> None:
         """Learn what is usual from a window of errors."""

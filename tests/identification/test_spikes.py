@@ -133,7 +133,7 @@ def test_errors_without_consequence_are_let_through():
     x[DAMAGED, 1] += 5.0
     gate = SpikeGate([True, False])
     for stamp, row in zip(t, x, strict=True):
-        gate.take(float(stamp), row, np.array([0.0, 2.0]))
+        gate.take(float(stamp), row, np.array([0.0, 6.0]))
     assert not gate.rejected
 
 

@@ -41,8 +41,9 @@ class Bench:
         self._clock = self.probe.create_publisher(Clock, '/clock', 10)
 
     def add(self, make: Callable[..., AnyNode], *args: Any, **parameters: Any) -> AnyNode:
-        """Make a node on the bench; keywords are parameters, except node_name and namespace."""
-        ros = {k: parameters.pop(k) for k in ('node_name', 'namespace') if k in parameters}
+        """Make a node on the bench; keywords are parameters, but for names and cli_args."""
+        names = ('node_name', 'namespace', 'cli_args')
+        ros = {k: parameters.pop(k) for k in names if k in parameters}
         node = make(
             *args,
             context=self.context,
