@@ -30,7 +30,8 @@ from armid_ros.identification.regression import regressions
 from armid_ros.identification.signals import conditioning, SignalSettings
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
-from armid_ros.robots import load_robot
+from armid_ros.robots import load_robot, Robot
+from armid_ros.simulation.plant import middle_position
 import numpy as np
 
 from benchmarks.real_recordings import example_robot
@@ -50,14 +51,15 @@ def panda() -> ArmModel:
     return arm
 
 
-def exciting_motion(joints: tuple[str, ...], seconds: float, rng: np.random.Generator) -> Motion:
+def exciting_motion(robot: Robot, seconds: float, rng: np.random.Generator) -> Motion:
     """Return five harmonics of 0.1 Hz per joint, up to 2 rad/s and 4 rad/s^2."""
     t = np.arange(0.0, seconds, 1.0 / RATE)
     w = 2.0 * np.pi * 0.1 * np.arange(1.0, 6.0)[:, None, None]
-    size = 0.5 * rng.normal(size=(5, 1, len(joints)))
-    angle = w * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, (5, 1, len(joints)))
+    size = 0.5 * rng.normal(size=(5, 1, robot.n_joints))
+    angle = w * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, (5, 1, robot.n_joints))
     shares = (size / w * np.sin(angle), size * np.cos(angle), -size * w * np.sin(angle))
-    return Motion(joints, t, *(share.sum(axis=0) for share in shares))
+    q, dq, ddq = (share.sum(axis=0) for share in shares)
+    return Motion(robot.joints, t, q + middle_position(robot), dq, ddq)
 
 
 def update_times(arm: ArmModel, motion: Motion, tau: FloatArray, settings: OnlineSettings) -> str:
@@ -150,7 +152,7 @@ def main() -> None:
     seconds = parser.parse_args().seconds
     rng = np.random.default_rng(1)
     arm = panda()
-    exact = exciting_motion(arm.robot.joints, seconds, rng)
+    exact = exciting_motion(arm.robot, seconds, rng)
     tau = arm.torque(exact) + TORQUE_NOISE * rng.normal(size=exact.q.shape)
     noisy_q = exact.q + POSITION_NOISE * rng.normal(size=exact.q.shape)
     measured = Motion(exact.joints, exact.t, noisy_q, exact.dq, exact.ddq)
