@@ -32,8 +32,8 @@ SCHEDULES = int(os.environ.get('ARMID_CHAOS', 4))
 NUMBER = 6
 #: Samples that are learned after an event, and in the end.
 CHUNK, LAST = 50, 1000
-#: Joint states that are sent at once, fewer than any queue holds.
-PIECE = 50
+#: Joint states that are sent at once: what two senders say of one time must not be far apart.
+PIECE = 5
 NOISE = 0.02
 QOS = tuple(
     QoSProfile(depth=1000, reliability=reliability, durability=durability)
