@@ -4,8 +4,7 @@
 Watch for changes while learning: a load picked up, friction risen.
 
 Rows are summed up in blocks of a quarter of a second. After each block windows of half a second to
-two seconds that end with it are tested (``change_evidence``), one with every row that comes then,
-so that no row waits for all of them. When a test is positive, all begins
+two seconds that end with it are tested (``change_evidence``). When a test is positive, all begins
 of the change are compared, and it is named as soon as nothing else explains the torques as well,
 or when time is up. The estimator then returns to what it knew before, forgets what may have
 changed, and only that, and learns from the rows since then again.
@@ -15,9 +14,8 @@ changed, and only that, and learns from the rows since then again.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
@@ -137,7 +135,6 @@ class ChangeWatch:
         self._samples: list[tuple[FloatArray, FloatArray, FloatArray]] = []
         self._before: tuple[Learned, Learned] | None = None
         self._begin = 0.0
-        self._search: Iterator[None] | None = None
 
     def update(
         self, t: float, rows: FloatArray, tau: FloatArray, weights: FloatArray
@@ -156,26 +153,11 @@ class ChangeWatch:
 
         """
         if self._before is not None and t - self._begin >= BLOCK:
-            self.finish()
-            if self._before is not None:  # else a change was named, and a new stretch begins
-                self._end_block(t)
-        elif self._search is not None:
-            next(self._search, None)  # a slice of what is to be done about the block before
+            self._end_block(t)
         if self._before is None:
             self._before, self._begin = (self._wider.learned(), self._estimator.learned()), t
         self._samples.append((rows, tau, weights))
         return self._learn(rows, tau, weights)
-
-    def finish(self) -> None:
-        """Do at once what is left to do about the last block."""
-        for _ in self._search or ():
-            pass
-        self._search = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what is copied: a watch with nothing left to do."""
-        self.finish()
-        return self.__dict__
 
     def _learn(self, rows: FloatArray, tau: FloatArray, weights: FloatArray) -> FloatArray:
         self._wider.update(rows, tau, weights)
@@ -199,23 +181,13 @@ class ChangeWatch:
         block = Block(self._begin, t, *sums, *self._before, tuple(self._samples))
         self._blocks.append(block)
         self._samples, self._before = [], None
-        self._search = self._searched()
-
-    def _searched(self) -> Iterator[None]:
-        """Look for a change in the windows that end with the last block, slice by slice."""
-        weighed: dict[int, Weighed] = {}
-        for m in _LENGTHS:
-            yield
-            if m <= len(self._blocks):
-                weighed[m] = self._weigh(m)
-        yield
+        weighed = {m: self._weigh(m) for m in _LENGTHS if m <= len(self._blocks)}
         if any(np.any(self._usual[m].excess(r, self._chance) > 1.0) for m, r in weighed.items()):
-            yield from self._judge()
+            self._judge()
         if self._blocks:
             self._waiting.append(weighed)
             if len(self._waiting) > _LENGTHS[-1]:  # by now a change in it would have been named
                 for m, values in self._waiting.popleft().items():
-                    yield
                     self._usual[m].learn(values)
 
     def _window(self, first: int, before: int | None = None) -> Evidence:
@@ -233,14 +205,11 @@ class ChangeWatch:
     def _ratios(self, window: Evidence) -> FloatArray:
         return np.array([window.ratio(some) for some in self._slices])
 
-    def _judge(self) -> Iterator[None]:
+    def _judge(self) -> None:
         """Find when the change was and what it is; name it if that is clear or time is up."""
         count = len(self._blocks)
-        found = []
-        for k in range(count - 1):
-            found.append(self._likelihood(self._ratios(self._window(k))))
-            yield
-        likelihood = np.array(found)
+        starts = range(count - 1)
+        likelihood = np.array([self._likelihood(self._ratios(self._window(k))) for k in starts])
         at = likelihood.max(axis=0)
         best = int(np.argmax(at))
         first = int(np.flatnonzero(likelihood[:, best] > at[best] - _ALIKE)[-1])
@@ -300,8 +269,6 @@ class ChangeWatch:
         for block in since:
             for sample in block.samples:
                 self._learn(*sample)
-        for sample in self._samples:  # what came while the change was looked for
-            self._learn(*sample)
 
     def _louder(self, blocks: Sequence[Block], free: int) -> float:
         """
