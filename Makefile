@@ -31,7 +31,7 @@ TREE := $(shell find armid_ros scripts launch config resource -name __pycache__ 
 MESSAGES := $(shell find msg_schemas -type f)
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test fuzz coverage lint bench benchmark lock clean help check
+.PHONY: all demo test fuzz chaos coverage lint bench benchmark lock clean help check
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
 
@@ -73,6 +73,9 @@ lock: $(STAMPS)/test  ## pin the requirements anew, with hashes, for Python 3.11
 	cd requirements && ../$(UV) -c bench.txt test.in -o test.txt
 	cd requirements && ../$(UV) -c bench.txt run.in ros.in -o run.txt
 	cd requirements && ../$(UV) -c bench.txt build.in -o build.txt
+
+chaos: $(STAMPS)/armid_ros $(STAMPS)/test  ## 100 random schedules of events around the identifier
+	ARMID_CHAOS=100 $(BIN)/pytest tests/ros/test_chaos.py
 
 clean:  ## remove the environment and everything built
 	rm -rf $(VENV) build install log dist *.egg-info .coverage .coverage.* .mypy_cache \

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+import math
 from types import MappingProxyType
 
 from armid_ros.errors import IdentificationError
@@ -36,6 +37,8 @@ MOTION_FILTER_RATIO = 4.0
 ROW_RATE_RATIO = 40.0
 #: Time constants until the start of G at rest is forgotten, to 1e-6.
 _SETTLED = 20.0
+#: No arm has positions or torques beyond this [SI units]; their squares would drown all others.
+LARGEST = 1e6
 #: Intervals whose median is taken as the sampling period.
 _PERIOD_INTERVALS = 20
 
@@ -141,9 +144,9 @@ class CausalFilter:
     """
     Filter and differentiate joint states as they come.
 
-    A sample with a wrong length, a number that is not finite, or a stamp slightly behind is left
-    out and counted; the signal is interpolated across. A gap or a larger jump of time restarts
-    the filter, which gives nothing until it has settled again.
+    A sample with a wrong length, a number that is not finite or beyond what arms have, or a stamp
+    slightly behind is left out and counted; the signal is interpolated across. A gap or a larger
+    jump of time restarts the filter, which gives nothing until it has settled again.
 
     Parameters
     ----------
@@ -215,7 +218,7 @@ class CausalFilter:
 
     @property
     def rejected(self) -> Mapping[str, int]:
-        """Samples left out, by reason: wrong_length, not_finite, out_of_order, no_velocity."""
+        """Samples left out: wrong_length, not_finite, impossible, out_of_order, no_velocity."""
         return MappingProxyType(self._rejected)
 
     @property
@@ -252,22 +255,10 @@ class CausalFilter:
             None while the filter settles and for a sample that is left out.
 
         """
-        signal = self._signal(t, q, dq, tau)
-        if signal is None or not self._in_order(t):
-            return None
-        dt = 0.0 if self._last is None else t - self._last
-        self._last = t
-        if self._lag is None:
-            self._learn(dt)
-            return None
-        if self._start is None:
-            self._start = t
-        stages = self._lag.update(dt, self._unwrapped(signal))
-        if t - self._start < _SETTLED / self._lag.pole:
-            return None
-        return self._motion(t, stages)
+        signal = self.signal(t, q, dq, tau)
+        return None if signal is None else self.advance(t, signal)
 
-    def _signal(
+    def signal(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> FloatArray | None:
         """Stack what is filtered, shape (2 n,) or (3 n,); None for a sample to leave out."""
@@ -279,10 +270,27 @@ class CausalFilter:
             self._rejected['wrong_length'] += 1
             return None
         signal = np.concatenate(parts, dtype=np.float64)
-        if not np.isfinite(signal.sum() + t):
-            self._rejected['not_finite'] += 1
+        largest = float(np.max(np.abs(signal)))
+        if not (largest <= LARGEST and math.isfinite(t)):
+            finite = math.isfinite(largest) and math.isfinite(t)
+            self._rejected['impossible' if finite else 'not_finite'] += 1
             return None
         return signal
+
+    def advance(self, t: float, signal: FloatArray) -> CausalMotion | None:
+        """Filter what `signal` has stacked; see `update`."""
+        if not self._in_order(t):
+            return None
+        dt, self._last = 0.0 if self._last is None else t - self._last, t
+        if self._lag is None:
+            self._learn(dt)
+            return None
+        if self._start is None:
+            self._start = t
+        stages = self._lag.update(dt, self._unwrapped(signal))
+        if t - self._start < _SETTLED / self._lag.pole:
+            return None
+        return self._motion(t, stages)
 
     def _in_order(self, t: float) -> bool:
         """Return whether to use a sample; one that does not continue the stream starts anew."""

@@ -23,6 +23,8 @@ REST_RANGE = 1e-3
 LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
 #: A recording shorter than this holds less than a movement [s].
 SHORTEST = 1.0
+#: Said of torques that are absent.
+SILENT = 'the torque of every joint is constant; is effort filled in?'
 
 
 def check_motion(
@@ -82,9 +84,7 @@ def check_torque(
     silent = [name for name, y in zip(robot.joints, tau.T, strict=True) if np.ptp(y) == 0.0]
     source = recordings[0].source
     if len(silent) == robot.n_joints:
-        raise IdentificationError(
-            f'{source}: the torque of every joint is constant; is effort filled in?'
-        )
+        raise IdentificationError(f'{source}: {SILENT}')
     slope, correlation = _slope_on_description(robot, problem)
     clear = np.abs(correlation) > 0.9
     if np.sum(clear) >= min(2, robot.n_joints):
@@ -139,19 +139,25 @@ def _gives_out_energy(problem: Sequence[Regression]) -> bool:
 
 
 def _check_positions(robot: Robot, recording: Recording) -> None:
-    excess = np.maximum(
-        robot.lower - recording.q.min(axis=0), recording.q.max(axis=0) - robot.upper
-    )
+    problem = position_problem(robot, recording.q.min(axis=0), recording.q.max(axis=0))
+    if problem:
+        raise IdentificationError(f'{recording.source}: {problem}')
+
+
+def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> str:
+    """Say which joint is far out of its limits, given where joints have been; empty if none."""
+    excess = np.maximum(robot.lower - lowest, highest - robot.upper)
     allowed = np.where(robot.prismatic, LIMIT_EXCESS_SLIDING, LIMIT_EXCESS_TURNING)
     worst = int(np.argmax(excess / allowed))
-    if excess[worst] > allowed[worst]:
-        reach = np.abs(recording.q[:, worst]).max()
-        hint = '' if robot.prismatic[worst] else ' (degrees?)'
-        raise IdentificationError(
-            f'{recording.source}: {robot.joints[worst]} reaches {reach:.4g}{hint}, its limits are '
-            f'{robot.lower[worst]:.4g} to {robot.upper[worst]:.4g}; positions have to be in rad '
-            'or m, with the zero of the description'
-        )
+    if not excess[worst] > allowed[worst]:
+        return ''
+    reach = max(abs(lowest[worst]), abs(highest[worst]))
+    hint = '' if robot.prismatic[worst] else ' (degrees?)'
+    return (
+        f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its limits are '
+        f'{robot.lower[worst]:.4g} to {robot.upper[worst]:.4g}; positions have to be in rad '
+        'or m, with the zero of the description'
+    )
 
 
 def _slope_on_description(

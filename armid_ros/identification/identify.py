@@ -11,6 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.checks import check_motion, check_torque
+from armid_ros.identification.damage import without_damage
 from armid_ros.identification.excited import excited
 from armid_ros.identification.halves import halves_error
 from armid_ros.identification.identifiability import Unidentified, unidentified
@@ -173,6 +174,8 @@ class Identification:
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
         """Predict the torques of other recordings, filtered like the training data."""
+        signals = SignalSettings(self.used.cutoff_hz, self.used.decimation)
+        recordings, _ = without_damage(recordings, signals)
         found = predictions(self.arm, recordings, self.used)
         if not found:
             raise IdentificationError(
@@ -221,8 +224,9 @@ def identify(
 
     """
     settings = settings or IdentificationSettings()
+    recordings, damage = without_damage(recordings, settings.signals)
     used = conditioning(list(recordings), settings.signals)
-    notes = check_motion(arm.robot, recordings, used)
+    notes = tuple(map(str, damage)) + check_motion(arm.robot, recordings, used)
     theory = arm.base_parameters(rng)
     # inertia of a motion that is taken as slow: as described, unless bodies are fitted to weight
     described = arm.quasi_static and settings.physical is None

@@ -25,6 +25,8 @@ _LEARNED = 0.9
 #: as the noise is, and have to fall by more.
 _NOTHING = 100.0
 _BEGUN = 0.5
+#: Standard deviations by which a torque is larger than nothing to be sure.
+_CERTAIN = 2.0
 #: Joints that are named at most.
 _NAMED = 3
 _WORDS = {'kg m^2': 'inertia', 'kg m': 'balance', 'kg': 'mass'}
@@ -82,11 +84,9 @@ class LearningProgress:
     def __init__(self, arm: ArmModel, base: BaseParameters, rng: np.random.Generator) -> None:
         motion = random_motion(arm.robot, _STATES, rng)
         columns = arm.columns(motion)[:, :, base.independent]
-        usual = np.sqrt(np.mean(inverse_dynamics(arm.robot, motion) ** 2, axis=0))
-        size = (
-            np.sqrt(np.mean(columns**2, axis=0)) / np.maximum(usual, 1e-3 * usual.max())[:, None]
-        )
-        self._share = size.max(axis=0)
+        self._rigid = np.sqrt(np.mean(inverse_dynamics(arm.robot, motion) ** 2, axis=0))
+        self._size = np.sqrt(np.mean(columns**2, axis=0))
+        self._of_effects = np.asarray(base.independent) >= len(arm.robot.rigid_parameters)
         self._past: deque[tuple[float, FloatArray]] = deque()
 
     def reset(self) -> None:
@@ -112,7 +112,7 @@ class LearningProgress:
             self._past.popleft()
         if self._past[0][0] > t - _WAIT:
             return ()
-        unknown = self._share * estimate.std
+        unknown = self._share(estimate) * estimate.std
         learned = np.where(unknown > _NOTHING, _BEGUN, _LEARNED)
         stuck = (unknown > _KNOWN) & (estimate.std > learned * self._past[0][1])
         by_joint: dict[str, list[int]] = {}
@@ -122,6 +122,20 @@ class LearningProgress:
             Unlearned(joint, tuple(estimate.parameters[k] for k in some), float(unknown[some[0]]))
             for joint, some in by_joint.items()
         )
+
+    def _share(self, estimate: Estimate) -> FloatArray:
+        """
+        Return what a unit of each parameter makes of the torque that a joint usually takes, (r,).
+
+        It takes what moves the links of the description and what effects, friction above all, are
+        known to take: by how much they are larger than they are uncertain.
+
+        """
+        known = np.maximum(np.abs(estimate.values) - _CERTAIN * estimate.std, 0.0)
+        effects = self._size * np.where(self._of_effects, known, 0.0)
+        usual = np.sqrt(self._rigid**2 + np.sum(effects**2, axis=1))
+        share = self._size / np.maximum(usual, 1e-3 * usual.max())[:, np.newaxis]
+        return np.asarray(share.max(axis=0))
 
 
 def too_little_motion(unlearned: Sequence[Unlearned]) -> str:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -12,12 +13,14 @@ from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.causal import CausalFilter, CausalMotion, TripleLag
 from armid_ros.identification.change import Change, change_candidates
-from armid_ros.identification.change_watch import ChangeWatch
+from armid_ros.identification.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.friction_beside import by_joint, FrictionBeside
+from armid_ros.identification.online_checks import StreamChecks
 from armid_ros.identification.online_settings import OnlineSettings
 from armid_ros.identification.recursive import RecursiveLeastSquares
-from armid_ros.identification.row_noise import RowNoise, sensor_noise
+from armid_ros.identification.row_noise import Misfit, RowNoise, sensor_noise
 from armid_ros.identification.score_variance import ScoreVariance
+from armid_ros.identification.spikes import SpikeGate
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -83,6 +86,8 @@ class OnlineIdentifier:
     ----------
     base : BaseParameters
         What is estimated.
+    latest : tuple of OnlineSample
+        What the last update brought: several samples where some had waited for it.
 
     """
 
@@ -112,6 +117,9 @@ class OnlineIdentifier:
             measured_velocity=settings.measured_velocity,
             prismatic=robot.prismatic,
         )
+        self._gate = _gate(arm, settings)
+        self._checks = StreamChecks(robot)
+        self.latest: tuple[OnlineSample, ...] = ()
         self._row_filter = TripleLag(settings.cutoff)
         self._row_period = 1.0 / settings.rows_per_second()
         self._estimator = RecursiveLeastSquares(
@@ -141,10 +149,16 @@ class OnlineIdentifier:
         self._last_moving = np.full(robot.n_joints, -np.inf)
         self._last_useless: FloatArray | None = None
         self._noise: RowNoise | None = None
+        self._misfit = Misfit(robot.n_joints, settings.forgetting)
 
     def reset(self) -> None:
         """Forget everything that was learned, and set the counters to zero."""
         self._filter.reset()
+        self._misfit.reset()
+        self._checks.reset()
+        self.latest = ()
+        if self._gate is not None:
+            self._gate.reset()
         self._estimator.reset()
         self._scores.reset()
         if self._watch is not None:
@@ -171,18 +185,33 @@ class OnlineIdentifier:
             None between rows, while the filters settle, and for a sample that is left out.
 
         """
-        motion = self._filter.update(t, q, dq, tau)
+        signal = self._filter.signal(t, q, dq, tau)
+        if signal is None:
+            self.latest = ()
+        elif self._gate is None:
+            self.latest = self._take(t, signal)
+        else:
+            good = self._gate.take(t, signal, self._without_consequence)
+            self.latest = tuple(one for sample in good for one in self._take(sample.t, sample.x))
+        return self.latest[-1] if self.latest else None
+
+    def _take(self, t: float, signal: FloatArray) -> tuple[OnlineSample, ...]:
+        """Learn from a good sample; return what it brought, if anything."""
+        n = self.arm.robot.n_joints
+        self._checks.take(t, signal[:n], signal[-n:])
+        motion = self._filter.advance(t, signal)
         if motion is None:
-            return None
+            return ()
         if self._filter.generation != self._generation:
             self._begin()
         useless = self._watch_rest(motion)
         step = self._row_period if self._last_row is None else motion.t - self._last_row
         if step < self._row_period - 0.5 * (self._filter.period or 0.0):
-            return None
+            return ()
         self._last_row = motion.t
         used = motion.t - useless > _FORGOTTEN / self._row_filter.pole
-        return self._learn(motion, step, used)
+        usable = not (self._checks.silent or self._checks.error)
+        return (self._learn(motion, step, used & usable),)
 
     def estimate(self) -> Estimate:
         """Return values and covariance of the base parameters, errors that last included."""
@@ -211,8 +240,29 @@ class OnlineIdentifier:
 
     @property
     def rejected(self) -> Mapping[str, int]:
-        """Joint states left out, by reason; see CausalFilter."""
-        return self._filter.rejected
+        """Joint states left out, by reason; see CausalFilter and SpikeGate."""
+        damaged = Counter() if self._gate is None else self._gate.rejected
+        return Counter(self._filter.rejected) + damaged
+
+    @property
+    def error(self) -> str:
+        """Why nothing can be learned, such as torques that are absent; empty when all is well."""
+        return self._checks.error
+
+    @property
+    def spikes(self) -> Mapping[tuple[str, str], int]:
+        """Joint states left out as a signal jumped and came back, by joint and signal."""
+        counts = {} if self._gate is None else self._gate.spikes
+        joints = self.arm.robot.joints
+        names = (
+            ('position', 'velocity', 'effort')
+            if self.settings.measured_velocity
+            else ('position', 'effort')
+        )
+        return {
+            (joints[k % len(joints)], names[k // len(joints)]): count
+            for k, count in counts.items()
+        }
 
     @property
     def restarts(self) -> Mapping[str, int]:
@@ -267,9 +317,19 @@ class OnlineIdentifier:
             innovation = self._watch.update(stamp, wider, *sample)
             for change in self._watch.changes[known:]:
                 self._scores.reopen(change.reopened, self._estimator.values)
+        self._misfit.learn(innovation, sample[0] - rows / gain @ self._estimator.values, weights)
         scale = self._estimator.scale(weights) / gain
         self._scores.add(rows * scale[:, np.newaxis], measured * scale, self._estimator.values)
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
+
+    @property
+    def _without_consequence(self) -> FloatArray:
+        """What a single sample may be off by before a row shows it, positions not so judged."""
+        n = self.arm.robot.n_joints
+        floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
+        if self._filter.pole is not None and self._filter.period is not None:
+            floor[-n:] = self._misfit.size * self._row_noise().single
+        return floor
 
     def _rows(self, motion: Motion) -> FloatArray:
         """Return the regressor of one sample in the independent columns, shape (n, r)."""
@@ -293,6 +353,21 @@ class OnlineIdentifier:
             assert period is not None and pole is not None
             self._noise = RowNoise.of(period, pole, self._row_filter.pole)
         return self._noise
+
+
+def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
+    """Return what leaves damaged samples out, if that is wanted."""
+    if settings.longest_damage < 1:
+        return None
+    signals = 3 if settings.measured_velocity else 2
+    turning = np.zeros((signals, arm.robot.n_joints), dtype=bool)
+    turning[0] = ~np.asarray(arm.robot.prismatic, dtype=bool)
+    changes = settings.changes or ChangeSettings()
+    return SpikeGate(
+        turning.ravel(),
+        max_gap=settings.longest_damage,
+        false_alarm_time=changes.false_alarm_time,
+    )
 
 
 def _one_sample(arm: ArmModel, motion: CausalMotion) -> Motion:

@@ -47,6 +47,9 @@ class OnlineSettings:
         Differentiate the measured velocity instead of the position.
     changes : ChangeSettings or None
         How readily a change of the arm is believed; None does not look for any.
+    longest_damage : int
+        Successive samples that may be damaged by chance, and are then left out; what lasts longer
+        is real. 0 takes all samples as they are.
 
     """
 
@@ -61,6 +64,7 @@ class OnlineSettings:
     max_gap: int = 10
     measured_velocity: bool = False
     changes: ChangeSettings | None = field(default_factory=ChangeSettings)
+    longest_damage: int = 10
 
     def rows_per_second(self) -> float:
         """

@@ -10,10 +10,13 @@ from armid_ros.errors import IdentificationError
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
+from scipy import signal
 
 #: Noise of a torque sensor relative to the torque limit of its joint, when nobody gives it; only
 #: the ratios between joints matter, as the residuals then say how large it is.
 _NOISE_OF_LIMIT = 0.01
+#: The same relative to how much a torque varies, before anything has been fitted to it.
+NOISE_OF_TORQUE = 0.01
 
 
 @dataclass(frozen=True)
@@ -31,25 +34,70 @@ class RowNoise:
         Sampling period T [s].
     bandwidth : float
         B [Hz].
+    peak : float
+        Largest value of the impulse response of H [1/s].
 
     """
 
     period: float
     bandwidth: float
+    peak: float
 
     @classmethod
     def of(cls, period: float, motion_pole: float, row_pole: float) -> RowNoise:
         """Return what the motion filter and the row filter leave, of these poles [rad/s]."""
-        return cls(period, _bandwidth(motion_pole, row_pole, 0.5 / period))
+        bandwidth = _bandwidth(motion_pole, row_pole, 0.5 / period)
+        return cls(period, bandwidth, _peak(motion_pole, row_pole))
 
     @property
     def gain(self) -> float:
         """Standard deviation of the noise of a row over that of a sample."""
         return float(np.sqrt(self.period * self.bandwidth))
 
+    @property
+    def single(self) -> float:
+        """What one sample is off by that moves a row by what noise of 1 in all samples does."""
+        return self.gain / (self.period * self.peak)
+
     def independent(self, step: float) -> float:
         """Return how many independent observations a row holds, `step` [s] after the last."""
         return min(1.0, self.bandwidth * step)
+
+
+class Misfit:
+    """
+    What an estimator leaves of the torque of every joint, as noise of single samples.
+
+    Parameters
+    ----------
+    joints : int
+        Their number n.
+    forgetting : float
+        Share of what was that a sample leaves.
+
+    Attributes
+    ----------
+    size : ndarray, shape (n,)
+        Standard deviation [N m]; 0 before the first sample.
+
+    """
+
+    def __init__(self, joints: int, forgetting: float = 1.0) -> None:
+        self._joints = joints
+        self._forgetting = forgetting
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._squares, self._counts = np.zeros(self._joints), np.zeros(self._joints)
+        self.size = np.zeros(self._joints)
+
+    def learn(self, before: FloatArray, after: FloatArray, weights: FloatArray) -> None:
+        """Take in the residual of a sample before and after it was learned, shape (n,)."""
+        self._squares = self._forgetting * self._squares + weights * before * after
+        self._counts = self._forgetting * self._counts + weights
+        known = np.maximum(self._counts, np.finfo(float).tiny)
+        self.size = np.sqrt(np.maximum(self._squares, 0.0) / known)
 
 
 def sensor_noise(robot: Robot, given: tuple[float, ...] | None) -> FloatArray:
@@ -75,3 +123,10 @@ def _bandwidth(motion_pole: float, row_pole: float, nyquist: float) -> float:
     w = 2.0 * np.pi * f
     gain = 1.0 / ((1.0 + (w / motion_pole) ** 2) * (1.0 + (w / row_pole) ** 2)) ** 3
     return float(2.0 * np.trapezoid(gain, f))
+
+
+def _peak(motion_pole: float, row_pole: float) -> float:
+    """Return the largest value of the impulse response of both filters in series [1/s]."""
+    ratio = motion_pole / row_pole  # in the time of the row filter
+    response = signal.impulse(([], [-ratio] * 3 + [-1.0] * 3, ratio**3), T=np.linspace(0, 20, 401))
+    return float(row_pole * np.max(response[1]))

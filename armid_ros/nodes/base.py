@@ -11,10 +11,13 @@ from typing import Any, ClassVar
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.complaints import Complaints
 from armid_ros.nodes.parameters import declare, NodeParameter
+from armid_ros.nodes.surviving import FATAL, surviving
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 EXECUTOR = NodeParameter(
@@ -29,6 +32,9 @@ EXECUTOR = NodeParameter(
 class ArmidNode(Node):
     """
     A node with parameters from a table, that says on /diagnostics what it does and what it missed.
+
+    No message and no timer ends it: what its callbacks raise is counted and said, but for errors
+    of the operating system, such as a full disk.
 
     Attributes
     ----------
@@ -52,6 +58,21 @@ class ArmidNode(Node):
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters to declare."""
         return (*self.table, EXECUTOR)
+
+    def create_subscription(
+        self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **more: Any
+    ) -> Subscription:
+        """Subscribe as rclpy does, with a callback that every message is survived by."""
+        return super().create_subscription(
+            msg_type, topic, self._surviving(callback, topic), *args, **more
+        )
+
+    def create_timer(
+        self, timer_period_sec: float, callback: Callable[[], None], *args: Any, **more: Any
+    ) -> Timer:
+        """Make a timer as rclpy does, with a callback that may fail."""
+        guarded = self._surviving(callback, getattr(callback, '__name__', 'timer'))
+        return super().create_timer(timer_period_sec, guarded, *args, **more)
 
     @property
     def finished(self) -> bool:
@@ -81,6 +102,10 @@ class ArmidNode(Node):
             What diagnostics shows; plotters draw the numbers.
 
         """
+
+    def level(self, troubled: bool) -> bytes:
+        """Return the level of the status; a node that knows worse than a warning says so here."""
+        return DiagnosticStatus.WARN if troubled else DiagnosticStatus.OK
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
         """Return what else to say on /diagnostics."""
@@ -112,6 +137,11 @@ class ArmidNode(Node):
                 response.success = True
             except ArmidError as error:
                 response.message = str(error)
+            except FATAL:
+                raise
+            except Exception as error:
+                self.complaints.defect(service, error)
+                response.message = self.complaints.latest
             return response
 
         self.create_service(Trigger, service, answer)
@@ -136,7 +166,7 @@ class ArmidNode(Node):
             name=f'{self.get_fully_qualified_name()[1:]}: state', hardware_id=self.hardware
         )
         troubled = bool(trouble) or self.complaints.fresh
-        status.level = DiagnosticStatus.WARN if troubled else DiagnosticStatus.OK
+        status.level = self.level(troubled)
         status.message = trouble or (self.complaints.latest if troubled else 'running')
         rejected = {f'rejected {kind}': n for kind, n in self.complaints.counts.items()}
         for key, value in {**values, **rejected}.items():
@@ -145,6 +175,9 @@ class ArmidNode(Node):
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
         self.complaints.settle()
+
+    def _surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
+        return surviving(callback, what, lambda: self.complaints, lambda: self.context.ok())
 
     def _note_refusal(self, name: str, result: SetParametersResult) -> None:
         if not result.successful:

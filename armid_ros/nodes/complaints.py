@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+import traceback
 from types import MappingProxyType
 
 from rclpy.impl.rcutils_logger import RcutilsLogger
@@ -26,6 +27,8 @@ class Complaints:
         Text of the last complaint; empty when there was none.
     fresh : bool
         Whether something was rejected since the last `settle`.
+    defects : int
+        Rejections that nobody had foreseen.
 
     """
 
@@ -36,6 +39,7 @@ class Complaints:
         self._said: dict[str, set[str]] = {}
         self.latest = ''
         self.fresh = False
+        self.defects = 0
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -51,6 +55,12 @@ class Complaints:
         if text not in said and len(said) < _TEXTS_PER_KIND:
             said.add(text)
             self._logger.warning(text)
+
+    def defect(self, kind: str, error: Exception) -> None:
+        """Count an input that led to an error which nobody had foreseen, and say where."""
+        self.defects += 1
+        self.say(kind, f'{kind}: left out, as it cannot be used ({type(error).__name__}: {error})')
+        self._logger.debug(''.join(traceback.format_exception(error)))
 
     def settle(self) -> None:
         """Begin a new period of reporting."""

@@ -4,19 +4,24 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
-from armid_ros.errors import ArmidError
+from armid_ros.errors import ArmidError, RecordingError
+from armid_ros.identification.causal import LARGEST
 from armid_ros.identification.interaction import Interaction
 from armid_ros.identification.interaction_online import InteractionSettings, OnlineInteraction
+from armid_ros.identification.joint_order import JointOrder
+from armid_ros.identification.spikes import SpikeGate, StreamSample
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.joint_states import JointOrder
+from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.parameters import NodeParameter
 from armid_ros.nodes.process import run
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.simulation.leg_pair import leg_pair
+from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
@@ -25,6 +30,14 @@ from sensor_msgs.msg import JointState
 _LOOK_PERIOD = 0.1
 #: Messages held while an estimate is made: several seconds at 1 kHz.
 _DEPTH = 10_000
+_TOPICS = ('exo/joint_states', 'human/joint_states')
+#: What is said of joint states that are left out.
+_DAMAGED = {
+    'spike': 'joint states that jump for single samples are left out',
+    'stamp': 'joint states whose stamp alone is off are left out',
+    'out_of_order': 'joint states whose stamp is not after that of the one before are left out',
+    'erratic': 'joint states that follow neither those before nor each other are left out',
+}
 
 
 class InteractionIdentifierNode(ArmidNode):
@@ -67,13 +80,17 @@ class InteractionIdentifierNode(ArmidNode):
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
         core = self.identifier
         self._orders = JointOrder(core.robot.joints), JointOrder(core.other.joints)
+        self._gates = tuple(
+            SpikeGate(np.repeat([True, False], [robot.n_joints, extra]))
+            for robot, extra in ((core.robot, core.robot.n_joints), (core.other, 0))
+        )
+        self._told: list[Counter[str]] = [Counter(), Counter()]
+        self.freshness = tuple(Freshness(topic) for topic in _TOPICS)
+        self._stopped = False
         self._epoch: int | None = None
         self.topics = tuple(
             MatchedSubscription(self, JointState, topic, take, depth=_DEPTH)
-            for topic, take in (
-                ('exo/joint_states', self._on_machine),
-                ('human/joint_states', self._on_wearer),
-            )
+            for topic, take in zip(_TOPICS, (self._on_machine, self._on_wearer), strict=True)
         )
         self.offer('~/reset', self.reset)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -85,13 +102,20 @@ class InteractionIdentifierNode(ArmidNode):
         return str(self.identifier.robot.name)
 
     def match(self) -> None:
-        """Look at who publishes joint states."""
+        """Look at who publishes joint states, and say at once when they stop or come again."""
         for topic in self.topics:
             topic.match()
+        stopped = any(fresh.stopped for fresh in self.freshness)
+        if stopped != self._stopped:
+            self._stopped = stopped
+            self.publish_diagnostics()
 
     def reset(self) -> str:
         """Forget everything."""
         self.identifier.reset()
+        for machine, gate in enumerate(self._gates):
+            gate.reset()
+            self._told[machine].clear()
         return 'the estimate begins anew'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
@@ -110,26 +134,55 @@ class InteractionIdentifierNode(ArmidNode):
                 ), values
         if not self.received:
             return 'no joint states so far', values
-        return '', values
+        return '; '.join(filter(None, (f.trouble() for f in self.freshness))), values
+
+    def level(self, troubled: bool) -> bytes:
+        """Return STALE when joint states of a machine have stopped."""
+        if any(fresh.stopped for fresh in self.freshness):
+            return DiagnosticStatus.STALE
+        return super().level(troubled)
 
     def _on_wearer(self, message: JointState) -> None:
         self.received += 1
-        try:
-            order = self._orders[1].map(message.name)
-        except ArmidError as error:
-            self.complaints.say('human/joint_states', str(error))
-            return
-        self.identifier.take_other(self._time(message), np.array(message.position)[order])
+        self.freshness[1].heard()
+        for sample in self._signals(1, message, ('position',)):
+            self.identifier.take_other(sample.t, sample.x)
 
     def _on_machine(self, message: JointState) -> None:
         self.received += 1
+        self.freshness[0].heard()
+        n = self.identifier.robot.n_joints
+        for sample in self._signals(0, message, ('position', 'effort')):
+            try:
+                if self.identifier.take(sample.t, sample.x[:n], sample.x[n:]):
+                    self._publish(message)
+            except ArmidError as error:
+                self.complaints.say(_TOPICS[0], str(error))
+
+    def _signals(
+        self, machine: int, message: JointState, fields: tuple[str, ...]
+    ) -> list[StreamSample]:
+        """Return samples of what a machine sends, without those that are damaged."""
+        topic, gate = _TOPICS[machine], self._gates[machine]
         try:
-            order = self._orders[0].map(message.name)
-            q, tau = np.array(message.position)[order], np.array(message.effort)[order]
-            if self.identifier.take(self._time(message), q, tau):
-                self._publish(message)
-        except (ArmidError, IndexError) as error:
-            self.complaints.say('exo/joint_states', str(error))
+            order = self._orders[machine].map(message.name)
+            parts = [np.array(getattr(message, name)) for name in fields]
+            for name, part in zip(fields, parts, strict=True):
+                if len(part) != len(message.name):
+                    raise RecordingError(f'{len(message.name)} names but {len(part)} of {name}')
+            signal = np.concatenate([part[order] for part in parts])
+            if not np.all(np.abs(signal) <= LARGEST):
+                raise RecordingError('numbers that no machine has')
+            t = self._time(message)
+        except RecordingError as error:
+            self.complaints.say(topic, f'{topic}: {error}')
+            return []
+        good = gate.take(t, signal)
+        for reason, count in (gate.rejected - self._told[machine]).items():
+            for _ in range(count):
+                self.complaints.say(f'{topic} {reason}', f'{topic}: {_DAMAGED[reason]}')
+        self._told[machine] = gate.rejected.copy()
+        return good
 
     def _publish(self, message: JointState) -> None:
         core = self.identifier
@@ -149,6 +202,8 @@ class InteractionIdentifierNode(ArmidNode):
 
     def _time(self, message: JointState) -> float:
         stamp = message.header.stamp
+        if stamp.sec < 0 or stamp.nanosec >= 10**9:
+            raise RecordingError('a stamp that is no time')
         if self._epoch is None:
             self._epoch = stamp.sec
         return float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec

@@ -8,6 +8,7 @@ import math
 from typing import NamedTuple
 
 from armid_ros.errors import RecordingError
+from armid_ros.identification.joint_merge import JointMerger
 from armid_ros.identification.joint_order import JointOrder
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.complaints import Complaints
@@ -16,6 +17,9 @@ import numpy.typing as npt
 from rclpy.clock import Clock
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
+
+#: Messages that name some of the joints before it is said that the others do not come.
+_PATIENCE = 100
 
 
 class JointSample(NamedTuple):
@@ -59,22 +63,69 @@ class JointStateReader:
         self._complaints = complaints
         self._clock = clock
         self._names: list[str] | None = None
+        self._some: tuple[int, ...] = ()
+        self._whole = False
+        self._merger: JointMerger | None = None
+        self._alone = 0
         self._order: npt.NDArray[np.intp] | slice = slice(None)
         self._epoch: int | None = None
 
-    def read(self, message: JointState) -> JointSample | None:
-        """Return the sample of a message, None when it cannot be used."""
+    def read(self, message: JointState) -> list[JointSample]:
+        """
+        Return the samples of all joints that a message completes.
+
+        One as a rule; none when it cannot be used. Messages that name some of the joints are put
+        together with those of other senders.
+
+        """
         try:
             if message.name != self._names:
-                self._order = self._joints.map(message.name)
-                self._names = list(message.name)
+                self._match(message.name)
+            stamp = self._time(message)
             q = self._values(message, 'position')
             dq = self._values(message, 'velocity') if message.velocity else None
             tau = self._values(message, 'effort')
         except RecordingError as error:
             self._complaints.say('joint_states', str(error))
-            return None
-        return JointSample(self._time(message), q, dq, tau)
+            return []
+        if self._merger is None:
+            return [JointSample(stamp, q, dq, tau)]
+        return self._merged(stamp, q, dq, tau)
+
+    def _match(self, names: list[str]) -> None:
+        """Learn where the joints are in messages with these names."""
+        self._names = None
+        some = tuple(k for k, joint in enumerate(self._joints.joints) if joint in names)
+        whole = len(some) == len(self._joints.joints)
+        if whole or not some or self._whole:
+            self._order = self._joints.map(names)
+            self._merger, self._whole = None, True
+        else:
+            wanted = JointOrder(tuple(self._joints.joints[k] for k in some))
+            self._order, self._some = wanted.map(names), some
+            self._merger = self._merger or JointMerger(len(self._joints.joints))
+        self._names = list(names)
+
+    def _merged(
+        self, stamp: float, q: FloatArray, dq: FloatArray | None, tau: FloatArray
+    ) -> list[JointSample]:
+        """Return what the samples of several senders have become with one more."""
+        assert self._merger is not None
+        parts = [q, np.full(len(q), np.nan) if dq is None else dq, tau]
+        found = [
+            JointSample(t, x[0], None if np.isnan(x[1]).any() else x[1], x[2])
+            for t, x in self._merger.take(self._some, stamp, np.stack(parts))
+        ]
+        self._alone = 0 if found else self._alone + 1
+        if self._alone > _PATIENCE:
+            missing = [self._joints.joints[k] for k in self._merger.missing]
+            self._complaints.say(
+                'joint_states',
+                f'joint states without {", ".join(missing)}; they name {", ".join(self._names)}'
+                if missing
+                else 'joint states of different senders do not share their time',
+            )
+        return found
 
     def stamp(self, t: float) -> Time:
         """Return the stamp of a time of this reader."""
@@ -87,9 +138,17 @@ class JointStateReader:
                 'stamp', 'joint states without a stamp: the time of reception is used'
             )
             stamp = self._clock.now().to_msg()
+        if stamp.sec < 0 or stamp.nanosec >= 10**9:
+            raise RecordingError('joint states with a stamp that is no time are left out')
         if self._epoch is None:
             self._epoch = stamp.sec
         return float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec
+
+    @property
+    def _wanted(self) -> tuple[str, ...]:
+        """Joints of the last message, in their order."""
+        joints = self._joints.joints
+        return joints if self._merger is None else tuple(joints[k] for k in self._some)
 
     def _values(self, message: JointState, name: str) -> FloatArray:
         field = getattr(message, name)
@@ -101,6 +160,6 @@ class JointStateReader:
         values = np.frombuffer(field)[self._order]
         # a plain sum of a few numbers is quicker than numpy; joints left out may well be NaN
         if not math.isfinite(sum(field)) and not np.all(np.isfinite(values)):
-            joint = self._joints.joints[int(np.argmin(np.isfinite(values)))]
+            joint = self._wanted[int(np.argmin(np.isfinite(values)))]
             raise RecordingError(f"joint states where the {name} of '{joint}' is not a number")
         return values

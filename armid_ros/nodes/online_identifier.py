@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+import sys
 import time
 from typing import Any
 
@@ -18,8 +19,9 @@ from armid_ros.identification.online import OnlineIdentifier, OnlineSample
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.estimates import estimate_message, save_identification
+from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.identifier_parameters import IDENTIFIER_PARAMETERS, make_identifier
-from armid_ros.nodes.joint_states import JointStateReader
+from armid_ros.nodes.joint_states import JointSample, JointStateReader
 from armid_ros.nodes.learning_status import change_status, parameter_status
 from armid_ros.nodes.parameters import NodeParameter
 from armid_ros.nodes.process import run
@@ -31,7 +33,9 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-#: How often publishers of joint states are looked for [s].
+#: Where ~/save writes to when nobody says.
+_FOLDER = 'online_identification'
+#: How often publishers of joint states are looked for, and whether states still come [s].
 _LOOK_PERIOD = 0.1
 #: Update times that are kept for diagnostics.
 _TIMED = 2000
@@ -39,6 +43,10 @@ _TIMED = 2000
 _DISTURBANCES = {
     'out_of_order': 'joint states whose stamp is not after that of the one before are left out; '
     'do two nodes publish them?',
+    'impossible': 'joint states with numbers that no arm has are left out',
+    'stamp': 'joint states whose stamp alone is off are left out',
+    'erratic': 'joint states that follow neither those before nor each other are left out; do two '
+    'nodes publish them?',
     'no_velocity': 'joint states without velocity are left out: measured_velocity asks for it',
     'jump_back': 'joint states jump back in time: the filters begin anew',
     'dropout': 'joint states are missing for longer than max_gap: the filters begin anew',
@@ -58,7 +66,9 @@ class OnlineIdentifierNode(ArmidNode):
     last_stamp_ns : int
         Stamp of the last one [ns].
     update_times : deque of float
-        How long the last updates took [s].
+        Processor time of the last updates [s].
+    freshness : Freshness
+        Whether joint states still come.
 
     """
 
@@ -67,8 +77,9 @@ class OnlineIdentifierNode(ArmidNode):
         NodeParameter('estimate_rate', 10.0, 'Of ~/estimate.', 'Hz', lower=0.1, upper=1000.0),
         NodeParameter(
             'save_to',
-            'online_identification',
-            'Folder that ~/save writes to: estimate.yaml, model.yaml, robot.urdf.',
+            '',
+            'Folder that ~/save and the end of the node write to: estimate.yaml, model.yaml, '
+            f'robot.urdf; empty: ~/save alone writes, to {_FOLDER}.',
             read_only=False,
         ),
     )
@@ -80,6 +91,8 @@ class OnlineIdentifierNode(ArmidNode):
         self.received = 0
         self.last_stamp_ns = 0
         self.update_times: deque[float] = deque(maxlen=_TIMED)
+        self.freshness = Freshness('joint states')
+        self._stopped = False
         self._description: str | None = None
         self._published = -1
         self._disturbed: Counter[str] = Counter()
@@ -100,7 +113,7 @@ class OnlineIdentifierNode(ArmidNode):
         self.offer('~/save', self.save)
         self.create_timer(1.0 / self.value('estimate_rate'), self.publish_estimate)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_LOOK_PERIOD, self.joint_states.match, clock=steady)
+        self.create_timer(_LOOK_PERIOD, self.look, clock=steady)
 
     @property
     def hardware(self) -> str:
@@ -111,6 +124,7 @@ class OnlineIdentifierNode(ArmidNode):
         """Forget everything that was learned."""
         self._require().reset()
         self._progress.reset()
+        self._disturbed.clear()
         self._published = -1
         self._told = 0
         self._begin_statistics()
@@ -118,8 +132,27 @@ class OnlineIdentifierNode(ArmidNode):
 
     def save(self) -> str:
         """Write what was learned."""
-        paths = save_identification(Path(self.value('save_to')).expanduser(), self._require())
+        if not self._require().samples:
+            raise IdentificationError('nothing has been learned so far, so nothing is written')
+        folder = Path(self.value('save_to') or _FOLDER).expanduser()
+        paths = save_identification(folder, self._require())
         return f'wrote {", ".join(map(str, paths))}'
+
+    def close(self) -> None:
+        """Save what was learned, where somebody has said where to."""
+        if self.value('save_to') and self.identifier is not None and self.identifier.samples:
+            try:
+                said = self.save()
+            except ArmidError as error:
+                said = f'what was learned is lost: {error}'
+            print(said, file=sys.stderr)  # the log is closed when a signal ends the node
+
+    def look(self) -> None:
+        """Look at who publishes joint states, and say at once when they stop or come again."""
+        self.joint_states.match()
+        if self.freshness.stopped != self._stopped:
+            self._stopped = self.freshness.stopped
+            self.publish_diagnostics()
 
     def publish_estimate(self) -> None:
         """Publish the estimate if it has changed."""
@@ -152,10 +185,7 @@ class OnlineIdentifierNode(ArmidNode):
             values |= {'update_p50_us': float(p50), 'update_p99_us': float(p99)}
         values |= {f'left out {reason}': n for reason, n in identifier.rejected.items()}
         values |= {f'restarted {reason}': n for reason, n in identifier.restarts.items()}
-        counted = Counter(identifier.rejected) + Counter(identifier.restarts)
-        for reason in (counted - self._disturbed).keys() & _DISTURBANCES.keys():
-            self.complaints.say(reason, _DISTURBANCES[reason])
-        self._disturbed = counted
+        self._say_what_was_left_out(identifier)
         self._begin_statistics()
         return self._trouble(identifier), values
 
@@ -174,9 +204,34 @@ class OnlineIdentifierNode(ArmidNode):
             status.hardware_id = self.hardware
         return statuses
 
+    def level(self, troubled: bool) -> bytes:
+        """Return STALE when joint states have stopped, ERROR when nothing can be learned."""
+        if self.freshness.stopped:
+            return DiagnosticStatus.STALE
+        if self.identifier is not None and self.identifier.error:
+            return DiagnosticStatus.ERROR
+        return super().level(troubled)
+
+    def _say_what_was_left_out(self, identifier: OnlineIdentifier) -> None:
+        counted = Counter(identifier.rejected) + Counter(identifier.restarts)
+        for reason in (counted - self._disturbed).keys() & _DISTURBANCES.keys():
+            self.complaints.say(reason, _DISTURBANCES[reason])
+        if counted['spike'] > self._disturbed['spike']:
+            for joint, signal in identifier.spikes:
+                self.complaints.say(
+                    'spike', f"the {signal} of '{joint}' jumps for single samples: left out"
+                )
+        self._disturbed = counted
+
     def _trouble(self, identifier: OnlineIdentifier) -> str:
         if not self.received:
             return 'no joint states so far'
+        stopped = self.freshness.trouble()
+        if stopped:
+            fresh = self.complaints.latest if self.complaints.fresh else ''
+            return '; '.join(filter(None, (stopped, fresh)))
+        if identifier.error:
+            return identifier.error
         if not identifier.samples:
             return ''
         return too_little_motion(self._progress.look(self._last_sample, identifier.estimate()))
@@ -194,19 +249,23 @@ class OnlineIdentifierNode(ArmidNode):
 
     def _on_joint_states(self, message: JointState) -> None:
         self.received += 1
+        self.freshness.heard()
         stamp = message.header.stamp
         self.last_stamp_ns = stamp.sec * 10**9 + stamp.nanosec
         if self.identifier is None:
             return
-        sample = self._reader.read(message)
-        if sample is None:
-            return
-        begun = time.perf_counter()
-        learned = self.identifier.update(*sample)
-        self.update_times.append(time.perf_counter() - begun)
-        if learned is not None:
+        for sample in self._reader.read(message):
+            self._take(sample)
+
+    def _take(self, sample: JointSample) -> None:
+        """Learn from the joint state of all joints."""
+        identifier = self._require()
+        begun = time.thread_time()
+        identifier.update(*sample)
+        self.update_times.append(time.thread_time() - begun)
+        for learned in identifier.latest:
             self._publish_sample(learned)
-        for change in self.identifier.changes[self._told :]:
+        for change in identifier.changes[self._told :]:
             self._tell(change)
 
     def _tell(self, change: Change) -> None:

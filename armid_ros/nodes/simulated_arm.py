@@ -30,6 +30,10 @@ from trajectory_msgs.msg import JointTrajectory
 #: How late or early a trajectory may be [s]; more is a message from another time.
 LATEST = 1.0
 EARLIEST = 60.0
+#: How long a trajectory may be [s]: each of its steps is held against the limits when it begins.
+LONGEST = 3600.0
+#: A clock that goes on by more at once was set, and there is nothing to make up [ns].
+LONGEST_NS = 60 * 10**9
 #: Longest stretch of work before services are answered [s], and backlog that is given up.
 _BURST = 0.005
 _BACKLOG = 0.2
@@ -173,7 +177,7 @@ class SimulatedArmNode(ArmidNode):
     def follow(self) -> None:
         """Move as far as /clock has."""
         now = self.get_clock().now().nanoseconds
-        if self._origin_ns is None or now < self.stamp_ns:
+        if self._origin_ns is None or not 0 <= now - self.stamp_ns <= LONGEST_NS:
             self._origin_ns = now - self._arm.state.steps * self._dt_ns
         while self.stamp_ns + self._stride * self._dt_ns <= now:
             self.step()
@@ -203,7 +207,13 @@ class SimulatedArmNode(ArmidNode):
     def _on_trajectory(self, message: JointTrajectory) -> None:
         try:
             reference = read_trajectory(message).for_robot(self._arm.plant.robot)
-            start_ns = Time.from_msg(message.header.stamp).nanoseconds or self.stamp_ns
+            if reference.duration > LONGEST:
+                raise TrajectoryError(
+                    f'trajectory: it lasts {reference.duration:.4g} s; the longest that is taken '
+                    f'lasts {LONGEST:g} s'
+                )
+            stamp = message.header.stamp
+            start_ns = stamp.sec * 10**9 + stamp.nanosec or self.stamp_ns
             delay = (start_ns - self.stamp_ns) * 1e-9
             if not -LATEST <= delay <= EARLIEST:
                 when = f'{delay:.3g} s from now' if delay > 0 else f'{-delay:.3g} s ago'

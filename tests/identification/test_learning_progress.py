@@ -60,3 +60,18 @@ def test_while_the_estimate_gets_better_nothing_is_asked_for(arm):
         assert not progress.look(float(second), better)
     worse = [progress.look(30.0 + second, better) for second in range(30)]
     assert worse[-1]
+
+
+@pytest.mark.parametrize(('friction', 'named'), [(0.2, False), (0.0, True)])
+def test_what_a_joint_takes_includes_its_friction(arm, friction, named):
+    """The links beyond the wrist take 0.007 N m; 0.005 N m is much of that, little of 0.2 N m."""
+    online = OnlineIdentifier(arm, rng=np.random.default_rng(0))
+    progress = LearningProgress(online.arm, online.base, np.random.default_rng(0))
+    start = online.estimate()
+    values, std = 0.0 * start.values, np.full(len(start.values), 1e-9)
+    wrist = start.index('coulomb_torque', 'wrist_pitch')
+    values[wrist], std[wrist] = friction, 0.005
+    said = ()
+    for second in range(12):
+        said = progress.look(float(second), Estimate(start.parameters, values, np.diag(std**2)))
+    assert [part.joint for part in said] == (['wrist_pitch'] if named else [])

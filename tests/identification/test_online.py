@@ -234,7 +234,8 @@ def test_bad_samples_gaps_and_jumps_do_not_corrupt_the_estimate(arm, motion, tau
             t -= 8e-3
         online.update(t, q, None, torque)
     assert dict(online.rejected) == {'not_finite': 40, 'wrong_length': 40, 'out_of_order': 40}
-    assert dict(online.restarts) == {'dropout': 5, 'jump_back': 5}
+    # the last sample alone is back in time: that may be its stamp
+    assert dict(online.restarts) == {'dropout': 5, 'jump_back': 4}
     assert torque_error(arm, online, motion) < 1e-3
 
 

@@ -445,3 +445,21 @@ class TestXacroIsAProgram:
         )
         with pytest.raises(RobotError, match='no joint can be driven'):
             load_robot(text)
+
+
+@pytest.mark.parametrize(
+    ('element', 'name'),
+    [('<axis xyz="nan 0 1"/>', 'xyz'), ('<origin xyz="inf 0 0"/>', 'xyz'),
+     ('<origin rpy="0 0 nan"/>', 'rpy')],
+)  # fmt: skip
+def test_vectors_are_three_finite_numbers(element: str, name: str) -> None:
+    """Of a direction that is none the whole chain becomes NaN, and nobody says which joint."""
+    text = (
+        '<robot name="one"><link name="base"/><link name="bob"/><joint name="hinge" '
+        f'type="continuous"><parent link="base"/><child link="bob"/>{element}</joint></robot>'
+    )
+    refusal = f"joint 'hinge': {name}='.*' of .* is not three finite numbers"
+    with pytest.raises(RobotError, match=refusal):
+        RobotError, match=f"joint 'hinge': {name}='.*' of .* is not three finite numbers"
+    ):
+        load_robot(text)

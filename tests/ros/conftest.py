@@ -41,8 +41,9 @@ class Bench:
         self._clock = self.probe.create_publisher(Clock, '/clock', 10)
 
     def add(self, make: Callable[..., AnyNode], *args: Any, **parameters: Any) -> AnyNode:
-        """Make a node on the bench; keywords are parameters, except node_name and namespace."""
-        ros = {k: parameters.pop(k) for k in ('node_name', 'namespace') if k in parameters}
+        """Make a node on the bench; keywords are parameters, but for names and cli_args."""
+        names = ('node_name', 'namespace', 'cli_args')
+        ros = {k: parameters.pop(k) for k in names if k in parameters}
         node = make(
             *args,
             context=self.context,
@@ -133,6 +134,9 @@ def bench() -> Iterator[Bench]:
         bench = Bench(context)
         yield bench
         for node in list(bench.executor.get_nodes()):
+            # a callback that fails ends no node, but is an error of the node all the same
+            complaints = getattr(node, 'complaints', None)
+            assert complaints is None or complaints.defects == 0, complaints.latest
             bench.executor.remove_node(node)
             if hasattr(node, 'close'):
                 node.close()

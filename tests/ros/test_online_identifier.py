@@ -14,6 +14,7 @@ from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.robots import load_robot
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -69,6 +70,7 @@ def messages(arm, samples):
 
 def identifying(bench, **parameters):
     node = bench.add(OnlineIdentifierNode, effects=['viscous_friction'], **parameters)
+    node.freshness.now = lambda: 0.0  # joint states never stop, however busy the machine is
     description = bench.probe.create_publisher(String, 'robot_description', LATCHED)
     description.publish(String(data=PENDULUM))
     bench.spin_until(lambda: node.identifier is not None, 'the robot')
@@ -280,6 +282,119 @@ def test_reset_and_save(bench, arm, samples, tmp_path):
     assert document['samples'] == node.identifier.samples
     assert bench.call('online_identifier/reset').success
     assert node.identifier.samples == 0
+
+
+def test_saving_nothing_is_refused_and_overwrites_nothing(bench, tmp_path):
+    (tmp_path / 'model.yaml').write_text('of yesterday')
+    node = identifying(bench, save_to=str(tmp_path))
+    answer = bench.call('online_identifier/save')
+    assert not answer.success and 'nothing has been learned' in answer.message
+    node.close()
+    assert [p.name for p in tmp_path.iterdir()] == ['model.yaml']
+    assert (tmp_path / 'model.yaml').read_text() == 'of yesterday'
+
+
+@pytest.mark.parametrize('asked', [True, False])
+def test_the_end_of_the_node_saves_where_that_is_asked_for(
+    bench, arm, samples, tmp_path, monkeypatch, asked
+):
+    monkeypatch.chdir(tmp_path)
+    node = identifying(bench, **({'save_to': 'learned'} if asked else {}))
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    publish(bench, node, publisher, messages(arm, samples)[:600])
+    node.close()
+    assert [p.name for p in tmp_path.iterdir()] == (['learned'] if asked else [])
+    if asked:
+        load_model(tmp_path / 'learned' / 'model.yaml')
+
+
+def test_joint_states_that_stop_are_stale_within_a_second(bench, arm, samples):
+    now = [0.0]
+    diagnostics = bench.diagnostics()
+    node = identifying(bench)
+    node.freshness.now = lambda: now[0]
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    publish(bench, node, publisher, messages(arm, samples)[:400])
+
+    def levels_after(seconds):
+        now[0] += seconds
+        diagnostics.clear()
+        node.look()
+        bench.settle()
+        return [d.status[0].level for d in diagnostics]
+
+    assert DiagnosticStatus.STALE not in levels_after(0.4)
+    assert DiagnosticStatus.STALE in levels_after(0.2)  # at once, not at the next second
+    assert any('stopped 0.6 s ago' in d.status[0].message for d in diagnostics)
+    publish(bench, node, publisher, messages(arm, samples)[400:420])
+    assert DiagnosticStatus.OK in levels_after(0.0)
+
+
+def test_effort_that_is_not_filled_in_is_an_error_and_teaches_nothing(bench, arm, samples):
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    t, q, dq, tau = samples
+    batch = messages(arm, (t, q, dq, 0.0 * tau))
+    publish(bench, node, publisher, batch)
+    state = statuses(bench, node)['state']
+    assert state.level == DiagnosticStatus.ERROR
+    assert 'torque of every joint is constant; is effort filled in?' in state.message
+    assert node.identifier.estimate().std.min() > 1e3
+
+
+def test_degrees_are_noticed(bench, arm, samples):
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    t, q, dq, tau = samples
+    publish(bench, node, publisher, messages(arm, (t, np.degrees(q), np.degrees(dq), tau)))
+    state = statuses(bench, node)['state']
+    assert state.level == DiagnosticStatus.ERROR
+    assert '(degrees?)' in state.message and 'have to be in rad' in state.message
+    assert bench.call('online_identifier/reset').success
+    assert statuses(bench, node)['state'].level == DiagnosticStatus.OK
+
+
+@pytest.mark.parametrize('late', [0.0, 0.002])
+def test_two_senders_with_half_of_the_joints_each_are_one_arm(bench, arm, samples, late):
+    """The second one has stamps of its own, between those of the first."""
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    t, q, dq, tau = samples
+    shifted = [[np.interp(t + late, t, x[:, 1])] for x in (q, dq, tau)]
+    batch = []
+    for k, stamp in enumerate(t):
+        one = (x[k, :1] for x in (q, dq, tau))
+        other = (np.array([x[0][k]]) for x in shifted)
+        batch += [message(['shoulder'], stamp, *one), message(['elbow'], stamp + late, *other)]
+    publish(bench, node, publisher, batch)
+    truth = node.identifier.base.values(arm.theta)
+    np.testing.assert_allclose(node.identifier.estimate().values, truth, rtol=3e-2, atol=5e-3)
+    assert not node.complaints.counts
+
+
+def test_half_of_the_joints_alone_is_said(bench, arm, samples):
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    t, q, dq, tau = samples
+    some = zip(t[:200], q[:200, :1], dq[:200, :1], tau[:200, :1], strict=True)
+    publish(bench, node, publisher, [message(['shoulder'], *sample) for sample in some])
+    assert 'joint states without elbow; they name shoulder' in node.complaints.latest
+
+
+def test_a_spike_is_said_with_the_joint_and_costs_nothing(bench, arm, samples, expected):
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    t, q, dq, tau = samples
+    spoiled = tau.copy()
+    spoiled[600, 1] += 1000.0
+    publish(bench, node, publisher, messages(arm, (t, q, dq, spoiled)))
+    state = statuses(bench, node)['state']
+    assert node.complaints.counts['spike'] == 1
+    assert "effort of 'elbow' jumps for single samples" in node.complaints.latest
+    assert {v.key: v.value for v in state.values}['left out spike'] == '1'
+    np.testing.assert_allclose(
+        node.identifier.estimate().values, expected.estimate().values, rtol=1e-3, atol=1e-4
+    )
 
 
 def test_without_a_robot_the_services_say_so(bench):

@@ -74,7 +74,8 @@ def test_arm_identifier_recorder_and_player_work_together(bench, processes, tmp_
     estimates = bench.listen(ParameterEstimate, 'online_identifier/estimate', LATCHED)
     diagnostics = bench.diagnostics()
     recorder = processes.start('recorder', f'bag:={bag}', 'topics:=[joint_states]')
-    identifier = processes.start('online_identifier')
+    learned = tmp_path / 'learned'
+    identifier = processes.start('online_identifier', f'save_to:={learned}')
     save_excitation(short_excitation(), tmp_path / 'run.yaml')
     excitation = processes.start(
         'excitation_publisher', f'file:={tmp_path / "run.yaml"}', 'simulation:=true'
@@ -91,6 +92,7 @@ def test_arm_identifier_recorder_and_player_work_together(bench, processes, tmp_
     for process in (arm, identifier, excitation):
         errors = processes.end(process, signal.SIGINT, signal.SIGINT)
         assert process.returncode == 0 and 'Traceback' not in errors, errors
+    assert (learned / 'model.yaml').is_file()  # it was saved when the node was ended
     errors = processes.end(recorder, signal.SIGINT, signal.SIGTERM)
     assert recorder.returncode == 0 and 'Traceback' not in errors, errors
     joints = load_robot('humanoid_arm').joints

@@ -1,0 +1,130 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""One stream of joint states out of several, each of which has some of the joints."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Samples of one sender that wait for those of the others.
+_WAITING = 1000
+#: Periods of a sender that its signals are interpolated across.
+_LONGEST = 10.0
+#: Weight of a new interval in the period of a sender.
+_NEW = 0.05
+
+Moment = tuple[float, FloatArray]
+
+
+@dataclass
+class _Part:
+    """What one sender has sent: joints, and samples of shape (s, k) that are still needed."""
+
+    joints: tuple[int, ...]
+    samples: deque[Moment] = field(default_factory=lambda: deque(maxlen=_WAITING))
+    period: float = np.inf
+
+    def take(self, t: float, values: FloatArray) -> None:
+        if self.samples:
+            step = t - self.samples[-1][0]
+            if step == 0.0:
+                return
+            if step < 0.0:
+                self.samples.clear()
+            elif np.isfinite(self.period):
+                self.period += _NEW * (min(step, _LONGEST * self.period) - self.period)
+            else:
+                self.period = step
+        self.samples.append((t, values))
+
+    def reaches(self, t: float) -> bool:
+        """Return whether what it sends has come to a time."""
+        return bool(self.samples) and self.samples[-1][0] >= t
+
+    def at(self, t: float) -> FloatArray | None:
+        """Return the values at a time that has been reached; None where nothing is near."""
+        while len(self.samples) > 1 and self.samples[1][0] <= t:
+            self.samples.popleft()
+        first, values = self.samples[0]
+        if first == t:
+            return values
+        if first > t or self.samples[1][0] - first > _LONGEST * self.period:
+            return None
+        second, following = self.samples[1]
+        return np.asarray(values + (t - first) / (second - first) * (following - values))
+
+
+class JointMerger:
+    """
+    Put together what several senders say of different joints, at the times of one of them.
+
+    The sender of the first joint gives the times; the others are interpolated linearly between
+    their stamps, which are of the same clock. A joint that two senders have is taken from the
+    one that came first.
+
+    Parameters
+    ----------
+    n_joints : int
+        Number of joints that are wanted.
+
+    """
+
+    def __init__(self, n_joints: int) -> None:
+        self._n_joints = n_joints
+        self._parts: dict[tuple[int, ...], _Part] = {}
+
+    @property
+    def missing(self) -> tuple[int, ...]:
+        """Joints that no sender has sent so far."""
+        sent = {joint for part in self._parts for joint in part}
+        return tuple(k for k in range(self._n_joints) if k not in sent)
+
+    def take(self, joints: tuple[int, ...], t: float, values: FloatArray) -> list[Moment]:
+        """
+        Take in a sample of some joints, and return those of all joints that it completes.
+
+        Parameters
+        ----------
+        joints : tuple of int
+            Which joints, k of them.
+        t : float
+            Stamp [s].
+        values : ndarray, shape (s, k)
+            Signals of each.
+
+        Returns
+        -------
+        list of (float, ndarray of shape (s, n))
+            Stamps and signals of all joints, oldest first.
+
+        """
+        self._parts.setdefault(joints, _Part(joints)).take(t, values)
+        if self.missing:
+            return []
+        first, *others = self._needed()
+        complete = []
+        while first.samples and all(part.reaches(first.samples[0][0]) for part in others):
+            t, values = first.samples.popleft()
+            rest = [part.at(t) for part in others]
+            merged = np.empty((len(values), self._n_joints))
+            for part, found in zip((*others, first), (*rest, values), strict=True):
+                if found is None:
+                    break
+                merged[:, part.joints] = found
+            else:
+                complete.append((t, merged))
+        return complete
+
+    def _needed(self) -> list[_Part]:
+        """Return the senders that bring a joint which none before them has, in their order."""
+        found: list[_Part] = []
+        known: set[int] = set()
+        for part in self._parts.values():
+            if not known.issuperset(part.joints):
+                found.append(part)
+                known.update(part.joints)
+        return sorted(found, key=lambda part: min(part.joints))
