@@ -15,6 +15,7 @@ import click
 #: Command and module, in the order of the work; a module is imported when its command is called.
 COMMANDS = {
     'demo': 'demo',
+    'convert': 'convert',
     'excite': 'excite',
     'simulate': 'record',
     'identify': 'identify',

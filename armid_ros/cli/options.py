@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from armid_ros.arm import ArmModel
+from armid_ros.cli import columns
 from armid_ros.effects import make_effect
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray
-from armid_ros.recording import read_recording, read_robot_description, Recording
+from armid_ros.recording import read_robot_description, Recording
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
 import click
 import numpy as np
@@ -107,8 +108,8 @@ def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
 
 
 def read(bags: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
-    """Read what the bags hold of the robot's joints."""
-    return [read_recording(path, joints=robot.joints, topic=topic) for path in bags]
+    """Read what bags, or tables, hold of the robot's joints."""
+    return columns.read(bags, robot, topic)
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
