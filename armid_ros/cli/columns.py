@@ -17,6 +17,7 @@ from armid_ros.robots import Robot
 import click
 
 _META = 'armid.columns'
+_SHOWN = 'armid.columns.shown'
 
 
 def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
@@ -109,7 +110,8 @@ def settings() -> ColumnSettings:
 def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
     """Read bags and tables; guesses are shown on stderr, those of equal files once."""
     said = settings()
-    shown: set[str] = set()
+    context = click.get_current_context(silent=True)
+    shown: set[str] = set() if context is None else context.meta.setdefault(_SHOWN, set())
 
     def show(plan: Plan) -> None:
         lines = plan.lines()

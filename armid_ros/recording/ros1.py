@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from armid_ros.recording.bag import Bag
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.tables.settings import renamed
 from armid_ros.recording.writer import BagWriter
+from rosbags.convert.converter import is_same_wireformat, migrate_bytes
 from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
@@ -115,6 +117,7 @@ def _copy_ros1(path: Path, reader: Reader, out: Path, rename: Sequence[tuple[str
     left_out: dict[str, str] = {}
     counts: dict[str, tuple[str, int]] = {}
     names: dict[str, str] = {}
+    converters: dict[str, Callable[[bytes | memoryview], memoryview]] = {}
     usable = []
     for connection in reader.connections:
         if connection.msgtype not in new.fielddefs:
@@ -136,7 +139,9 @@ def _copy_ros1(path: Path, reader: Reader, out: Path, rename: Sequence[tuple[str
         for connection, stamp, raw in reader.messages(usable):
             topic, kind = connection.topic, connection.msgtype
             try:
-                cdr = bytes(old.ros1_to_cdr(raw, kind))
+                if kind not in converters:
+                    converters[kind] = _converter(old, new, kind)
+                cdr = bytes(converters[kind](raw))
                 if kind == JOINT_STATE and rename:
                     cdr = _with_names(new, new.deserialize_cdr(cdr, kind), rename, names)
             except (SerdeError, KeyError, ValueError) as error:
@@ -150,6 +155,15 @@ def _copy_ros1(path: Path, reader: Reader, out: Path, rename: Sequence[tuple[str
         tuple(left_out.values()),
         _changed(names),
     )
+
+
+def _converter(
+    old: Typestore, new: Typestore, kind: str
+) -> Callable[[bytes | memoryview], memoryview]:
+    """Return what makes a message of ROS 2 of one of ROS 1."""
+    if is_same_wireformat(old, new, kind, kind):
+        return partial(new.ros1_to_cdr, typename=kind)
+    return partial(migrate_bytes, old, new, kind, kind, {}, src_is2=False, dst_is2=True)
 
 
 def _with_names(

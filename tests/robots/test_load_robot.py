@@ -327,6 +327,17 @@ def test_arrays_cannot_be_written_to() -> None:
             values[0] = 1
 
 
+def test_a_world_that_is_no_link_of_the_file_is_the_ground() -> None:
+    weld = joint('weld', 'world', 'base', 'fixed', '')
+    arm = robot_from_urdf(robot(weld, ARM, FOREARM))
+    plain = robot_from_urdf(robot(link('world', ''), weld, ARM, FOREARM))
+    assert arm.joints == ('shoulder', 'elbow')
+    np.testing.assert_array_equal(
+        inverse_dynamics(arm, 0.3, 0.2, 0.1), inverse_dynamics(plain, 0.3, 0.2, 0.1)
+    )
+    assert any('taken as the ground' in note for note in arm.notes)
+
+
 def test_an_unknown_joint_is_answered_with_those_that_exist() -> None:
     arm = robot_from_urdf(TWO_LINKS)
     assert arm.index('elbow') == 1

@@ -17,6 +17,9 @@ from armid_ros.recording.tables.table import Table, table_of_arrays
 import numpy as np
 import numpy.typing as npt
 
+#: What an HDF5 file begins with; MATLAB puts 512 bytes before it.
+HDF5 = b'\x89HDF'
+
 Arrays = dict[str, npt.NDArray[np.generic]]
 
 
@@ -36,10 +39,11 @@ def read_matlab(path: Path) -> Table:
     """Read a .mat file: up to version 7 by scipy, version 7.3 by h5py."""
     from scipy.io import loadmat
 
+    with path.open('rb') as file:
+        if HDF5 in file.read(1024):
+            return read_hdf5(path)
     try:
         content = loadmat(path, simplify_cells=True)
-    except NotImplementedError:
-        return read_hdf5(path)
     except (ValueError, TypeError, OSError) as error:
         raise RecordingError(f'{path}: no MAT file that can be read: {error}') from error
     content = {name: value for name, value in content.items() if not name.startswith('__')}

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+import textwrap
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
@@ -132,7 +133,11 @@ class Plan:
                 lines.append(f'  {quantity:9s} none')
         lines.append(f'  joints    {", ".join(self.joints)}')
         lines += [f'  note: {note}' for note in (*table.notes, *self.notes)]
-        return lines
+        return lines[:1] + [_wrapped(line) for line in lines[1:]]
+
+
+def _wrapped(line: str) -> str:
+    return textwrap.fill(line, 80, subsequent_indent=' ' * 12, break_long_words=False)
 
 
 def plan(

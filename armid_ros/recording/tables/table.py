@@ -59,12 +59,14 @@ class Column:
     def __post_init__(self) -> None:
         """Freeze the values, and take the unit from the name where none was given."""
         object.__setattr__(self, 'values', read_only(self.values))
-        object.__setattr__(self, 'unit', normal_unit(self.unit) or unit_of(self.name))
+        object.__setattr__(
+            self, 'unit', normal_unit(self.unit) or unit_of(self.array or self.name)
+        )
 
     @property
     def bare_name(self) -> str:
         """The name without a unit in brackets behind it."""
-        return _UNIT.sub('', self.name)
+        return self.name if self.array else _UNIT.sub('', self.name)
 
 
 @dataclass(frozen=True, eq=False)
