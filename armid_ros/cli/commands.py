@@ -16,6 +16,7 @@ import click
 COMMANDS = {
     'demo': 'demo',
     'convert': 'convert',
+    'inspect': 'inspect',
     'excite': 'excite',
     'simulate': 'record',
     'identify': 'identify',

@@ -70,7 +70,7 @@ def measured(plan: Plan) -> Recording:
         tau=tau,
         start_ns=start,
         source=table.source,
-        topic='',
+        topic='the table',
         report=report,
     )
 
