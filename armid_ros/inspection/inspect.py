@@ -196,7 +196,7 @@ def _of_units(
     ]
     if turned:
         named = ', '.join(f'{j.name} reaches {max(-j.lower, j.upper):.4g}' for j in turned[:3])
-        yield Remark('bad', f'{named}: are positions in degrees, or those of motors?')
+        yield Remark('doubt', f'{named}: are positions in degrees, or those of motors?')
     if recording.dq is None:
         yield Remark('note', 'no velocities; they are taken from the positions anyway')
         return

@@ -111,7 +111,7 @@ def short(clean):
 @pytest.mark.parametrize(
     ('spoil', 'said'),
     {
-        in_degrees: 'bad: shoulder_pitch reaches',
+        in_degrees: 'doubt: shoulder_pitch reaches',
         velocities_in_degrees: 'are in degrees/s while positions are in rad',
         velocities_reversed: 'have the opposite sign of what the positions do',
         velocities_empty: 'are zero while they move',
