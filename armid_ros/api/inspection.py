@@ -81,8 +81,8 @@ class InspectionResult(Shown):
 
 
 def _without_detail(row: tuple[str, ...]) -> tuple[str, ...]:
-    """Leave out how much a joint moves and the steps of its encoder."""
-    return row[:4] + row[6:]
+    """Leave out speed, share of motion and steps of the encoder."""
+    return row[:3] + row[6:]
 
 
 def inspect(
