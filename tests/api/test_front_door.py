@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `import armid_ros` offers: late, complete, and readable."""
 
+import os
+from pathlib import Path
 import subprocess
 import sys
 
@@ -49,7 +51,13 @@ def test_importing_it_imports_nothing_else():
         "heavy = {'numpy', 'scipy', 'pinocchio', 'matplotlib', 'rclpy', 'rich', 'click'}\n"
         'print(sorted(heavy & set(sys.modules)))'
     )
-    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, '-c', code],
+        env={**os.environ, 'PYTHONPATH': str(Path(__file__).parents[2])},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert done.stdout.strip() == '[]'
 
 
