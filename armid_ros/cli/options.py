@@ -26,7 +26,8 @@ robot = click.option(
     'robot_source',
     required=True,
     metavar='R',
-    help='Shipped name, path of a URDF or xacro, or - for the /robot_description in the bag.',
+    help='Shipped name, path of a URDF or xacro ("arm.xacro tool:=true" with '
+    'arguments), or - for the /robot_description in the bag.',
 )
 gravity = click.option(
     '--gravity', default='earth', show_default=True, help='earth, moon, or a vector x,y,z [m/s^2].'
@@ -117,4 +118,6 @@ def kept_source(source: str, robot: Robot, out: Path) -> str:
     if source == '-':
         (out / 'robot.urdf').write_text(robot.urdf, encoding='utf-8')
         return 'robot.urdf'
-    return str(Path(source).resolve()) if Path(source).is_file() else source
+    path, *arguments = source.split(' ') if ':=' in source else [source]
+    kept = str(Path(path).resolve()) if Path(path).is_file() else path
+    return ' '.join([kept, *arguments])

@@ -138,6 +138,8 @@ def inspect(
     elif trial is not None:
         found += _of_fit(trial)
         found += [Remark('note', note) for note in trial.notes]
+    if robot is not None:
+        found += [Remark('note', note) for note in robot.notes]
     order = ('bad', 'doubt', 'note')
     remarks = tuple(sorted(found, key=lambda remark: order.index(remark.weight)))
     return Inspection(recording, topics, robot, sampling, joints, trial, remarks)

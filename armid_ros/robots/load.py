@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
+import shlex
 from xml.etree import ElementTree
 
 from armid_ros.errors import RobotError
@@ -21,7 +22,7 @@ from armid_ros.robots.description import (
 )
 from armid_ros.robots.gravity import parse_gravity
 from armid_ros.robots.robot import Robot
-from armid_ros.robots.selection import driven_joints, standing_position
+from armid_ros.robots.selection import driven_joints, several_arms, standing_position
 from armid_ros.robots.shipped import shipped_path, shipped_robots
 import numpy as np
 import pinocchio as pin
@@ -69,6 +70,8 @@ def load_robot(
     """
     if isinstance(source, str) and source.lstrip().startswith('<'):
         return robot_from_urdf(source, gravity=gravity, joints=joints)
+    source, given = _xacro_arguments(source)
+    xacro_arguments = {**given, **(xacro_arguments or {})}
     shipped = isinstance(source, str) and source in shipped_robots()
     path = shipped_path(str(source)) if shipped else Path(source).expanduser()
     if not path.is_file():
@@ -136,10 +139,24 @@ def robot_from_urdf(
         urdf=text,
         urdf_damping=np.array([joint.damping for joint in driven]),
         urdf_friction=np.array([joint.friction for joint in driven]),
-        notes=description.notes + locked,
+        notes=description.notes + locked + several_arms(description, driven),
         path=path,
     )
     return replace(robot, notes=robot.notes + _inertia_notes(robot))
+
+
+def _xacro_arguments(source: str | Path) -> tuple[str | Path, dict[str, str]]:
+    """Take a path and arguments apart that are written as for xacro: 'arm.xacro tool:=true'."""
+    if not isinstance(source, str) or ':=' not in source:
+        return source, {}
+    first, *rest = shlex.split(source)
+    arguments = {}
+    for text in rest:
+        name, assigned, value = text.partition(':=')
+        if not assigned or not name:
+            raise RobotError(f"{source}: '{text}' is no argument; write name:=value")
+        arguments[name] = value
+    return first, arguments
 
 
 def _expand_xacro(path: Path, arguments: Mapping[str, str]) -> str:

@@ -10,6 +10,8 @@ from armid_ros.errors import RobotError
 from armid_ros.robots.description import Description, Joint
 
 GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
+#: Branches of fewer joints are no arms: a head, a trunk.
+SHORTEST_ARM = 3
 
 
 def driven_joints(
@@ -41,6 +43,43 @@ def driven_joints(
     if not chosen:
         raise RobotError(f'{source}: no joint can be driven; a robot needs one at least')
     return chosen
+
+
+def several_arms(description: Description, driven: Sequence[Joint]) -> tuple[str, ...]:
+    """Return a note where the driven joints are those of several arms; none where of one."""
+    names = {joint.name for joint in driven}
+    after = {
+        joint.name: [other for other in description.beyond(joint) if other.name in names]
+        for joint in driven
+    }
+    # An arm begins where a joint is not carried by another driven one, or beside others.
+    firsts = [
+        joint
+        for joint in driven
+        if not any(joint in after[other.name] for other in driven)
+        or any(_beside(joint, other, after) for other in driven)
+    ]
+    arms = [
+        joint
+        for joint in firsts
+        if len(after[joint.name]) + 1 >= SHORTEST_ARM
+        and not any(other in after[joint.name] for other in firsts)
+    ]
+    if len(arms) < 2:
+        return ()
+    begins = ', '.join(f"'{joint.name}' ({len(after[joint.name]) + 1} joints)" for joint in arms)
+    return (f'{len(arms)} arms are driven, beginning with {begins}; --joints A,B,... takes one',)
+
+
+def _beside(joint: Joint, other: Joint, after: dict[str, list[Joint]]) -> bool:
+    """Whether two joints are the first ones of branches that part after one driven joint."""
+    if joint is other or other in after[joint.name] or joint in after[other.name]:
+        return False
+    return _carriers(joint, after) == _carriers(other, after)
+
+
+def _carriers(joint: Joint, after: dict[str, list[Joint]]) -> set[str]:
+    return {name for name, beyond in after.items() if joint in beyond}
 
 
 def standing_position(description: Description, joint: Joint) -> float:
