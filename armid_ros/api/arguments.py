@@ -14,7 +14,8 @@ from armid_ros.recording import Recording
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.tables import ColumnSettings
 from armid_ros.recording.tables.settings import numbers
-from armid_ros.robots import load_robot, Robot
+from armid_ros.robots import load_robot, Robot, shipped_robots
+from armid_ros.robots.shipped import shipped_path
 import numpy as np
 
 #: A robot: as it is, as part of a model, by a shipped name, or by the path of its description.
@@ -38,6 +39,14 @@ def robot_of(robot: RobotLike) -> Robot:
     if isinstance(robot, ArmModel):
         return robot.robot
     return robot if isinstance(robot, Robot) else load_robot(str(robot))
+
+
+def source_of(robot: Robot) -> str:
+    """Return how files refer to a robot: by its shipped name, its path, or its name."""
+    for name in shipped_robots():
+        if robot.path == shipped_path(name):
+            return name
+    return robot.name if robot.path is None else str(Path(robot.path).resolve())
 
 
 def arm_of(arm: RobotLike, effects: str = USUAL_EFFECTS) -> ArmModel:

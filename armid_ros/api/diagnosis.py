@@ -18,6 +18,7 @@ from armid_ros.api.arguments import (
     recordings_of,
     Rng,
     RobotLike,
+    source_of,
 )
 from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel, save_model
@@ -133,8 +134,7 @@ class DiagnosisResult(Shown):
 
     @property
     def _robot(self) -> str:
-        robot = self.description.robot
-        return robot.name if robot.path is None else str(robot.path)
+        return source_of(self.description.robot)
 
     def _details(self) -> str:
         """Return the gap of every joint, before and after, as bars."""

@@ -17,6 +17,7 @@ from armid_ros.api.arguments import (
     recordings_of,
     Rng,
     RobotLike,
+    source_of,
     USUAL_EFFECTS,
 )
 from armid_ros.api.table import html_table, Shown, Summary
@@ -184,8 +185,7 @@ class IdentificationResult(Shown):
 
     @property
     def _robot(self) -> str:
-        robot = self.description.robot
-        return robot.name if robot.path is None else str(robot.path)
+        return source_of(self.description.robot)
 
     def _value(self, name: str, joint: str) -> str:
         for k, parameter in enumerate(self.estimate.parameters):

@@ -22,7 +22,7 @@ from armid_ros.excitation import (
     whole_period,
 )
 from armid_ros.motion import Motion
-from armid_ros.recording import read_waypoints, Recording, write_joint_trajectory
+from armid_ros.recording import read_waypoints, ReadReport, Recording, write_joint_trajectory
 from armid_ros.robots import collision_model
 from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run
@@ -216,6 +216,7 @@ def simulate(
         dq=measured.dq,
         tau=measured.tau,
         source='simulation',
+        report=ReadReport(messages=len(measured.t), samples=len(measured.t)),
     )
 
 
