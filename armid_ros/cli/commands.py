@@ -25,6 +25,7 @@ COMMANDS = {
     'exo': 'exo',
     'compare': 'compare',
     'recover': 'record',
+    'layout': 'layout',
     'robots': 'catalogues',
     'effects': 'catalogues',
 }
