@@ -13,6 +13,8 @@ from armid_ros.effects import make_effect
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, Recording
+from armid_ros.recording.ros1 import is_ros1
+from armid_ros.recording.tables import is_table
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
 import click
 import numpy as np
@@ -61,7 +63,7 @@ def open_robot(source: str, gravity: str, joints: str | None, bags: Sequence[Pat
     if source != '-':
         return load_robot(source, gravity=gravity, joints=chosen)
     for path in bags:
-        text = read_robot_description(path)
+        text = None if is_table(path) or is_ros1(path) else read_robot_description(path)
         if text is not None:
             return robot_from_urdf(text, gravity=gravity, joints=chosen, source=str(path))
     raise RobotError(

@@ -84,3 +84,9 @@ def test_joints_get_other_names_in_a_copy(bags, tmp_path):
     ).stdout
     assert 'renamed: shoulder_pitch to left_pitch' in text
     assert len(read_recording(tmp_path / 'bag', joints=('left_pitch', 'elbow_pitch')))
+
+
+def test_a_table_has_no_description_and_that_is_said(csv, tmp_path):
+    error = armid('identify', csv, '--robot', '-', '--out', tmp_path / 'o', code=2).stderr
+    assert 'no /robot_description in' in error
+    assert 'name the URDF with --robot' in error
