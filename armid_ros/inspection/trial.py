@@ -89,8 +89,8 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         arm = arm.with_effect(make_effect(name, robot))
     try:
         result = identify(arm, [recording], rng=rng)
-    except ArmidError as error:
-        return Trial(refused=str(error))
+    except ArmidError as refusal:
+        return Trial(refused=str(refusal))
     motions = [fit.motion for fit in result.training]
     error = Score.of(result.training).relative_error_percent
     return Trial(
