@@ -223,6 +223,8 @@ def _source(
             )
         )[:4]
     unit = next((column.unit for column in chosen.columns if column.unit), '')
+    if not unit and 'curr' in chosen.pattern.lower():
+        unit = 'A'
     plain = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}[quantity]
     factor = np.full(len(chosen.columns), _FACTORS.get(unit, 1.0))
     return Source(quantity, chosen, unit or plain, factor, asked is None, rivals)

@@ -80,6 +80,25 @@ def test_degrees_are_those_of_joints_that_turn():
     np.testing.assert_allclose(recording.q[-1], [1.0, np.radians(2.0)])
 
 
+def test_elements_of_a_state_vector_are_told_apart_by_their_endings():
+    """As LeRobot names them; what was commanded stands beside what was measured."""
+    names = [f'{joint}.{kind}' for joint in JOINTS for kind in ('pos', 'vel', 'torque')]
+    columns = [
+        Column(f'observation.state[{name}]', np.linspace(0, k + 1, 50), 'observation.state')
+        for k, name in enumerate(names)
+    ]
+    columns += [
+        Column(f'action[{joint}.pos]', np.linspace(0, 9, 50), 'action') for joint in JOINTS
+    ]
+    for joints in (JOINTS, None):
+        settled = plan(Table('set', tuple(columns), rate_hz=50.0), ColumnSettings(), joints)
+        assert settled.joints == JOINTS
+        recording = measured(settled)
+        np.testing.assert_allclose(recording.q[-1], [1, 4])
+        np.testing.assert_allclose(recording.dq[-1], [2, 5])
+        np.testing.assert_allclose(recording.tau[-1], [3, 6])
+
+
 def test_large_angles_are_doubted():
     columns = table(q1=np.linspace(0, 90, 50), q2=np.linspace(0, 45, 50))
     assert any('--degrees' in note for note in plan(columns, ColumnSettings(), JOINTS).notes)
