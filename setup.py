@@ -65,6 +65,7 @@ setup(
     install_requires=requirements('run'),
     extras_require={
         'ros': requirements('ros'),
+        'convert': requirements('convert'),
         'test': requirements('test'),
         'bench': requirements('bench'),
     },

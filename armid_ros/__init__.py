@@ -3,11 +3,122 @@
 """
 Identification of robot arms: find where simulation and measurement disagree.
 
-An arm model is a rigid body plus a list of effects. The packages, from the ground up: ``robots``
-(descriptions), ``model`` (rigid body), ``effects`` (what else acts on a joint), ``arm`` (the two
-together), ``recording``, ``simulation``, ``excitation``, ``identification``, ``report``,
-``nodes``.
+An arm model is a rigid body plus a list of effects. With ``import armid_ros as ar``::
+
+    arm = ar.ArmModel.of('ur10.urdf', effects='viscous_friction,coulomb_friction,torque_offset')
+    model = ar.identify(arm, ['monday.mcap', 'tuesday.csv'], validate='wednesday.mcap')
+    print(model)
+    found = ar.diagnose(model.arm, 'today.mcap')
+    print(found)
+    found.report('found.html')
+
+Names are imported when they are used. The packages, from the ground up: ``robots`` (descriptions),
+``model`` (rigid body), ``effects`` (what else acts on a joint), ``arm`` (the two together),
+``recording``, ``simulation``, ``excitation``, ``identification``, ``inspection``, ``diagnosis``,
+``report``, ``api``, ``nodes``, ``cli``.
 
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any, TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from armid_ros.api.arguments import read_recording
+    from armid_ros.api.comparison import compare, ComparisonResult
+    from armid_ros.api.diagnosis import diagnose, DiagnosisResult
+    from armid_ros.api.identification import IdentificationResult, identify
+    from armid_ros.api.inspection import inspect, InspectionResult
+    from armid_ros.api.simulation import design_excitation, ExcitationResult, simulate
+    from armid_ros.arm import ArmModel, load_model, save_model
+    from armid_ros.effects import Effect, make_effect, Quantity
+    from armid_ros.errors import ArmidError
+    from armid_ros.estimate import Estimate
+    from armid_ros.identification.online import OnlineIdentifier
+    from armid_ros.model import regressor
+    from armid_ros.motion import Motion
+    from armid_ros.recording import Recording, write_recording
+    from armid_ros.robots import load_robot, Robot, shipped_robots
+
 __version__ = '0.1.0'
+
+#: Public names, and the modules they live in.
+_HOMES = {
+    'load_robot': 'armid_ros.robots',
+    'shipped_robots': 'armid_ros.robots',
+    'Robot': 'armid_ros.robots',
+    'ArmModel': 'armid_ros.arm',
+    'load_model': 'armid_ros.arm',
+    'save_model': 'armid_ros.arm',
+    'Effect': 'armid_ros.effects',
+    'Quantity': 'armid_ros.effects',
+    'make_effect': 'armid_ros.effects',
+    'regressor': 'armid_ros.model',
+    'Motion': 'armid_ros.motion',
+    'Recording': 'armid_ros.recording',
+    'read_recording': 'armid_ros.api.arguments',
+    'write_recording': 'armid_ros.recording',
+    'inspect': 'armid_ros.api.inspection',
+    'InspectionResult': 'armid_ros.api.inspection',
+    'identify': 'armid_ros.api.identification',
+    'IdentificationResult': 'armid_ros.api.identification',
+    'OnlineIdentifier': 'armid_ros.identification.online',
+    'diagnose': 'armid_ros.api.diagnosis',
+    'DiagnosisResult': 'armid_ros.api.diagnosis',
+    'compare': 'armid_ros.api.comparison',
+    'ComparisonResult': 'armid_ros.api.comparison',
+    'simulate': 'armid_ros.api.simulation',
+    'design_excitation': 'armid_ros.api.simulation',
+    'ExcitationResult': 'armid_ros.api.simulation',
+    'Estimate': 'armid_ros.estimate',
+    'ArmidError': 'armid_ros.errors',
+}
+
+__all__ = [
+    'load_robot',
+    'shipped_robots',
+    'Robot',
+    'ArmModel',
+    'load_model',
+    'save_model',
+    'Effect',
+    'Quantity',
+    'make_effect',
+    'regressor',
+    'Motion',
+    'Recording',
+    'read_recording',
+    'write_recording',
+    'inspect',
+    'InspectionResult',
+    'identify',
+    'IdentificationResult',
+    'OnlineIdentifier',
+    'diagnose',
+    'DiagnosisResult',
+    'compare',
+    'ComparisonResult',
+    'simulate',
+    'design_excitation',
+    'ExcitationResult',
+    'Estimate',
+    'ArmidError',
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used."""
+    if name not in _HOMES:
+        raise AttributeError(
+            f"armid_ros has no '{name}'; it has {', '.join(__all__)}, and packages such as "
+            'armid_ros.excitation'
+        )
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the public names."""
+    return [*__all__, '__version__']

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from armid_ros.effects import (
@@ -14,6 +16,7 @@ from armid_ros.effects import (
     Effect,
     law_derivatives,
     merge_actions,
+    parse_effect,
     TorqueReading,
 )
 from armid_ros.effects.timing import smoothed
@@ -31,7 +34,7 @@ from armid_ros.model import (
     rigid_parameter_names,
 )
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
-from armid_ros.robots import Robot
+from armid_ros.robots import load_robot, Robot
 import numpy as np
 import numpy.typing as npt
 
@@ -39,7 +42,7 @@ import numpy.typing as npt
 _STENCIL = 4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ArmModel:
     """
     A rigid body plus effects: tau = Y pi + sum over effects of tau_e(motion; theta_e).
@@ -75,6 +78,62 @@ class ArmModel:
                 f'{self.robot.name}: effects {", ".join(e.name for e in self.effects)} take '
                 f'{sizes} values, got shapes {[v.shape for v in self.values]}'
             )
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot | str | Path,
+        *,
+        effects: str | Sequence[str | Effect] = (),
+        gravity: str | Sequence[float] = 'earth',
+        joints: Sequence[str] | None = None,
+    ) -> ArmModel:
+        """
+        Make a model of a description.
+
+        Parameters
+        ----------
+        robot : Robot, str or Path
+            As it is, a shipped name, or the path of a URDF or xacro.
+        effects : str or sequence of str or Effect
+            What acts beside the rigid body: catalogue names, with commas in one text; joints as
+            in 'payload@wrist', values as in 'viscous_friction:viscous_coefficient=0.1', the
+            latter one a text.
+        gravity : str or sequence of float
+            'earth', 'moon', or a vector in the base frame [m/s^2]; not for a Robot as it is.
+        joints : sequence of str, optional
+            Driven joints; all but grippers by default.
+
+        Raises
+        ------
+        RobotError or ModelError
+            The description cannot be used, or the catalogue has no such effect.
+
+        """
+        if not isinstance(robot, Robot):
+            robot = load_robot(robot, gravity=gravity, joints=joints)
+        arm = cls(robot)
+        if isinstance(effects, str):
+            effects = [effects] if ':' in effects else [e for e in effects.split(',') if e.strip()]
+        for effect in effects:
+            if isinstance(effect, Effect):
+                arm = arm.with_effect(effect)
+            else:
+                arm = arm.with_effect(*parse_effect(effect, robot))
+        return arm
+
+    def __repr__(self) -> str:
+        """Return robot, joints and effects in a few lines."""
+        gravity = ', '.join(f'{value:g}' for value in self.robot.gravity)
+        lines = [
+            f'ArmModel of {self.robot.name}: {self.robot.n_joints} joints '
+            f'({", ".join(self.robot.joints)})',
+            f'  gravity {gravity} m/s^2, {self.robot.rigid_parameters[::10].sum():.4g} kg moving',
+        ]
+        for effect, values in zip(self.effects, self.values, strict=True):
+            shown = ', '.join(f'{value:.4g}' for value in values[:6])
+            lines.append(f'  {effect.name}: {shown}{" ..." if len(values) > 6 else ""}')
+        return '\n'.join(lines)
 
     def with_effect(self, effect: Effect, values: npt.ArrayLike | None = None) -> ArmModel:
         """Return the arm with one more effect; without values its parameters are zero."""

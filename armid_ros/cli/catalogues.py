@@ -4,11 +4,16 @@
 
 from __future__ import annotations
 
+import textwrap
+
 from armid_ros.cli import options
-from armid_ros.cli.terminal import print_rows
+from armid_ros.cli.terminal import print_rows, say
 from armid_ros.effects import CATALOGUE
 from armid_ros.robots import shipped_robots
 import click
+
+#: Stands for a blank at which no line ends.
+_JOINED = '\u00a0'
 
 
 @click.command(epilog='Example: armid robots')
@@ -32,7 +37,29 @@ def effects(as_json: bool) -> None:
         }
         for name, effect in CATALOGUE.items()
     ]
-    print_rows(rows, as_json)
+    if as_json:
+        print_rows(rows, as_json)
+        return
+    for row in rows:
+        say(_wrapped(f'{row["name"]}: {row["what it is"]}', '', '    '))
+        say(_wrapped(', '.join(map(_unbroken, row['parameters'])), '    ', '    '))
+
+
+def _unbroken(text: str) -> str:
+    """Keep a name and its unit on one line."""
+    return text.replace(' ', _JOINED)
+
+
+def _wrapped(text: str, first: str, others: str) -> str:
+    lines = textwrap.wrap(
+        text,
+        80,
+        initial_indent=first,
+        subsequent_indent=others,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return '\n'.join(lines).replace(_JOINED, ' ')
 
 
 def _with_unit(name: str, unit: str) -> str:

@@ -16,6 +16,8 @@ import click
 #: Command and module, in the order of the work; a module is imported when its command is called.
 COMMANDS = {
     'demo': 'demo',
+    'convert': 'convert',
+    'inspect': 'inspect',
     'excite': 'excite',
     'simulate': 'record',
     'identify': 'identify',
@@ -24,6 +26,7 @@ COMMANDS = {
     'exo': 'exo',
     'compare': 'compare',
     'recover': 'record',
+    'layout': 'layout',
     'robots': 'catalogues',
     'effects': 'catalogues',
 }

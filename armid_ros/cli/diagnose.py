@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_model, save_model
-from armid_ros.cli import options
+from armid_ros.cli import columns, options
 from armid_ros.cli import partner as partner_options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
@@ -57,6 +57,7 @@ import numpy as np
 )
 @click.option('--cutoff', type=float, help='Of the position filter [Hz]; from the noise if none.')
 @click.option('--decimation', type=int, help='Keep one sample of this many.')
+@columns.options
 @click.option('--topic', help='JointState topic, where a bag has several.')
 @partner_options.options
 @options.gravity

@@ -10,7 +10,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf
-from armid_ros.cli import options
+from armid_ros.cli import columns, options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
 from armid_ros.errors import IdentificationError
@@ -94,6 +94,7 @@ OUTPUTS = (
     help='Test for encoder noise and simulate along the held-out bags.',
 )
 @click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
+@columns.options
 @click.option('--topic', help='JointState topic, where a bag has several.')
 @options.gravity
 @options.joints

@@ -9,16 +9,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from armid_ros.arm import ArmModel
+from armid_ros.cli import columns
 from armid_ros.effects import make_effect
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.files import default_memory_limit, result_folder, write_file
 from armid_ros.motion import FloatArray
-from armid_ros.recording import (
-    read_recording,
-    read_robot_description,
-    ReadSettings,
-    Recording,
-)
+from armid_ros.recording import read_robot_description, ReadSettings, Recording
+from armid_ros.recording.ros1 import is_ros1
+from armid_ros.recording.tables import is_table
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
 import click
 import numpy as np
@@ -36,7 +34,8 @@ robot = click.option(
     'robot_source',
     required=True,
     metavar='R',
-    help='Shipped name, path of a URDF or xacro, or - for the /robot_description in the bag. '
+    help='Shipped name, path of a URDF or xacro ("arm.xacro tool:=true" with '
+    'arguments), or - for the /robot_description in the bag. '
     'A xacro is a program, which can read any file: name only one that you trust.',
 )
 gravity = click.option(
@@ -119,7 +118,8 @@ def open_robot(source: str, gravity: str, joints: str | None, bags: Sequence[Pat
     if source != '-':
         return load_robot(source, gravity=gravity, joints=chosen)
     for path in bags:
-        text = read_robot_description(path, read_settings())
+        bag = not (is_table(path) or is_ros1(path))
+        text = read_robot_description(path, read_settings()) if bag else None
         if text is not None:
             return robot_from_urdf(text, gravity=gravity, joints=chosen, source=str(path))
     raise RobotError(
@@ -185,11 +185,8 @@ def require_own(folder: Path, ours: Collection[str], command: str) -> None:
 
 
 def read(bags: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
-    """Read what the bags hold of the robot's joints."""
-    settings = read_settings()
-    return [
-        read_recording(path, joints=robot.joints, topic=topic, settings=settings) for path in bags
-    ]
+    """Read what bags, or tables, hold of the robot's joints."""
+    return columns.read(bags, robot, topic, read_settings())
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
@@ -197,4 +194,6 @@ def kept_source(source: str, robot: Robot, out: Path) -> str:
     if source == '-':
         write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'
-    return str(Path(source).resolve()) if Path(source).is_file() else source
+    path, *arguments = source.split(' ') if ':=' in source else [source]
+    kept = str(Path(path).resolve()) if Path(path).is_file() else path
+    return ' '.join([kept, *arguments])

@@ -10,8 +10,11 @@ from dataclasses import dataclass
 import multiprocessing
 from multiprocessing.connection import Connection, wait
 import os
+import pickle
 import signal
+import sys
 import threading
+from types import ModuleType
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.clearance import ClearanceModel
@@ -96,7 +99,7 @@ def search_all(
     deadline = clock() + task.problem.settings.time_budget
     processes = min(task.problem.settings.processes, len(rngs))
     try:
-        if processes == 1:
+        if processes == 1 or not _portable(task):
             stopped = _here(task, rngs, board, deadline, clock)
         else:
             stopped = _in_processes(task, rngs, board, deadline, clock, processes)
@@ -169,7 +172,7 @@ def _in_processes(
                 number, rng = waiting.pop()
                 ours, theirs = context.Pipe(duplex=False)
                 process = context.Process(target=_work, args=(task, rng, theirs), daemon=True)
-                with _undisturbed_children():
+                with _undisturbed_children(), _nameless_main():
                     process.start()
                 theirs.close()
                 running[ours] = (number, process)
@@ -213,6 +216,32 @@ def _work(task: Task, rng: np.random.Generator, connection: Connection) -> None:
         connection.send(error)
     finally:
         connection.close()
+
+
+def _portable(task: Task) -> bool:
+    """Whether a task can go to a process that does not know the script that runs."""
+    with _nameless_main():
+        try:
+            pickle.dumps(task)
+        except (pickle.PicklingError, AttributeError, TypeError):
+            return False
+    return True
+
+
+@contextmanager
+def _nameless_main() -> Iterator[None]:
+    """
+    Hide the script that runs from processes that start in the meantime.
+
+    They would run it again, which a script that is not written for it does not survive.
+
+    """
+    script = sys.modules['__main__']
+    sys.modules['__main__'] = ModuleType('__main__')
+    try:
+        yield
+    finally:
+        sys.modules['__main__'] = script
 
 
 @contextmanager

@@ -124,7 +124,7 @@ class ReadReport:
         return text
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Recording:
     """
     Joint measurements of one arm, as recorded.
@@ -185,6 +185,19 @@ class Recording:
     def __len__(self) -> int:
         """Return the number of samples N."""
         return len(self.t)
+
+    def __repr__(self) -> str:
+        """Return what was recorded in two lines."""
+        rate = f'{1.0 / self.period:.4g} Hz' if self.period else 'one sample'
+        held = [
+            name
+            for name, values in (('velocity', self.dq), ('effort', self.tau))
+            if values is not None
+        ]
+        return (
+            f'Recording {self.source or "in memory"}: {self.duration:.2f} s at {rate}, '
+            f'{", ".join(["position", *held])}\n  of {", ".join(self.joints)}'
+        )
 
     @property
     def n_joints(self) -> int:

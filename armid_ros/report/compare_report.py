@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import PurePath
 
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.comparison import Change, Comparison, GroupChange
@@ -54,7 +55,8 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
         Changes(comparison),
         Origin(provenance or Provenance()),
     ]
-    title = f'Comparison of two identifications of {comparison.after.robot}'
+    robot = PurePath(comparison.after.robot).name
+    title = f'Comparison of two identifications of {robot}'
     subtitle = f'{comparison.before.source} · {comparison.after.source}'
     return Page(title, subtitle, sections).html()
 

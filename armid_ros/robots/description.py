@@ -122,6 +122,10 @@ def parse_xml(text: str, source: str) -> ElementTree.Element:
     return root
 
 
+#: A parent of this name stands for the ground in Drake, Bullet and Gazebo, without a link of it.
+GROUND = 'world'
+
+
 def parse_description(root: ElementTree.Element, source: str) -> Description:
     """
     Return the kinematic tree of a URDF.
@@ -145,6 +149,9 @@ def parse_description(root: ElementTree.Element, source: str) -> Description:
     for element in root.findall('joint'):
         name = reader.name(element, joints)
         joints[name] = reader.joint(element, name)
+    if GROUND not in links and any(joint.parent == GROUND for joint in joints.values()):
+        reader.notes.append(f"link '{GROUND}' is not in the file; taken as the ground")
+        links = {GROUND: None, **links}
     _check_tree(source, links, joints.values())
     return Description(
         name=root.get('name') or 'robot',

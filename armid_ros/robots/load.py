@@ -9,6 +9,7 @@ from dataclasses import replace
 import math
 import os
 from pathlib import Path
+import shlex
 from xml.etree import ElementTree
 
 from armid_ros.errors import RobotError
@@ -23,7 +24,7 @@ from armid_ros.robots.description import (
 )
 from armid_ros.robots.gravity import parse_gravity
 from armid_ros.robots.robot import Robot
-from armid_ros.robots.selection import driven_joints, standing_position
+from armid_ros.robots.selection import driven_joints, several_arms, standing_position
 from armid_ros.robots.shipped import shipped_path, shipped_robots
 from armid_ros.robots.xacro_expansion import expand_xacro
 import numpy as np
@@ -74,6 +75,8 @@ def load_robot(
     """
     if isinstance(source, str) and source.lstrip().startswith('<'):
         return robot_from_urdf(source, gravity=gravity, joints=joints)
+    source, given = _xacro_arguments(source)
+    xacro_arguments = {**given, **(xacro_arguments or {})}
     shipped = isinstance(source, str) and source in shipped_robots()
     path = shipped_path(str(source)) if shipped else Path(source).expanduser()
     if not os.path.lexists(path):
@@ -139,12 +142,26 @@ def robot_from_urdf(
         urdf=text,
         urdf_damping=np.array([joint.damping for joint in driven]),
         urdf_friction=np.array([joint.friction for joint in driven]),
-        notes=description.notes + locked,
+        notes=description.notes + locked + several_arms(description, driven),
         path=path,
     )
     if not np.isfinite(robot.rigid_parameters).all():
         raise RobotError(f'{source}: its masses, lengths and inertias are beyond all numbers')
     return replace(robot, notes=robot.notes + _inertia_notes(robot))
+
+
+def _xacro_arguments(source: str | Path) -> tuple[str | Path, dict[str, str]]:
+    """Take a path and arguments apart that are written as for xacro: 'arm.xacro tool:=true'."""
+    if not isinstance(source, str) or ':=' not in source:
+        return source, {}
+    first, *rest = shlex.split(source)
+    arguments = {}
+    for text in rest:
+        name, assigned, value = text.partition(':=')
+        if not assigned or not name:
+            raise RobotError(f"{source}: '{text}' is no argument; write name:=value")
+        arguments[name] = value
+    return first, arguments
 
 
 def _kinematic_model(

@@ -12,6 +12,8 @@ from armid_ros.robots.description import Description, Joint
 #: Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70.
 MAX_DRIVEN = 150
 GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
+#: Branches of fewer joints are no arms: a head, a trunk.
+SHORTEST_ARM = 3
 
 
 def driven_joints(
@@ -48,6 +50,43 @@ def driven_joints(
             'identified together: name those of one arm with --joints'
         )
     return chosen
+
+
+def several_arms(description: Description, driven: Sequence[Joint]) -> tuple[str, ...]:
+    """Return a note where the driven joints are those of several arms; none where of one."""
+    before = {joint.name: _carriers(description, [joint]) for joint in driven}
+    after = {
+        joint.name: [other for other in driven if joint.name in before[other.name]]
+        for joint in driven
+    }
+    # An arm begins where a joint is not carried by another driven one, or beside others.
+    firsts = [
+        joint
+        for joint in driven
+        if not any(joint in after[other.name] for other in driven)
+        or any(_beside(joint, other, after) for other in driven)
+    ]
+    arms = [
+        joint
+        for joint in firsts
+        if len(after[joint.name]) + 1 >= SHORTEST_ARM
+        and not any(other in after[joint.name] for other in firsts)
+    ]
+    if len(arms) < 2:
+        return ()
+    begins = ', '.join(f"'{joint.name}' ({len(after[joint.name]) + 1} joints)" for joint in arms)
+    return (f'{len(arms)} arms are driven, beginning with {begins}; --joints A,B,... takes one',)
+
+
+def _beside(joint: Joint, other: Joint, after: dict[str, list[Joint]]) -> bool:
+    """Whether two joints are the first ones of branches that part after one driven joint."""
+    if joint is other or other in after[joint.name] or joint in after[other.name]:
+        return False
+    return _driven_before(joint, after) == _driven_before(other, after)
+
+
+def _driven_before(joint: Joint, after: dict[str, list[Joint]]) -> set[str]:
+    return {name for name, beyond in after.items() if joint in beyond}
 
 
 def standing_position(description: Description, joint: Joint) -> float:

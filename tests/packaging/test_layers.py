@@ -13,9 +13,9 @@ import pytest
 
 LAYERS = (
     ('cli',),
-    ('nodes',),
+    ('api', 'nodes'),
     ('report',),
-    ('diagnosis',),
+    ('diagnosis', 'inspection'),
     ('identification',),
     ('recording', 'simulation', 'excitation'),
     ('arm',),

@@ -316,6 +316,12 @@ def first_plot(browser, tmp_path, html):
     return opened
 
 
+def test_a_legend_has_no_values_without_a_pointer(browser, first_plot):
+    first_plot(1280)
+    said = browser.run('document.querySelector("#fit figure.chart .u-legend").innerText')
+    assert ''.join(said.split()) == 'measuredpredicted'
+
+
 def test_dragging_zooms_torque_and_residual_and_the_button_undoes_it(browser, first_plot):
     left, middle, width = first_plot(1280)
     assert browser.run(HIDDEN) == [True, True]

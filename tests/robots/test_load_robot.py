@@ -330,6 +330,45 @@ def test_arrays_cannot_be_written_to() -> None:
             values[0] = 1
 
 
+def test_a_world_that_is_no_link_of_the_file_is_the_ground() -> None:
+    weld = joint('weld', 'world', 'base', 'fixed', '')
+    arm = robot_from_urdf(robot(weld, ARM, FOREARM))
+    plain = robot_from_urdf(robot(link('world', ''), weld, ARM, FOREARM))
+    assert arm.joints == ('shoulder', 'elbow')
+    np.testing.assert_array_equal(
+        inverse_dynamics(arm, 0.3, 0.2, 0.1), inverse_dynamics(plain, 0.3, 0.2, 0.1)
+    )
+    assert any('taken as the ground' in note for note in arm.notes)
+
+
+def test_two_arms_are_said_to_be_two() -> None:
+    chains = ''.join(
+        link(f'{side}{k}') + joint(f'{side}_{k}', f'{side}{k - 1}' if k else 'torso', f'{side}{k}')
+        for side in ('left', 'right')
+        for k in range(3)
+    )
+    torso = BASE + link('torso') + joint('waist', 'base', 'torso')
+    head = link('head') + joint('neck', 'torso', 'head')
+    (note,) = robot_from_urdf(robot(torso, chains, head)).notes
+    assert note.startswith("2 arms are driven, beginning with 'left_0' (3 joints), 'right_0'")
+    right = ('waist', 'right_0', 'right_1', 'right_2')
+    one = robot_from_urdf(robot(torso, chains, head), joints=right)
+    assert not any('arms are driven' in text for text in one.notes)
+    assert not any('arms are driven' in text for text in robot_from_urdf(TWO_LINKS).notes)
+
+
+def test_xacro_arguments_are_written_behind_the_path(tmp_path: Path) -> None:
+    path = tmp_path / 'arm.xacro'
+    text = TWO_LINKS.replace('<robot ', '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
+    text = text.replace('value="1.5"', 'value="$(arg mass)"')
+    path.write_text(text.replace('>', '><xacro:arg name="mass" default="1.5"/>', 1))
+    heavy = load_robot(f'{path} mass:=4.0')
+    np.testing.assert_allclose(heavy.rigid_parameters[::10], 4.0)
+    np.testing.assert_allclose(load_robot(path).rigid_parameters[::10], 1.5)
+    with pytest.raises(RobotError, match="'mass=4' is no argument; write name:=value"):
+        load_robot(f'{path} other:=1 mass=4')
+
+
 def test_an_unknown_joint_is_answered_with_those_that_exist() -> None:
     arm = robot_from_urdf(TWO_LINKS)
     assert arm.index('elbow') == 1
@@ -460,6 +499,4 @@ def test_vectors_are_three_finite_numbers(element: str, name: str) -> None:
     )
     refusal = f"joint 'hinge': {name}='.*' of .* is not three finite numbers"
     with pytest.raises(RobotError, match=refusal):
-        RobotError, match=f"joint 'hinge': {name}='.*' of .* is not three finite numbers"
-    ):
         load_robot(text)

@@ -232,7 +232,9 @@
       legend: {show: spec.legend, markers: {width: 3}},
       cursor: {y: false, drag: {x: true, y: false}, points: {size: 6},
         ...(spec.link ? {sync: {key: spec.link, scales: ['x', null]}} : {})},
-      hooks: {draw: [drawLevels(spec), drawMarks(spec)], setScale: [share(spec, figure)]},
+      hooks: {draw: [drawLevels(spec), drawMarks(spec)], setScale: [share(spec, figure)],
+        ready: [(u) => u.root.classList.add('idle')],
+        setLegend: [(u) => u.root.classList.toggle('idle', u.cursor.idx == null)]},
     }, data, figure);
     charts.set(figure, {plot, spec});
     touch(plot, spec);

@@ -1,0 +1,135 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a person passes, and what the packages below take: a path for a robot, an int for a rng."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import RecordingError
+from armid_ros.recording import Recording
+from armid_ros.recording.anything import read_anything
+from armid_ros.recording.tables import ColumnSettings
+from armid_ros.recording.tables.settings import numbers
+from armid_ros.robots import load_robot, Robot, shipped_robots
+from armid_ros.robots.shipped import shipped_path
+import numpy as np
+
+#: A robot: as it is, as part of a model, by a shipped name, or by the path of its description.
+RobotLike = Robot | ArmModel | str | Path
+#: A recording: as it is, or the path of a bag or a table.
+RecordingLike = Recording | str | Path
+#: A generator, or the seed of one.
+Rng = np.random.Generator | int
+
+#: What is fitted beside the rigid body where nothing is said.
+USUAL_EFFECTS = 'viscous_friction,coulomb_friction,torque_offset'
+
+
+def generator(rng: Rng) -> np.random.Generator:
+    """Return a random generator; an int is its seed."""
+    return rng if isinstance(rng, np.random.Generator) else np.random.default_rng(rng)
+
+
+def robot_of(robot: RobotLike) -> Robot:
+    """Return the robot that is meant."""
+    if isinstance(robot, ArmModel):
+        return robot.robot
+    return robot if isinstance(robot, Robot) else load_robot(str(robot))
+
+
+def source_of(robot: Robot) -> str:
+    """Return how files refer to a robot: by its shipped name, its path, or its name."""
+    for name in shipped_robots():
+        if robot.path == shipped_path(name):
+            return name
+    return robot.name if robot.path is None else str(Path(robot.path).resolve())
+
+
+def arm_of(arm: RobotLike, effects: str = USUAL_EFFECTS) -> ArmModel:
+    """Return the model that is meant; a robot alone gets the usual friction."""
+    if isinstance(arm, ArmModel):
+        return arm
+    return ArmModel.of(arm if isinstance(arm, Robot) else str(arm), effects=effects)
+
+
+def recordings_of(
+    recordings: RecordingLike | Sequence[RecordingLike], robot: Robot
+) -> list[Recording]:
+    """Return recordings, read where they are paths; one or many."""
+    several = [recordings] if isinstance(recordings, (Recording, str, Path)) else list(recordings)
+    read = [one if isinstance(one, Recording) else read_recording(one, robot) for one in several]
+    for recording in read:
+        if recording.joints != robot.joints:
+            raise RecordingError(
+                f'{recording.source or "recording"}: its joints are '
+                f'{", ".join(recording.joints)}, those of {robot.name} '
+                f'{", ".join(robot.joints)}; read it with that robot'
+            )
+    return read
+
+
+def read_recording(
+    path: str | Path,
+    robot: RobotLike | Sequence[str],
+    *,
+    topic: str | None = None,
+    **columns: Any,
+) -> Recording:
+    """
+    Read the joints of a robot from a bag or a table.
+
+    Parameters
+    ----------
+    path : str or Path
+        A rosbag2 directory, .mcap, .db3, .bag, .csv, .npz, .mat, .parquet, or the folder of a
+        LeRobot dataset.
+    robot : robot, model, name, path, or sequence of str
+        Whose joints; a sequence of names does too.
+    topic : str, optional
+        JointState topic, where a bag has several.
+    **columns
+        Of a table, as in ColumnSettings: ``position='q{}'``, ``effort='tau{}'``, ``time='t'``,
+        ``degrees=True``, ``effort_scale=(11.2, ...)``, ``rename={'fer_': 'panda_'}``. What is not
+        said is guessed.
+
+    Returns
+    -------
+    Recording
+        Joint positions, velocities and torques.
+
+    Raises
+    ------
+    RecordingError
+        Naming the file, and the topic, joint, column or line, and what to do.
+
+    """
+    if isinstance(robot, (Robot, ArmModel, str, Path)):
+        described = robot_of(robot)
+        joints: Sequence[str] = described.joints
+        slides: Sequence[bool] | None = [bool(one) for one in described.prismatic]
+    else:
+        joints, slides = tuple(robot), None
+    return read_anything(
+        path, joints=joints, slides=slides, topic=topic, columns=_settings(columns)
+    )
+
+
+def _settings(columns: dict[str, Any]) -> ColumnSettings:
+    said = dict(columns)
+    if isinstance(said.get('rename'), dict):
+        said['rename'] = tuple(said['rename'].items())
+    for name in ('position_scale', 'effort_scale', 'zero', 'gear'):
+        value = said.get(name)
+        if isinstance(value, str):
+            said[name] = numbers(value)
+        elif value is not None:
+            said[name] = tuple(np.atleast_1d(value).tolist())
+    try:
+        return ColumnSettings(**said)
+    except TypeError as error:
+        known = ', '.join(ColumnSettings.__dataclass_fields__)
+        raise RecordingError(f'{str(error).split(" ", 1)[1]}; columns take {known}') from None

@@ -1,0 +1,120 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What changed between two identifications."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import json
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
+
+from armid_ros.api.identification import IdentificationResult
+from armid_ros.api.table import Shown, Summary
+from armid_ros.identification.comparison import compare as run
+from armid_ros.identification.comparison import Comparison
+from armid_ros.identification.parameters_file import Parameters, parameters_of, read_parameters
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class ComparisonResult(Shown):
+    """
+    Two identifications side by side.
+
+    Attributes
+    ----------
+    core : Comparison
+        Everything that was found.
+
+    """
+
+    core: Comparison
+
+    @property
+    def anything(self) -> bool:
+        """Whether something changed beyond chance."""
+        return self.core.anything
+
+    @property
+    def load(self) -> float | None:
+        """Mass that was added to a link [kg], where that explains the changes of the body."""
+        return None if self.core.load is None else float(self.core.load.mass)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return all parameters as a pandas table, before and after."""
+        from pandas import DataFrame
+
+        return DataFrame(self.document()['parameters'])
+
+    def document(self) -> dict[str, Any]:
+        """Return what comparison.json holds."""
+        return self.core.document()
+
+    def report(self, path: str | Path = 'report.html') -> Path:
+        """Write the page; return where it is."""
+        from armid_ros.report.compare_report import compare_report
+
+        Path(path).write_text(compare_report(self.core), encoding='utf-8')
+        return Path(path)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write comparison.json and report.html as ``armid compare`` does."""
+        out = Path(folder)
+        out.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(self.document(), indent=1)
+        (out / 'comparison.json').write_text(text, encoding='utf-8')
+        self.report(out / 'report.html')
+        return out
+
+    def summary(self) -> Summary:
+        """Return what changed, the surest first."""
+        from armid_ros.report.compare_report import tell
+
+        rows = [
+            (
+                change.parameter.name,
+                change.parameter.joint,
+                f'{change.before:.4g}',
+                f'{change.after:.4g}',
+                f'± {change.std:.2g} {change.parameter.unit}',
+            )
+            for change in self.core.changed
+        ]
+        heads = ('parameter', 'joint', 'before', 'after', 'std') if rows else ()
+        badge = 'changed' if self.anything else 'unchanged'
+        first, *more = tell(self.core)
+        return Summary(first, badge, heads, rows, lines=more[:1])
+
+
+def compare(
+    before: IdentificationResult | str | Path, after: IdentificationResult | str | Path
+) -> ComparisonResult:
+    """
+    Say what changed between two identifications of one robot.
+
+    Parameters
+    ----------
+    before, after : IdentificationResult, or path
+        Results of ``identify``, or folders that they were saved to.
+
+    Returns
+    -------
+    ComparisonResult
+        Prints what changed; ``report``, ``save``, ``to_dataframe``.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> print(ar.compare('monday', 'friday'))  # doctest: +SKIP
+
+    """
+    return ComparisonResult(run(_parameters('before', before), _parameters('after', after)))
+
+
+def _parameters(name: str, one: IdentificationResult | str | Path) -> Parameters:
+    if isinstance(one, IdentificationResult):
+        return parameters_of(name, one.document())
+    return read_parameters(one)

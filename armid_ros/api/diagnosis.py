@@ -1,0 +1,215 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings and a model in, what the model lacks out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+import json
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
+
+from armid_ros.api.arguments import (
+    arm_of,
+    generator,
+    RecordingLike,
+    recordings_of,
+    Rng,
+    RobotLike,
+    source_of,
+)
+from armid_ros.api.table import Shown, Summary
+from armid_ros.arm import ArmModel, save_model
+from armid_ros.diagnosis import diagnose as run
+from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
+from armid_ros.identification import SignalSettings
+from armid_ros.recording import Recording
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class DiagnosisResult(Shown):
+    """
+    What a model lacks.
+
+    Attributes
+    ----------
+    core : Diagnosis
+        Everything that the diagnosis found.
+    description : ArmModel
+        The model before.
+    recordings, held_out : tuple of Recording
+        What was looked at, and what was only predicted.
+
+    """
+
+    core: Diagnosis
+    description: ArmModel
+    recordings: tuple[Recording, ...]
+    held_out: tuple[Recording, ...]
+
+    @property
+    def verdict(self) -> str:
+        """One word: consistent, named, ambiguous, partial, unknown, not_repeatable, bad_data."""
+        return self.core.verdict
+
+    @property
+    def summary_text(self) -> str:
+        """The verdict in a sentence or two."""
+        return self.core.summary
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Effects that are named, the largest first."""
+        return tuple(finding.name for finding in self.core.findings)
+
+    @property
+    def arm(self) -> ArmModel:
+        """The model with what was found added."""
+        return self.core.arm
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return what was named as a pandas table, a row a parameter."""
+        from pandas import DataFrame
+
+        return DataFrame(
+            {'effect': effect['name'], 'joints': ', '.join(effect['joints']), **row}
+            for effect in self.document()['effects']
+            for row in effect['parameters']
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return what diagnosis.json holds."""
+        return diagnosis_document(self.core)
+
+    def report(self, path: str | Path = 'report.html') -> Path:
+        """Write the page with the verdict and the evidence; return where it is."""
+        from armid_ros.report.diagnosis_report import diagnosis_report
+
+        page = diagnosis_report(
+            self.core,
+            robot=self._robot,
+            recordings=self.recordings,
+            validation=self.held_out,
+        )
+        Path(path).write_text(page, encoding='utf-8')
+        return Path(path)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write diagnosis.json, model.yaml and report.html as ``armid diagnose`` does."""
+        out = Path(folder)
+        out.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(self.document(), indent=1)
+        (out / 'diagnosis.json').write_text(text, encoding='utf-8')
+        save_model(out / 'model.yaml', self.arm, self._robot)
+        self.report(out / 'report.html')
+        return out
+
+    def summary(self) -> Summary:
+        """Return what was named, with values."""
+        rows = []
+        for finding in self.core.findings:
+            where = ', '.join(finding.joints) or 'whole arm'
+            for parameter, value, std in zip(
+                finding.parameters, finding.values, finding.std, strict=True
+            ):
+                said = f'{value:.4g} ± {std:.2g} {parameter.unit}'
+                rows.append((finding.name, where, parameter.name, said))
+        gap = self.core.gap
+        below = []
+        if gap is not None and rows:
+            below.append(f'{100 * gap.closed:.0f} % of the gap closed on data not used to fit')
+        return Summary(
+            self.core.summary,
+            self.core.verdict.replace('_', ' '),
+            ('effect', 'joint', 'parameter', 'value') if rows else (),
+            rows,
+            lines=below,
+            details=self._details(),
+        )
+
+    @property
+    def _robot(self) -> str:
+        return source_of(self.description.robot)
+
+    def _details(self) -> str:
+        """Return the gap of every joint, before and after, as bars."""
+        gap = self.core.gap
+        if gap is None:
+            return ''
+        robot, largest = self.description.robot, max(float(gap.before.max()), 1e-12)
+        lines = []
+        for k, joint in enumerate(robot.joints):
+            for label, value, colour in (
+                ('before', gap.before[k], '#e69f00'),
+                ('after', gap.after[k], '#0072b2'),
+                ('noise', gap.floor[k], '#8c9196'),
+            ):
+                width = 100.0 * float(value) / largest
+                lines.append(
+                    f'<tr><td>{escape(joint) if label == "before" else ""}</td><td>{label}</td>'
+                    f'<td>{value:.3g} {robot.torque_units[k]}</td><td style="min-width:14em">'
+                    f'<div style="background:{colour};height:.6em;width:{width:.0f}%"></div>'
+                    '</td></tr>'
+                )
+        return f'<details open><summary>gap</summary><table>{"".join(lines)}</table></details>'
+
+
+def diagnose(
+    arm: RobotLike,
+    recordings: RecordingLike | Sequence[RecordingLike],
+    *,
+    validate: RecordingLike | Sequence[RecordingLike] = (),
+    baseline: RecordingLike | Sequence[RecordingLike] = (),
+    effects: str = '',
+    cutoff: float | None = None,
+    decimation: int | None = None,
+    rng: Rng = 0,
+) -> DiagnosisResult:
+    """
+    Find what a model lacks.
+
+    Parameters
+    ----------
+    arm : model, robot, name or path
+        What is believed of the arm, such as ``identify(...).arm``.
+    recordings : recording or path, or several
+        What it did.
+    validate : recording or path, or several
+        To be predicted and not to be fitted.
+    baseline : recording or path, or several
+        From when the model was right: what it left then is no cause.
+    effects : str
+        Catalogue names with commas, for a robot without a model.
+    cutoff : float, optional
+        Of the position filter [Hz]; from the noise by default.
+    decimation : int, optional
+        Keep one sample of this many.
+    rng : int or Generator
+        Seed, or source of randomness.
+
+    Returns
+    -------
+    DiagnosisResult
+        Prints its verdict; ``report``, ``save``, ``to_dataframe``, ``arm``.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> found = ar.diagnose(model.arm, 'today.mcap')  # doctest: +SKIP
+
+    """
+    model = arm_of(arm, effects)
+    looked_at = recordings_of(recordings, model.robot)
+    held_out = recordings_of(validate, model.robot)
+    before = recordings_of(baseline, model.robot)
+    more: dict[str, Any] = {'baseline': before} if before else {}
+    settings = DiagnosisSettings(signals=SignalSettings(cutoff, decimation))
+    result = run(
+        model, looked_at, validate=held_out, settings=settings, rng=generator(rng), **more
+    )
+    return DiagnosisResult(result, model, tuple(looked_at), tuple(held_out))

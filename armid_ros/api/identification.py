@@ -1,0 +1,275 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings in, a model with uncertainties out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
+
+from armid_ros.api.arguments import (
+    arm_of,
+    generator,
+    RecordingLike,
+    recordings_of,
+    Rng,
+    RobotLike,
+    source_of,
+    USUAL_EFFECTS,
+)
+from armid_ros.api.table import html_table, Shown, Summary
+from armid_ros.arm import ArmModel, save_model
+from armid_ros.arm.export import arm_mjcf, arm_urdf
+from armid_ros.estimate import Estimate
+from armid_ros.identification import (
+    Fit,
+    Grade,
+    grade,
+    Identification,
+    identification_document,
+    IdentificationSettings,
+    PhysicalSettings,
+    Score,
+    SignalSettings,
+    write_document,
+)
+from armid_ros.identification import identify as run
+from armid_ros.identification.least_squares import Method
+from armid_ros.recording import Recording
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class IdentificationResult(Shown):
+    """
+    An identified model, and what it was made from.
+
+    Attributes
+    ----------
+    core : Identification
+        Everything that the identification found.
+    description : ArmModel
+        The model before.
+    recordings : tuple of Recording
+        What it was fitted to.
+    held_out : tuple of Recording
+        What it only predicted.
+
+    """
+
+    core: Identification
+    description: ArmModel
+    recordings: tuple[Recording, ...]
+    held_out: tuple[Recording, ...]
+    validation: dict[str, tuple[Fit, ...]]
+
+    @property
+    def arm(self) -> ArmModel:
+        """The identified model."""
+        return self.core.arm
+
+    @property
+    def estimate(self) -> Estimate:
+        """Base and effect parameters with covariance."""
+        return self.core.estimate
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know."""
+        return self.core.notes
+
+    @property
+    def training(self) -> Score:
+        """How well it fits what it was fitted to."""
+        return Score.of(self.core.training)
+
+    @property
+    def held_out_score(self) -> Score | None:
+        """How well it predicts what it was not fitted to; None without such recordings."""
+        fits = [fit for part in self.validation.values() for fit in part]
+        return Score.of(fits) if fits else None
+
+    @property
+    def relative_error_percent(self) -> float:
+        """100 |tau - tau_hat| / |tau|, of the held-out recordings where there are any."""
+        return (self.held_out_score or self.training).relative_error_percent
+
+    @property
+    def grade(self) -> str:
+        """How far it can be believed, in a word."""
+        return self._graded.word
+
+    @cached_property
+    def _graded(self) -> Grade:
+        return grade(self.core, self.description, self.recordings, self.validation, self.held_out)
+
+    def predict(self, recordings: RecordingLike | Sequence[RecordingLike]) -> tuple[Fit, ...]:
+        """Predict the torques of other recordings."""
+        return self.core.predict(recordings_of(recordings, self.arm.robot))
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return the parameters as a pandas table: name, joint, value, std, unit."""
+        from pandas import DataFrame
+
+        return DataFrame(self.document()['parameters'])
+
+    def document(self) -> dict[str, Any]:
+        """Return what identification.json holds."""
+        return identification_document(self.core, self._robot, self.validation, grade=self._graded)
+
+    def urdf(self, path: str | Path | None = None) -> str:
+        """Return the description with the identified values; write it where a path is given."""
+        text = arm_urdf(self.arm).text
+        if path is not None:
+            Path(path).write_text(text, encoding='utf-8')
+        return text
+
+    def report(self, path: str | Path = 'report.html') -> Path:
+        """Write the page with all curves, numbers and doubts; return where it is."""
+        from armid_ros.report import identification_report
+
+        page = identification_report(
+            self.core,
+            description=self.description,
+            robot=self._robot,
+            recordings=self.recordings,
+            validation=self.validation,
+            validation_recordings=self.held_out,
+        )
+        Path(path).write_text(page, encoding='utf-8')
+        return Path(path)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write model.yaml, identification.json and report.html as ``armid identify`` does."""
+        out = Path(folder)
+        out.mkdir(parents=True, exist_ok=True)
+        save_model(out / 'model.yaml', self.arm, self._robot, self.estimate)
+        write_document(out / 'identification.json', self.document())
+        self.report(out / 'report.html')
+        if self.core.physical is not None:
+            self.urdf(out / 'identified.urdf')
+            text = arm_mjcf(self.arm).text
+            (out / 'identified.mjcf.xml').write_text(text, encoding='utf-8')
+        return out
+
+    def summary(self) -> Summary:
+        """Return errors joint by joint, with the friction."""
+        score = self.held_out_score or self.training
+        said = f'{self.training.relative_error_percent:.2f} % relative error'
+        if self.held_out_score is not None:
+            said += f', {self.held_out_score.relative_error_percent:.2f} % held out'
+        robot = self.arm.robot
+        rows = [
+            (
+                joint,
+                f'{score.rms[k]:.3g} {robot.torque_units[k]}',
+                f'{score.joint_relative_error_percent[k]:.2g} %',
+                self._value('viscous_coefficient', joint),
+                self._value('coulomb_torque', joint),
+            )
+            for k, joint in enumerate(robot.joints)
+        ]
+        count = len(self.estimate.parameters)
+        below = f'{count} parameters, condition number {self.core.condition_number:.4g}'
+        return Summary(
+            f'{robot.name}: {said}',
+            self.grade,
+            ('joint', 'residual', 'relative', 'viscous', 'Coulomb'),
+            rows,
+            [float(value) / 100.0 for value in score.joint_relative_error_percent],
+            (below,),
+            self._details(),
+        )
+
+    @property
+    def _robot(self) -> str:
+        return source_of(self.description.robot)
+
+    def _value(self, name: str, joint: str) -> str:
+        for k, parameter in enumerate(self.estimate.parameters):
+            if (parameter.name, parameter.joint) == (name, joint):
+                value, std = self.estimate.values[k], self.estimate.std[k]
+                return f'{value:.3g} ± {std:.1g}' if abs(value) > 1.96 * std else '~ 0'
+        return '-'
+
+    def _details(self) -> str:
+        rows = [
+            (row['name'], row['joint'], f'{row["value"]:.5g}', f'{row["std"]:.2g}', row['unit'])
+            for row in self.document()['parameters']
+        ]
+        table = html_table(('parameter', 'joint', 'value', 'std', 'unit'), rows)
+        notes = ''.join(f'<li>{escape(note)}</li>' for note in self.notes)
+        return f'<details><summary>{len(rows)} parameters</summary>{table}</details>' + (
+            f'<details><summary>notes</summary><ul>{notes}</ul></details>' if notes else ''
+        )
+
+
+def identify(
+    arm: RobotLike,
+    recordings: RecordingLike | Sequence[RecordingLike],
+    *,
+    validate: RecordingLike | Sequence[RecordingLike] = (),
+    effects: str = USUAL_EFFECTS,
+    method: Method = 'wls',
+    cutoff: float | None = None,
+    decimation: int | None = None,
+    physical: bool | PhysicalSettings = False,
+    rng: Rng = 0,
+) -> IdentificationResult:
+    """
+    Fit the rigid body and the effects of an arm to recordings.
+
+    Parameters
+    ----------
+    arm : model, robot, name or path
+        What is fitted; a robot without a model gets ``effects``.
+    recordings : recording or path, or several
+        Bags or tables with torques.
+    validate : recording or path, or several
+        To be predicted and not to be fitted.
+    effects : str
+        Catalogue names with commas, for a robot without a model.
+    method : {'ols', 'wls', 'irls'}
+        All joints alike, weighted by their noise, or robust as well.
+    cutoff : float, optional
+        Of the position filter [Hz]; from the noise by default.
+    decimation : int, optional
+        Keep one sample of this many.
+    physical : bool or PhysicalSettings
+        Fit links that can be bodies; ``urdf`` then describes one.
+    rng : int or Generator
+        Seed, or source of randomness.
+
+    Returns
+    -------
+    IdentificationResult
+        Prints as a table; ``report``, ``save``, ``to_dataframe``, ``urdf``.
+
+    Raises
+    ------
+    IdentificationError
+        If the data cannot identify anything; the message says why and what to do.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> model = ar.identify('ur10.urdf', 'monday.mcap', validate='tuesday.mcap')  # doctest: +SKIP
+
+    """
+    model = arm_of(arm, effects)
+    training = recordings_of(recordings, model.robot)
+    held_out = recordings_of(validate, model.robot)
+    known = PhysicalSettings() if physical is True else physical or None
+    settings = IdentificationSettings(method, SignalSettings(cutoff, decimation), known)
+    result = run(model, training, settings, rng=generator(rng))
+    validation = {
+        recording.source or f'held out {k + 1}': result.predict([recording])
+        for k, recording in enumerate(held_out)
+    }
+    return IdentificationResult(result, model, tuple(training), tuple(held_out), validation)

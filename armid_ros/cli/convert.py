@@ -1,0 +1,108 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From tables and bags of ROS 1 to bags."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from armid_ros.cli import columns, options
+from armid_ros.cli.terminal import say
+from armid_ros.errors import RecordingError
+from armid_ros.recording import write_recording
+from armid_ros.recording.ros1 import convert_ros1, Copied, copy_renamed, is_ros1
+from armid_ros.recording.tables import is_table, measured, open_table, plan, side_by_side
+from armid_ros.robots import Robot
+import click
+
+
+@click.command(
+    epilog="Example: armid convert run.csv --robot ur10.urdf --effort 'tau{}' --out run"
+)
+@click.argument('files', nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    '--robot',
+    'robot_source',
+    metavar='R',
+    help='Shipped name or path of a URDF, whose joints the columns become; without it, joints '
+    'are called as the columns are.',
+)
+@click.option('--out', type=click.Path(path_type=Path), help='Bag to write; must not exist.')
+@click.option('--dry-run', is_flag=True, help='Show what would be read from where; write nothing.')
+@columns.options
+@options.joints
+def convert(
+    files: tuple[Path, ...],
+    robot_source: str | None,
+    out: Path | None,
+    dry_run: bool,
+    joints: str | None,
+) -> None:
+    """
+    Make a bag of a table or of a bag of ROS 1.
+
+    Tables are CSV (.tsv, .txt, .gz too), NPZ and NPY, MAT, HDF5, Parquet, and folders of LeRobot
+    datasets. Columns that are not named are guessed, and shown. Several tables hold columns of the
+    same rows. Bags of ROS 1 and ROS 2 are copied, joints renamed.
+
+    """
+    if out is None and not dry_run:
+        raise click.UsageError('--out says which bag to write; --dry-run writes none')
+    robot = None
+    if robot_source is not None:
+        robot = options.open_robot(robot_source, 'earth', joints)
+    if all(is_table(path) for path in files):
+        _table(files, robot, joints, None if dry_run else out)
+        return
+    if len(files) > 1:
+        named = ', '.join(str(path) for path in files)
+        raise RecordingError(f'{named}: several files have to be tables; convert bags one by one')
+    _bag(files[0], None if dry_run else out)
+
+
+def _table(
+    files: tuple[Path, ...], robot: Robot | None, joints: str | None, out: Path | None
+) -> None:
+    said = columns.settings()
+    table = side_by_side([open_table(path, episode=said.episode) for path in files])
+    names = None if robot is None else robot.joints
+    if robot is None and joints:
+        names = tuple(joints.split(','))
+    settled = plan(table, said, names, None if robot is None else list(robot.prismatic))
+    for line in settled.lines():
+        say(line)
+    recording = measured(settled)
+    rate = 1.0 / recording.period
+    say(f'  {recording.report.describe()} {recording.duration:.2f} s at {rate:.4g} Hz')
+    if out is None:
+        say('nothing was written; without --dry-run and with --out BAG it is')
+        return
+    write_recording(
+        out,
+        replace(recording, topic='/joint_states'),
+        robot_description=None if robot is None else robot.urdf,
+    )
+    say(f'{out}: {len(recording)} samples of {recording.n_joints} joints')
+
+
+def _bag(path: Path, out: Path | None) -> None:
+    rename = columns.settings().rename
+    if out is None:
+        raise RecordingError(f'{path}: --dry-run is for tables; armid inspect shows a bag')
+    if not is_ros1(path) and not rename:
+        raise RecordingError(
+            f'{path}: nothing to do: a bag of ROS 2 stays as it is without --rename'
+        )
+    copied = convert_ros1(path, out, rename) if is_ros1(path) else copy_renamed(path, out, rename)
+    _tell(copied)
+    say(f'{out}: {sum(count for _, _, count in copied.topics)} messages')
+
+
+def _tell(copied: Copied) -> None:
+    for topic, kind, count in copied.topics:
+        say(f'  {topic} ({kind}): {count} messages')
+    for text in copied.left_out:
+        say(f'  left out: {text}')
+    if copied.renamed:
+        say('  renamed: ' + ', '.join(f'{old} to {new}' for old, new in copied.renamed))

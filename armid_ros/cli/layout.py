@@ -1,0 +1,30 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Layouts of plotters for one robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armid_ros.cli import options
+from armid_ros.cli.terminal import say
+from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout
+import click
+
+
+@click.command(epilog='Example: armid layout --robot ur10.urdf --namespace left --out layouts')
+@options.robot
+@options.folder
+@click.option('--namespace', default='', help='Of the nodes, such as left_arm.')
+@options.joints
+def layout(robot_source: str, out: Path, namespace: str, joints: str | None) -> None:
+    """Write layouts for PlotJuggler and Foxglove that show this robot's joints by name."""
+    robot = options.open_robot(robot_source, 'earth', joints)
+    out.mkdir(parents=True, exist_ok=True)
+    files = {
+        'plotjuggler.xml': plotjuggler_layout(robot.name, robot.joints, namespace),
+        'foxglove.json': foxglove_layout(robot.joints, namespace),
+    }
+    for name, text in files.items():
+        (out / name).write_text(text, encoding='utf-8')
+    say(f'{out}: {", ".join(files)}')

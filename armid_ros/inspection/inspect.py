@@ -1,0 +1,282 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From a recording to what a person should know of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from armid_ros.inspection.joints import joint_facts, JointFacts
+from armid_ros.inspection.sampling import Sampling
+from armid_ros.inspection.trial import Trial, try_identification
+from armid_ros.recording import Recording
+from armid_ros.recording.contents import TopicContent
+from armid_ros.robots import Robot
+import numpy as np
+
+Weight = Literal['bad', 'doubt', 'note']
+
+#: Beyond two turns to either side positions of an arm are hardly in rad.
+_TURNS = 4.0 * np.pi
+_DEGREE = np.pi / 180.0
+#: Steps between samples that vary by more than this share blur what is differentiated.
+_JITTER = 0.2
+#: A recording shorter than this shows few of the parameters [s].
+_SHORT = 5.0
+#: A fit that leaves more than this share of the efforts explains little [%].
+POOR = 20.0
+
+
+@dataclass(frozen=True)
+class Remark:
+    """
+    Something a person should know.
+
+    Attributes
+    ----------
+    weight : {'bad', 'doubt', 'note'}
+        Whether it spoils a result, may do so, or is good to know.
+    text : str
+        What, where, and what to do.
+
+    """
+
+    weight: Weight
+    text: str
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """
+    What a recording holds.
+
+    Attributes
+    ----------
+    recording : Recording
+        As it was read.
+    topics : tuple of TopicContent
+        Of the bag; empty for a table.
+    robot : Robot or None
+        Description, where one was given.
+    sampling : Sampling
+        Rate, jitter, gaps, period.
+    joints : tuple of JointFacts
+        In the order of the recording.
+    trial : Trial or None
+        What an identification makes of it; None without a robot.
+    remarks : tuple of Remark
+        The worst first.
+
+    """
+
+    recording: Recording
+    topics: tuple[TopicContent, ...]
+    robot: Robot | None
+    sampling: Sampling
+    joints: tuple[JointFacts, ...]
+    trial: Trial | None
+    remarks: tuple[Remark, ...]
+
+    @property
+    def verdict(self) -> str:
+        """One sentence: what this recording is good for."""
+        if self.trial is None:
+            if self.recording.tau is None:
+                return 'No efforts: motion alone, from which nothing can be identified.'
+            if any(remark.weight == 'bad' for remark in self.remarks):
+                return 'Not fit for identification as it is.'
+            return 'Fit to be identified, as far as can be said without --robot.'
+        if self.trial.refused:
+            return 'armid identify refuses it.'
+        return (
+            f'armid identify takes it: relative error {self.trial.relative_error_percent:.1f} %, '
+            f'{self.trial.rank} of {self.trial.theory} parameters told apart.'
+        )
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each position."""
+        if self.robot is None:
+            return ('rad',) * self.recording.n_joints
+        return self.robot.position_units
+
+
+def inspect(
+    recording: Recording,
+    robot: Robot | None = None,
+    *,
+    topics: tuple[TopicContent, ...] = (),
+    rng: np.random.Generator,
+) -> Inspection:
+    """
+    Look at a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of some joints; of those of the robot, in its order, where there is one.
+    robot : Robot, optional
+        Description: with it limits and units are checked, and an identification is tried.
+    topics : tuple of TopicContent, optional
+        Of the bag.
+    rng : numpy.random.Generator
+        Of the identification.
+
+    """
+    sampling, joints = Sampling.of(recording), joint_facts(recording)
+    trial = None if robot is None else try_identification(robot, recording, rng)
+    found = [
+        *_of_time(recording, sampling),
+        *_of_units(recording, joints, robot),
+        *_of_motion(recording, joints, sampling),
+        *_of_efforts(joints, robot, trial),
+    ]
+    if trial is not None and trial.refused:
+        found.insert(0, Remark('bad', f'identify refuses it: {trial.refused}'))
+    elif trial is not None:
+        found += _of_fit(trial)
+        found += [Remark('note', note) for note in trial.notes]
+    if robot is not None:
+        found += [Remark('note', note) for note in robot.notes]
+    order = ('bad', 'doubt', 'note')
+    remarks = tuple(sorted(found, key=lambda remark: order.index(remark.weight)))
+    return Inspection(recording, topics, robot, sampling, joints, trial, remarks)
+
+
+def _of_fit(trial: Trial) -> Iterator[Remark]:
+    error = trial.relative_error_percent
+    if trial.better is not None:
+        cutoff, left = trial.better
+        yield Remark(
+            'doubt',
+            f'noise of the positions: identify would filter them at {trial.cutoff_hz:.3g} Hz and '
+            f'leave {error:.0f} % of the efforts; with --cutoff {cutoff:.2g} it leaves '
+            f'{left:.0f} %',
+        )
+    elif error is not None and error > POOR:
+        yield Remark(
+            'doubt',
+            f'rigid body and friction leave {error:.0f} % of the efforts; look for axes or zeros '
+            'other than those of the description, another unit, or contact',
+        )
+
+
+def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
+    report = recording.report
+    if report.damage:
+        yield Remark('doubt', report.damage)
+    if report.clock_note:
+        yield Remark('doubt', f'time is that of reception: header stamps {report.clock_note}')
+    lost = report.duplicates + report.out_of_order + report.restarted + report.nan
+    if lost or report.malformed or report.unstamped or report.incomplete:
+        yield Remark('doubt', report.describe())
+    if sampling.gaps:
+        yield Remark(
+            'doubt',
+            f'{sampling.gaps} {"gap" if sampling.gaps == 1 else "gaps"} in time, the longest '
+            f'{sampling.longest_step:.3g} s; stretches between them are filtered apart',
+        )
+    if sampling.jitter > _JITTER:
+        yield Remark(
+            'doubt',
+            f'steps between samples vary by {100 * sampling.jitter:.0f} %; velocities and '
+            'accelerations from the positions are blurred by that',
+        )
+    if sampling.duration < _SHORT:
+        yield Remark('doubt', f'{sampling.duration:.2g} s is short; record 20 s or more')
+    if sampling.period is None:
+        yield Remark(
+            'note',
+            'the motion does not repeat; two periods of one excitation would tell noise from what '
+            'a model lacks',
+        )
+
+
+def _of_units(
+    recording: Recording, joints: tuple[JointFacts, ...], robot: Robot | None
+) -> Iterator[Remark]:
+    turned = [
+        joint
+        for k, joint in enumerate(joints)
+        if max(abs(joint.lower), abs(joint.upper)) > _TURNS
+        and not (robot is not None and robot.prismatic[k])
+    ]
+    if turned:
+        named = ', '.join(f'{j.name} reaches {max(-j.lower, j.upper):.4g}' for j in turned[:3])
+        yield Remark('doubt', f'{named}: are positions in degrees, or those of motors?')
+    if recording.dq is None:
+        yield Remark('note', 'no velocities; they are taken from the positions anyway')
+        return
+    for text, ratio, weight in (
+        ('are in degrees/s while positions are in rad', 1.0 / _DEGREE, 'bad'),
+        ('are in rad/s while positions are in degrees', _DEGREE, 'bad'),
+        ('have the opposite sign of what the positions do', -1.0, 'bad'),
+    ):
+        off = [
+            j.name
+            for j in joints
+            if j.velocity_ratio
+            and j.velocity_fit * np.sign(ratio) > 0.7
+            and 0.8 < j.velocity_ratio / ratio < 1.25
+        ]
+        if off:
+            yield Remark(weight, f'velocities of {", ".join(off)} {text}')  # type: ignore[arg-type]
+    empty = [j.name for j in joints if j.velocity_ratio == 0.0]
+    if empty:
+        yield Remark('doubt', f'velocities of {", ".join(empty)} are zero while they move')
+
+
+def _of_motion(
+    recording: Recording, joints: tuple[JointFacts, ...], sampling: Sampling
+) -> Iterator[Remark]:
+    still = [joint.name for joint in joints if joint.still]
+    if len(still) == len(joints):
+        yield Remark('bad', 'nothing moves')
+    elif still:
+        yield Remark('note', f'at rest throughout: {", ".join(still)}')
+    coarse = [j.name for j in joints if j.repeated > 0.5]
+    if coarse:
+        yield Remark(
+            'doubt',
+            f'positions of {", ".join(coarse)} repeat in most samples while they move: the '
+            f'encoder is read slower than at {sampling.rate_hz:.4g} Hz, or its steps are coarse',
+        )
+
+
+def _of_efforts(
+    joints: tuple[JointFacts, ...], robot: Robot | None, trial: Trial | None
+) -> Iterator[Remark]:
+    if joints[0].effort_rms is None:
+        yield Remark('bad', 'no efforts: nothing can be identified; is JointState.effort filled?')
+        return
+    silent = [joint.name for joint in joints if not joint.effort_varies]
+    if silent:
+        weight: Weight = 'bad' if len(silent) == len(joints) else 'doubt'
+        yield Remark(weight, f'efforts of {", ".join(silent)} never change')
+    if robot is not None:
+        beyond = [
+            f'{joint.name} {joint.effort_largest:.4g} of {limit:.4g} {unit}'
+            for joint, limit, unit in zip(
+                joints, robot.torque_limit, robot.torque_units, strict=True
+            )
+            if joint.effort_largest is not None and joint.effort_largest > 3.0 * limit
+        ]
+        if beyond:
+            yield Remark(
+                'doubt',
+                f'efforts beyond three times the limit of the description: {", ".join(beyond)}; '
+                'mN m, or torques of the description too low?',
+            )
+    if trial is None or trial.scale is None:
+        return
+    known = np.flatnonzero(np.isfinite(trial.scale))
+    off = [k for k in known if not 0.4 < trial.scale[k] < 2.5]
+    if len(off) >= max(1, len(known) / 2):
+        named = ', '.join(f'{joints[k].name} {trial.scale[k]:.3g}' for k in off)
+        yield Remark(
+            'doubt',
+            f'efforts follow the description with other factors ({named}): currents, torques '
+            'before the gear, or wrong masses of the description; --current-gain scales them',
+        )

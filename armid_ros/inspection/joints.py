@@ -1,0 +1,123 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What every joint did, and whether its numbers agree with each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+import numpy as np
+from scipy.signal import savgol_filter
+
+#: A joint slower than this share of its own top speed is at rest.
+_REST = 0.02
+#: Samples to either side that a speed is fitted over.
+_HALF = 5
+#: A joint that stays within this is at rest [rad or m].
+STILL = 1e-3
+
+
+@dataclass(frozen=True)
+class JointFacts:
+    """
+    One joint of a recording in numbers, in the units of the file.
+
+    Attributes
+    ----------
+    name : str
+        Joint.
+    lower, upper : float
+        Range of the positions.
+    speed : float
+        99th percentile of the speed, from the positions.
+    moving : float
+        Share of the time in which it moves.
+    step : float
+        Smallest change of the position from sample to sample that is not zero.
+    repeated : float
+        Share of the samples that repeat the position of the one before while it moves.
+    velocity_ratio : float or None
+        Slope of the recorded velocity on the positions' derivative, which is 1 in equal units;
+        None where there is no velocity or no motion.
+    velocity_fit : float
+        Correlation of the two.
+    effort_rms, effort_largest : float or None
+        Of the efforts; None where there are none.
+    effort_varies : bool
+        Whether they change at all.
+
+    """
+
+    name: str
+    lower: float
+    upper: float
+    speed: float
+    moving: float
+    step: float
+    repeated: float
+    velocity_ratio: float | None
+    velocity_fit: float
+    effort_rms: float | None
+    effort_largest: float | None
+    effort_varies: bool
+
+    @property
+    def still(self) -> bool:
+        """Whether it stays where it is."""
+        return self.upper - self.lower < STILL
+
+
+def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
+    """Return the facts of every joint of a recording."""
+    derivative = _derivative(recording)
+    return tuple(_facts(recording, derivative, j) for j in range(recording.n_joints))
+
+
+def _derivative(recording: Recording) -> FloatArray:
+    """Return velocities from positions, by parabolas through neighbours in even steps."""
+    if len(recording) <= 2 * _HALF + 1:
+        return np.gradient(recording.q, recording.t, axis=0)
+    even = np.linspace(recording.t[0], recording.t[-1], len(recording))
+    columns = []
+    for column in recording.q.T:
+        q = np.interp(even, recording.t, column)
+        speed = savgol_filter(q, 2 * _HALF + 1, 2, deriv=1, delta=float(even[1] - even[0]))
+        columns.append(np.interp(recording.t, even, speed))
+    return np.column_stack(columns)
+
+
+def _facts(recording: Recording, derivative: FloatArray, j: int) -> JointFacts:
+    q, speed = recording.q[:, j], np.abs(derivative[:, j])
+    top = float(np.percentile(speed, 99))
+    moves = speed > _REST * max(top, 1e-12)
+    changes = np.abs(np.diff(q))
+    moved = changes[changes > 0.0]
+    still = float(np.ptp(q)) < STILL
+    ratio, fit = None, 0.0
+    if recording.dq is not None and not still:
+        ratio, fit = _slope(derivative[:, j], recording.dq[:, j])
+    tau = None if recording.tau is None else recording.tau[:, j]
+    return JointFacts(
+        name=recording.joints[j],
+        lower=float(q.min()),
+        upper=float(q.max()),
+        speed=top,
+        moving=0.0 if still else float(moves.mean()),
+        step=float(moved.min()) if len(moved) else 0.0,
+        repeated=0.0 if still else float(np.mean(changes[moves[1:]] == 0.0)),
+        velocity_ratio=ratio,
+        velocity_fit=fit,
+        effort_rms=None if tau is None else float(np.sqrt(np.mean(tau**2))),
+        effort_largest=None if tau is None else float(np.abs(tau).max()),
+        effort_varies=tau is not None and bool(np.ptp(tau) > 0.0),
+    )
+
+
+def _slope(x: FloatArray, y: FloatArray) -> tuple[float | None, float]:
+    """Return the slope of y on x, and their correlation."""
+    power = float(np.sqrt((x @ x) * (y @ y)))
+    if power == 0.0:
+        return (0.0, 0.0) if x @ x > 0.0 else (None, 0.0)
+    return float((x @ y) / (x @ x)), float((x @ y) / power)

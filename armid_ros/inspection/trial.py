@@ -1,0 +1,142 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What an identification with the usual friction makes of a recording, or why it refuses it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import ArmidError
+from armid_ros.identification import (
+    Conditioning,
+    IdentificationSettings,
+    identify,
+    Score,
+    SignalSettings,
+)
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+
+#: What is fitted beside the rigid body.
+EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
+#: A fit that leaves less than this needs no other cut-off [%].
+_GOOD = 3.0
+#: Shares of the cut-off that are tried below it, and what they have to leave of the error.
+_CUTOFFS = (0.5, 0.25, 0.1, 0.05)
+_CLEARLY = 0.75
+
+
+@dataclass(frozen=True)
+class Trial:
+    """
+    An identification, tried.
+
+    Attributes
+    ----------
+    refused : str
+        Why ``identify`` refuses the recording; empty where it does not.
+    relative_error_percent : float or None
+        100 |tau - tau_hat| / |tau| of the fit.
+    rank : int
+        Parameters that the motion tells apart, of ``theory``.
+    theory : int
+        Parameters that any motion could.
+    condition_number : float or None
+        Of the weighted regressor.
+    cutoff_hz : float or None
+        Of the position filter.
+    scale : ndarray, shape (n,), or None
+        Efforts over what the description takes, joint by joint; NaN where it does not follow.
+    notes : tuple of str
+        What the identification says.
+    better : (float, float) or None
+        A lower cut-off [Hz] that leaves a clearly smaller relative error, and that error [%].
+
+    """
+
+    refused: str = ''
+    relative_error_percent: float | None = None
+    rank: int = 0
+    theory: int = 0
+    condition_number: float | None = None
+    cutoff_hz: float | None = None
+    scale: FloatArray | None = None
+    notes: tuple[str, ...] = ()
+    better: tuple[float, float] | None = None
+
+
+def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> Trial:
+    """
+    Identify, and keep what says whether that can be believed.
+
+    Parameters
+    ----------
+    robot : Robot
+        Description.
+    recording : Recording
+        Of its joints.
+    rng : numpy.random.Generator
+        Of the identification.
+
+    """
+    arm = ArmModel(robot)
+    for name in EFFECTS:
+        arm = arm.with_effect(make_effect(name, robot))
+    try:
+        result = identify(arm, [recording], rng=rng)
+    except ArmidError as refusal:
+        return Trial(refused=str(refusal))
+    motions = [fit.motion for fit in result.training]
+    error = Score.of(result.training).relative_error_percent
+    return Trial(
+        relative_error_percent=error,
+        rank=result.base.rank,
+        theory=result.theory.rank,
+        condition_number=result.condition_number,
+        cutoff_hz=result.used.cutoff_hz,
+        scale=_scale(robot, motions),
+        notes=result.notes,
+        better=_better_cutoff(arm, recording, result.used, error, rng) if error > _GOOD else None,
+    )
+
+
+def _better_cutoff(
+    arm: ArmModel,
+    recording: Recording,
+    used: Conditioning,
+    error: float,
+    rng: np.random.Generator,
+) -> tuple[float, float] | None:
+    """Try lower cut-offs on the same rows of torque, for which errors can be compared."""
+    best = None
+    for share in _CUTOFFS:
+        signals = SignalSettings(used.cutoff_hz * share, used.decimation)
+        try:
+            fits = identify(arm, [recording], IdentificationSettings(signals=signals), rng=rng)
+        except ArmidError:
+            break
+        left = Score.of(fits.training).relative_error_percent
+        if left < _CLEARLY * error and (best is None or left < best[1]):
+            best = signals.cutoff_hz or 0.0, left
+    return best
+
+
+def _scale(robot: Robot, motions: list[Motion]) -> FloatArray:
+    """Regress efforts on what the description takes, friction and offset taken out first."""
+    predicted = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
+    tau = np.concatenate([motion.tau for motion in motions if motion.tau is not None])
+    dq = np.concatenate([motion.dq for motion in motions])
+    scale = np.full(robot.n_joints, np.nan)
+    for j in range(robot.n_joints):
+        nuisance = np.column_stack([np.ones(len(dq)), dq[:, j], np.sign(dq[:, j])])
+        pair = np.column_stack([predicted[:, j], tau[:, j]])
+        rest = pair - nuisance @ np.linalg.lstsq(nuisance, pair, rcond=None)[0]
+        own, other = rest[:, 0] @ rest[:, 0], rest[:, 1] @ rest[:, 1]
+        if own > 0.0 and other > 0.0 and abs(rest[:, 0] @ rest[:, 1]) > 0.9 * np.sqrt(own * other):
+            scale[j] = rest[:, 0] @ rest[:, 1] / own
+    return scale

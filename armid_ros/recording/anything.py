@@ -1,0 +1,94 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A recording from whatever holds one: a bag of ROS 2 or ROS 1, a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+import tempfile
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.reader import read_recording
+from armid_ros.recording.recording import Recording
+from armid_ros.recording.ros1 import convert_ros1, is_ros1
+from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.tables import (
+    ColumnSettings,
+    is_table,
+    measured,
+    name_in_file,
+    open_table,
+    Plan,
+    plan,
+)
+
+Show = Callable[[Plan], None]
+
+
+def read_anything(
+    path: str | Path,
+    *,
+    joints: Sequence[str],
+    slides: Sequence[bool] | None = None,
+    topic: str | None = None,
+    columns: ColumnSettings | None = None,
+    show: Show | None = None,
+    settings: ReadSettings = DEFAULT,
+) -> Recording:
+    """
+    Read the measurements of some joints from a bag or a table.
+
+    Parameters
+    ----------
+    path : str or Path
+        What ``read_recording`` takes, a .bag of ROS 1, or a table: CSV, NPZ, MAT, Parquet, the
+        folder of a LeRobot dataset.
+    joints : sequence of str
+        The joints wanted, in this order.
+    slides : sequence of bool, optional
+        Whether each of them is prismatic, which has no degrees.
+    topic : str, optional
+        Of a bag, where it has several of JointState.
+    columns : ColumnSettings, optional
+        Of a table: which columns are what, in which unit; what is not said is guessed. Its
+        ``rename`` counts for bags too.
+    show : callable, optional
+        Given the plan of a table before it is read.
+    settings : ReadSettings, optional
+        How careful bags are read.
+
+    Raises
+    ------
+    RecordingError
+        Naming the file, and the topic, joint, column or line, and what to do.
+
+    """
+    path = Path(path)
+    columns = columns or ColumnSettings()
+    if is_table(path):
+        table = open_table(path, episode=columns.episode)
+        settled = plan(table, columns, joints, slides)
+        if show is not None:
+            show(settled)
+        return measured(settled)
+    called = [name_in_file(joint, columns.rename) for joint in joints]
+    recording = (
+        _read_ros1(path, called, topic)
+        if is_ros1(path)
+        else read_recording(path, joints=called, topic=topic, settings=settings)
+    )
+    return replace(recording, joints=tuple(joints))
+
+
+def _read_ros1(path: Path, joints: Sequence[str], topic: str | None) -> Recording:
+    """Read a bag of ROS 1 as what it becomes in ROS 2."""
+    with tempfile.TemporaryDirectory(prefix='armid-') as folder:
+        copy = Path(folder, 'bag')
+        convert_ros1(path, copy)
+        try:
+            recording = read_recording(copy, joints=joints, topic=topic)
+        except RecordingError as error:
+            raise RecordingError(str(error).replace(str(copy), str(path))) from error
+    return replace(recording, source=str(path))

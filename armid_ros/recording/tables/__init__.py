@@ -1,0 +1,30 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Recordings that are not bags: CSV, NPZ, MAT, Parquet, LeRobot datasets.
+
+``open_table`` reads columns, ``plan`` settles which of them are what (said or guessed, and shown),
+``measured`` makes a recording of them.
+
+"""
+
+from armid_ros.recording.tables.files import is_table, open_table, side_by_side
+from armid_ros.recording.tables.measured import measured
+from armid_ros.recording.tables.plan import Plan, plan
+from armid_ros.recording.tables.settings import ColumnSettings, name_in_file, numbers, renamed
+from armid_ros.recording.tables.table import Column, Table
+
+__all__ = [
+    'Column',
+    'ColumnSettings',
+    'Plan',
+    'Table',
+    'is_table',
+    'measured',
+    'name_in_file',
+    'numbers',
+    'open_table',
+    'plan',
+    'renamed',
+    'side_by_side',
+]

@@ -1,0 +1,95 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Tables in files of arrays: NumPy's .npy and .npz, MATLAB's .mat, HDF5."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import gzip
+import io
+from pathlib import Path
+from typing import Any
+import zipfile
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.tables.extra import imported
+from armid_ros.recording.tables.table import Table, table_of_arrays
+import numpy as np
+import numpy.typing as npt
+
+#: What an HDF5 file begins with; MATLAB puts 512 bytes before it.
+HDF5 = b'\x89HDF'
+
+Arrays = dict[str, npt.NDArray[np.generic]]
+
+
+def read_numpy(path: Path) -> Table:
+    """Read a .npy or .npz file, compressed by gzip or not."""
+    raw = gzip.decompress(path.read_bytes()) if path.suffix == '.gz' else path.read_bytes()
+    try:
+        loaded = np.load(io.BytesIO(raw), allow_pickle=False)
+        arrays = {'': loaded} if isinstance(loaded, np.ndarray) else dict(loaded)
+    except (ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise RecordingError(f'{path}: NumPy cannot read it: {error}') from error
+    described = 'one NumPy array' if '' in arrays else 'NumPy arrays'
+    return table_of_arrays(str(path), _fields(arrays), described)
+
+
+def read_matlab(path: Path) -> Table:
+    """Read a .mat file: up to version 7 by scipy, version 7.3 by h5py."""
+    from scipy.io import loadmat
+
+    with path.open('rb') as file:
+        if HDF5 in file.read(1024):
+            return read_hdf5(path)
+    try:
+        content = loadmat(path, simplify_cells=True)
+    except (ValueError, TypeError, OSError) as error:
+        raise RecordingError(f'{path}: no MAT file that can be read: {error}') from error
+    content = {name: value for name, value in content.items() if not name.startswith('__')}
+    arrays = dict(_flattened(content, ''))
+    if not arrays:
+        raise RecordingError(
+            f'{path}: there is no array in it; tables and timeseries are objects that only '
+            'MATLAB reads: save their columns as arrays'
+        )
+    return table_of_arrays(str(path), arrays, 'MATLAB arrays')
+
+
+def read_hdf5(path: Path) -> Table:
+    """Read an HDF5 file, which a .mat of version 7.3 is."""
+    h5py = imported('h5py', path, 'HDF5, which MAT files of version 7.3 are,')
+    arrays: Arrays = {}
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and not name.startswith('#'):
+            arrays[name.replace('/', '.')] = np.asarray(item)
+
+    try:
+        with h5py.File(path, 'r') as file:
+            file.visititems(visit)
+    except OSError as error:
+        raise RecordingError(f'{path}: HDF5 cannot read it: {error}') from error
+    return table_of_arrays(str(path), arrays, 'HDF5 arrays')
+
+
+def _fields(arrays: Mapping[str, npt.NDArray[Any]]) -> Arrays:
+    """Take structured arrays apart."""
+    apart: Arrays = {}
+    for name, values in arrays.items():
+        if values.dtype.names:
+            dot = f'{name}.' if name else ''
+            apart.update({f'{dot}{field}': values[field] for field in values.dtype.names})
+        else:
+            apart[name] = values
+    return apart
+
+
+def _flattened(
+    content: Mapping[str, Any], prefix: str
+) -> Iterator[tuple[str, npt.NDArray[np.generic]]]:
+    for name, value in content.items():
+        if isinstance(value, Mapping):
+            yield from _flattened(value, f'{prefix}{name}.')
+        elif isinstance(value, np.ndarray) and value.dtype.kind in 'fiub':
+            yield f'{prefix}{name}', value

@@ -1,0 +1,107 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which files are tables, and who reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.tables.arrays import read_hdf5, read_matlab, read_numpy
+from armid_ros.recording.tables.parquet import INFO, read_lerobot, read_parquet
+from armid_ros.recording.tables.table import Column, Table
+from armid_ros.recording.tables.text import read_text
+
+_READERS: dict[str, Callable[[Path], Table]] = {
+    '.csv': read_text,
+    '.tsv': read_text,
+    '.txt': read_text,
+    '.dat': read_text,
+    '.npy': read_numpy,
+    '.npz': read_numpy,
+    '.mat': read_matlab,
+    '.h5': read_hdf5,
+    '.hdf5': read_hdf5,
+    '.parquet': read_parquet,
+}
+
+
+def is_table(path: Path) -> bool:
+    """Whether a path is a table by its name, or a LeRobot dataset."""
+    return _suffix(path) in _READERS or (path / INFO).is_file()
+
+
+def open_table(path: Path, *, episode: int | None = None) -> Table:
+    """
+    Read a table.
+
+    Parameters
+    ----------
+    path : Path
+        CSV (also with semicolons, tabs, blanks; .gz too), NPY, NPZ, MAT, HDF5, Parquet, or the
+        folder of a LeRobot dataset.
+    episode : int, optional
+        Of a LeRobot dataset; the first by default.
+
+    Raises
+    ------
+    RecordingError
+        There is no such file, nobody reads it, or what is in it is no table.
+
+    """
+    if not path.exists():
+        raise RecordingError(f'{path}: there is no such file')
+    if (path / INFO).is_file():
+        return read_lerobot(path, episode)
+    if _suffix(path) not in _READERS:
+        known = ', '.join(_READERS)
+        raise RecordingError(f'{path}: no table; tables are {known} and LeRobot datasets')
+    return _READERS[_suffix(path)](path)
+
+
+def side_by_side(tables: Sequence[Table]) -> Table:
+    """
+    Put tables of the same samples beside each other.
+
+    Names that several have are preceded by the file's: 'currents:Joint_1'.
+
+    Raises
+    ------
+    RecordingError
+        They differ in length.
+
+    """
+    if len(tables) == 1:
+        return tables[0]
+    lengths = [len(table) for table in tables]
+    if len(set(lengths)) > 1:
+        counted = ', '.join(f'{table.source} has {len(table)} rows' for table in tables)
+        raise RecordingError(f'{counted}; files side by side hold the same samples')
+    names = [name for table in tables for name in table.names]
+    columns = [
+        Column(
+            name if names.count(name) == 1 else f'{_stem(table)}:{name}',
+            column.values,
+            column.array and f'{_stem(table)}:{column.array}',
+            column.unit,
+        )
+        for table in tables
+        for name, column in zip(table.names, table.columns, strict=True)
+    ]
+    return Table(
+        ' + '.join(table.source for table in tables),
+        tuple(columns),
+        tables[0].described,
+        tables[0].first_line,
+        next((table.rate_hz for table in tables if table.rate_hz), None),
+        tuple(note for table in tables for note in table.notes),
+    )
+
+
+def _stem(table: Table) -> str:
+    return Path(table.source).name.split('.')[0]
+
+
+def _suffix(path: Path) -> str:
+    return Path(path.stem).suffix.lower() if path.suffix == '.gz' else path.suffix.lower()

@@ -1,0 +1,190 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which columns are positions, velocities and efforts, from what they are called.
+
+Columns that are alike but for a joint's name or number form a family; a family is judged by the
+words in its name. A guess is always shown, with what else would have fitted.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+import re
+
+from armid_ros.recording.tables.patterns import Chosen
+from armid_ros.recording.tables.settings import renamed
+from armid_ros.recording.tables.table import Column, Table
+from armid_ros.recording.tables.words import MEASURED, OTHERWISE, QuantityName, TIMES, WORDS
+import numpy as np
+
+_NUMBER = re.compile(r'\d+')
+_BREAK = re.compile(r'[^A-Za-z0-9]+')
+
+
+@dataclass(frozen=True)
+class Guess:
+    """
+    A family of columns that may be a quantity.
+
+    Attributes
+    ----------
+    chosen : Chosen
+        Its columns.
+    score : float
+        How much speaks for it.
+
+    """
+
+    chosen: Chosen
+    score: float
+
+
+def guess(
+    table: Table,
+    quantity: QuantityName,
+    joints: Sequence[str] | None,
+    rename: Sequence[tuple[str, str]] = (),
+) -> list[Guess]:
+    """
+    Return the families that may be a quantity, the likeliest first.
+
+    Parameters
+    ----------
+    table : Table
+        Where they are.
+    quantity : {'position', 'velocity', 'effort'}
+        What is looked for.
+    joints : sequence of str or None
+        The joints, where they are known: a family has to have a column for each.
+    rename : sequence of (str, str)
+        From names in the file to names of the joints.
+
+    """
+    families = _families(table, joints, rename)
+    scored = [
+        Guess(chosen, _score(chosen.pattern, quantity) - _still(chosen)) for chosen in families
+    ]
+    likely = [one for one in scored if one.score > 0.0]
+    best: dict[tuple[Column, ...], Guess] = {}
+    for one in sorted(likely, key=lambda one: (-one.score, -len(one.chosen.columns))):
+        best.setdefault(one.chosen.columns, one)
+    return list(best.values())
+
+
+def guess_time(table: Table) -> Column | None:
+    """Return the column of time: named so, and increasing."""
+    scores = {}
+    for column in table.columns:
+        words = _words(column.bare_name)
+        score = max((TIMES.get(word, 0.0) for word in words), default=0.0)
+        score += sum(OTHERWISE.get(word, 0.0) for word in words) - 0.1 * len(words)
+        finite = column.values[np.isfinite(column.values)]
+        if score > 0.5 and len(finite) > 1 and np.mean(np.diff(finite) >= 0.0) > 0.9:
+            scores[column] = score
+    return max(scores, key=lambda column: scores[column]) if scores else None
+
+
+def _families(
+    table: Table, joints: Sequence[str] | None, rename: Sequence[tuple[str, str]]
+) -> list[Chosen]:
+    """Return the columns that are alike but for what stands for a joint."""
+    groups: dict[str, dict[str, Column]] = {}
+    for column in table.columns:
+        for pattern, label in _readings(column, joints, rename):
+            groups.setdefault(pattern, {})[label] = column
+    families = []
+    for pattern, members in groups.items():
+        chosen = _in_order(pattern, members, joints, rename)
+        if chosen is not None:
+            families.append(chosen)
+    return families
+
+
+def _readings(
+    column: Column, joints: Sequence[str] | None, rename: Sequence[tuple[str, str]]
+) -> Iterator[tuple[str, str]]:
+    """Yield the ways to read a name as a pattern and what stands for the joint."""
+    name = column.bare_name
+    if column.array and name.endswith(']'):
+        element = name[len(column.array) + 1 : -1]
+        stem, dot, kind = element.rpartition('.')
+        if dot and _quantity_of(kind):
+            yield f'{column.array}[{{}}.{kind}]', stem
+        yield column.array, element
+        return
+    for joint in joints or ():
+        for called in {joint, *(old + joint[len(new) :] for old, new in rename)}:
+            if renamed(called, rename) == joint and called in name:
+                yield name.replace(called, '{}', 1), called
+    for match in _NUMBER.finditer(name):
+        yield f'{name[: match.start()]}{{}}{name[match.end() :]}', match[0]
+    if joints is None or len(joints) == 1:
+        yield name, '1'
+    if joints is None:
+        yield from _named(name)
+
+
+def _named(name: str) -> Iterator[tuple[str, str]]:
+    """Read a name as a joint's with the quantity behind or in front: 'elbow/position'."""
+    behind = re.fullmatch(r'(.*[/.])?([^/.]+)([/._ ])([A-Za-z]+)', name)
+    if behind and _quantity_of(behind[4]) and not behind[2].isdigit():
+        yield f'{behind[1] or ""}{{}}{behind[3]}{behind[4]}', behind[2]
+    ahead = re.fullmatch(r'([A-Za-z]+)([/._ ])([^/.]+)', name)
+    if ahead and _quantity_of(ahead[1]) and not ahead[3].isdigit():
+        yield f'{ahead[1]}{ahead[2]}{{}}', ahead[3]
+
+
+def _in_order(
+    pattern: str,
+    members: dict[str, Column],
+    joints: Sequence[str] | None,
+    rename: Sequence[tuple[str, str]],
+) -> Chosen | None:
+    """Return a family in the order of the joints; None where it does not fit them."""
+    labels = list(members)
+    if all(label.isdigit() for label in labels):
+        labels.sort(key=int)
+    if joints is not None:
+        names = [renamed(label, rename) for label in labels]
+        if set(joints) <= set(names):
+            labels = [labels[names.index(joint)] for joint in joints]
+        elif len(labels) != len(joints) or not all(label.isdigit() for label in labels):
+            return None
+    return Chosen(tuple(members[label] for label in labels), tuple(labels), pattern)
+
+
+def _score(pattern: str, quantity: QuantityName) -> float:
+    words = _words(pattern)
+    own = max((WORDS[quantity].get(word, 0.0) for word in words), default=0.0)
+    others = [table for name, table in WORDS.items() if name != quantity]
+    other = max((table.get(word, 0.0) for table in others for word in words), default=0.0)
+    if own == 0.0 or own < other:
+        return 0.0
+    return (
+        own
+        + sum(MEASURED.get(word, 0.0) + OTHERWISE.get(word, 0.0) for word in words)
+        - 0.01 * len(words)
+    )
+
+
+def _still(chosen: Chosen) -> float:
+    """Return what speaks against a family with columns that never change: they are not filled."""
+    still = [
+        float(np.ptp(column.values[np.isfinite(column.values)])) == 0.0
+        for column in chosen.columns
+    ]
+    return 1.0 if any(still) else 0.0
+
+
+def _quantity_of(word: str) -> bool:
+    return any(word.lower() in words for words in WORDS.values())
+
+
+def _words(name: str) -> list[str]:
+    """Return the words of a name in small letters: 'actualQ_{}' is actual, q."""
+    apart = re.sub(r'(?<=[a-z])(?=[A-Z])', ' ', name)
+    apart = re.sub(r'\d+', ' ', apart)
+    return [word.lower() for word in _BREAK.split(apart) if word]

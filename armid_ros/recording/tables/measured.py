@@ -1,0 +1,137 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From a table and a plan to a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from armid_ros.errors import RecordingError
+from armid_ros.motion import FloatArray
+from armid_ros.recording.recording import Gap, ReadReport, Recording
+from armid_ros.recording.series import GAP_PERIODS
+from armid_ros.recording.tables.plan import Plan
+from armid_ros.recording.tables.settings import gear_matrix, per_joint, TIME_UNITS
+from armid_ros.recording.tables.words import QuantityName
+import numpy as np
+import numpy.typing as npt
+
+#: Times later than this count from 1970 [s].
+_EPOCH = 1e8
+#: More rows than this part without a number is no glitch but a fault of the file.
+_MAX_NOT_FINITE = 0.2
+
+
+def measured(plan: Plan) -> Recording:
+    """
+    Return what a table holds.
+
+    Raises
+    ------
+    RecordingError
+        Time stands still, or too many rows have a value that is no number.
+
+    """
+    table = plan.table
+    t, start = _times(plan)
+    values = {source.quantity: source.values() for source in plan.sources}
+    kept, nan = _finite(plan, t, values)
+    order = np.argsort(t[kept], kind='stable')
+    late = int(np.sum(t[kept][1:] < np.maximum.accumulate(t[kept])[:-1]))
+    rows = np.flatnonzero(kept)[order]
+    first = np.concatenate([[True], np.diff(t[rows]) > 0.0])
+    duplicates = int((~first).sum())
+    if duplicates > 0.5 * len(rows):
+        raise RecordingError(
+            f'{table.source}: column {plan.time.name if plan.time else "time"} stands still in '
+            f'{duplicates} of {len(rows)} rows; name another with --time, or give --rate'
+        )
+    rows = rows[first]
+    if len(rows) < 2:
+        raise RecordingError(f'{table.source}: {len(rows)} rows with numbers are left')
+    q, dq, tau = _joint_side(plan, {name: array[rows] for name, array in values.items()})
+    time = t[rows] - t[rows[0]]
+    absent = tuple(n for n, v in (('velocity', dq), ('effort', tau)) if v is None)
+    report = ReadReport(
+        messages=len(table),
+        samples=len(rows),
+        duplicates=duplicates,
+        out_of_order=late,
+        nan=nan,
+        gaps=_gaps(time),
+        absent=absent,
+        damage='; '.join(note for note in table.notes if 'cut off' in note),
+    )
+    return Recording(
+        joints=plan.joints,
+        t=time,
+        q=q,
+        dq=dq,
+        tau=tau,
+        start_ns=start,
+        source=table.source,
+        topic='the table',
+        report=report,
+    )
+
+
+def _times(plan: Plan) -> tuple[FloatArray, int]:
+    """Return times [s], and the stamp of the first row [ns]; zero where it is not known."""
+    if plan.time is None:
+        assert plan.rate_hz is not None
+        return np.arange(len(plan.table)) / plan.rate_hz, 0
+    scale = TIME_UNITS[plan.time_unit]
+    values = plan.time.values
+    origin = float(values[np.isfinite(values)][0])
+    epoch = origin * scale > _EPOCH
+    # Differences first: counted from 1970, nanoseconds do not fit into a float.
+    return (values - origin) * scale, int(origin * scale * 1e9) if epoch else 0
+
+
+def _finite(
+    plan: Plan,
+    t: FloatArray,
+    values: Mapping[QuantityName, FloatArray],
+) -> tuple[npt.NDArray[np.bool_], int]:
+    """Return the rows in which everything is a number; refuse when they are few."""
+    good = np.isfinite(t)
+    for array in values.values():
+        good &= np.isfinite(array).all(axis=1)
+    lost = int((~good).sum())
+    if lost > _MAX_NOT_FINITE * len(t):
+        for source in plan.sources:
+            for column in source.chosen.columns:
+                bad = np.flatnonzero(~np.isfinite(column.values))
+                if len(bad) > _MAX_NOT_FINITE * len(t):
+                    raise RecordingError(
+                        f'{plan.table.source}: column {column.name} has no number in {len(bad)} '
+                        f'of {len(t)} rows, first in {plan.table.where(int(bad[0]))}; leave '
+                        f'{source.quantity} out with --{source.quantity} none, or mend the file'
+                    )
+        raise RecordingError(
+            f'{plan.table.source}: {lost} of {len(t)} rows have a value that is no number'
+        )
+    return good, lost
+
+
+def _joint_side(
+    plan: Plan, values: Mapping[QuantityName, FloatArray]
+) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
+    """Return positions, velocities and efforts of the joints, where those of motors are given."""
+    q, dq, tau = values['position'], values.get('velocity'), values.get('effort')
+    settings = plan.settings
+    if settings.gear:
+        gear = gear_matrix(settings, plan.joints)
+        inverse = np.linalg.inv(gear)
+        q = q @ inverse.T
+        dq = None if dq is None else dq @ inverse.T
+        tau = None if tau is None else tau @ gear
+    if settings.zero:
+        q = q + per_joint(settings.zero, plan.joints, 'the zero of positions')
+    return q, dq, tau
+
+
+def _gaps(t: FloatArray) -> tuple[Gap, ...]:
+    steps = np.diff(t)
+    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
+    return tuple(Gap(float(t[i]), float(steps[i])) for i in at)

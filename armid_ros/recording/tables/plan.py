@@ -1,0 +1,339 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is read from which column, in which unit: settled, and shown, before anything is read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+import textwrap
+
+from armid_ros.errors import RecordingError
+from armid_ros.motion import FloatArray
+from armid_ros.recording.tables.guess import guess, guess_time
+from armid_ros.recording.tables.patterns import choose, Chosen
+from armid_ros.recording.tables.settings import ColumnSettings, per_joint, TIME_UNITS
+from armid_ros.recording.tables.table import Column, Table
+from armid_ros.recording.tables.words import QuantityName
+import numpy as np
+import numpy.typing as npt
+
+_OTHERS: tuple[QuantityName, ...] = ('velocity', 'effort')
+#: What a unit is in SI.
+_FACTORS = {'deg': np.pi / 180, 'deg/s': np.pi / 180, 'mN m': 1e-3, 'N mm': 1e-3, 'mA': 1e-3}
+_FACTORS |= {'mrad': 1e-3, 'kN m': 1e3, 'rpm': 2 * np.pi / 60, 'mm': 1e-3, 'mm/s': 1e-3}
+_TURNS = ('deg', 'deg/s', 'rpm', 'mrad')
+#: Steps between samples that are told from the numbers alone [s].
+_STEP = (2e-5, 0.5)
+
+
+@dataclass(frozen=True)
+class Source:
+    """
+    Where one quantity comes from.
+
+    Attributes
+    ----------
+    quantity : str
+        'position', 'velocity' or 'effort'.
+    chosen : Chosen
+        Columns.
+    unit : str
+        Of the file.
+    factor : ndarray, shape (n,)
+        To SI.
+    guessed : bool
+        Whether nobody said so.
+    rivals : tuple of str
+        What else would have fitted.
+
+    """
+
+    quantity: QuantityName
+    chosen: Chosen
+    unit: str
+    factor: FloatArray
+    guessed: bool
+    rivals: tuple[str, ...] = ()
+
+    def values(self) -> FloatArray:
+        """Return the quantity in SI, shape (N, n)."""
+        return np.column_stack([c.values for c in self.chosen.columns]) * self.factor
+
+
+@dataclass(frozen=True)
+class Plan:
+    """
+    What is read from where.
+
+    Attributes
+    ----------
+    table : Table
+        The file.
+    joints : tuple of str
+        In the order of the columns.
+    time : Column or None
+        None for even steps of a known rate.
+    time_unit : str
+        Of that column.
+    time_guessed : bool
+        Whether nobody named it.
+    rate_hz : float or None
+        Where there is no column of time.
+    sources : tuple of Source
+        Position first.
+    settings : ColumnSettings
+        What was said.
+    notes : tuple of str
+        What a person should look at.
+
+    """
+
+    table: Table
+    joints: tuple[str, ...]
+    time: Column | None
+    time_unit: str
+    time_guessed: bool
+    rate_hz: float | None
+    sources: tuple[Source, ...]
+    settings: ColumnSettings
+    notes: tuple[str, ...] = ()
+
+    @property
+    def guessed(self) -> bool:
+        """Whether anything was not said but guessed."""
+        return self.time_guessed or any(source.guessed for source in self.sources)
+
+    def source(self, quantity: QuantityName) -> Source | None:
+        """Return where a quantity comes from; None where it does not."""
+        return next((one for one in self.sources if one.quantity == quantity), None)
+
+    def lines(self) -> list[str]:
+        """Return the plan for a person, in lines."""
+        table = self.table
+        lines = [f'{table.source}: {table.described}, {len(table)} rows of {len(table.columns)}']
+        if self.time is None:
+            lines.append(f'  time      none; {self.rate_hz:g} samples a second')
+        else:
+            lines.append(
+                f'  time      {self.time.name}, in {self.time_unit}'
+                f'{" (guessed)" if self.time_guessed else ""}'
+            )
+        for source in self.sources:
+            names = [column.name for column in source.chosen.columns]
+            shown = ', '.join(names) if len(names) <= 3 else f'{names[0]}, .., {names[-1]}'
+            lines.append(
+                f'  {source.quantity:9s} {shown}, in {source.unit}'
+                f'{" (guessed)" if source.guessed else ""}'
+            )
+            if source.rivals:
+                lines.append(f'            also fits: {", ".join(source.rivals)}')
+        for quantity in _OTHERS:
+            if self.source(quantity) is None:
+                lines.append(f'  {quantity:9s} none')
+        lines.append(f'  joints    {", ".join(self.joints)}')
+        lines += [f'  note: {note}' for note in (*table.notes, *self.notes)]
+        return lines[:1] + [_wrapped(line) for line in lines[1:]]
+
+
+def _wrapped(line: str) -> str:
+    return textwrap.fill(line, 80, subsequent_indent=' ' * 12, break_long_words=False)
+
+
+def plan(
+    table: Table,
+    settings: ColumnSettings,
+    joints: Sequence[str] | None = None,
+    slides: Sequence[bool] | None = None,
+) -> Plan:
+    """
+    Settle what is read from where.
+
+    Parameters
+    ----------
+    table : Table
+        The file.
+    settings : ColumnSettings
+        What a person says; the rest is guessed.
+    joints : sequence of str, optional
+        Joints of the robot, in order; by default as the columns call them.
+    slides : sequence of bool, optional
+        Whether each of them is prismatic; by default none is.
+
+    Raises
+    ------
+    RecordingError
+        There are no positions, what was asked for is not there, or does not fit the joints.
+
+    """
+    position = _source(table, 'position', settings, joints)
+    if position is None:
+        of_joints = f' of {", ".join(joints)}' if joints else ''
+        raise RecordingError(
+            f'{table.source}: no columns seem to be positions{of_joints}; name them, as in '
+            f"--position 'q{{}}' or --position a,b,c. Its columns are {table.listed()}"
+        )
+    names = tuple(joints) if joints else position.chosen.joints(settings.rename)
+    sliding = np.zeros(len(names), np.bool_) if slides is None else np.asarray(slides, np.bool_)
+    sources = [position]
+    for quantity in _OTHERS:
+        found = _source(table, quantity, settings, names)
+        if found is None and joints is None:
+            found = _as_many(table, quantity, settings, position)
+        if found is not None:
+            sources.append(found)
+    time, unit, rate = _time(table, settings)
+    return Plan(
+        table,
+        names,
+        time,
+        unit,
+        settings.time is None and time is not None,
+        rate,
+        tuple(_scaled(source, settings, names, sliding) for source in sources),
+        settings,
+        tuple(_doubts(sources, settings)),
+    )
+
+
+def _source(
+    table: Table,
+    quantity: QuantityName,
+    settings: ColumnSettings,
+    joints: Sequence[str] | None,
+) -> Source | None:
+    asked = getattr(settings, quantity)
+    if asked is not None and asked.lower() == 'none':
+        return None
+    rivals: tuple[str, ...] = ()
+    if asked is not None:
+        chosen = choose(table, asked, joints, quantity, settings.rename)
+    else:
+        guesses = guess(table, quantity, joints, settings.rename)
+        if not guesses:
+            return None
+        chosen = guesses[0].chosen
+        taken = {id(column) for column in chosen.columns}
+        rivals = tuple(
+            dict.fromkeys(
+                one.chosen.pattern
+                for one in guesses[1:]
+                if not taken & {id(column) for column in one.chosen.columns}
+                and len(one.chosen.columns) == len(chosen.columns)
+            )
+        )[:4]
+    unit = next((column.unit for column in chosen.columns if column.unit), '')
+    if not unit and 'curr' in chosen.pattern.lower():
+        unit = 'A'
+    plain = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}[quantity]
+    factor = np.full(len(chosen.columns), _FACTORS.get(unit, 1.0))
+    return Source(quantity, chosen, unit or plain, factor, asked is None, rivals)
+
+
+def _as_many(
+    table: Table, quantity: QuantityName, settings: ColumnSettings, position: Source
+) -> Source | None:
+    """Guess a quantity whose joints are called otherwise, or not at all, from their number."""
+    if getattr(settings, quantity) is not None:
+        return None
+    numbers = [str(k) for k in range(len(position.chosen.columns))]
+    return _source(table, quantity, settings, numbers)
+
+
+def _scaled(
+    source: Source,
+    settings: ColumnSettings,
+    joints: Sequence[str],
+    slides: npt.NDArray[np.bool_],
+) -> Source:
+    """Apply what a person says of units; degrees are those of joints that turn."""
+    if source.quantity == 'effort':
+        if settings.effort_scale:
+            given = per_joint(settings.effort_scale, joints, 'the scale of efforts')
+            unit = 'units of the file' if source.unit == 'N m' else source.unit
+            factor = given * (1e-3 if source.unit == 'mA' else 1.0)
+            return replace(source, factor=factor, unit=f'{unit} times {_short(given)}')
+        return source
+    if settings.position_scale:
+        given = per_joint(settings.position_scale, joints, 'the scale of positions')
+        return replace(source, factor=given, unit=f'units of the file times {_short(given)}')
+    if settings.degrees and source.unit not in _TURNS:
+        unit = 'deg' if source.quantity == 'position' else 'deg/s'
+        return replace(source, factor=np.where(slides, 1.0, np.pi / 180), unit=unit)
+    if source.quantity == 'velocity' and source.unit == 'deg':
+        return replace(source, unit='deg/s')
+    if slides.all() and source.unit in ('rad', 'rad/s'):
+        return replace(source, unit=source.unit.replace('rad', 'm'))
+    return source
+
+
+def _short(values: FloatArray) -> str:
+    texts = [f'{value:.6g}' for value in values]
+    return texts[0] if len(set(texts)) == 1 else ', '.join(texts)
+
+
+def _doubts(sources: Sequence[Source], settings: ColumnSettings) -> list[str]:
+    doubts = []
+    for source in sources:
+        text = source.chosen.pattern.lower()
+        amps = source.unit in ('A', 'mA') or 'curr' in text or 'load' in text
+        if source.quantity == 'effort' and amps and not settings.effort_scale:
+            doubts.append(
+                f"efforts '{source.chosen.pattern}' seem to be currents; --current-gain makes "
+                'them N m'
+            )
+        largest = float(np.nanmax(np.abs(source.values())))
+        if source.quantity == 'position' and not settings.degrees and largest > 4.5 * np.pi:
+            if not settings.gear and not settings.position_scale and source.unit == 'rad':
+                doubts.append(
+                    f'positions reach {largest:.4g}: --degrees, or motor angles (--gear)?'
+                )
+    return doubts
+
+
+def _time(table: Table, settings: ColumnSettings) -> tuple[Column | None, str, float | None]:
+    """Return the column of time and its unit, or None and the rate."""
+    asked = settings.time
+    column: Column | None
+    if asked is not None and asked.lower() != 'none':
+        column = table.column(asked)
+        if column is None:
+            raise RecordingError(
+                f"{table.source}: there is no column '{asked}' of time; its columns are "
+                f'{table.listed()}'
+            )
+    elif settings.rate_hz is not None or asked is not None:
+        column = None
+    else:
+        column = guess_time(table)
+    if column is not None:
+        return column, settings.time_unit or _time_unit(table, column), None
+    rate = settings.rate_hz or table.rate_hz
+    if rate is None:
+        raise RecordingError(
+            f'{table.source}: no column of time; name it with --time, or give the samples per '
+            f'second with --rate. Its columns are {table.listed()}'
+        )
+    return None, 's', rate
+
+
+def _time_unit(table: Table, column: Column) -> str:
+    if column.unit in TIME_UNITS:
+        return column.unit
+    steps = np.diff(column.values[np.isfinite(column.values)])
+    steps = steps[steps > 0.0]
+    if not len(steps):
+        raise RecordingError(f'{table.source}: column {column.name} does not increase')
+    step = float(np.median(steps))
+    if step == 1.0 and np.all(steps == np.rint(steps)):
+        raise RecordingError(
+            f'{table.source}: column {column.name} counts 1, 2, 3; give its unit with '
+            '--time-unit s or ms, or the samples per second with --rate'
+        )
+    fitting = [u for u, scale in TIME_UNITS.items() if _STEP[0] <= step * scale <= _STEP[1]]
+    if not fitting:
+        raise RecordingError(
+            f'{table.source}: column {column.name} goes in steps of {step:g}; say in which unit '
+            'with --time-unit'
+        )
+    return fitting[0]

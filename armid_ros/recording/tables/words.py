@@ -1,0 +1,40 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Words in the names of columns, and what they say; larger numbers are surer."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+QuantityName = Literal['position', 'velocity', 'effort']
+
+WORDS: dict[QuantityName, dict[str, float]] = {
+    'position': dict.fromkeys(('position', 'positions', 'pos', 'q', 'qpos', 'jpos'), 3.0)
+    | dict.fromkeys(('angle', 'angles', 'theta', 'qm'), 2.5)
+    | {'state': 1.5, 'joint': 1.0, 'joints': 1.0},
+    'velocity': dict.fromkeys(('velocity', 'velocities', 'vel', 'dq', 'qvel', 'qdot', 'jvel'), 3.0)
+    | dict.fromkeys(('qd', 'speed', 'speeds', 'dtheta', 'thetadot', 'dqm'), 2.5)
+    | {'omega': 2.0},
+    'effort': dict.fromkeys(('torque', 'torques', 'tau', 'effort', 'efforts', 'trq'), 3.0)
+    | dict.fromkeys(('tq', 'current', 'currents', 'curr'), 2.5)
+    | {'force': 2.0, 'load': 1.5, 'moment': 1.5},
+}
+TIMES = dict.fromkeys(('time', 't', 'timestamp', 'timestamps'), 3.0) | dict.fromkeys(
+    ('stamp', 'secs', 'seconds', 'elapsed'), 2.0
+)
+#: Said of what was measured.
+MEASURED = dict.fromkeys(
+    ('meas', 'measured', 'act', 'actual', 'fb', 'feedback', 'observation'), 1.0
+)
+_COMMANDED = (
+    'cmd command commanded des desired target ref reference con goal set setpoint ctrl control '
+    'action ff feedforward traj leader'
+)
+_OF_OTHER_THINGS = (
+    'err error ext external fric friction pert model pred predicted residual limit min max std '
+    'temp temperature tcp ee cart cartesian acc ddq imu rel init gravity kin dyn'
+)
+#: Said of what was not measured, or not of the joints; and, weakly, of what was worked on.
+OTHERWISE = dict.fromkeys((_COMMANDED + ' ' + _OF_OTHER_THINGS).split(), -2.0) | dict.fromkeys(
+    ('filt', 'filtered', 'est', 'estimated', 'se', 'disc', 'mot', 'motor'), -0.3
+)

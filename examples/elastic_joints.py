@@ -1,0 +1,30 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Stiffness of the joints, from encoders at the motors and at the links."""
+
+from pathlib import Path
+
+import armid_ros as ar
+from armid_ros.identification.two_inertia.joints import fit_springs
+from armid_ros.simulation import Reference, Sensors
+from armid_ros.simulation.elastic_arm import record
+from armid_ros.simulation.elastic_setup import make_elastic_arm
+import numpy as np
+
+URDF = Path(__file__).with_name('arm.urdf')
+
+# The robot: springs of 4000 N m/rad, and motors with an inertia of their own.
+compliance = 'joint_elasticity:compliance=0.00025'
+robot = ar.ArmModel.of(URDF, effects=[compliance, 'rotor_inertia:rotor_inertia=0.5'])
+plan = ar.design_excitation(URDF, duration=12.0, starts=1, iterations=10)
+encoders = Sensors(position_noise=1e-5, torque_noise=0.05)
+elastic = make_elastic_arm(robot, rng=np.random.default_rng(1), sensors=encoders)
+run = record(elastic, Reference.of(plan.motion(1000.0)), rate=500.0)
+
+motors, links = (
+    ar.Recording(joints=side.joints, t=side.t, q=side.q, tau=side.tau)
+    for side in (run.motor, run.link)
+)
+for joint in fit_springs(ar.load_robot(URDF), [(motors, links)], np.random.default_rng(2)):
+    value, low, high = joint.transmission.stiffness
+    print(f'{joint.joint:9s} {value:6.0f} N m/rad ({low:.0f} to {high:.0f}), true 4000')

@@ -1,0 +1,183 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What `import armid_ros` offers: late, complete, and readable."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import armid_ros as ar
+from armid_ros.api.table import LINES, Summary, WIDTH
+import numpy as np
+import pytest
+
+EFFECTS = 'viscous_friction,coulomb_friction,torque_offset'
+
+
+@pytest.fixture(scope='module')
+def arm():
+    values = ('viscous_friction:viscous_coefficient=0.1', 'coulomb_friction:coulomb_torque=0.02')
+    return ar.ArmModel.of('humanoid_arm', effects=[*values, 'torque_offset'])
+
+
+@pytest.fixture(scope='module')
+def excitation(arm):
+    return ar.design_excitation(arm, duration=12.0, starts=1, iterations=2, candidates=10)
+
+
+@pytest.fixture(scope='module')
+def runs(arm, excitation):
+    return [ar.simulate(arm, excitation, torque_noise=0.005, rng=seed) for seed in range(2)]
+
+
+@pytest.fixture(scope='module')
+def model(runs):
+    unknown = ar.ArmModel.of('humanoid_arm', effects=EFFECTS)
+    return ar.identify(unknown, runs[0], validate=runs[1])
+
+
+@pytest.fixture(scope='module')
+def loaded(arm, excitation):
+    values = [0.2, 0.0, 0.0, 0.01, 0.001, 0.0, 0.001, 0.0, 0.0, 0.001]
+    held = arm.with_effect(ar.make_effect('payload', arm.robot), values)
+    return ar.simulate(held, excitation, torque_noise=0.005, rng=5)
+
+
+def test_importing_it_imports_nothing_else():
+    """The numerical libraries come with the first name that needs them."""
+    code = (
+        'import sys, armid_ros\n'
+        "heavy = {'numpy', 'scipy', 'pinocchio', 'matplotlib', 'rclpy', 'rich', 'click'}\n"
+        'print(sorted(heavy & set(sys.modules)))'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', code],
+        env={**os.environ, 'PYTHONPATH': str(Path(__file__).parents[2])},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == '[]'
+
+
+@pytest.mark.parametrize('name', ar.__all__)
+def test_every_name_is_there_and_documented(name):
+    value = getattr(ar, name)
+    assert value.__doc__
+    assert name in dir(ar)
+
+
+def test_the_list_of_names_is_complete_and_short():
+    assert set(ar.__all__) == set(ar._HOMES)
+    assert 20 <= len(ar.__all__) <= 30
+
+
+def test_an_unknown_name_is_answered_with_the_known_ones():
+    with pytest.raises(AttributeError, match=r"no 'identfy'; it has load_robot, .*identify"):
+        _ = ar.identfy
+
+
+def short(result):
+    lines = repr(result).splitlines()
+    return len(lines) <= LINES and max(map(len, lines)) <= WIDTH
+
+
+def test_an_identification_shows_itself_in_ten_lines_and_in_a_notebook(model, tmp_path):
+    assert short(model)
+    assert 'GOOD: humanoid_arm: 0.1' in repr(model)
+    assert 'elbow_pitch' in repr(model)
+    html = model._repr_html_()
+    assert html.count('<tr>') > 50
+    assert 'background:#0072b2' in html
+    assert model.report(tmp_path / 'page.html').read_text().startswith('<!')
+    table = model.to_dataframe()
+    assert list(table.columns) == ['name', 'joint', 'value', 'std', 'unit']
+    viscous = table[table.name == 'viscous_coefficient'].value
+    np.testing.assert_allclose(viscous, 0.1, atol=0.01)
+
+
+def test_a_saved_identification_is_what_the_command_line_writes(model, tmp_path):
+    folder = model.save(tmp_path / 'saved')
+    names = {'model.yaml', 'identification.json', 'report.html'}
+    assert {path.name for path in folder.iterdir()} == names
+    again = ar.load_model(folder / 'model.yaml')
+    np.testing.assert_allclose(again.theta, model.arm.theta)
+
+
+def test_a_physical_identification_gives_a_urdf_that_loads(runs, tmp_path):
+    found = ar.identify('humanoid_arm', runs[0], physical=True)
+    found.urdf(tmp_path / 'arm.urdf')
+    robot = ar.load_robot(tmp_path / 'arm.urdf')
+    np.testing.assert_allclose(robot.rigid_parameters, found.arm.robot.rigid_parameters, atol=1e-6)
+
+
+def test_a_diagnosis_and_a_comparison_find_the_load(model, loaded, tmp_path):
+    found = ar.diagnose(model.arm, loaded)
+    assert short(found)
+    assert 'payload' in repr(found)
+    assert found.to_dataframe().effect.str.contains('payload').any()
+    assert (found.save(tmp_path / 'found') / 'diagnosis.json').is_file()
+    after = ar.identify(ar.ArmModel.of('humanoid_arm', effects=EFFECTS), loaded)
+    compared = ar.compare(model, after)
+    assert short(compared)
+    assert compared.load == pytest.approx(0.2, abs=0.01)
+    assert ar.compare(model.save(tmp_path / 'before'), after).load == compared.load
+
+
+def test_an_inspection_and_an_excitation_show_themselves(runs, excitation, tmp_path):
+    found = ar.inspect(runs[0], 'humanoid_arm')
+    assert short(found)
+    assert 'armid identify takes it' in ' '.join(repr(found).split())
+    assert found.report(tmp_path / 'page.html').is_file()
+    assert short(excitation)
+    assert (excitation.save(tmp_path / 'plan') / 'trajectory').is_dir()
+    again = ar.simulate('humanoid_arm', tmp_path / 'plan' / 'trajectory', rate=100.0)
+    assert again.duration == pytest.approx(excitation.duration, abs=0.05)
+
+
+def test_models_and_recordings_print_in_a_few_lines(model, runs):
+    for one in (model.arm, runs[0]):
+        assert len(repr(one).splitlines()) <= LINES
+        assert 'shoulder_pitch' in repr(one)
+
+
+def test_a_recording_is_read_by_robot_or_by_names_from_bags_and_tables(runs, tmp_path):
+    ar.write_recording(tmp_path / 'bag', runs[0])
+    names = ','.join(f'q{k}' for k in range(6))
+    table = np.column_stack([runs[0].t, np.degrees(runs[0].q)])
+    path = tmp_path / 'run.csv'
+    np.savetxt(path, table, delimiter=',', header=f't,{names}', comments='')
+    for robot in ('humanoid_arm', runs[0].joints):
+        np.testing.assert_allclose(
+            ar.read_recording(path, robot, degrees=True).q,
+            ar.read_recording(tmp_path / 'bag', robot).q,
+            atol=1e-9,
+        )
+    with pytest.raises(ar.ArmidError, match=r"'degree'.*columns take time, position"):
+        ar.read_recording(path, 'humanoid_arm', degree=True)
+
+
+def test_a_recording_of_other_joints_is_refused(runs):
+    with pytest.raises(ar.ArmidError, match='those of two_link_elastic'):
+        ar.identify('two_link_elastic', runs[0])
+
+
+def test_a_seed_is_enough(arm, excitation):
+    first, second = (ar.simulate(arm, excitation, torque_noise=0.1, rng=3) for _ in range(2))
+    np.testing.assert_array_equal(first.tau, second.tau)
+    other = ar.simulate(arm, excitation, torque_noise=0.1, rng=np.random.default_rng(3))
+    np.testing.assert_array_equal(first.tau, other.tau)
+
+
+def test_a_summary_of_many_joints_stays_short_and_says_so():
+    rows = [(f'a_joint_with_a_very_long_name_{k}', *['1.234 ± 0.001'] * 5) for k in range(30)]
+    text = Summary('t' * 300, 'good', tuple('abcdef'), rows, lines=['x ' * 200]).text()
+    assert len(text.splitlines()) <= LINES
+    assert max(map(len, text.splitlines())) <= WIDTH
+    assert 'more' in text
+
+
+def test_names_are_escaped_in_a_notebook():
+    html = Summary('<b>', heads=('<i>',), rows=[('<u>',)], lines=['<s>']).html()
+    assert all(tag not in html for tag in ('<i>', '<u>', '<s>'))

@@ -1,0 +1,92 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A table becomes a bag, or is identified as it is; guesses are shown first."""
+
+import json
+
+from armid_ros.recording import read_recording, read_robot_description
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+from .conftest import armid, ROBOT
+
+
+@pytest.fixture(scope='module')
+def recording(bags):
+    """Return what the first bag holds."""
+    return read_recording(bags[0], joints=load_robot(ROBOT).joints)
+
+
+@pytest.fixture
+def csv(recording, tmp_path):
+    """Write it as a table, in degrees, with currents of 50 mN m/A."""
+    names = [f'{name}{k}' for name in ('pos', 'current') for k in range(1, 7)]
+    values = [recording.t, np.degrees(recording.q), recording.tau / 0.05]
+    head = ','.join(['time', *names])
+    path = tmp_path / 'run.csv'
+    np.savetxt(path, np.column_stack(values), delimiter=',', header=head, comments='')
+    return path
+
+
+SAID = ('--degrees', '--current-gain', 0.05)
+
+
+def test_a_table_becomes_a_bag(csv, recording, tmp_path):
+    text = armid('convert', csv, '--robot', ROBOT, *SAID, '--out', tmp_path / 'bag').stdout
+    assert 'position  pos1, .., pos6, in deg (guessed)' in text
+    assert f'{len(recording)} samples of 6 joints' in text
+    again = read_recording(tmp_path / 'bag', joints=recording.joints)
+    np.testing.assert_allclose(again.q, recording.q, atol=1e-9)
+    np.testing.assert_allclose(again.tau, recording.tau, atol=1e-9)
+    assert read_robot_description(tmp_path / 'bag') is not None
+
+
+def test_a_dry_run_shows_and_writes_nothing(csv, tmp_path):
+    text = armid('convert', csv, '--robot', ROBOT, '--dry-run', '--out', tmp_path / 'bag').stdout
+    words = ' '.join(text.split())
+    assert "efforts 'current{}' seem to be currents; --current-gain makes them N m" in words
+    assert '--degrees, or motor angles' in words
+    assert not (tmp_path / 'bag').exists()
+    assert all(len(line) <= 80 for line in text.splitlines()[1:-1])
+
+
+def test_a_table_is_identified_as_the_bag_is(bags, csv, tmp_path):
+    same = ('--robot', ROBOT, '--no-verify', '--json')
+    bag = armid('identify', bags[0], *same, '--out', tmp_path / 'a')
+    table = armid('identify', csv, *SAID, *same, '--out', tmp_path / 'b')
+    assert 'pos1, .., pos6, in deg (guessed)' in table.stderr
+    errors = [json.loads(run.stdout)['training']['relative_error_percent'] for run in (bag, table)]
+    assert errors[0] == pytest.approx(errors[1], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (('{csv}', '--robot', ROBOT, '--effort', 'torque{}'), "no column is 'torque{}'"),
+        (('{csv}', '--rename', 'fer'), "--rename 'fer' has to be OLD:NEW"),
+        (('{csv}', '--gear', '3', '--coupling', '5'), "--coupling '5' has to be MOTOR,JOINT"),
+        (('{csv}', '{bag}'), 'several files have to be tables'),
+        (('{bag}',), 'nothing to do: a bag of ROS 2 stays as it is without --rename'),
+        (('{csv}', '--episode', '1', '--position', 'x'), "no column is 'x', given for position"),
+    ],
+)
+def test_what_cannot_be_done_is_said(arguments, message, csv, bags, tmp_path):
+    filled = [text.replace('{csv}', str(csv)).replace('{bag}', str(bags[0])) for text in arguments]
+    result = armid('convert', *filled, '--out', tmp_path / 'bag', code=2)
+    assert message in result.stderr
+    assert result.stderr.count('\n') == 1
+
+
+def test_joints_get_other_names_in_a_copy(bags, tmp_path):
+    text = armid(
+        'convert', bags[0], '--rename', 'shoulder_:left_', '--out', tmp_path / 'bag'
+    ).stdout
+    assert 'renamed: shoulder_pitch to left_pitch' in text
+    assert len(read_recording(tmp_path / 'bag', joints=('left_pitch', 'elbow_pitch')))
+
+
+def test_a_table_has_no_description_and_that_is_said(csv, tmp_path):
+    error = armid('identify', csv, '--robot', '-', '--out', tmp_path / 'o', code=2).stderr
+    assert 'no /robot_description in' in error
+    assert 'name the URDF with --robot' in error

@@ -1,0 +1,159 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is wrong with a recording is said, with the joint; what is right is not complained of."""
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.inspection import inspect, Sampling
+from armid_ros.motion import Motion
+from armid_ros.recording import Recording
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+PERIOD = 10.0
+
+
+@pytest.fixture(scope='module')
+def robot():
+    return load_robot('humanoid_arm')
+
+
+@pytest.fixture(scope='module')
+def clean(robot):
+    """Record two periods of a motion of the arm with friction, at 100 Hz."""
+    rng = np.random.default_rng(0)
+    t = np.arange(2000) / 100.0
+    q, dq, ddq = np.zeros((3, len(t), 6))
+    for harmonic, size in ((1, 0.5), (3, 0.25), (7, 0.08)):
+        w = 2 * np.pi * harmonic / PERIOD
+        angle = w * t[:, None] + rng.uniform(0, 2 * np.pi, 6)
+        q += size * np.sin(angle)
+        dq += size * w * np.cos(angle)
+        ddq -= size * w * w * np.sin(angle)
+    arm = ArmModel(robot).with_effect(make_effect('viscous_friction', robot), np.full(6, 0.1))
+    tau = arm.torque(Motion(robot.joints, t, q, dq, ddq)) + 0.002 * rng.normal(size=q.shape)
+    return Recording(joints=robot.joints, t=t, q=q, dq=dq, tau=tau, source='run')
+
+
+def remarks(recording, robot=None):
+    """Return what an inspection remarks, each with its weight in front."""
+    found = inspect(recording, robot, rng=np.random.default_rng(0))
+    return [f'{remark.weight}: {remark.text}' for remark in found.remarks]
+
+
+def test_of_a_clean_recording_nothing_is_said(clean, robot):
+    found = inspect(clean, robot, rng=np.random.default_rng(0))
+    assert found.remarks == ()
+    assert found.trial.rank == found.trial.theory
+    assert found.trial.relative_error_percent < 3.0
+    assert found.verdict.startswith('armid identify takes it')
+    assert found.sampling.period == pytest.approx(PERIOD, abs=0.1)
+    assert found.sampling.periods == pytest.approx(2.0, abs=0.02)
+    for joint in found.joints:
+        assert joint.velocity_ratio == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_motion_that_does_not_repeat_has_no_period(clean):
+    half = clean.select(slice(0, 1300))
+    assert Sampling.of(half).period is None
+    turning = replace(clean, q=np.cumsum(np.ones((2000, 6)), axis=0) * 1e-3)
+    assert Sampling.of(turning).period is None
+
+
+def in_degrees(clean):
+    return replace(clean, q=np.degrees(clean.q), dq=np.degrees(clean.dq))
+
+
+def velocities_in_degrees(clean):
+    return replace(clean, dq=np.degrees(clean.dq))
+
+
+def velocities_reversed(clean):
+    return replace(clean, dq=-clean.dq)
+
+
+def velocities_empty(clean):
+    return replace(clean, dq=0 * clean.dq)
+
+
+def no_efforts(clean):
+    return replace(clean, tau=None)
+
+
+def constant_efforts(clean):
+    return replace(clean, tau=0 * clean.tau + 1.0)
+
+
+def still(clean):
+    return replace(clean, q=0 * clean.q + 0.2, dq=0 * clean.dq)
+
+
+def with_a_gap(clean):
+    return clean.select(np.r_[0:800, 860:2000])
+
+
+def jittering(clean):
+    noise = np.random.default_rng(1).uniform(-0.004, 0.004, len(clean))
+    return replace(clean, t=clean.t + noise)
+
+
+def held_samples(clean):
+    return replace(clean, q=np.repeat(clean.q[::4], 4, axis=0))
+
+
+def short(clean):
+    return clean.select(slice(0, 300))
+
+
+@pytest.mark.parametrize(
+    ('spoil', 'said'),
+    {
+        in_degrees: 'doubt: shoulder_pitch reaches',
+        velocities_in_degrees: 'are in degrees/s while positions are in rad',
+        velocities_reversed: 'have the opposite sign of what the positions do',
+        velocities_empty: 'are zero while they move',
+        no_efforts: 'bad: no efforts',
+        constant_efforts: 'bad: efforts of shoulder_pitch',
+        still: 'bad: nothing moves',
+        with_a_gap: 'doubt: 1 gap in time, the longest 0.61 s',
+        jittering: 'steps between samples vary by',
+        held_samples: 'repeat in most samples while they move',
+        short: 'doubt: 3 s is short',
+    }.items(),
+    ids=lambda case: getattr(case, '__name__', ''),
+)
+def test_what_is_wrong_is_said_without_a_robot(spoil, said, clean):
+    assert any(said in remark for remark in remarks(spoil(clean))), remarks(spoil(clean))
+    assert not any(said in remark for remark in remarks(clean))
+
+
+@pytest.mark.parametrize(
+    ('factor', 'said'),
+    [
+        (1e3, 'bad: identify refuses it: run: torques of'),
+        (-1.0, 'bad: identify refuses it: run: torques of'),
+        (12.0, 'currents, torques before the gear'),
+    ],
+)
+def test_units_of_efforts_are_seen_against_the_description(factor, said, clean, robot):
+    wrong = replace(clean, tau=factor * clean.tau)
+    assert any(said in remark for remark in remarks(wrong, robot))
+
+
+def test_noisy_positions_are_answered_with_a_cutoff_that_helps(clean, robot):
+    """Coarse encoders make noise of every frequency in what is differentiated."""
+    coarse = replace(clean, q=np.round(clean.q / 0.02) * 0.02)
+    found = inspect(coarse, robot, rng=np.random.default_rng(0))
+    cutoff, left = found.trial.better
+    assert cutoff < found.trial.cutoff_hz
+    assert left < 0.75 * found.trial.relative_error_percent
+    assert any('with --cutoff' in remark.text for remark in found.remarks)
+
+
+def test_a_fit_that_explains_little_is_doubted(clean, robot):
+    """The efforts of one joint are those of another."""
+    swapped = replace(clean, tau=clean.tau[:, [1, 0, 2, 3, 4, 5]])
+    assert any('leave' in r or 'refuses' in r for r in remarks(swapped, robot))

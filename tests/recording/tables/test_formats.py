@@ -1,0 +1,298 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The same motion comes out of every kind of file, with nothing said but its name."""
+
+import gzip
+import json
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.anything import read_anything
+from armid_ros.recording.tables import ColumnSettings, open_table, side_by_side
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from .conftest import assert_holds, JOINTS
+
+HEAD = ['time', 'q1', 'q2', 'dq1', 'dq2', 'tau1', 'tau2']
+
+
+def text(motion, head=HEAD, separator=',', scale=1.0):
+    """Return a motion as text, its positions and velocities in units of 1/scale."""
+    t, q, dq, tau = motion
+    table = np.column_stack([t, q * scale, dq * scale, tau])
+    rows = [separator.join(f'{value:.9g}' for value in row) for row in table]
+    return '\n'.join([separator.join(head), *rows]) + '\n'
+
+
+def csv(path, motion):
+    path.write_text(text(motion))
+
+
+def semicolons_and_decimal_commas(path, motion):
+    path.write_text(text(motion, separator=';').replace('.', ','))
+
+
+def blanks_below_a_comment(path, motion):
+    path.write_text('# recorded today\n# ' + text(motion, separator=' '))
+
+
+def compressed(path, motion):
+    path.write_bytes(gzip.compress(text(motion).encode()))
+
+
+def with_a_line_of_units(path, motion):
+    lines = text(motion, separator='\t', scale=180 / np.pi).splitlines()
+    units = '\t'.join(['s', 'deg', 'deg', 'deg/s', 'deg/s', 'Nm', 'Nm'])
+    path.write_text('\n'.join([lines[0], units, *lines[1:]]))
+
+
+def degrees_by_name(path, motion):
+    head = ['t_ms', *(f'{name}_deg' for name in HEAD[1:5]), 'tau1', 'tau2']
+    t, *rest = motion
+    path.write_text(text((1e3 * t, *rest), head, scale=180 / np.pi))
+
+
+def stamps_since_1970_in_ns(path, motion):
+    head = ['timestamp', *HEAD[1:]]
+    t = motion[0]
+    lines = text(motion, head).splitlines()
+    stamps = (1_760_000_000_000_000_000 + np.rint(t * 1e9).astype(np.int64)).tolist()
+    rows = [
+        f'{stamp},{line.split(",", 1)[1]}' for stamp, line in zip(stamps, lines[1:], strict=True)
+    ]
+    path.write_text('\n'.join([lines[0], *rows]))
+
+
+def as_plotjuggler_exports(path, motion):
+    names = [
+        f'/joint_states/{joint}/{quantity}'
+        for quantity in ('position', 'velocity', 'effort')
+        for joint in JOINTS
+    ]
+    path.write_text(text(motion, ['__time', *names]))
+
+
+def with_references_and_filtered(path, motion):
+    t, q, dq, tau = motion
+    blocks = {'q_ref': 0 * q, 'q_meas': q, 'q_filt': 0.9 * q, 'dq_meas': dq, 'tau_cmd': 0 * q}
+    blocks |= {'tau_meas': tau, 'tau_ext': 0.1 * tau, 'ee_pos': q}
+    names = [f'{name}{k}' for name in blocks for k in (1, 2)]
+    np.savetxt(
+        path,
+        np.column_stack([t, *blocks.values()]),
+        delimiter=',',
+        header=','.join(['time', *names]),
+        comments='',
+    )
+
+
+def npz(path, motion):
+    np.savez(path, **dict(zip(('t', 'q', 'dq', 'tau'), motion, strict=True)), name='today')
+
+
+def npz_of_rows(path, motion):
+    t, *rest = motion
+    np.savez(path, t=t, **{n: v.T for n, v in zip(('q', 'qd', 'torque'), rest, strict=True)})
+
+
+def structured(path, motion):
+    t, q, dq, tau = motion
+    table = np.column_stack([t, q, dq, tau])
+    np.save(path, np.array([tuple(row) for row in table], [(name, float) for name in HEAD]))
+
+
+def mat(path, motion):
+    t, q, dq, tau = motion
+    savemat(path, {'t': t, 'q': q, 'dq': dq, 'tau': tau, 'gain': 3.0})
+
+
+def mat_of_structures(path, motion):
+    t, q, dq, tau = motion
+    rec = {'time': t, 'act_pos_rad': q.T, 'act_vel': dq.T, 'act_torque_nm': tau.T}
+    savemat(path, {'rec': rec, 'ref': {'pos_rad': 0 * q.T}, 'note': 'text'})
+
+
+def mat_of_version_7_3(path, motion):
+    h5py = pytest.importorskip('h5py')
+    with h5py.File(path, 'w', userblock_size=512) as file:
+        for name, values in zip(('t', 'q', 'dq', 'tau'), motion, strict=True):
+            file[name] = np.atleast_2d(values.T)
+    with path.open('r+b') as file:
+        file.write(b'MATLAB 7.3 MAT-file'.ljust(124) + b'\x00\x02IM')
+
+
+def parquet(path, motion):
+    pa = pytest.importorskip('pyarrow')
+    import pyarrow.parquet as pq
+
+    t, q, dq, tau = motion
+    columns = {'timestamp': t, 'q': list(q), 'dq': list(dq), 'tau': list(tau)}
+    pq.write_table(pa.table({**columns, 'task': ['pick'] * len(t)}), path)
+
+
+WRITERS = {
+    csv: 'run.csv',
+    semicolons_and_decimal_commas: 'run.csv',
+    blanks_below_a_comment: 'run.txt',
+    compressed: 'run.csv.gz',
+    with_a_line_of_units: 'run.tsv',
+    degrees_by_name: 'run.csv',
+    stamps_since_1970_in_ns: 'run.csv',
+    as_plotjuggler_exports: 'run.csv',
+    with_references_and_filtered: 'run.csv',
+    npz: 'run.npz',
+    npz_of_rows: 'run.npz',
+    structured: 'run.npy',
+    mat: 'run.mat',
+    mat_of_structures: 'run.mat',
+    mat_of_version_7_3: 'run.mat',
+    parquet: 'run.parquet',
+}
+
+
+@pytest.mark.parametrize('write', WRITERS, ids=lambda write: write.__name__)
+def test_the_motion_comes_out(write, motion, tmp_path):
+    path = tmp_path / WRITERS[write]
+    write(path, motion)
+    assert_holds(read_anything(path, joints=JOINTS), motion)
+
+
+def lerobot(folder, motion, version):
+    """Write a dataset of two episodes of which the second is the motion."""
+    pa = pytest.importorskip('pyarrow')
+    import pyarrow.parquet as pq
+
+    t, q, dq, tau = motion
+    both = np.concatenate
+    table = pa.table(
+        {
+            'observation.state': list(both([0 * q, q])),
+            'observation.velocity': list(both([0 * q, dq])),
+            'observation.effort': list(both([0 * q, tau])),
+            'action': list(both([q, q])),
+            'timestamp': both([t, t]),
+            'frame_index': np.tile(np.arange(len(t)), 2),
+            'episode_index': np.repeat([0, 1], len(t)),
+        }
+    )
+    names = {'motors': list(JOINTS)} if version == 2 else list(JOINTS)
+    features = {
+        name: {'dtype': 'float32', 'shape': [2], 'names': names}
+        for name in ('observation.state', 'observation.velocity', 'observation.effort', 'action')
+    }
+    (folder / 'meta').mkdir(parents=True)
+    (folder / 'meta' / 'info.json').write_text(
+        json.dumps({'fps': 200, 'total_episodes': 2, 'features': features})
+    )
+    chunk = folder / 'data' / 'chunk-000'
+    chunk.mkdir(parents=True)
+    if version == 2:
+        for k in range(2):
+            part = table.slice(k * len(t), len(t))
+            pq.write_table(part, chunk / f'episode_{k:06d}.parquet')
+    else:
+        pq.write_table(table, chunk / 'file-000.parquet')
+
+
+@pytest.mark.parametrize('version', [2, 3])
+def test_an_episode_of_a_dataset_comes_out(version, motion, tmp_path):
+    lerobot(tmp_path / 'dataset', motion, version)
+    said = ColumnSettings(episode=1)
+    assert_holds(read_anything(tmp_path / 'dataset', joints=JOINTS, columns=said), motion)
+    with pytest.raises(RecordingError, match='no episode 7; the dataset has 0 to 1'):
+        open_table(tmp_path / 'dataset', episode=7)
+
+
+def test_files_side_by_side_hold_columns_of_the_same_rows(motion, tmp_path):
+    _, q, _, tau = motion
+    for name, values in (('positions', q), ('currents', tau)):
+        np.savetxt(
+            tmp_path / f'{name}.csv', values, delimiter=',', header='Joint_1,Joint_2', comments=''
+        )
+    table = side_by_side([open_table(tmp_path / f'{n}.csv') for n in ('positions', 'currents')])
+    assert table.names[0] == 'positions:Joint_1'
+    np.testing.assert_allclose(table.column('currents:Joint_2').values, tau[:, 1])
+    (tmp_path / 'short.csv').write_text('a\n1\n2\n')
+    with pytest.raises(RecordingError, match=r'positions.csv has 200 rows.*short.csv has 2'):
+        side_by_side([open_table(tmp_path / f'{n}.csv') for n in ('positions', 'short')])
+
+
+def broken_cell(path, motion):
+    path.write_text(text(motion).replace('\n', '\nx', 1).replace('x0,', 'oops,', 1))
+
+
+def ragged(path, motion):
+    lines = text(motion).splitlines()
+    lines[7] += ',1'
+    path.write_text('\n'.join(lines))
+
+
+def unnamed(path, motion):
+    lines = text(motion).splitlines()
+    lines[0] = 'time,q1,q2'
+    path.write_text('\n'.join(lines))
+
+
+def words(path, _motion):
+    path.write_text('nothing\nto see\n')
+
+
+def holes(path, motion):
+    lines = text(motion).splitlines()
+    lines[50:150] = [line.rsplit(',', 1)[0] + ',' for line in lines[50:150]]
+    path.write_text('\n'.join(lines))
+
+
+def still_clock(path, motion):
+    t, *rest = motion
+    path.write_text(text((0 * t, *rest)))
+
+
+def counter(path, motion):
+    t, *rest = motion
+    path.write_text(text((np.arange(len(t)), *rest)))
+
+
+@pytest.mark.parametrize(
+    ('write', 'message'),
+    {
+        broken_cell: r"run.csv: line 2, column time: 'oops' is no number",
+        ragged: r'run.csv: line 8 has 8 values, the others 7',
+        unnamed: r'run.csv: 3 names \(time, q1, q2 ...\) stand above 7 values in line 2',
+        words: r'run.csv: no line of numbers in 2 lines',
+        holes: r'run.csv: column tau2 has no number in 100 of 200 rows, first in line 51',
+        still_clock: r'run.csv: column time does not increase',
+        counter: r'run.csv: column time counts 1, 2, 3; give its unit with --time-unit',
+    }.items(),
+    ids=lambda case: getattr(case, '__name__', ''),
+)
+def test_what_is_wrong_is_named_with_file_line_and_column(write, message, motion, tmp_path):
+    path = tmp_path / 'run.csv'
+    write(path, motion)
+    with pytest.raises(RecordingError, match=message):
+        read_anything(path, joints=JOINTS)
+
+
+def test_a_last_line_cut_off_is_left_out_and_said(motion, tmp_path):
+    path = tmp_path / 'run.csv'
+    path.write_text(text(motion)[:-30])
+    recording = read_anything(path, joints=JOINTS)
+    assert len(recording) == 199
+    assert 'Line 201 is cut off' in recording.report.describe()
+
+
+def test_a_file_of_another_kind_is_refused_with_the_kinds_there_are(tmp_path):
+    (tmp_path / 'run.xlsx').write_bytes(b'')
+    with pytest.raises(RecordingError, match=r'no table; tables are \.csv'):
+        open_table(tmp_path / 'run.xlsx')
+
+
+def test_a_library_that_is_missing_is_named(motion, tmp_path, monkeypatch):
+    import sys
+
+    path = tmp_path / 'run.parquet'
+    path.write_bytes(b'')
+    monkeypatch.setitem(sys.modules, 'pyarrow.parquet', None)
+    with pytest.raises(RecordingError, match=r"pip install 'armid_ros\[convert\]'"):
+        open_table(path)

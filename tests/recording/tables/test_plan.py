@@ -1,0 +1,174 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Columns are matched to joints by name, else by number; what is guessed is said to be."""
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.tables import (
+    Column,
+    ColumnSettings,
+    measured,
+    name_in_file,
+    numbers,
+    plan,
+    renamed,
+    Table,
+)
+import numpy as np
+import pytest
+
+from .conftest import JOINTS
+
+
+def table(**columns):
+    """Return a table of columns by name, with time where there is none."""
+    columns = {'t': np.arange(50) * 0.01, **columns}
+    return Table('run.csv', tuple(Column(name, values) for name, values in columns.items()))
+
+
+def ramps(*names):
+    """Return a table with a ramp of its own in each column."""
+    return table(**{name: np.linspace(0, k + 1, 50) for k, name in enumerate(names)})
+
+
+def test_names_count_before_numbers():
+    both = ramps('elbow_pos', 'shoulder_pos')
+    assert [c.name for c in plan(both, ColumnSettings(), JOINTS).sources[0].chosen.columns] == [
+        'shoulder_pos',
+        'elbow_pos',
+    ]
+
+
+def test_numbers_are_in_order_even_beyond_nine():
+    columns = ramps(*(f'q{k}' for k in range(12, 0, -1)))
+    joints = tuple(f'j{k}' for k in range(1, 13))
+    chosen = plan(columns, ColumnSettings(position='q{}'), joints).sources[0].chosen
+    assert [c.name for c in chosen.columns] == [f'q{k}' for k in range(1, 13)]
+
+
+def test_spans_name_columns_of_a_larger_array():
+    columns = tuple(Column(f'[{k}]', np.linspace(0, k + 1, 50), '[]') for k in range(9))
+    said = ColumnSettings(time='[0]', position='[1..2]', effort='[7..8]', velocity='none')
+    recording = measured(plan(Table('run.npy', columns), said, JOINTS))
+    np.testing.assert_allclose(recording.q[-1], [2, 3])
+    np.testing.assert_allclose(recording.tau[-1], [8, 9])
+    assert recording.dq is None
+
+
+def test_what_was_guessed_is_said_with_what_else_fits():
+    lines = plan(ramps('q1', 'q2', 'tau_meas1', 'tau_meas2', 'tau_con1', 'tau_con2'),
+                 ColumnSettings(position='q{}'), JOINTS).lines()  # fmt: skip
+    text = '\n'.join(lines)
+    assert 'position  q1, q2, in rad\n' in text
+    assert 'effort    tau_meas1, tau_meas2, in N m (guessed)\n' in text
+    assert 'also fits: tau_con{}' in text
+    assert 'velocity  none' in text
+
+
+def test_currents_are_said_to_be_no_torques_until_a_gain_is_given():
+    columns = ramps('q1', 'q2', 'current1', 'current2')
+    notes = plan(columns, ColumnSettings(), JOINTS).notes
+    assert any('--current-gain' in note for note in notes)
+    said = ColumnSettings(effort_scale=(11.2, -5.0))
+    settled = plan(columns, said, JOINTS)
+    assert not settled.notes
+    np.testing.assert_allclose(measured(settled).tau[-1], [3 * 11.2, -4 * 5.0])
+
+
+def test_degrees_are_those_of_joints_that_turn():
+    columns = ramps('q1', 'q2')
+    recording = measured(plan(columns, ColumnSettings(degrees=True), JOINTS, [True, False]))
+    np.testing.assert_allclose(recording.q[-1], [1.0, np.radians(2.0)])
+
+
+def test_elements_of_a_state_vector_are_told_apart_by_their_endings():
+    """As LeRobot names them; what was commanded stands beside what was measured."""
+    names = [f'{joint}.{kind}' for joint in JOINTS for kind in ('pos', 'vel', 'torque')]
+    columns = [
+        Column(f'observation.state[{name}]', np.linspace(0, k + 1, 50), 'observation.state')
+        for k, name in enumerate(names)
+    ]
+    columns += [
+        Column(f'action[{joint}.pos]', np.linspace(0, 9, 50), 'action') for joint in JOINTS
+    ]
+    for joints in (JOINTS, None):
+        settled = plan(Table('set', tuple(columns), rate_hz=50.0), ColumnSettings(), joints)
+        assert settled.joints == JOINTS
+        recording = measured(settled)
+        np.testing.assert_allclose(recording.q[-1], [1, 4])
+        np.testing.assert_allclose(recording.dq[-1], [2, 5])
+        np.testing.assert_allclose(recording.tau[-1], [3, 6])
+
+
+def test_large_angles_are_doubted():
+    columns = table(q1=np.linspace(0, 90, 50), q2=np.linspace(0, 45, 50))
+    assert any('--degrees' in note for note in plan(columns, ColumnSettings(), JOINTS).notes)
+
+
+def test_motor_side_becomes_joint_side_with_the_same_power():
+    """With motor = G q, dq tau is conserved: what a coupled wrist needs."""
+    said = ColumnSettings(gear=(32.0, -48.0), coupling=(('2', '1', 16.0),), zero=(0.0, 0.5))
+    columns = ramps('q1', 'q2', 'dq1', 'dq2', 'tau1', 'tau2')
+    motor = measured(plan(columns, ColumnSettings(), JOINTS))
+    joint = measured(plan(columns, said, JOINTS))
+    np.testing.assert_allclose(
+        np.sum(joint.dq * joint.tau, axis=1), np.sum(motor.dq * motor.tau, axis=1)
+    )
+    np.testing.assert_allclose(32.0 * joint.q[:, 0], motor.q[:, 0])
+    np.testing.assert_allclose(
+        16.0 * joint.q[:, 0] - 48.0 * (joint.q[:, 1] - 0.5), motor.q[:, 1], atol=1e-12
+    )
+
+
+def test_joints_are_called_as_the_columns_where_no_robot_says_otherwise():
+    assert plan(ramps('q1', 'q2'), ColumnSettings()).joints == ('joint_1', 'joint_2')
+    columns = ramps('fer_a/position', 'fer_b/position', 'fer_a/effort', 'fer_b/effort')
+    settled = plan(columns, ColumnSettings(rename=(('fer_', 'panda_'),)))
+    assert settled.joints == ('panda_a', 'panda_b')
+    assert settled.source('effort') is not None
+
+
+def test_names_go_to_the_file_and_back():
+    rules = (('fer_', 'panda_'), ('tool', 'flange'))
+    for name in ('panda_joint1', 'flange', 'elbow'):
+        assert renamed(name_in_file(name, rules), rules) == name
+    assert name_in_file('panda_joint1', rules) == 'fer_joint1'
+
+
+def test_a_rename_is_also_one_of_columns():
+    columns = ramps('fer_a_pos', 'fer_b_pos')
+    settled = plan(columns, ColumnSettings(rename=(('fer_', 'panda_'),)), ('panda_a', 'panda_b'))
+    assert [c.name for c in settled.sources[0].chosen.columns] == ['fer_a_pos', 'fer_b_pos']
+
+
+def test_ratios_are_written_as_people_do():
+    np.testing.assert_allclose(
+        numbers('1798/7,-pi/2, 2*pi ,3e-2'), [1798 / 7, -np.pi / 2, 2 * np.pi, 0.03]
+    )
+    with pytest.raises(RecordingError, match="'x' is no number"):
+        numbers('1,x')
+
+
+@pytest.mark.parametrize(
+    ('said', 'message'),
+    [
+        ({'position': 'a{}'}, r"no column is 'a\{\}', given for position; its columns are t, q1"),
+        ({'position': 'q{}'}, r'3 columns fit \(q1, q2, q3\), and there are 2 joints \(sh'),
+        ({'position': 'q1,q7'}, "there is no column 'q7'; its columns are t, q1"),
+        ({'position': 'q1,q2', 'time': 'clock'}, "no column 'clock' of time"),
+        ({'position': 'q1,q2', 'time': 'none'}, 'no column of time; name it with --time'),
+        ({'position': 'q1,q2', 'effort_scale': (1.0, 2.0, 3.0), 'effort': 'q2,q3'},
+         'the scale of efforts has 3 values; give one, or 2 for shoulder, elbow'),
+        ({}, 'no columns seem to be positions of shoulder, elbow; name them, as in --position'),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_refused_with_what_there_is(said, message):
+    with pytest.raises(RecordingError, match=message):
+        plan(ramps('q1', 'q2', 'q3'), ColumnSettings(**said), JOINTS)
+
+
+@pytest.mark.parametrize(
+    'settings', [{'time_unit': 'h'}, {'rate_hz': 0.0}, {'coupling': (('1', '2', 3.0),)}]
+)
+def test_settings_without_meaning_are_refused(settings):
+    with pytest.raises(RecordingError):
+        ColumnSettings(**settings)

@@ -1,0 +1,112 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Bags of ROS 1 hold what they held when they are bags of ROS 2; joints can get other names."""
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording import read_recording, topics, write_recording
+from armid_ros.recording.anything import read_anything
+from armid_ros.recording.recording import Recording
+from armid_ros.recording.ros1 import convert_ros1, copy_renamed
+from armid_ros.recording.tables import ColumnSettings
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import get_types_from_msg, get_typestore, Stores
+
+JOINTS = ('fer_joint1', 'fer_joint2')
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+T0 = 1_700_000_000
+
+
+@pytest.fixture
+def motion():
+    """Return time, positions and torques."""
+    t = np.arange(300) * 0.01
+    q = np.column_stack([np.sin(t), np.cos(2 * t)])
+    return t, q, 5.0 * q
+
+
+@pytest.fixture
+def bag(tmp_path, motion):
+    """Write a bag of ROS 1 with joint states, a description and a type of its own."""
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(get_types_from_msg('float64 x', 'my_msgs/msg/Own'))
+    states, header = store.types[JOINT_STATE], store.types['std_msgs/msg/Header']
+    stamp, own = store.types['builtin_interfaces/msg/Time'], store.types['my_msgs/msg/Own']
+    path = tmp_path / 'run.bag'
+    with Writer(path) as writer:
+        connections = {
+            name: writer.add_connection(name, kind, typestore=store)
+            for name, kind in (
+                ('/joint_states', JOINT_STATE),
+                ('/robot_description', 'std_msgs/msg/String'),
+                ('/own', 'my_msgs/msg/Own'),
+            )
+        }
+
+        def write(name, kind, message, when):
+            raw = store.serialize_ros1(message, kind)
+            writer.write(connections[name], when, raw)
+
+        write('/own', 'my_msgs/msg/Own', own(1.0), T0 * 10**9)
+        text = store.types['std_msgs/msg/String']('<robot name="r"/>')
+        write('/robot_description', 'std_msgs/msg/String', text, T0 * 10**9)
+        for k, (when, q, tau) in enumerate(zip(*motion, strict=True)):
+            ns = round(when * 1e9)
+            time = stamp(T0 + ns // 10**9, ns % 10**9)
+            message = states(header(k, time, 'base'), list(JOINTS), q, np.zeros(0), tau)
+            write('/joint_states', JOINT_STATE, message, T0 * 10**9 + ns + 500)
+    return path
+
+
+def test_what_ros_2_has_a_type_for_is_kept_and_the_rest_is_named(bag, motion, tmp_path):
+    copied = convert_ros1(bag, tmp_path / 'out')
+    assert {topic.name: topic.count for topic in topics(tmp_path / 'out')} == {
+        '/joint_states': 300,
+        '/robot_description': 1,
+    }
+    assert len(copied.left_out) == 1
+    assert '/own (my_msgs/msg/Own)' in copied.left_out[0]
+    recording = read_recording(tmp_path / 'out', joints=JOINTS)
+    np.testing.assert_allclose(recording.t, motion[0], atol=1e-9)
+    np.testing.assert_array_equal(recording.q, motion[1])
+    np.testing.assert_array_equal(recording.tau, motion[2])
+    assert recording.dq is None
+    assert recording.start_ns == T0 * 10**9
+    assert recording.clock == 'header'
+
+
+def test_it_is_read_as_it_is_under_the_names_of_the_robot(bag, motion):
+    said = ColumnSettings(rename=(('fer_', 'panda_'),))
+    recording = read_anything(bag, joints=('panda_joint2', 'panda_joint1'), columns=said)
+    np.testing.assert_array_equal(recording.q, motion[1][:, ::-1])
+    assert recording.joints == ('panda_joint2', 'panda_joint1')
+    assert recording.source == str(bag)
+
+
+def test_a_joint_that_is_not_there_is_named_with_the_bag_and_not_with_a_copy(bag):
+    with pytest.raises(RecordingError, match=r'run\.bag: /joint_states.*elbow'):
+        read_anything(bag, joints=('elbow',))
+
+
+def test_a_copy_of_a_bag_differs_in_the_names_alone(motion, tmp_path):
+    t, q, tau = motion
+    recording = Recording(joints=JOINTS, t=t, q=q, tau=tau, start_ns=T0 * 10**9)
+    write_recording(tmp_path / 'bag', recording, robot_description='<robot name="r"/>')
+    copied = copy_renamed(tmp_path / 'bag', tmp_path / 'out', (('fer_', ''),))
+    assert copied.renamed == (('fer_joint1', 'joint1'), ('fer_joint2', 'joint2'))
+    again = read_recording(tmp_path / 'out', joints=('joint1', 'joint2'))
+    np.testing.assert_array_equal(again.tau, tau)
+    assert again.start_ns == recording.start_ns
+    before, after = topics(tmp_path / 'bag'), topics(tmp_path / 'out')
+    assert [(x.name, x.type_name, x.qos, x.count) for x in before] == [
+        (x.name, x.type_name, x.qos, x.count) for x in after
+    ]
+
+
+def test_what_is_no_bag_is_refused_and_leaves_nothing(tmp_path):
+    path = tmp_path / 'run.bag'
+    path.write_text('no bag at all')
+    with pytest.raises(RecordingError, match=r'run\.bag: cannot be read as a bag of ROS 1'):
+        convert_ros1(path, tmp_path / 'out')
+    assert not (tmp_path / 'out').exists()

@@ -1,0 +1,42 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Layouts for any robot are those that are shipped, with its joints and its namespace."""
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout
+from armid_ros.robots import load_robot
+
+CONFIG = Path(__file__).parents[2] / 'config'
+JOINTS = load_robot('humanoid_arm').joints
+
+
+def test_layouts_of_the_shipped_arm_are_the_shipped_layouts():
+    """What somebody tried in the plotters is what everybody gets."""
+    made = plotjuggler_layout('humanoid_arm', JOINTS)
+    shipped = (CONFIG / 'plotjuggler_layout.xml').read_text()
+    same = {'strip_text': True}
+    assert ElementTree.canonicalize(made, **same) == ElementTree.canonicalize(shipped, **same)
+    shipped = json.loads((CONFIG / 'foxglove_layout.json').read_text())
+    assert json.loads(foxglove_layout(JOINTS)) == shipped
+
+
+def test_a_namespace_is_before_every_topic_of_the_nodes():
+    text = plotjuggler_layout('arm', ('a', 'b'), '/left/')
+    curves = [curve.get('name') for curve in ElementTree.fromstring(text).iter('curve')]
+    assert '/left/joint_states/a/effort' in curves
+    assert '/diagnostics/arm/left/online_identifier: state/samples' in curves
+    assert all(name.startswith(('/left/', '/diagnostics/arm/left/')) for name in curves)
+    layout = json.loads(foxglove_layout(('a', 'b'), 'left'))['configById']
+    assert layout['RawMessages!estimate']['topicPath'] == '/left/online_identifier/estimate'
+    values = [path['value'] for path in layout['Plot!torque']['paths']]
+    assert values[0] == '/left/joint_states.effort[0]'
+    assert values[-1] == '/left/online_identifier/predicted_joint_states.effort[1]'
+
+
+def test_names_that_xml_does_not_like_are_escaped():
+    text = plotjuggler_layout('arm', ('a<b&"c',))
+    curves = [curve.get('name') for curve in ElementTree.fromstring(text).iter('curve')]
+    assert '/joint_states/a<b&"c/effort' in curves
