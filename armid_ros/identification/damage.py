@@ -104,7 +104,30 @@ def _damaged(
         ]
         kept += [sample.t for sample in gate.rest()]
         bad = ~np.isin(recording.t, kept)
+        bad = _impossible(bad, off, recording)
     return bad, np.argmax(off, axis=1)
+
+
+def _impossible(
+    bad: npt.NDArray[np.bool_], off: FloatArray, recording: Recording
+) -> npt.NDArray[np.bool_]:
+    """
+    Return the pulses that no arm makes, shape (N,).
+
+    A position cannot jump and come back. A torque can, as where free play is crossed, but not to
+    where it never is otherwise.
+
+    """
+    assert recording.tau is not None
+    tau, n = recording.tau, recording.n_joints
+    good = tau[~bad]
+    beyond = (tau < good.min(axis=0)) | (tau > good.max(axis=0))
+    sure = np.any(off[:, :n] > 1.0, axis=1) | np.any((off[:, n:] > 1.0) & beyond, axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], bad.astype(int), [0]]))).reshape(-1, 2)
+    result = np.zeros_like(bad)
+    for start, stop in edges:
+        result[start:stop] = sure[start:stop].any()
+    return result
 
 
 def _repaired(recording: Recording, bad: npt.NDArray[np.bool_]) -> Recording:

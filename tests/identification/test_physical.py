@@ -200,7 +200,7 @@ def test_an_inertia_that_is_not_of_the_links_takes_no_mass_along(arm, geared):
 
 def test_masses_far_beyond_the_described_are_said(arm, recording):
     light = arm.robot.rigid_parameters.reshape(-1, 10).copy()
-    light[5] *= 0.1
+    light[5] *= 0.02
     structure = ArmModel(arm.robot.with_inertias(light.ravel()), arm.effects)
     result = run(structure, recording, PhysicalSettings())
     (note,) = (n for n in result.notes if 'times as heavy as described' in n)
