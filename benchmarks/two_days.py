@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-import inspect
 import time
 from typing import Any
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
 from armid_ros.effects import make_effect
 from armid_ros.identification import Identification, identify
 from armid_ros.recording import Recording
@@ -113,6 +113,7 @@ def ask(
     *,
     validate: Sequence[Recording] = (),
     baseline: Sequence[Recording] = (),
+    settings: DiagnosisSettings | None = None,
 ) -> Answer:
     """
     Ask the diagnosis what is not in a model.
@@ -125,16 +126,18 @@ def ask(
         Of the day in question; the second are not fitted.
     baseline : sequence of Recording
         Of the day on which the model was identified.
+    settings : DiagnosisSettings, optional
+        The numbers that decide.
 
     """
-    from armid_ros.diagnosis import diagnose, diagnosis_document
-
-    more: dict[str, Any] = {}
-    if 'baseline' in inspect.signature(diagnose).parameters:
-        more['baseline'] = tuple(baseline)
     begin = time.process_time()
     found = diagnose(
-        arm, list(recordings), validate=list(validate), rng=np.random.default_rng(0), **more
+        arm,
+        list(recordings),
+        validate=list(validate),
+        baseline=list(baseline),
+        settings=settings,
+        rng=np.random.default_rng(0),
     )
     seconds = time.process_time() - begin
     return answer_of(diagnosis_document(found), seconds)
