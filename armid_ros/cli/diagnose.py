@@ -21,7 +21,7 @@ import click
 import numpy as np
 
 
-class Percent(click.ParamType):
+class Percent(click.ParamType):  # type: ignore[type-arg]
     """A share that a person writes in per cent, with or without the sign."""
 
     name = 'percent'

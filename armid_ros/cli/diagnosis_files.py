@@ -133,7 +133,7 @@ def make_extras(result: Diagnosis, case: Case, seed: int, tick: Tick) -> Extras:
 def _simulated(
     result: Diagnosis, case: Case, tick: Tick
 ) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
-    used = conditioning(case.recordings, case.settings.signals)
+    used = conditioning(list(case.recordings), case.settings.signals)
     return simulate_held_out(
         case.arm, result.arm, used, case.held_out, progress=lambda _, what: tick(1.0, what)
     )
