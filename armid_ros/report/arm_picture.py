@@ -11,7 +11,7 @@ mass. Of some poses and directions the one is taken in which the arm covers the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 from armid_ros.motion import FloatArray
@@ -20,7 +20,9 @@ from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
 
-_HEIGHT, _WIDTH, _EDGE = 250.0, 340.0, 26.0
+_HEIGHT, _WIDTH, _EDGE = 250.0, 340.0, 30.0
+#: Names are so far above their joints, a line is so high, a name about so long [px].
+_ABOVE, _LINE, _LABEL = 14.0, 14.0, 90.0
 _VIEWS = tuple(View(float(azimuth), np.radians(14.0)) for azimuth in np.radians([-90, -55, -20]))
 #: Poses that are tried, and how far the last body is drawn beyond its centre of mass.
 _POSES, _BEYOND = 12, 2.0
@@ -63,9 +65,9 @@ class Dot:
     marked : bool
         Whether it is to be pointed out.
     label_x, label_y : float
-        Where its name starts, or ends [px].
+        Where its name is written [px].
     anchor : str
-        Which of the two: 'start' or 'end'.
+        What of the name is there: 'start', 'middle' or 'end'.
 
     """
 
@@ -188,18 +190,20 @@ def _area(lines: FloatArray) -> float:
 
 
 def _dot(at: tuple[float, float], name: str, marked: bool, width: float) -> Dot:
-    right = at[0] < width / 2.0
-    x = at[0] + (12.0 if right else -12.0)
-    return Dot(*at, name, marked, round(x, 1), at[1] + 4.0, 'start' if right else 'end')
+    """Return a joint with its name above it, inside the drawing."""
+    x, y = at
+    side = 'start' if x < width / 4.0 else 'end' if x > 3.0 * width / 4.0 else 'middle'
+    shift = {'start': -8.0, 'end': 8.0, 'middle': 0.0}[side]
+    return Dot(x, y, name, marked, round(x + shift, 1), round(y - _ABOVE, 1), side)
 
 
 def _apart(dots: Sequence[Dot]) -> list[Dot]:
-    """Return joints with the names of those that are pointed out below each other."""
+    """Return joints with the names of those that are pointed out above each other."""
     result: list[Dot] = []
     for dot in dots:
         y = dot.label_y
-        others = [o for o in result if o.marked and o.anchor == dot.anchor]
-        while dot.marked and any(abs(o.label_y - y) < 14.0 for o in others):
-            y += 14.0
-        result.append(Dot(dot.x, dot.y, dot.name, dot.marked, dot.label_x, y, dot.anchor))
+        near = [o for o in result if o.marked and abs(o.label_x - dot.label_x) < _LABEL]
+        while dot.marked and any(abs(o.label_y - y) < _LINE for o in near):
+            y -= _LINE
+        result.append(replace(dot, label_y=round(y, 1)))
     return result

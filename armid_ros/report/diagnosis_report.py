@@ -109,7 +109,7 @@ def diagnosis_report(
 def _verdict(diagnosis: Diagnosis, names: Mapping[str, str]) -> Verdict:
     tone = _TONES.get(diagnosis.verdict, 'bad')
     notes = [with_names(note, names) for note in diagnosis.notes]
-    summary = with_names(diagnosis.summary, names)
+    summary = with_names(diagnosis.summary, names).replace('+-', '±')
     return Verdict(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)
 
 

@@ -16,7 +16,7 @@ from markupsafe import Markup
 import numpy as np
 
 #: Joints of the gap that are said, and values of a cause.
-_JOINTS, _VALUES = 2, 4
+_JOINTS, _VALUES = 2, 2
 
 
 @dataclass(frozen=True)
@@ -62,12 +62,12 @@ class Story(Section):
     @property
     def caption(self) -> str:
         """What the drawing shows."""
+        names = ', '.join(one.name.replace('_', ' ') for one in self.diagnosis.findings)
         if self.whole_arm:
-            return 'the whole arm is concerned'
+            return f'coloured: the whole arm ({names})'
         if not self.joints:
             return 'no joint stands out'
-        what = 'it is in' if self.diagnosis.findings else 'what is missing shows in'
-        return f'{what} {", ".join(self.joints)}'
+        return f'coloured: {", ".join(self.joints)} ({names or "the largest gap"})'
 
     @property
     def rows(self) -> list[tuple[str, list[str]]]:
@@ -77,7 +77,6 @@ class Story(Section):
             ('Which', self._which()),
             ('Patch', self._patch()),
             ('Gap', self._gap()),
-            ('Floor', [f'The gap is what is beyond {self.diagnosis.baseline}.']),
         ]
 
     def _where(self) -> list[str]:
@@ -114,8 +113,11 @@ class Story(Section):
         )
         where = 'on recordings that were not used' if gap.predicted else f'on {gap.data}'
         if not self.diagnosis.findings:
-            return [f'{robot.joints[j]}: {after} {where}; the floor is {floor}.']
-        return [f'{robot.joints[j]}: {before} before, {after} after, {where}; floor {floor}.']
+            change = after
+        else:
+            change = f'{before} before, {after} after'
+        least = f'The floor, {floor}, is {self.diagnosis.baseline}.'
+        return [f'{robot.joints[j]}: {change}, {where}.', least]
 
 
 def _cause(finding: Finding) -> str:
