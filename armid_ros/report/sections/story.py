@@ -72,12 +72,16 @@ class Story(Section):
     @property
     def rows(self) -> list[tuple[str, list[str]]]:
         """Questions and answers."""
-        return [
+        answers = [
             ('Where', self._where()),
             ('Which', self._which()),
             ('Patch', self._patch()),
             ('Gap', self._gap()),
         ]
+        left = self.diagnosis.left
+        if self.diagnosis.findings and left:
+            answers.append(('Left', [f'{w.joint}: {w.signature}' for w in left[:_JOINTS]]))
+        return answers
 
     def _where(self) -> list[str]:
         places = self.diagnosis.where
