@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What armid diagnose writes: the verdict, and a motion to run where names are in doubt."""
 
-from itertools import pairwise
 import json
 
-from armid_ros.arm import load_model, save_model
+from armid_ros.arm import load_misfit, load_model, Misfit, save_model
+from armid_ros.cli.diagnose import Percent
 from armid_ros.excitation import check_limits, Limits, load_excitation
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import write_recording
@@ -78,11 +78,81 @@ def test_candidates_say_how_sure_they_are_in_numbers_and_on_the_page(files, tmp_
     urdf, model, bags = files
     out = tmp_path / 'out'
     armid('diagnose', *bags, '--robot', urdf, '--model', model, '--out', out)
-    document = json.loads((out / 'diagnosis.json').read_text())
-    rows = document['candidates']
+    rows = json.loads((out / 'diagnosis.json').read_text())['candidates']
     assert rows
-    assert all(0.0 <= row['adjusted_p'] <= 1.0 and 0.0 <= row['inclusion'] <= 1.0 for row in rows)
-    assert all(a['held_out_gain'] >= b['held_out_gain'] for a, b in pairwise(rows))
+    assert all(0.0 <= row['adjusted_p'] <= 1.0 and row['share'] <= 1.0 for row in rows)
     page = (out / 'report.html').read_text()
     assert 'Adjusted p' in page
-    assert 'Inclusion' in page
+    assert 'Price' in page
+    assert '<svg class="arm"' in page
+
+
+def test_the_sentence_comes_first_and_then_the_values_with_their_share(files, tmp_path):
+    urdf, model, bags = files
+    out = tmp_path / 'out'
+    result = armid('diagnose', *bags, '--robot', urdf, '--model', model, '--out', out)
+    document = json.loads((out / 'diagnosis.json').read_text())
+    lines = result.stdout.splitlines()
+    assert lines[0] == f'{document["verdict"].upper()}: {document["summary"]}'
+    assert 'value, 95 %' in lines[1]
+    assert ' to ' in lines[2]
+    assert document['effects'][0]['name'].replace('_', ' ') in lines[2]
+
+
+def test_an_extra_that_fails_costs_no_result(files, tmp_path, monkeypatch):
+    urdf, model, bags = files
+    out = tmp_path / 'out'
+
+    def broken(*arguments, **options):
+        assert {path.name for path in out.iterdir()} >= {
+            'diagnosis.json',
+            'model.yaml',
+            'report.html',
+        }
+        raise ZeroDivisionError('no motion at all')
+
+    monkeypatch.setattr('armid_ros.cli.diagnosis_files.next_run', broken)
+    monkeypatch.setattr('armid_ros.cli.diagnosis_files.simulate_held_out', broken)
+    result = armid(
+        'diagnose', *bags, '--robot', urdf, '--model', model, '--validate', bags[0], '--out', out
+    )
+    assert result.output.count('no motion at all') == 2
+    document = json.loads((out / 'diagnosis.json').read_text())
+    assert document['effects']
+    assert (document['next_run'], document['forward']) == (None, [])
+
+
+def test_a_baseline_of_the_same_day_leaves_nothing_to_name(files, tmp_path):
+    urdf, model, bags = files
+    out = tmp_path / 'out'
+    asked = ['--robot', urdf, '--model', model, '--baseline', bags[0], '--baseline', bags[1]]
+    armid('diagnose', bags[2], *asked, '--out', out)
+    document = json.loads((out / 'diagnosis.json').read_text())
+    assert document['effects'] == []
+    assert 'before' in document['baseline']
+
+
+def test_the_misfit_of_the_model_file_is_the_floor_where_there_is_no_baseline(files, tmp_path):
+    urdf, model, bags = files
+    arm = load_model(model, load_robot(str(urdf)))
+    misfit = Misfit('held-out', {'shoulder': 10.0, 'elbow': 10.0}, 50.0)
+    save_model(tmp_path / 'known.yaml', arm, str(urdf), misfit=misfit)
+    out = tmp_path / 'out'
+    armid('diagnose', *bags, '--robot', urdf, '--model', tmp_path / 'known.yaml', '--out', out)
+    document = json.loads((out / 'diagnosis.json').read_text())
+    assert document['verdict'] == 'consistent'
+    assert 'when it was identified' in document['baseline']
+    assert load_misfit(out / 'model.yaml') == misfit
+
+
+@pytest.mark.parametrize(('text', 'share'), [('2%', 0.02), ('0.5', 0.005), ('0 %', 0.0)])
+def test_what_matters_is_a_percentage(text, share):
+    assert Percent().convert(text, None, None) == pytest.approx(share)
+
+
+@pytest.mark.parametrize('text', ['much', '-1%', '100%', 'nan'])
+def test_what_is_no_percentage_is_refused(text, tmp_path):
+    result = armid(
+        'diagnose', 'bag', '--robot', 'r', '--out', tmp_path, '--material', text, code=2
+    )
+    assert text in result.output

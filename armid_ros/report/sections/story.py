@@ -126,7 +126,8 @@ class Story(Section):
 
 def _cause(finding: Finding) -> str:
     """Return a cause with its place, values and share."""
-    where = ', '.join(finding.place_of(joint) for joint in finding.joints) or 'whole arm'
+    places = ', '.join(finding.place_of(joint) for joint in finding.joints)
+    where = f' at {places}' if places else ', whole arm'
     values = [
         f'{name.name.replace("_", " ")} {with_interval(value, std, name.unit)}'
         for name, value, std in _values(finding)
@@ -138,7 +139,7 @@ def _cause(finding: Finding) -> str:
     share = f'{percent(finding.share)} of the gap ({percent(low)} to {percent(high)})'
     rivals = ', '.join(name.replace('_', ' ') for name in finding.ambiguous_with)
     doubt = f'; not told from {rivals}' if rivals else ''
-    return f'{finding.name.replace("_", " ")} ({where}){numbers}; explains {share}{doubt}'
+    return f'{finding.name.replace("_", " ")}{where}{numbers}; explains {share}{doubt}'
 
 
 def _values(finding: Finding) -> Sequence[tuple]:  # type: ignore[type-arg]
