@@ -258,7 +258,7 @@ def _sized(arm: ArmModel, effect: Effect, motion: Motion, rng: np.random.Generat
     whole = np.sqrt(np.mean(arm.torque(motion) ** 2, axis=0))
     share = rng.uniform(*_SIZE)
     size = share * min(float(whole[j] / own[j]) for j in joints if own[j] > 0.0)
-    return np.clip(size * direction, *effect.bounds())
+    return np.asarray(np.clip(size * direction, *effect.bounds()))
 
 
 def _excitations(arm: ArmModel, rng: np.random.Generator) -> list[Excitation]:
