@@ -13,11 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-import math
 from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import ModelError
+from armid_ros.files import finite, load_yaml, read_text, reading
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -90,23 +90,26 @@ def load_misfit(path: str | Path) -> Misfit | None:
 
     """
     path = Path(path)
+    text = read_text(path, ModelError)
+    with reading(path, ModelError):
+        try:
+            document = load_yaml(text)
+        except (yaml.YAMLError, ValueError) as error:
+            raise ModelError(f'not YAML: {" ".join(str(error).split())}') from error
+        block = document.get('misfit') if isinstance(document, dict) else None
+        return None if block is None else _misfit(block)
+
+
+def _misfit(block: Any) -> Misfit:
     try:
-        document = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise ModelError(f'{path}: {error.strerror}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ModelError(f'{path}: not YAML: {error}') from error
-    block = document.get('misfit') if isinstance(document, dict) else None
-    if block is None:
-        return None
-    try:
-        rms = {str(joint): float(value) for joint, value in block['rms'].items()}
-        found = Misfit(str(block['data']), rms, float(block['relative_error_percent']))
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise ModelError(f'{path}: misfit: {type(error).__name__} {error}') from error
-    for joint, value in rms.items():
-        if not (math.isfinite(value) and value >= 0.0):
-            raise ModelError(f"{path}: misfit of joint '{joint}' is {value:g}, not a torque")
-    if found.data not in _DATA:
-        raise ModelError(f"{path}: misfit has data '{found.data}', not {' or '.join(_DATA)}")
-    return found
+        rms = {str(joint): value for joint, value in block['rms'].items()}
+        data, error = str(block['data']), block['relative_error_percent']
+    except (AttributeError, KeyError, TypeError) as fault:
+        raise ModelError(f'misfit: {type(fault).__name__} {fault}') from fault
+    if data not in _DATA:
+        raise ModelError(f"misfit has data '{data}', not {' or '.join(_DATA)}")
+    torques = {joint: finite(value, f"misfit of joint '{joint}'") for joint, value in rms.items()}
+    negative = [joint for joint, value in torques.items() if value < 0.0]
+    if negative:
+        raise ModelError(f"misfit of joint '{negative[0]}' is negative")
+    return Misfit(data, torques, finite(error, 'relative_error_percent of the misfit'))

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_misfit, load_model
@@ -15,6 +14,8 @@ from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, Finding
+from armid_ros.diagnosis.verdict.document import SCHEMA
+from armid_ros.files import json_text
 from armid_ros.identification import SignalSettings
 from armid_ros.report.notation import percent, probability, with_interval
 import click
@@ -143,7 +144,6 @@ def diagnose(
             rng=np.random.default_rng(seed),
             progress=tick,
         )
-        out.mkdir(parents=True, exist_ok=True)
         case = Case(
             arm,
             robot_source,

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-import json
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,6 +25,7 @@ from armid_ros.diagnosis import (
     NextRun,
 )
 from armid_ros.excitation import save_excitation
+from armid_ros.files import json_text, write_file
 from armid_ros.identification.signals import conditioning
 from armid_ros.identification.verification import ForwardValidation, simulate_held_out
 from armid_ros.recording import Recording
@@ -99,7 +99,7 @@ def write_results(out: Path, result: Diagnosis, case: Case, extras: Extras) -> d
     document = diagnosis_document(result)
     document['forward'] = [pair.document() for pair in extras.forward]
     document['next_run'] = None if extras.next_run is None else extras.next_run.document()
-    (out / 'diagnosis.json').write_text(json.dumps(document, indent=1), encoding='utf-8')
+    write_file(out / 'diagnosis.json', json_text(document, indent=1))
     if extras.next_run is not None:
         save_excitation(extras.next_run.excitation, out / EXPERIMENT_FILE)
     page = diagnosis_report(
@@ -114,7 +114,7 @@ def write_results(out: Path, result: Diagnosis, case: Case, extras: Extras) -> d
         patch=(out / 'model.yaml').read_text(encoding='utf-8'),
         provenance=case.provenance,
     )
-    (out / 'report.html').write_text(page, encoding='utf-8')
+    write_file(out / 'report.html', page)
     return document
 
 

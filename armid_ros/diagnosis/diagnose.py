@@ -33,6 +33,7 @@ from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.checks import check_motion
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -198,7 +199,7 @@ def diagnose(
         chosen = explained(arm, prepared, known, settings, rng, tell, written)
         unseen = _unseen(validate, chosen.explanation, prepared, chosen)
         if harmed(chosen.explanation, unseen, settings):
-            chosen = _second_choice(chosen, arm, prepared, known, settings, rng, tell)
+            chosen = _second_choice(chosen, (arm, prepared, known, settings, rng, tell, written))
     notes += chosen.notes
     explanation, remarks = as_bodies(chosen.explanation, arm)
     return _said(
@@ -207,20 +208,25 @@ def diagnose(
     )
 
 
-def _second_choice(
-    chosen: Chosen,
-    arm: ArmModel,
-    prepared: Prepared,
-    baseline: Baseline | None,
-    settings: DiagnosisSettings,
-    rng: np.random.Generator,
-    tell: Progress,
-) -> Chosen:
+def _second_choice(chosen: Chosen, asked: _Asked) -> Chosen:
     """Explain the gap without the names that make the model worse somewhere."""
+    arm, prepared, baseline, settings, rng, tell, written = asked
     gone = {own.effect.name for own in chosen.explanation.fitted.named}
     library = tuple(name for name in settings.library if name not in gone)
-    again = explained(arm, prepared, baseline, replace(settings, library=library), rng, tell)
+    fewer = replace(settings, library=library)
+    again = explained(arm, prepared, baseline, fewer, rng, tell, written)
     return again if again.explanation.steps else chosen
+
+
+_Asked = tuple[
+    ArmModel,
+    Prepared,
+    Baseline | None,
+    DiagnosisSettings,
+    np.random.Generator,
+    Progress,
+    FloatArray | None,
+]
 
 
 _Context = tuple[
