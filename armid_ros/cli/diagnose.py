@@ -17,6 +17,7 @@ from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, F
 from armid_ros.diagnosis.verdict.document import SCHEMA
 from armid_ros.files import json_text
 from armid_ros.identification import SignalSettings
+from armid_ros.identification.identifiability import told_from_zero
 from armid_ros.report.notation import percent, probability, with_interval
 import click
 import numpy as np
@@ -180,10 +181,11 @@ def show(result: Diagnosis) -> None:
 
 
 def _rows(finding: Finding) -> list[dict[str, str]]:
-    """Return a row for every value of an effect; the first one says its share."""
+    """Return a row for every value that is told from zero; the first one says the share."""
     low, high = finding.share_interval
     share = f'{percent(finding.share)} ({percent(low)} to {percent(high)})'
-    values = zip(finding.parameters, finding.values, finding.std, strict=True)
+    every = list(zip(finding.parameters, finding.values, finding.std, strict=True))
+    values = [row for row in every if told_from_zero(row[1], row[2])] or every
     return [
         {
             'effect': '' if number else finding.name.replace('_', ' '),

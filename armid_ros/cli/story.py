@@ -51,6 +51,8 @@ _MASS, _REACH = (0.4, 0.8), 0.06
 #: A run: seconds of a period, and harmonics.
 _PERIOD, _HARMONICS = 8.0, 5
 _RATE = 100.0
+#: Draws until one shows.
+_DRAWS = 50
 _RUNS = ('after_1', 'after_2', 'unused')
 
 
@@ -220,18 +222,33 @@ def draw_hidden(
         What is not to be drawn: see `tell_story`.
 
     """
-    robot = arm.robot
     if ':' in asked:
-        effect, values = parse_effect(asked, robot)
+        effect, values = parse_effect(asked, arm.robot)
         return Hidden(effect, values)
+    for _ in range(_DRAWS):
+        hidden = _drawn(arm, motion, rng, asked)
+        if _shows(arm, hidden, motion) or '@' in asked:
+            break
+    return hidden
+
+
+def _drawn(arm: ArmModel, motion: Motion, rng: np.random.Generator, asked: str) -> Hidden:
     head, at, joints = asked.partition('@')
     name = head or str(rng.choice(HIDEABLE))
-    effect = make_effect(f'{name}@{joints}' if at else name, robot)
+    effect = make_effect(f'{name}@{joints}' if at else name, arm.robot)
     if not at and len(effect.joints) > 1:
-        effect = make_effect(f'{name}@{rng.choice(effect.joints)}', robot)
+        effect = make_effect(f'{name}@{rng.choice(effect.joints)}', arm.robot)
     if name == 'payload':
         return Hidden(effect, _payload(arm, effect, rng))
     return Hidden(effect, _sized(arm, effect, motion, rng))
+
+
+def _shows(arm: ArmModel, hidden: Hidden, motion: Motion) -> bool:
+    """Return whether the torque of some joint changes by as much as one can see."""
+    whole = arm.torque(motion)
+    change = arm.with_effect(hidden.effect, hidden.values).torque(motion) - whole
+    share = np.sqrt(np.mean(change**2, axis=0) / np.mean(whole**2, axis=0))
+    return bool(share.max() > 0.9 * _SIZE[0])
 
 
 def _payload(arm: ArmModel, effect: Effect, rng: np.random.Generator) -> FloatArray:
@@ -258,7 +275,9 @@ def _sized(arm: ArmModel, effect: Effect, motion: Motion, rng: np.random.Generat
     whole = np.sqrt(np.mean(arm.torque(motion) ** 2, axis=0))
     share = rng.uniform(*_SIZE)
     size = share * min(float(whole[j] / own[j]) for j in joints if own[j] > 0.0)
-    return np.asarray(np.clip(size * direction, *effect.bounds()))
+    most = np.array([q.typical[1] if q.typical else np.inf for q in effect.quantities])
+    values = np.clip(size * direction, -most, most)
+    return np.asarray(np.clip(values, *effect.bounds()))
 
 
 def _excitations(arm: ArmModel, rng: np.random.Generator) -> list[Excitation]:
