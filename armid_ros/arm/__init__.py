@@ -3,12 +3,15 @@
 """The arm model: rigid body plus effects, and the file it is kept in."""
 
 from armid_ros.arm.arm_model import ArmModel
+from armid_ros.arm.misfit import load_misfit, Misfit
 from armid_ros.arm.model_file import load_model, model_document, parameter_table, save_model
 from armid_ros.arm.torque_slope import TorqueSlope
 
 __all__ = [
     'ArmModel',
+    'Misfit',
     'TorqueSlope',
+    'load_misfit',
     'load_model',
     'model_document',
     'parameter_table',

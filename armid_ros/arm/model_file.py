@@ -8,6 +8,7 @@ Schema armid/model/1: ``robot`` (shipped name or path of the description), ``gra
 A std of null says that the data did not determine the parameter on its own. An effect has
 ``shapes`` as well if the torque is not linear in all that describes it, and ``partner`` and
 ``ties`` - points of both machines, in the frames of their joints [m] - if it ends at another one.
+A model that was identified has ``misfit`` as well: what it leaves of recordings, see `Misfit`.
 
 """
 
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.arm.arm_model import ArmModel
+from armid_ros.arm.misfit import Misfit
 from armid_ros.effects import CATALOGUE, Effect, Kind
 from armid_ros.effects.tied import TIED, Tied, TiedKind
 from armid_ros.errors import ModelError
@@ -127,10 +129,32 @@ def _point(values: Sequence[float]) -> tuple[float, float, float]:
 
 
 def save_model(
-    path: str | Path, arm: ArmModel, robot: str, estimate: Estimate | None = None
+    path: str | Path,
+    arm: ArmModel,
+    robot: str,
+    estimate: Estimate | None = None,
+    misfit: Misfit | None = None,
 ) -> None:
-    """Write model.yaml; a relative path of the description is taken from the file's own folder."""
+    """
+    Write model.yaml.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    arm : ArmModel
+        The model.
+    robot : str
+        Shipped name or path of the description; a relative one from the file's own folder.
+    estimate : Estimate, optional
+        Where the standard deviations come from.
+    misfit : Misfit, optional
+        What the model leaves of recordings.
+
+    """
     document = model_document(arm, robot, estimate)
+    if misfit is not None:
+        document['misfit'] = misfit.document()
     text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=99)
     write_file(path, text)
 

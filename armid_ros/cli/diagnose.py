@@ -4,33 +4,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-from armid_ros.arm import ArmModel, load_model, save_model
+from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.cli import columns, options
 from armid_ros.cli import partner as partner_options
+from armid_ros.cli.diagnosis_files import Case, Extras, make_extras, write_results
 from armid_ros.cli.origin import provenance
-from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
+from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.diagnosis import diagnose as run
-from armid_ros.diagnosis import (
-    Diagnosis,
-    diagnosis_document,
-    DiagnosisSettings,
-    EXPERIMENT_FILE,
-    next_run,
-    NextRun,
-)
-from armid_ros.diagnosis.output import SCHEMA
-from armid_ros.errors import ArmidError
-from armid_ros.excitation import save_excitation
-from armid_ros.files import json_text, write_file
+from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, Finding
+from armid_ros.diagnosis.verdict.document import SCHEMA
+from armid_ros.files import json_text
 from armid_ros.identification import SignalSettings
-from armid_ros.identification.signals import conditioning
-from armid_ros.identification.verification import ForwardValidation, simulate_held_out
-from armid_ros.report.diagnosis_report import diagnosis_report
+from armid_ros.identification.identifiability import told_from_zero
+from armid_ros.report.notation import percent, probability, with_interval
 import click
 import numpy as np
+
+
+class Percent(click.ParamType):  # type: ignore[type-arg]
+    """A share that a person writes in per cent, with or without the sign."""
+
+    name = 'percent'
+
+    def convert(
+        self, value: str | float, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return the share, 0 to 1."""
+        if isinstance(value, float):
+            return value
+        try:
+            share = float(value.removesuffix('%')) / 100.0
+        except ValueError:
+            share = np.nan
+        if not 0.0 <= share < 1.0:
+            self.fail(f"'{value}' is not a percentage from 0% to 100%", param, ctx)
+        return share
 
 
 @click.command(epilog='Example: armid diagnose slow.mcap fast.mcap --robot ur10.urdf --out found')
@@ -48,6 +58,25 @@ import numpy as np
     '--model',
     type=click.Path(path_type=Path),
     help='model.yaml with what is known of the arm; its effects are part of the model.',
+)
+@click.option(
+    '--baseline',
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar='BAG',
+    help='A bag from when nothing was wrong, to ask what has changed since; may be given several '
+    'times. Without one, the misfit that identify wrote into --model is what the gap is beyond.',
+)
+@click.option(
+    '--material',
+    type=Percent(),
+    default='1%',
+    show_default=True,
+    metavar='PERCENT',
+    help="Share of a joint's torque (rms) below which an effect does not matter.",
+)
+@click.option(
+    '--all', 'everything', is_flag=True, help='Add effects to the model that do not matter, too.'
 )
 @click.option(
     '--effects',
@@ -71,6 +100,9 @@ def diagnose(
     out: Path,
     validate: tuple[Path, ...],
     model: Path | None,
+    baseline: tuple[Path, ...],
+    material: float,
+    everything: bool,
     effects: str,
     cutoff: float | None,
     decimation: int | None,
@@ -89,10 +121,17 @@ def diagnose(
     arm = ArmModel(robot) if model is None else load_model(model, robot)
     arm = options.with_effects(arm, effects)
     beside = partner_options.open_partner(partner, ties, robot, gravity)
-    settings = DiagnosisSettings(signals=SignalSettings(cutoff, decimation), partner=beside)
+    settings = DiagnosisSettings(
+        signals=SignalSettings(cutoff, decimation),
+        partner=beside,
+        material=material,
+        everything=everything,
+    )
+    misfit = None if model is None or baseline else load_misfit(model)
     with progress('reading') as tick:
-        recordings = options.read(bags, robot, topic)
-        held_out = options.read(validate, robot, topic)
+        recordings, held_out, before = (
+            options.read(paths, robot, topic) for paths in (bags, validate, baseline)
+        )
         if beside is not None:
             recordings = partner_options.read_together(bags, recordings, beside, partner_topic)
             held_out = partner_options.read_together(validate, held_out, beside, partner_topic)
@@ -100,85 +139,81 @@ def diagnose(
             arm,
             recordings,
             validate=held_out,
+            baseline=before,
+            misfit=misfit,
             settings=settings,
             rng=np.random.default_rng(seed),
             progress=tick,
         )
-        forward: tuple[ForwardValidation, ...] = ()
-        left_out: tuple[str, ...] = ()
-        if held_out and result.gap is not None:
-            used = conditioning(recordings, settings.signals)
-            forward, left_out = simulate_held_out(
-                arm, result.arm, used, held_out, progress=lambda _, what: tick(1.0, what)
-            )
-        run_next, refused = _next_run(result, seed, tick)
-    document = diagnosis_document(result)
-    document['forward'] = [pair.document() for pair in forward]
-    document['next_run'] = None if run_next is None else run_next.document()
-    estimate = None if result.explanation is None else result.explanation.fitted.estimate
-    source = options.kept_source(robot_source, robot, out)
-    save_model(out / 'model.yaml', result.arm, source, estimate)
-    page = diagnosis_report(
-        result,
-        robot=robot_source,
-        recordings=recordings,
-        validation=held_out,
-        forward=forward,
-        next_run=run_next,
-        patch=(out / 'model.yaml').read_text(encoding='utf-8'),
-        provenance=provenance([*bags, *validate], seed=seed),
-    )
-    if run_next is not None:
-        save_excitation(run_next.excitation, out / EXPERIMENT_FILE)
-    write_file(out / 'report.html', page)
-    write_file(out / 'diagnosis.json', json_text(document, indent=1))
+        case = Case(
+            arm,
+            robot_source,
+            options.kept_source(robot_source, robot, out),
+            recordings,
+            held_out,
+            before,
+            settings,
+            misfit,
+            provenance([*bags, *validate, *baseline], seed=seed),
+        )
+        write_results(out, result, case, Extras())
+        extras = make_extras(result, case, seed, tick)
+        document = write_results(out, result, case, extras)
     if as_json:
         click.echo(json_text(document))
         return
-    _show(result)
-    for pair in forward:
-        say(pair.sentence())
-    for note in (*left_out, *refused):
-        say(f'note: {note}')
-    files = ['diagnosis.json', 'model.yaml', 'report.html']
-    if run_next is not None:
-        say(run_next.sentence)
-        files.append(EXPERIMENT_FILE)
-    say(f'{out}: {", ".join(files)}')
+    show(result)
+    _show_extras(out, extras)
 
 
-def _next_run(
-    result: Diagnosis, seed: int, tick: Callable[[float, str], None]
-) -> tuple[NextRun | None, tuple[str, ...]]:
-    """Return a motion that separates names in doubt, or why there is none."""
-    tick(1.0, 'next run')
-    try:
-        return next_run(result, np.random.default_rng(seed)), ()
-    except ArmidError as error:
-        return None, (str(error),)
-
-
-def _show(result: Diagnosis) -> None:
+def show(result: Diagnosis) -> None:
+    """Print the sentence first, then the values, then the small print."""
     say(f'{result.verdict.replace("_", " ").upper()}: {result.summary}')
-    explanation = result.explanation
-    if explanation is not None and explanation.steps:
-        rows = [
-            {
-                'added': step.trial.score.group.effect.name,
-                'joints': ', '.join(step.trial.score.group.effect.joints),
-                'loss': f'{step.before.max():.3g} -> {step.after.max():.3g}',
-            }
-            for step in explanation.steps
-        ]
-        print_rows(rows, as_json=False)
-    for finding in result.findings:
-        print_parameters(
-            [
-                {'name': p.name, 'joint': p.joint, 'value': value, 'std': std, 'unit': p.unit}
-                for p, value, std in zip(
-                    finding.parameters, finding.values, finding.std, strict=True
-                )
-            ]
-        )
+    if result.findings:
+        rows = [row for finding in result.findings for row in _rows(finding)]
+        print_rows(rows, as_json=False, right=('value, 95 %', 'share of the gap'))
+    if result.minor:
+        say('small print: there beyond chance, and smaller than what matters')
+        rows = [_minor(finding) for finding in result.minor]
+        print_rows(rows, as_json=False, right=('share of the gap', 'p'))
     for note in result.notes:
         say(f'note: {note}')
+
+
+def _rows(finding: Finding) -> list[dict[str, str]]:
+    """Return a row for every value that is told from zero; the first one says the share."""
+    low, high = finding.share_interval
+    share = f'{percent(finding.share)} ({percent(low)} to {percent(high)})'
+    every = list(zip(finding.parameters, finding.values, finding.std, strict=True))
+    values = [row for row in every if told_from_zero(row[1], row[2])] or every
+    return [
+        {
+            'effect': '' if number else finding.name.replace('_', ' '),
+            'joint': finding.place_of(name.joint) or 'whole arm',
+            'parameter': name.name.replace('_', ' '),
+            'value, 95 %': with_interval(value, std, name.unit),
+            'share of the gap': '' if number else share,
+        }
+        for number, (name, value, std) in enumerate(values)
+    ]
+
+
+def _minor(finding: Finding) -> dict[str, str]:
+    return {
+        'effect': finding.name.replace('_', ' '),
+        'joints': ', '.join(finding.joints) or 'whole arm',
+        'share of the gap': percent(finding.share),
+        'p': probability(finding.p),
+    }
+
+
+def _show_extras(out: Path, extras: Extras) -> None:
+    for pair in extras.forward:
+        say(pair.sentence())
+    for note in extras.notes:
+        say(f'note: {note}')
+    files = ['diagnosis.json', 'model.yaml', 'report.html']
+    if extras.next_run is not None:
+        say(extras.next_run.sentence)
+        files.append(EXPERIMENT_FILE)
+    say(f'{out}: {", ".join(files)}')

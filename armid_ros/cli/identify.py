@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from armid_ros.arm import ArmModel, save_model
+from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.cli import columns, options
 from armid_ros.cli.origin import provenance
@@ -16,6 +16,7 @@ from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
 from armid_ros.errors import IdentificationError
 from armid_ros.files import json_text, write_file
 from armid_ros.identification import (
+    Fit,
     Grade,
     grade,
     Identification,
@@ -23,6 +24,7 @@ from armid_ros.identification import (
     IdentificationSettings,
     PhysicalCertificate,
     PhysicalSettings,
+    Score,
     SignalSettings,
     Verification,
     verify,
@@ -149,7 +151,9 @@ def identify(
         )
     document = identification_document(result, robot_source, validation, verification, graded)
     source = options.kept_source(robot_source, robot, out)
-    save_model(out / 'model.yaml', result.arm, source, result.estimate)
+    held_out_fits = [fit for part in validation.values() for fit in part]
+    misfit = _misfit(result, held_out_fits)
+    save_model(out / 'model.yaml', result.arm, source, result.estimate, misfit)
     exports = _export(result.arm, out) if physical else {}
     page = identification_report(
         result,
@@ -198,6 +202,14 @@ def _print(
         say(f'relative error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
     files = ['model.yaml', 'identification.json', 'report.html', *exports]
     say(f'{out}: {", ".join(files)}')
+
+
+def _misfit(result: Identification, held_out: Sequence[Fit]) -> Misfit:
+    """Return what the model leaves, of held-out recordings where there are any."""
+    score = Score.of(held_out or result.training)
+    rms = dict(zip(result.arm.robot.joints, score.rms.tolist(), strict=True))
+    data = 'held-out' if held_out else 'training'
+    return Misfit(data, rms, score.relative_error_percent)
 
 
 def _export(arm: ArmModel, out: Path) -> dict[str, tuple[str, ...]]:

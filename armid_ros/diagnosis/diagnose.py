@@ -13,14 +13,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.arm import ArmModel
+from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Trajectory
 from armid_ros.diagnosis.data.floor import Floor, noise_floor
 from armid_ros.diagnosis.data.gate import check_data, Gate
 from armid_ros.diagnosis.data.prepare import choose_filters, prepare, Prepared
 from armid_ros.diagnosis.search.bodies import as_bodies
-from armid_ros.diagnosis.search.choice import Chosen, explained, OWN_MISFIT
+from armid_ros.diagnosis.search.choice import Chosen, ESTIMATED, explained, NOISE
 from armid_ros.diagnosis.search.explain import Explanation
 from armid_ros.diagnosis.search.unharmed import harmed
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -33,6 +33,7 @@ from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.checks import check_motion
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -113,6 +114,7 @@ def diagnose(
     *,
     validate: Sequence[Recording] = (),
     baseline: Sequence[Recording] = (),
+    misfit: Misfit | None = None,
     settings: DiagnosisSettings | None = None,
     rng: np.random.Generator,
     progress: Progress | None = None,
@@ -131,6 +133,8 @@ def diagnose(
     baseline : sequence of Recording
         Data from when nothing was wrong, such as those the model was identified from: what it
         leaves of them is its own misfit, and what is asked is what has changed since.
+    misfit : Misfit, optional
+        What the model left when it was identified, where there is no baseline to measure it.
     settings : DiagnosisSettings, optional
         Library and thresholds.
     rng : numpy.random.Generator
@@ -191,10 +195,11 @@ def diagnose(
         tell(0.2, f'ties to {settings.partner.source}')
         chosen = diagnose_ties(arm, recordings, prepared, settings)
     if chosen is None:
-        chosen = explained(arm, prepared, known, settings, rng, tell)
+        written = None if misfit is None else misfit.of(arm.robot)
+        chosen = explained(arm, prepared, known, settings, rng, tell, written)
         unseen = _unseen(validate, chosen.explanation, prepared, chosen)
         if harmed(chosen.explanation, unseen, settings):
-            chosen = _second_choice(chosen, arm, prepared, known, settings, rng, tell)
+            chosen = _second_choice(chosen, (arm, prepared, known, settings, rng, tell, written))
     notes += chosen.notes
     explanation, remarks = as_bodies(chosen.explanation, arm)
     return _said(
@@ -203,20 +208,25 @@ def diagnose(
     )
 
 
-def _second_choice(
-    chosen: Chosen,
-    arm: ArmModel,
-    prepared: Prepared,
-    baseline: Baseline | None,
-    settings: DiagnosisSettings,
-    rng: np.random.Generator,
-    tell: Progress,
-) -> Chosen:
+def _second_choice(chosen: Chosen, asked: _Asked) -> Chosen:
     """Explain the gap without the names that make the model worse somewhere."""
+    arm, prepared, baseline, settings, rng, tell, written = asked
     gone = {own.effect.name for own in chosen.explanation.fitted.named}
     library = tuple(name for name in settings.library if name not in gone)
-    again = explained(arm, prepared, baseline, replace(settings, library=library), rng, tell)
+    fewer = replace(settings, library=library)
+    again = explained(arm, prepared, baseline, fewer, rng, tell, written)
     return again if again.explanation.steps else chosen
+
+
+_Asked = tuple[
+    ArmModel,
+    Prepared,
+    Baseline | None,
+    DiagnosisSettings,
+    np.random.Generator,
+    Progress,
+    FloatArray | None,
+]
 
 
 _Context = tuple[
@@ -257,7 +267,7 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     left = [_left(explanation, evidence, settings, 'the recordings')]
     if unseen is not None:
         left.append(_left(explanation, unseen, settings, 'recordings that were not used'))
-    repeated = floors if chosen.floor_in_words != OWN_MISFIT else ()
+    repeated = floors if chosen.floor_in_words in (NOISE, ESTIMATED) else ()
     word = decide(
         found, repeated, left, arm, chosen.floor_in_words, refitted=explanation.base is not None
     )

@@ -55,6 +55,8 @@ class BarChart:
     scale_by_row : bool
         Whether each row fills the width with its own longest bar, as for joints of different
         strength.
+    full : float
+        What fills the width; the longest bar if zero.
 
     """
 
@@ -62,11 +64,12 @@ class BarChart:
     unit: str
     roles: Sequence[tuple[Role, str]] = ()
     scale_by_row: bool = False
+    full: float = 0.0
 
     def percent(self, row: int, bar: Bar) -> float:
         """Return how long a bar is, as a percentage of the space."""
         bars = self.rows[row][1] if self.scale_by_row else [b for _, bs in self.rows for b in bs]
-        longest = max(other.value for other in bars)
+        longest = self.full or max(other.value for other in bars)
         return round(100.0 * bar.value / longest, 2) if longest > 0.0 else 0.0
 
     def html(self) -> Markup:

@@ -1,12 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a diagnosis: the verdict first, then the evidence, then what to do."""
+"""The report of a diagnosis: the story first, then the evidence, then what was looked at."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import PurePath
 
-from armid_ros.diagnosis import Diagnosis, NextRun
+from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, NextRun
 from armid_ros.diagnosis.verdict.detectable import detectable
 from armid_ros.identification.verification import ForwardValidation
 from armid_ros.recording import Recording
@@ -23,8 +25,11 @@ from armid_ros.report.sections.named import NamedParameters
 from armid_ros.report.sections.next_steps import NextSteps
 from armid_ros.report.sections.origin import Origin
 from armid_ros.report.sections.patch import Patch
-from armid_ros.report.sections.staircase import Staircase
+from armid_ros.report.sections.shares import Shares
+from armid_ros.report.sections.small_print import SmallPrint
+from armid_ros.report.sections.story import Story
 from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sources import short_names, with_names
 
 _TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
 
@@ -35,6 +40,8 @@ def diagnosis_report(
     robot: str,
     recordings: Sequence[Recording],
     validation: Sequence[Recording] = (),
+    baseline: Sequence[Recording] = (),
+    settings: DiagnosisSettings | None = None,
     forward: Sequence[ForwardValidation] = (),
     next_run: NextRun | None = None,
     patch: str = '',
@@ -53,6 +60,10 @@ def diagnosis_report(
         Data that were looked at.
     validation : sequence of Recording
         Data that were only predicted.
+    baseline : sequence of Recording
+        Data from before.
+    settings : DiagnosisSettings, optional
+        What was asked.
     forward : sequence of ForwardValidation
         Those data simulated, with the model as it was and as it is patched.
     next_run : NextRun, optional
@@ -68,43 +79,80 @@ def diagnosis_report(
         One HTML file that loads nothing.
 
     """
-    word = diagnosis.verdict.replace('_', ' ')
+    settings = settings or DiagnosisSettings()
+    read = {'training': recordings, 'held-out': validation, 'baseline': baseline}
+    names = short_names([one.source for every in read.values() for one in every])
     sections: list[Section] = [
-        Verdict(
-            word, _TONES.get(diagnosis.verdict, 'bad'), [diagnosis.summary], list(diagnosis.notes)
-        )
+        _verdict(diagnosis, names),
+        *_story(diagnosis, names),
+        NextSteps(_next_steps(diagnosis, next_run)),
+        *_small_print(diagnosis, settings),
     ]
-    if diagnosis.gap is not None:
-        joints = diagnosis.arm.robot
-        sections += [
-            GapBars(joints, diagnosis.gap),
-            GapOverlay(joints, diagnosis.gap),
-        ]
-        if diagnosis.where:
-            sections.append(Evidence(diagnosis.where))
-        sections += [CandidateTable(diagnosis), Staircase(diagnosis)]
-        sections.append(CouldBeSeen(detectable(diagnosis.explanation, diagnosis.arm.robot)))
-    sections.append(NextSteps(_next_steps(diagnosis, next_run)))
-    if diagnosis.findings:
-        sections.append(NamedParameters(diagnosis.findings))
     if forward:
-        sections.append(Forward(diagnosis.arm.robot, forward, ('as it was', 'patched')))
+        pairs = [_renamed(pair, names) for pair in forward]
+        sections.append(Forward(diagnosis.arm.robot, pairs, ('as it was', 'patched')))
     sections.append(
-        DataQuality(
-            [
-                *(RecordingQuality.of(recording, 'training') for recording in recordings),
-                *(RecordingQuality.of(recording, 'held-out') for recording in validation),
-            ]
-        )
+        DataQuality([_quality(r, role, names) for role, every in read.items() for r in every])
     )
     if diagnosis.findings:
         sections.append(Patch(diagnosis.findings, patch))
     sections.append(Origin(provenance or Provenance()))
     subtitle = (
-        f'{robot} · {counted(len(recordings), "recording")} · '
+        f'{PurePath(robot).name or robot} · {counted(len(recordings), "recording")} · '
         f'{counted(len(validation), "held-out recording")}'
     )
+    if baseline:
+        subtitle += f' · {counted(len(baseline), "recording")} from before'
     return Page(f'Diagnosis of {diagnosis.arm.robot.name}', subtitle, sections).html()
+
+
+def _verdict(diagnosis: Diagnosis, names: Mapping[str, str]) -> Verdict:
+    tone = _TONES.get(diagnosis.verdict, 'bad')
+    notes = [with_names(note, names) for note in diagnosis.notes]
+    summary = with_names(diagnosis.summary, names).replace('+-', '±')
+    return Verdict(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)
+
+
+def _story(diagnosis: Diagnosis, names: Mapping[str, str]) -> list[Section]:
+    """Return what a person wants to know: where, which, how much, and the curves that show it."""
+    if diagnosis.gap is None:
+        return []
+    robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
+    sections: list[Section] = [Story(diagnosis)]
+    if patched:
+        sections += [Shares(diagnosis), NamedParameters(diagnosis.findings)]
+    sections += [
+        GapBars(robot, diagnosis.gap, diagnosis.baseline, patched),
+        GapOverlay(robot, diagnosis.gap, patched, names),
+    ]
+    if diagnosis.where:
+        sections.append(Evidence(diagnosis.where))
+    return sections
+
+
+def _small_print(diagnosis: Diagnosis, settings: DiagnosisSettings) -> list[Section]:
+    """Return what else was looked at."""
+    sections: list[Section] = []
+    if diagnosis.minor:
+        sections.append(SmallPrint(diagnosis.minor, settings.everything))
+    if diagnosis.gap is not None:
+        sizes = detectable(diagnosis.explanation, diagnosis.arm.robot)
+        sections += [CandidateTable(diagnosis, settings), CouldBeSeen(sizes)]
+    return sections
+
+
+def _quality(recording: Recording, role: str, names: Mapping[str, str]) -> RecordingQuality:
+    found = RecordingQuality.of(recording, role)
+    return replace(
+        found,
+        source=names.get(found.source, found.source),
+        description=with_names(found.description, names),
+    )
+
+
+def _renamed(pair: ForwardValidation, names: Mapping[str, str]) -> ForwardValidation:
+    after = replace(pair.after, source=names.get(pair.after.source, pair.after.source))
+    return replace(pair, after=after)
 
 
 def _next_steps(diagnosis: Diagnosis, next_run: NextRun | None) -> list[str]:

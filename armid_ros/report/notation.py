@@ -14,8 +14,18 @@ def pretty(unit: str) -> str:
     return unit.replace('^2', '²').replace('^3', '³')
 
 
+#: What is no number, or one that stands for none.
+DASH = '\N{EN DASH}'
+#: No quantity of an arm in SI units is as large.
+_NO_NUMBER = 1e12
+#: Standard deviations to either side of a 95 % interval.
+NORMAL = 1.96
+
+
 def digits(value: float, count: int = 2) -> str:
     """Return a number with significant digits, zeros kept: '2.0', not '2'; 178, not 1.8e+02."""
+    if not abs(value) < _NO_NUMBER:
+        return DASH
     if 10.0**count <= abs(value) < 1e5:
         return f'{value:.0f}'
     return f'{value:#.{count}g}'.rstrip('.')
@@ -29,6 +39,40 @@ def measured(value: float, reach: float) -> tuple[str, str]:
     if decimals > 7 or max(abs(value), reach) >= 1e7:
         return f'{value:.3g}', f'{reach:.2g}'
     return f'{value:.{decimals}f}', f'{reach:.{decimals}f}'
+
+
+def with_interval(value: float, std: float, unit: str) -> str:
+    """Return a value with its 95 % interval and unit, an angle in degrees as well."""
+    text = _plus_minus(value, std, f' {pretty(unit)}'.rstrip())
+    if unit == 'rad' and abs(value) < _NO_NUMBER:
+        turn = 180.0 / math.pi
+        text += f' ({_plus_minus(turn * value, turn * std, "°")})'
+    return text
+
+
+def _plus_minus(value: float, std: float, unit: str) -> str:
+    if not abs(value) < _NO_NUMBER:
+        return DASH
+    wide = NORMAL * std
+    if not 0.0 < wide < _NO_NUMBER:
+        return f'{value:.4g}{unit}'
+    centre, half = measured(value, wide)
+    return f'{centre} ± {half}{unit}'
+
+
+def percent(share: float) -> str:
+    """Return a share of the gap as a percentage, the digit that matters kept: '96 %', '0.4 %'."""
+    if not math.isfinite(share):
+        return DASH
+    size = abs(100.0 * share)
+    return f'{100.0 * share:.0f} %' if size >= 2.0 or size < 0.05 else f'{100.0 * share:.1f} %'
+
+
+def probability(p: float) -> str:
+    """Return a p value to the digit that matters."""
+    if p < 1e-4:
+        return '< 0.0001'
+    return f'{p:.1g}' if p < 0.1 else f'{p:.2f}'
 
 
 def counted(number: int, what: str, plural: str = '') -> str:

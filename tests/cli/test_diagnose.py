@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What armid diagnose writes: the verdict, and a motion to run where names are in doubt."""
 
-from itertools import pairwise
 import json
 
-from armid_ros.arm import load_model, save_model
+from armid_ros.arm import load_misfit, load_model, Misfit, save_model
+from armid_ros.cli.diagnose import Percent
 from armid_ros.excitation import check_limits, Limits, load_excitation
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import write_recording
 from armid_ros.robots import collision_model, load_robot
+import numpy as np
 import pytest
 
 from tests.diagnosis.conftest import Bench, URDF
@@ -36,12 +37,37 @@ def files(tmp_path_factory):
     return urdf, folder / 'known.yaml', bags
 
 
-def test_a_payload_is_never_told_from_its_link_and_the_next_run_says_so(files, tmp_path):
-    urdf, model, bags = files
+@pytest.fixture(scope='module')
+def doubtful(tmp_path_factory):
+    """Return bags of an arm with a payload and something outside every catalogue, and without."""
+    bench, folder = Bench(), tmp_path_factory.mktemp('doubtful')
+    heavy = bench.robot.rigid_parameters.copy()
+    heavy[10:20] += [0.8, 0.0, 0.0, 0.224, 0.0627, 0.0, 0.0627, 0.0, 0.0, 0.0]
+    true = bench.robot.with_inertias(heavy)
+
+    def hidden(motion, _):
+        bumps = 1.5 * np.sign(np.sin(motion.q @ [9.0, 5.0]))
+        weight = inverse_dynamics(true, motion) - inverse_dynamics(bench.robot, motion)
+        return weight + np.outer(bumps, [0.0, 1.0])
+
+    now, before = bench.recordings(hidden), bench.recordings()
+    for name, recordings in (('now', now), ('before', before)):
+        for k, recording in enumerate(recordings):
+            write_recording(folder / f'{name}_{k}', recording)
+    return [[folder / f'{name}_{k}' for k in range(3)] for name in ('now', 'before')]
+
+
+def test_a_provisional_name_comes_with_a_run_that_tells_it_from_the_next_best(
+    files, doubtful, tmp_path
+):
+    (urdf, model, _), (bags, before) = files, doubtful
     out = tmp_path / 'out'
-    result = armid('diagnose', *bags, '--robot', urdf, '--model', model, '--out', out)
+    old = [option for bag in before[:2] for option in ('--baseline', bag)]
+    asked = ['--robot', urdf, '--model', model, *old, '--out', out]
+    result = armid('diagnose', *bags, *asked)
     document = json.loads((out / 'diagnosis.json').read_text())
-    assert document['verdict'] == 'ambiguous'
+    assert document['verdict'] == 'partial'
+    assert document['effects'][0]['name'] == 'payload'
     run = document['next_run']
     excitation = load_excitation(out / run['file'])
     robot = load_robot(str(urdf))
@@ -49,11 +75,10 @@ def test_a_payload_is_never_told_from_its_link_and_the_next_run_says_so(files, t
     assert not check_limits(Limits.of(robot, speed=1.0, torque_fraction=1.0), motion)
     assert collision_model(robot).path_clearance(motion.q).min() > 0.0
     assert run['duration'] == pytest.approx(excitation.duration)
-    names = {name for effect in document['effects'] for name in (effect['name'],)}
+    names = {effect['name'] for effect in document['effects']}
     assert {pair['name'] for pair in run['separates']} <= names
     twins = [p for p in run['separates'] if {p['name'], p['rival']} == {'payload', 'link_inertia'}]
     assert all(pair['expected_z'] < 1e-3 for pair in twins)
-    assert twins
     page = (out / 'report.html').read_text()
     assert run['file'] in page
     assert run['file'] in result.output
@@ -78,11 +103,81 @@ def test_candidates_say_how_sure_they_are_in_numbers_and_on_the_page(files, tmp_
     urdf, model, bags = files
     out = tmp_path / 'out'
     armid('diagnose', *bags, '--robot', urdf, '--model', model, '--out', out)
-    document = json.loads((out / 'diagnosis.json').read_text())
-    rows = document['candidates']
+    rows = json.loads((out / 'diagnosis.json').read_text())['candidates']
     assert rows
-    assert all(0.0 <= row['adjusted_p'] <= 1.0 and 0.0 <= row['inclusion'] <= 1.0 for row in rows)
-    assert all(a['held_out_gain'] >= b['held_out_gain'] for a, b in pairwise(rows))
+    assert all(0.0 <= row['adjusted_p'] <= 1.0 and row['share'] <= 1.0 for row in rows)
     page = (out / 'report.html').read_text()
     assert 'Adjusted p' in page
-    assert 'Inclusion' in page
+    assert 'Price' in page
+    assert '<svg class="arm"' in page
+
+
+def test_the_sentence_comes_first_and_then_the_values_with_their_share(files, tmp_path):
+    urdf, model, bags = files
+    out = tmp_path / 'out'
+    result = armid('diagnose', *bags, '--robot', urdf, '--model', model, '--out', out)
+    document = json.loads((out / 'diagnosis.json').read_text())
+    lines = result.stdout.splitlines()
+    assert lines[0] == f'{document["verdict"].upper()}: {document["summary"]}'
+    assert 'value, 95 %' in lines[1]
+    assert ' to ' in lines[2]
+    assert document['effects'][0]['name'].replace('_', ' ') in lines[2]
+
+
+def test_an_extra_that_fails_costs_no_result(files, tmp_path, monkeypatch):
+    urdf, model, bags = files
+    out = tmp_path / 'out'
+
+    def broken(*arguments, **options):
+        assert {path.name for path in out.iterdir()} >= {
+            'diagnosis.json',
+            'model.yaml',
+            'report.html',
+        }
+        raise ZeroDivisionError('no motion at all')
+
+    monkeypatch.setattr('armid_ros.cli.diagnosis_files.next_run', broken)
+    monkeypatch.setattr('armid_ros.cli.diagnosis_files.simulate_held_out', broken)
+    result = armid(
+        'diagnose', *bags, '--robot', urdf, '--model', model, '--validate', bags[0], '--out', out
+    )
+    assert result.output.count('no motion at all') == 2
+    document = json.loads((out / 'diagnosis.json').read_text())
+    assert document['effects']
+    assert (document['next_run'], document['forward']) == (None, [])
+
+
+def test_a_baseline_of_the_same_day_leaves_nothing_to_name(files, tmp_path):
+    urdf, model, bags = files
+    out = tmp_path / 'out'
+    asked = ['--robot', urdf, '--model', model, '--baseline', bags[0], '--baseline', bags[1]]
+    armid('diagnose', bags[2], *asked, '--out', out)
+    document = json.loads((out / 'diagnosis.json').read_text())
+    assert document['effects'] == []
+    assert 'before' in document['baseline']
+
+
+def test_the_misfit_of_the_model_file_is_the_floor_where_there_is_no_baseline(files, tmp_path):
+    urdf, model, bags = files
+    arm = load_model(model, load_robot(str(urdf)))
+    misfit = Misfit('held-out', {'shoulder': 10.0, 'elbow': 10.0}, 50.0)
+    save_model(tmp_path / 'known.yaml', arm, str(urdf), misfit=misfit)
+    out = tmp_path / 'out'
+    armid('diagnose', *bags, '--robot', urdf, '--model', tmp_path / 'known.yaml', '--out', out)
+    document = json.loads((out / 'diagnosis.json').read_text())
+    assert document['verdict'] == 'consistent'
+    assert 'when it was identified' in document['baseline']
+    assert load_misfit(out / 'model.yaml') == misfit
+
+
+@pytest.mark.parametrize(('text', 'share'), [('2%', 0.02), ('0.5', 0.005), ('0 %', 0.0)])
+def test_what_matters_is_a_percentage(text, share):
+    assert Percent().convert(text, None, None) == pytest.approx(share)
+
+
+@pytest.mark.parametrize('text', ['much', '-1%', '100%', 'nan'])
+def test_what_is_no_percentage_is_refused(text, tmp_path):
+    result = armid(
+        'diagnose', 'bag', '--robot', 'r', '--out', tmp_path, '--material', text, code=2
+    )
+    assert text in result.output

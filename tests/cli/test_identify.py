@@ -8,7 +8,7 @@ from pathlib import Path
 import re
 import shutil
 
-from armid_ros.arm import ArmModel, load_model
+from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.effects import make_effect
 from armid_ros.recording import read_recording, write_recording
 from armid_ros.robots import load_robot
@@ -206,3 +206,17 @@ def test_a_joint_without_effort_is_named(tmp_path):
     write_recording(tmp_path / 'bag', replace(recording, tau=tau))
     result = armid('identify', tmp_path / 'bag', '--robot', ROBOT, '--out', tmp_path / 'o', code=2)
     assert 'has no effort of forearm_yaw (absent or NaN throughout)' in result.stderr
+
+
+def test_the_model_file_says_what_the_model_leaves(bags, tmp_path):
+    """Of held-out recordings where there are any, by joint and in all."""
+    out = tmp_path / 'out'
+    asked = ['--robot', ROBOT, '--no-verify', '--out', out]
+    armid('identify', bags[0], *asked)
+    assert load_misfit(out / 'model.yaml').data == 'training'
+    armid('identify', bags[0], '--validate', bags[1], *asked)
+    misfit = load_misfit(out / 'model.yaml')
+    (held_out,) = json.loads((out / 'identification.json').read_text())['validation']
+    assert misfit.data == 'held-out'
+    assert misfit.rms == pytest.approx(held_out['rms'])
+    assert misfit.relative_error_percent == pytest.approx(held_out['relative_error_percent'])

@@ -1,9 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a diagnosis says the verdict first, and works in a real browser."""
+"""The report of a diagnosis tells the story first, and works in a real browser."""
 
-from armid_ros.diagnosis import diagnose
+from dataclasses import replace
+import re
+
+from armid_ros.diagnosis import diagnose, DiagnosisSettings
 from armid_ros.report.diagnosis_report import diagnosis_report
+from armid_ros.report.notation import DASH, digits, percent, with_interval
+from armid_ros.report.sections.candidates import CandidateTable
+from armid_ros.report.sources import short_names, with_names
 import numpy as np
 import pytest
 
@@ -16,37 +22,129 @@ def hidden_drag(motion, tau):
 
 
 @pytest.fixture(scope='module')
-def html():
-    """Return the report of an arm with drag in its elbow."""
+def recordings():
+    """Return recordings of an arm with drag in its elbow, in folders with long names."""
+    found = Bench().recordings(hidden_drag)
+    return [replace(r, source=f'/data/of/{r.source}/run') for r in found]
+
+
+@pytest.fixture(scope='module')
+def found(recordings):
+    """Return the diagnosis of an arm with drag in its elbow."""
     bench = Bench()
-    recordings = bench.recordings(hidden_drag)
-    found = diagnose(
+    return diagnose(
         bench.arm,
         recordings[:3],
         validate=bench.recordings(hidden_drag, seed=7)[1:2],
         rng=np.random.default_rng(0),
     )
+
+
+@pytest.fixture(scope='module')
+def html(found, recordings):
+    """Return the report."""
     return diagnosis_report(
-        found, robot='two_links', recordings=recordings, patch='effects:\n- name: <b>x</b>\n'
+        found,
+        robot='/home/me/two_links.urdf',
+        recordings=recordings,
+        patch='effects:\n- name: <b>x</b>\n',
     )
 
 
-def test_the_verdict_comes_first_and_the_patch_last(html):
+@pytest.fixture(scope='module')
+def quiet():
+    """Return the report of an arm that is as its model."""
+    bench = Bench()
+    recordings = bench.recordings()
+    found = diagnose(bench.arm, recordings, rng=np.random.default_rng(0))
+    return diagnosis_report(found, robot='two_links', recordings=recordings)
+
+
+def test_the_story_comes_first_and_what_was_looked_at_last(html):
     body = html[html.index('class="verdict') :]
     order = [
         body.index(text)
         for text in (
             'quadratic friction',
+            '>In short<',
+            '<svg class="arm"',
+            '<dt>Where</dt>',
+            '<dt>Which</dt>',
+            '<dt>Patch</dt>',
+            '<dt>Gap</dt>',
+            '>What explains the gap<',
+            '>Gap</h2>',
             '>Measured and modelled<',
             '>Where it lives<',
-            '>Candidates<',
-            '>Step by step<',
             '>What to do next<',
-            '>Patch<',
+            '>Candidates<',
+            '>Patch</h2>',
         )
     ]
     assert order == sorted(order)
     assert '<b>x</b>' not in html
+
+
+def test_the_joint_with_the_cause_is_the_one_that_is_drawn_in_colour(html, quiet):
+    drawing = html[html.index('<svg class="arm"') : html.index('</svg>')]
+    assert re.findall('font-weight="600"[^>]*>([^<]*)<', drawing) == ['elbow']
+    assert drawing.count('<circle') == 2
+    assert drawing.count('<line') == 3  # from the ground to the shoulder, and two links
+    plain = quiet[quiet.index('<svg class="arm"') : quiet.index('</svg>')]
+    assert 'var(--predicted)' not in plain
+
+
+def test_the_share_has_its_interval_wherever_it_is_said(found, html):
+    (finding,) = found.findings
+    low, high = finding.share_interval
+    text = f'({percent(low)} to {percent(high)})'
+    body = html[: html.index('>Measured and modelled</h2>')]
+    assert body.count(text) == 2
+    assert f'floor, {digits(float(found.gap.floor[1]))} N m, is {found.baseline}' in body
+
+
+def test_nothing_is_named_and_nothing_patched_where_nothing_is(quiet):
+    assert '>consistent<' in quiet
+    assert 'Nothing is named.' in quiet
+    assert 'The model stays as it was given.' in quiet
+    assert '>What explains the gap<' not in quiet
+    assert '>Patch</h2>' not in quiet
+
+
+def test_recordings_have_names_and_paths_are_left_to_the_provenance(html):
+    shown = html[html.index('<h1>') :]
+    assert '/data/of' not in shown
+    assert 'speed 0.6/run' in shown
+    assert '/home/me' not in shown
+
+
+def test_no_candidate_has_a_value_that_it_cannot_have(found, html):
+    ranking = found.explanation.survey.ranking
+    rows = CandidateTable(found, DiagnosisSettings()).rows
+    assert rows[0].named
+    negative = [
+        row
+        for row, trial in zip(rows, ranking, strict=False)
+        if np.all(trial.group.effect.bounds()[0] >= 0.0) and row.value.startswith('-')
+    ]
+    assert not negative
+    shown = re.sub('<[^>]*>', '', re.sub('<script.*?</script>', '', html[html.index('<main>') :]))
+    assert not re.search(r'\de\+\d\d|\binf\b|\bnan\b', shown)
+
+
+def test_numbers_are_written_as_a_person_reads_them():
+    assert with_interval(3.04, 0.0255, 'kg') == '3.040 ± 0.050 kg'
+    assert with_interval(0.1, 0.01, 'rad') == '0.100 ± 0.020 rad (5.7 ± 1.1°)'
+    assert with_interval(0.1, float('inf'), 'kg m^2') == '0.1 kg m²'
+    assert with_interval(float('nan'), 1.0, 'kg') == DASH
+    assert digits(1e38) == digits(float('inf')) == digits(float('nan')) == DASH
+    assert [percent(x) for x in (0.957, 0.004, 0.0)] == ['96 %', '0.4 %', '0 %']
+
+
+def test_names_of_recordings_are_as_short_as_they_can_be():
+    names = short_names(['/a/day_1/run', '/a/day_2/run', 'other', '/b/other.mcap', '/x/y/z'])
+    assert list(names.values()) == ['day_1/run', 'day_2/run', 'other', 'other.mcap', 'z']
+    assert with_names('/x/y/z: short; other', names) == 'z: short; other'
 
 
 def test_nothing_is_loaded_from_elsewhere(html):
@@ -67,3 +165,6 @@ def test_a_browser_draws_it_without_complaint(browser, tmp_path, html, width):
     assert browser.run('document.querySelectorAll(".u-over").length') >= 4
     shown = browser.run('document.querySelector(".verdict").innerText')
     assert 'quadratic friction' in shown
+    box = 'document.querySelector("svg.arm").getBoundingClientRect()'
+    assert browser.run(f'{box}.width') > 200
+    assert browser.run(f'{box}.bottom') < 900  # the drawing is above the fold

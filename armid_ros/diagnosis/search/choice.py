@@ -30,6 +30,7 @@ Progress = Callable[[float, str], None]
 
 NOISE, ESTIMATED = 'noise', 'an estimate of the misfit that such a model has'
 OWN_MISFIT = 'the misfit that the model had before'
+WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
 
 
 @dataclass(frozen=True)
@@ -63,10 +64,33 @@ def explained(
     settings: DiagnosisSettings,
     rng: np.random.Generator,
     tell: Progress,
+    written: FloatArray | None = None,
 ) -> Chosen:
-    """Explain the gap of an arm."""
+    """
+    Explain the gap of an arm.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The arm.
+    prepared : Prepared
+        The data.
+    baseline : Baseline or None
+        Recordings in which nothing was wrong.
+    settings : DiagnosisSettings
+        What was asked.
+    rng : numpy.random.Generator
+        Draws states.
+    tell : callable
+        Told the share that is done and what is being done.
+    written : ndarray, shape (n,), optional
+        Misfit that the model is known to have, where there are no recordings of it [N m].
+
+    """
     if baseline is not None:
         return _since(arm, prepared, baseline, settings, rng, tell)
+    if written is not None:
+        return _beside(arm, prepared, written, settings, rng, tell)
     few, many = settings.thresholds.few_causes, settings.thresholds.many_causes
     given = as_given(arm, prepared.data, few)
     told = Evidence(prepared.data, prepared.as_told, prepared.as_told)
@@ -89,6 +113,35 @@ def explained(
     if _as_good(first, anew, settings):
         return Chosen(first, misfit, words)
     return Chosen(anew, nothing, words)
+
+
+def _beside(
+    arm: ArmModel,
+    prepared: Prepared,
+    misfit: FloatArray,
+    settings: DiagnosisSettings,
+    rng: np.random.Generator,
+    tell: Progress,
+) -> Chosen:
+    """
+    Explain what is beyond a misfit that is known in numbers alone.
+
+    Without the recordings nobody can say whether a body common to both would do. A body that is
+    fitted anew stays the rival of last resort.
+
+    """
+    tell(0.2, 'what has changed')
+    noise = prepared.as_told
+    evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
+    given = as_given(arm, prepared.data, 2 * settings.thresholds.few_causes)
+    found = explain(given, evidence, settings)
+    if _at_floor(found, settings):
+        return Chosen(found, misfit, WRITTEN_MISFIT)
+    tell(0.6, 'the model fitted anew')
+    sigma = tuple(np.maximum(one, misfit) for one in prepared.sigma)
+    question = fitted_anew(arm, prepared.data, settings.thresholds.many_causes, rng)
+    anew = explain(question, Evidence(prepared.data, sigma, tuple(prepared.sigma)), settings)
+    return Chosen(found if _as_good(found, anew, settings) else anew, misfit, WRITTEN_MISFIT)
 
 
 def _since(

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The league of candidates: what each would explain, and how little of it could have been seen."""
+"""The candidates of the first look, in the order in which they were judged."""
 
 from __future__ import annotations
 
@@ -9,12 +9,17 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis
-from armid_ros.diagnosis.league import Standing
-from armid_ros.diagnosis.verdict.detectable import smallest_size
-from armid_ros.report.notation import digits
+from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.patch import room
+from armid_ros.diagnosis.search.step import cost
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.report.notation import percent, probability, with_interval
 from armid_ros.report.page import Section
+import numpy as np
 
 _MOST = 15
+#: Deviations by which a value is told from zero, and from what is possible.
+_TOLD = 3.0
 
 
 @dataclass(frozen=True)
@@ -23,25 +28,26 @@ class Row:
 
     name: str
     joints: str
-    gain: str
-    replicated: str
+    share: str
+    price: str
+    z: str
+    adjusted_p: str
     value: str
     visible: str
-    detectable: str
-    adjusted_p: str
-    inclusion: str
     named: bool
 
 
 @dataclass(frozen=True)
 class CandidateTable(Section):
     """
-    Candidates of the first look, best first.
+    What each cause alone would take of the gap, and what its freedom costs.
 
     Attributes
     ----------
     diagnosis : Diagnosis
         What was found.
+    settings : DiagnosisSettings
+        What was asked.
 
     """
 
@@ -49,43 +55,44 @@ class CandidateTable(Section):
     template: ClassVar[str] = 'candidates.html'
 
     diagnosis: Diagnosis
+    settings: DiagnosisSettings
 
     @property
     def rows(self) -> Sequence[Row]:
         """The best candidates."""
+        explanation = self.diagnosis.explanation
+        survey = None if explanation is None else explanation.survey
+        if survey is None:
+            return []
+        return [self._row(trial, survey.total, survey.tried) for trial in survey.ranking[:_MOST]]
+
+    def _row(self, trial: Trial, total: float, tried: int) -> Row:
+        effect = trial.group.effect
         names = {finding.name for finding in self.diagnosis.findings}
-        rows = []
-        for standing in self.diagnosis.league.first[:_MOST]:
-            trial, score = standing.trial, standing.trial.score
-            effect = score.group.effect
-            quantity = effect.quantities[score.group.kept[0] % len(effect.quantities)]
-            value = f'{digits(float(score.values[0]))} {quantity.unit}'
-            rows.append(
-                Row(
-                    effect.name.replace('_', ' '),
-                    ', '.join(effect.joints),
-                    digits(trial.gain),
-                    f'{int((trial.z >= 3.0).sum())} of {len(trial.z)}',
-                    value.strip(),
-                    f'{100.0 * score.visible:.0f} %',
-                    _size(standing),
-                    _probability(standing.adjusted_p),
-                    f'{100.0 * standing.inclusion:.0f} %',
-                    effect.name in names,
-                )
-            )
-        return rows
+        price = self.settings.thresholds.price * cost(trial, self.settings)
+        return Row(
+            effect.name.replace('_', ' '),
+            ', '.join(effect.joints) or 'whole arm',
+            percent(trial.gain / total) if total > 0.0 else '',
+            percent(price),
+            f'{trial.z:.1f}',
+            probability(min(1.0, trial.p * tried)),
+            self._value(trial),
+            percent(trial.visible),
+            effect.name in names,
+        )
 
-
-def _size(standing: Standing) -> str:
-    """Return from which size on a candidate shows, with its unit."""
-    effect = standing.trial.score.group.effect
-    index, size = smallest_size(standing.trial.score)
-    return f'{digits(size)} {effect.quantities[index % len(effect.quantities)].unit}'.strip()
-
-
-def _probability(p: float) -> str:
-    """Return a p value to the digit that matters."""
-    if p < 1e-4:
-        return '< 0.0001'
-    return f'{p:.1g}' if p < 0.1 else f'{p:.2f}'
+    def _value(self, trial: Trial) -> str:
+        """Return the first value, where it is one that the cause can have."""
+        arm, effect, kept = self.diagnosis.arm, trial.group.effect, list(trial.group.kept)
+        if self.diagnosis.explanation is not None:
+            arm = self.diagnosis.explanation.given
+        lower, upper = (bound[kept] for bound in room(effect, arm))
+        slack = _TOLD * trial.std
+        inside = (trial.values > lower - slack) & (trial.values < upper + slack)
+        if not inside.all():
+            return 'not possible'
+        if not np.any(np.abs(trial.values) > _TOLD * trial.std):
+            return 'not told from 0'
+        name = effect.parameters(arm.robot)[kept[0]]
+        return with_interval(float(trial.values[0]), float(trial.std[0]), name.unit)

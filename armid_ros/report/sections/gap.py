@@ -1,17 +1,18 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The gap of every joint: without what was named, with it, and the noise."""
+"""The gap of every joint: without what was named, with it, and the floor."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.diagnosis.verdict.gap import Gap, Overlay
 from armid_ros.motion import FloatArray
 from armid_ros.report.bars import Bar, BarChart
-from armid_ros.report.charts import Chart, Series, thinned
-from armid_ros.report.notation import digits, torque_unit
+from armid_ros.report.charts import Chart, Role, Series, thinned
+from armid_ros.report.notation import digits, percent, torque_unit
 from armid_ros.report.page import Section
 from armid_ros.robots import Robot
 import numpy as np
@@ -20,7 +21,7 @@ import numpy as np
 @dataclass(frozen=True)
 class GapBars(Section):
     """
-    Errors before and after, beside the noise floor.
+    Errors before and after, beside the floor.
 
     Attributes
     ----------
@@ -28,6 +29,10 @@ class GapBars(Section):
         Gives joints and units.
     gap : Gap
         The numbers.
+    floor : str
+        What the floor is, in words.
+    patched : bool
+        Whether anything was added to the model.
 
     """
 
@@ -36,30 +41,44 @@ class GapBars(Section):
 
     robot: Robot
     gap: Gap
+    floor: str
+    patched: bool
 
     @property
     def bars(self) -> BarChart:
-        """Root mean square errors of each joint."""
+        """Root mean square errors of each joint, in units of its floor."""
+        roles: list[tuple[Role, str, FloatArray]] = [
+            ('before', 'before', self.gap.before),
+            ('after', 'after', self.gap.after),
+            ('floor', 'floor', self.gap.floor),
+        ]
+        if not self.patched:
+            roles = [('before', 'error', self.gap.after), roles[-1]]
         rows = []
         for joint, name in enumerate(self.robot.joints):
             unit = torque_unit(self.robot, joint)
-            numbers = (
-                (self.gap.before[joint], 'before'),
-                (self.gap.after[joint], 'after'),
-                (self.gap.floor[joint], 'floor'),
-            )
+            least = max(float(self.gap.floor[joint]), 1e-12)
             bars = [
-                Bar(float(value), role, f'{digits(float(value))} {unit}')  # type: ignore[arg-type]
-                for value, role in numbers
+                Bar(float(errors[joint]) / least, role, f'{digits(float(errors[joint]))} {unit}')
+                for role, _, errors in roles
             ]
             rows.append((name, bars))
-        roles = [('before', 'before'), ('after', 'after'), ('floor', 'noise floor')]
-        return BarChart(rows, 'N m', roles, scale_by_row=True)  # type: ignore[arg-type]
+        return BarChart(rows, '', [(role, label) for role, label, _ in roles])
+
+    @property
+    def where(self) -> str:
+        """What it was measured on."""
+        return 'recordings that were not used' if self.gap.predicted else self.gap.data
+
+    @property
+    def more(self) -> bool:
+        """Whether anything is gone of it."""
+        return self.patched and self.gap.closed > 0.0
 
     @property
     def closed(self) -> str:
-        """Share of the gap that is closed, in per cent."""
-        return f'{100.0 * self.gap.closed:.0f}'
+        """Share of the squares of the gap that is gone."""
+        return percent(self.gap.closed)
 
 
 @dataclass(frozen=True)
@@ -73,6 +92,10 @@ class GapOverlay(Section):
         Gives joints and units.
     gap : Gap
         The curves.
+    patched : bool
+        Whether anything was added to the model.
+    names : mapping of str to str
+        What each recording is called.
 
     """
 
@@ -81,6 +104,8 @@ class GapOverlay(Section):
 
     robot: Robot
     gap: Gap
+    patched: bool
+    names: Mapping[str, str]
 
     @property
     def joint(self) -> int:
@@ -91,6 +116,11 @@ class GapOverlay(Section):
     def name(self) -> str:
         """Its name."""
         return self.robot.joints[self.joint]
+
+    @property
+    def source(self) -> str:
+        """What the recording is called that is shown."""
+        return self.names.get(self.overlay.source, self.overlay.source)
 
     @property
     def overlay(self) -> Overlay:
@@ -120,8 +150,7 @@ class GapOverlay(Section):
             t[kept],
             [
                 Series('measured', measured[kept], 'measured'),
-                Series('before', before[kept], 'before'),
-                Series('after', after[kept], 'after'),
+                *self._models(before[kept], after[kept]),
             ],
             '',
             f'torque [{unit}]',
@@ -130,9 +159,8 @@ class GapOverlay(Section):
         residual = Chart(
             t[kept],
             [
-                Series('two sigma of the noise', -band, 'floor', 'band', band),
-                Series('before', (measured - before)[kept], 'before'),
-                Series('after', (measured - after)[kept], 'after'),
+                Series('twice the floor', -band, 'floor', 'band', band),
+                *self._models((measured - before)[kept], (measured - after)[kept]),
             ],
             'time [s]',
             f'residual [{unit}]',
@@ -141,3 +169,8 @@ class GapOverlay(Section):
             symmetric=True,
         )
         return torque, residual
+
+    def _models(self, before: FloatArray, after: FloatArray) -> list[Series]:
+        if not self.patched:
+            return [Series('model', after, 'before')]
+        return [Series('before', before, 'before'), Series('after', after, 'after')]

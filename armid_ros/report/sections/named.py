@@ -6,18 +6,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-import math
 from typing import ClassVar
 
 from armid_ros.diagnosis import Finding
-from armid_ros.report.notation import digits, pretty
+from armid_ros.report.notation import with_interval
 from armid_ros.report.page import Section
 
 
 @dataclass(frozen=True)
 class NamedParameters(Section):
     """
-    Values with standard deviations.
+    Values with 95 % intervals.
 
     Attributes
     ----------
@@ -32,16 +31,14 @@ class NamedParameters(Section):
     findings: Sequence[Finding]
 
     @property
-    def rows(self) -> list[tuple[str, str, str, str, str, str]]:
-        """Effect, parameter, joint or segment, value, deviation and unit, as text."""
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """Effect, parameter, joint or segment, and value with its interval, as text."""
         return [
             (
                 finding.name.replace('_', ' '),
                 name.name.replace('_', ' '),
-                finding.place_of(name.joint),
-                digits(value, 4),
-                digits(std) if math.isfinite(std) else 'not told',
-                pretty(name.unit),
+                finding.place_of(name.joint) or 'whole arm',
+                with_interval(value, std, name.unit),
             )
             for finding in self.findings
             for name, value, std in zip(

@@ -44,5 +44,6 @@ class Patch(Section):
     @property
     def yaml(self) -> str:
         """The effects of the patched model."""
-        start = self.text.find('effects:')
-        return self.text[start:] if start >= 0 else self.text
+        start = max(self.text.find('effects:'), 0)
+        end = self.text.find('\nmisfit:')
+        return self.text[start:end] if end > start else self.text[start:]

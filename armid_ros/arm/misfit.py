@@ -1,0 +1,115 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a model leaves of the recordings it was tried on, kept in model.yaml.
+
+No real arm is as its model to the noise. A diagnosis that asks what has changed measures in units
+of what the model left before. The block ``misfit`` of model.yaml has ``unit``, ``data`` - held-out
+or training -, ``rms`` of the residual by joint, and ``relative_error_percent`` of the torque.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import ModelError
+from armid_ros.files import finite, load_yaml, read_text, reading
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
+import numpy as np
+import yaml
+
+_DATA = ('held-out', 'training')
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """
+    What a model leaves.
+
+    Attributes
+    ----------
+    data : str
+        'held-out', or 'training' where nothing was held out.
+    rms : mapping of str to float
+        Root mean square residual of each joint [N m].
+    relative_error_percent : float
+        100 |tau - tau_hat| / |tau| over all joints.
+
+    """
+
+    data: str
+    rms: Mapping[str, float]
+    relative_error_percent: float
+
+    def document(self) -> dict[str, Any]:
+        """Return the block that model.yaml holds."""
+        return {
+            'unit': 'N m',
+            'data': self.data,
+            'rms': {joint: float(value) for joint, value in self.rms.items()},
+            'relative_error_percent': float(self.relative_error_percent),
+        }
+
+    def of(self, robot: Robot) -> FloatArray:
+        """
+        Return the root mean square residual of the joints of a robot, shape (n,) [N m].
+
+        Raises
+        ------
+        ModelError
+            If it does not say what is left of a joint.
+
+        """
+        missing = [joint for joint in robot.joints if joint not in self.rms]
+        if missing:
+            raise ModelError(
+                f"the misfit says nothing of joint '{missing[0]}'; its joints are "
+                f'{", ".join(self.rms)}'
+            )
+        return np.array([self.rms[joint] for joint in robot.joints])
+
+
+def load_misfit(path: str | Path) -> Misfit | None:
+    """
+    Read what a model left when it was identified; None if the file does not say.
+
+    Parameters
+    ----------
+    path : str or Path
+        model.yaml.
+
+    Raises
+    ------
+    ModelError
+        Naming the file and what is wrong in it.
+
+    """
+    path = Path(path)
+    text = read_text(path, ModelError)
+    with reading(path, ModelError):
+        try:
+            document = load_yaml(text)
+        except (yaml.YAMLError, ValueError) as error:
+            raise ModelError(f'not YAML: {" ".join(str(error).split())}') from error
+        block = document.get('misfit') if isinstance(document, dict) else None
+        return None if block is None else _misfit(block)
+
+
+def _misfit(block: Any) -> Misfit:
+    try:
+        rms = {str(joint): value for joint, value in block['rms'].items()}
+        data, error = str(block['data']), block['relative_error_percent']
+    except (AttributeError, KeyError, TypeError) as fault:
+        raise ModelError(f'misfit: {type(fault).__name__} {fault}') from fault
+    if data not in _DATA:
+        raise ModelError(f"misfit has data '{data}', not {' or '.join(_DATA)}")
+    torques = {joint: finite(value, f"misfit of joint '{joint}'") for joint, value in rms.items()}
+    negative = [joint for joint, value in torques.items() if value < 0.0]
+    if negative:
+        raise ModelError(f"misfit of joint '{negative[0]}' is negative")
+    return Misfit(data, torques, finite(error, 'relative_error_percent of the misfit'))

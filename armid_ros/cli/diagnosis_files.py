@@ -1,0 +1,147 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a diagnosis leaves in its folder: diagnosis.json, model.yaml and report.html.
+
+They are written as soon as the diagnosis is done, and again with what was made of it: a next run,
+or a simulation. Whatever happens to those, the results are there.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from armid_ros.arm import ArmModel, Misfit, save_model
+from armid_ros.diagnosis import (
+    Diagnosis,
+    diagnosis_document,
+    DiagnosisSettings,
+    EXPERIMENT_FILE,
+    next_run,
+    NextRun,
+)
+from armid_ros.excitation import save_excitation
+from armid_ros.files import json_text, write_file
+from armid_ros.identification.signals import conditioning
+from armid_ros.identification.verification import ForwardValidation, simulate_held_out
+from armid_ros.recording import Recording
+from armid_ros.report.diagnosis_report import diagnosis_report
+from armid_ros.report.provenance import Provenance
+import numpy as np
+
+Tick = Callable[[float, str], None]
+_Made = TypeVar('_Made')
+
+
+@dataclass(frozen=True)
+class Case:
+    """
+    What was diagnosed.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        The model as given.
+    robot, source : str
+        What the robot is called, and how model.yaml refers to it.
+    recordings, held_out, baseline : sequence of Recording
+        Data that were looked at, that were only predicted, and from before.
+    settings : DiagnosisSettings
+        What was asked.
+    misfit : Misfit or None
+        What the model left when it was identified.
+    provenance : Provenance
+        Files, versions, settings, seed.
+
+    """
+
+    arm: ArmModel
+    robot: str
+    source: str
+    recordings: Sequence[Recording]
+    held_out: Sequence[Recording] = ()
+    baseline: Sequence[Recording] = ()
+    settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
+    misfit: Misfit | None = None
+    provenance: Provenance = field(default_factory=Provenance)
+
+
+@dataclass(frozen=True)
+class Extras:
+    """
+    What was made of a diagnosis.
+
+    Attributes
+    ----------
+    forward : tuple of ForwardValidation
+        Held-out recordings simulated.
+    next_run : NextRun or None
+        A motion that separates names in doubt.
+    notes : tuple of str
+        Why there is not more.
+
+    """
+
+    forward: tuple[ForwardValidation, ...] = ()
+    next_run: NextRun | None = None
+    notes: tuple[str, ...] = ()
+
+
+def write_results(out: Path, result: Diagnosis, case: Case, extras: Extras) -> dict[str, Any]:
+    """Fill a folder, numbers before pictures; return what diagnosis.json holds."""
+    out.mkdir(parents=True, exist_ok=True)
+    estimate = None if result.explanation is None else result.explanation.fitted.estimate
+    save_model(out / 'model.yaml', result.arm, case.source, estimate, case.misfit)
+    document = diagnosis_document(result)
+    document['forward'] = [pair.document() for pair in extras.forward]
+    document['next_run'] = None if extras.next_run is None else extras.next_run.document()
+    write_file(out / 'diagnosis.json', json_text(document, indent=1))
+    if extras.next_run is not None:
+        save_excitation(extras.next_run.excitation, out / EXPERIMENT_FILE)
+    page = diagnosis_report(
+        result,
+        robot=case.robot,
+        recordings=case.recordings,
+        validation=case.held_out,
+        baseline=case.baseline,
+        settings=case.settings,
+        forward=extras.forward,
+        next_run=extras.next_run,
+        patch=(out / 'model.yaml').read_text(encoding='utf-8'),
+        provenance=case.provenance,
+    )
+    write_file(out / 'report.html', page)
+    return document
+
+
+def make_extras(result: Diagnosis, case: Case, seed: int, tick: Tick) -> Extras:
+    """Simulate the held-out recordings and plan a next run, as far as that can be done."""
+    extras = Extras()
+    if case.held_out and result.gap is not None:
+        found, why = _tried('a simulation', lambda: _simulated(result, case, tick))
+        simulated, left_out = found or ((), ())
+        extras = Extras(simulated, None, (*left_out, *why))
+    tick(1.0, 'next run')
+    run, why = _tried('a next run', lambda: next_run(result, np.random.default_rng(seed)))
+    return replace(extras, next_run=run, notes=(*extras.notes, *why))
+
+
+def _simulated(
+    result: Diagnosis, case: Case, tick: Tick
+) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
+    used = conditioning(list(case.recordings), case.settings.signals)
+    return simulate_held_out(
+        case.arm, result.arm, used, case.held_out, progress=lambda _, what: tick(1.0, what)
+    )
+
+
+def _tried(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
+    """Return what was made, or None and why there is none."""
+    try:
+        return make(), ()
+    except Exception as error:  # whatever it is, the diagnosis itself stands
+        return None, (f'there is not {what}: {error or type(error).__name__}',)

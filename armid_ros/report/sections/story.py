@@ -1,0 +1,147 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The diagnosis in short: the arm with the joint that it is about, where, which, patch, gap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armid_ros.diagnosis import Diagnosis, Finding
+from armid_ros.report.arm_picture import ArmPicture, draw_arm
+from armid_ros.report.notation import digits, percent, torque_unit, with_interval
+from armid_ros.report.page import render, Section
+from markupsafe import Markup
+import numpy as np
+
+#: Joints of the gap that are said, and values of a cause.
+_JOINTS, _VALUES = 2, 2
+
+
+@dataclass(frozen=True)
+class Story(Section):
+    """
+    The answers to the questions that a person has, in their order.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis
+        What was found.
+
+    """
+
+    title: ClassVar[str] = 'In short'
+    template: ClassVar[str] = 'story.html'
+
+    diagnosis: Diagnosis
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints to be pointed out: those of the causes, or else those with the gap."""
+        robot = self.diagnosis.arm.robot
+        if self.diagnosis.findings:
+            named = [joint for one in self.diagnosis.findings for joint in one.joints or ()]
+            return tuple(joint for joint in robot.joints if joint in named)
+        return tuple(place.joint for place in self.diagnosis.where[:1])
+
+    @property
+    def whole_arm(self) -> bool:
+        """Whether a cause is one of the whole arm."""
+        return any(not finding.joints for finding in self.diagnosis.findings)
+
+    @property
+    def picture(self) -> Markup:
+        """The arm, in a pose that it was in."""
+        data = self.diagnosis.data
+        q = np.concatenate([part.at_rows.q for part in data]) if data else None
+        robot = self.diagnosis.arm.robot
+        drawn: ArmPicture = draw_arm(robot, robot.joints if self.whole_arm else self.joints, q)
+        return render('arm_picture.html', {'picture': drawn, 'label': self.caption})
+
+    @property
+    def caption(self) -> str:
+        """What the drawing shows."""
+        names = ', '.join(one.name.replace('_', ' ') for one in self.diagnosis.findings)
+        if self.whole_arm:
+            return f'coloured: the whole arm ({names})'
+        if not self.joints:
+            return 'no joint stands out'
+        return f'coloured: {", ".join(self.joints)} ({names or "the largest gap"})'
+
+    @property
+    def rows(self) -> list[tuple[str, list[str]]]:
+        """Questions and answers."""
+        answers = [
+            ('Where', self._where()),
+            ('Which', self._which()),
+            ('Patch', self._patch()),
+            ('Gap', self._gap()),
+        ]
+        left = self.diagnosis.left
+        if self.diagnosis.findings and left:
+            answers.append(('Left', [f'{w.joint}: {w.signature}' for w in left[:_JOINTS]]))
+        return answers
+
+    def _where(self) -> list[str]:
+        places = self.diagnosis.where
+        lines = [
+            f'{place.joint}: {percent(place.share_of_gap)} of the gap, {place.signature}'
+            for place in places[:_JOINTS]
+        ]
+        if len(places) > _JOINTS:
+            rest = sum(place.share_of_gap for place in places[_JOINTS:])
+            others = ', '.join(place.joint for place in places[_JOINTS:])
+            lines.append(f'{others}: {percent(rest)}')
+        return lines or ['No joint has a gap.']
+
+    def _which(self) -> list[str]:
+        return [_cause(finding) for finding in self.diagnosis.findings] or ['Nothing is named.']
+
+    def _patch(self) -> list[str]:
+        names = [finding.name.replace('_', ' ') for finding in self.diagnosis.findings]
+        if not names:
+            return ['The model stays as it was given.']
+        more = ', with its rigid body and friction fitted anew' if self.diagnosis.refitted else ''
+        return [f'model.yaml is the model with {" and ".join(names)}{more}.']
+
+    def _gap(self) -> list[str]:
+        gap = self.diagnosis.gap
+        if gap is None:
+            return ['Not measured.']
+        j = int(np.argmax(gap.loss_before))
+        robot = self.diagnosis.arm.robot
+        unit = torque_unit(robot, j)
+        before, after, floor = (
+            f'{digits(float(x[j]))} {unit}' for x in (gap.before, gap.after, gap.floor)
+        )
+        where = 'on recordings that were not used' if gap.predicted else f'on {gap.data}'
+        if not self.diagnosis.findings:
+            change = after
+        else:
+            change = f'{before} before, {after} after'
+        least = f'The floor, {floor}, is {self.diagnosis.baseline}.'
+        return [f'{robot.joints[j]}: {change}, {where}.', least]
+
+
+def _cause(finding: Finding) -> str:
+    """Return a cause with its place, values and share."""
+    places = ', '.join(finding.place_of(joint) for joint in finding.joints)
+    where = f' at {places}' if places else ', whole arm'
+    values = [
+        f'{name.name.replace("_", " ")} {with_interval(value, std, name.unit)}'
+        for name, value, std in _values(finding)
+    ]
+    more = len(finding.values) - len(values)
+    listed = ', '.join([*values, f'{more} more'] if more else values)
+    numbers = f': {listed}' if listed else ''
+    low, high = finding.share_interval
+    share = f'{percent(finding.share)} of the gap ({percent(low)} to {percent(high)})'
+    rivals = ', '.join(name.replace('_', ' ') for name in finding.ambiguous_with)
+    doubt = f'; not told from {rivals}' if rivals else ''
+    return f'{finding.name.replace("_", " ")}{where}{numbers}; explains {share}{doubt}'
+
+
+def _values(finding: Finding) -> Sequence[tuple]:  # type: ignore[type-arg]
+    rows = list(zip(finding.parameters, finding.values, finding.std, strict=True))
+    return rows[:_VALUES]

@@ -1,0 +1,78 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""diagnosis.json says what was found, how much it explains, and beside what."""
+
+from dataclasses import replace
+import json
+
+from armid_ros.arm import Misfit
+from armid_ros.diagnosis import diagnose, diagnosis_document
+import numpy as np
+import pytest
+
+from .conftest import Bench
+
+
+def strict(found):
+    """Return the document as a strict reader of JSON has it."""
+    return json.loads(json.dumps(diagnosis_document(found), allow_nan=False))
+
+
+def hidden_drag(motion, tau):
+    """Return drag of the elbow."""
+    return np.outer(motion.dq[:, 1] * np.abs(motion.dq[:, 1]), [0.0, 0.08])
+
+
+@pytest.fixture(scope='module')
+def document():
+    bench = Bench()
+    return strict(diagnose(bench.arm, bench.recordings(hidden_drag), rng=np.random.default_rng(0)))
+
+
+def test_the_headline_has_its_share_with_an_interval(document):
+    (effect,) = document['effects']
+    assert (effect['name'], effect['joints']) == ('quadratic_friction', ['elbow'])
+    low, high = effect['share_interval']
+    assert 0.9 < low <= effect['share'] <= high <= 1.0
+    assert 0.0 <= effect['p'] <= 0.01
+    (parameter,) = effect['parameters']
+    assert set(parameter) == {'name', 'joint', 'value', 'std', 'unit'}
+    assert parameter['value'] == pytest.approx(0.08, rel=0.02)
+
+
+def test_every_field_of_the_schema_is_there(document):
+    assert document['schema'] == 'armid/diagnosis/1'
+    assert document['verdict'] == 'named'
+    assert set(document) >= {
+        *('summary', 'minor', 'baseline', 'where', 'gap', 'candidates', 'not_visible'),
+        *('detectable', 'pattern', 'model'),
+    }
+    assert document['baseline'] == 'noise'
+    for one in document['minor']:
+        assert set(one) >= {'name', 'joints', 'parameters', 'share', 'share_interval', 'p'}
+    gap = document['gap']
+    assert gap['before']['elbow'] > 3.0 * gap['after']['elbow']
+    assert all(0.0 <= row['adjusted_p'] <= 1.0 for row in document['candidates'])
+
+
+def test_a_diagnosis_of_bad_data_is_a_document_as_well():
+    bench = Bench()
+    turned = [replace(r, tau=-r.tau) for r in bench.recordings()]
+    document = strict(diagnose(bench.arm, turned, rng=np.random.default_rng(0)))
+    assert document['verdict'] == 'bad_data'
+    assert document['gap']['before'] == {}
+    assert document['baseline'] == ''
+
+
+def test_a_misfit_that_was_written_down_is_the_floor_that_is_said():
+    bench = Bench()
+    misfit = Misfit('held-out', {'shoulder': 0.5, 'elbow': 0.5}, 5.0)
+    small = bench.recordings(lambda m, tau: 0.2 * hidden_drag(m, tau))
+    rng = np.random.default_rng(0)
+    assert diagnose(bench.arm, small, rng=rng).verdict == 'named'
+    found = diagnose(bench.arm, small, misfit=misfit, rng=rng)
+    assert found.verdict == 'consistent'
+    assert 'misfit' in found.baseline
+    assert 'misfit' in found.summary
+    large = diagnose(bench.arm, bench.recordings(hidden_drag), misfit=misfit, rng=rng)
+    assert [one.name for one in large.findings] == ['quadratic_friction']
