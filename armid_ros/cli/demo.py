@@ -10,6 +10,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel, save_model
 from armid_ros.cli import options
+from armid_ros.cli.story import show_story, tell_story
 from armid_ros.cli.terminal import ConvergenceTable, progress, say
 from armid_ros.effects import make_effect
 from armid_ros.excitation import design, DesignSettings, Excitation, save_excitation
@@ -45,17 +46,23 @@ SENSORS = Sensors(
     torque_noise=np.array([0.02, 0.02, 0.01, 0.01, 0.004, 0.004]), resolution=2.0 * np.pi / 2**18
 )
 #: Files that a folder to be filled may hold already, from a demo before.
-OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html')
+OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
 
 
 @click.command(epilog='Example: armid demo --gravity earth --out demo')
 @click.option('--gravity', type=click.Choice(['moon', 'earth']), default='moon', show_default=True)
 @click.option('--rate', default=200.0, show_default=True, help='Joint states per second.')
+@click.option(
+    '--hide',
+    default='',
+    metavar='E@joint',
+    help='What is hidden in the arm in the end, to be found; drawn, and told last, by default.',
+)
 @options.folder
 @options.seed
 @options.as_json
-def demo(gravity: str, rate: float, out: Path, seed: int, as_json: bool) -> None:
-    """Excite, move, identify online, record, identify offline, and compare with the truth."""
+def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bool) -> None:
+    """Excite, move, identify online and offline; then find what was hidden in the arm."""
     from armid_ros.nodes.lockstep import Progress, replay_lockstep, run_lockstep
 
     rng = np.random.default_rng(seed)
@@ -106,13 +113,27 @@ def demo(gravity: str, rate: float, out: Path, seed: int, as_json: bool) -> None
     write_document(out / 'identification.json', document)
     with progress('drawing'):
         _draw(out, robot, result, history, target, result.base.values(truth.theta))
+    if not as_json:
+        say(f'{graded.word}: {graded.reasons[0]}')
+        say(f'online:  {online.sentence()}')
+        say(f'offline: {offline.sentence()}')
+        _tell(out, document, Score.of(result.training).relative_error_percent)
+    told = tell_story(
+        out / 'story',
+        truth,
+        result.arm,
+        recording,
+        sensors=SENSORS,
+        rng=np.random.default_rng([seed, 1]),
+        hide=hide,
+        rate=rate,
+    )
+    document['story'] = told.document()
+    write_document(out / 'identification.json', document)
     if as_json:
         click.echo(json_text(document))
-        return
-    say(f'{graded.word}: {graded.reasons[0]}')
-    say(f'online:  {online.sentence()}')
-    say(f'offline: {offline.sentence()}')
-    _tell(out, document, Score.of(result.training).relative_error_percent)
+    else:
+        show_story(told, out / 'story')
 
 
 def true_arm(robot: Robot) -> ArmModel:
