@@ -198,7 +198,7 @@ def diagnose(
         written = None if misfit is None else misfit.of(arm.robot)
         chosen = explained(arm, prepared, known, settings, rng, tell, written)
         unseen = _unseen(validate, chosen.explanation, prepared, chosen)
-        if harmed(chosen.explanation, unseen, settings):
+        if _harmed(chosen, chosen.explanation, unseen, settings):
             chosen = _second_choice(chosen, (arm, prepared, known, settings, rng, tell, written))
     notes += chosen.notes
     explanation, remarks = as_bodies(chosen.explanation, arm)
@@ -250,7 +250,7 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     least = settings.thresholds.headline if np.any(chosen.misfit > 0.0) else 0.0
     explanation, shares = _headline(explanation, unseen, least)
     found = findings(explanation, shares, arm, rng)
-    worse = harmed(explanation, unseen, settings)
+    worse = _harmed(chosen, explanation, unseen, settings)
     patched = explanation.fitted.arm
     if worse:
         names = ', '.join(one.name.replace('_', ' ') for one in found)
@@ -264,12 +264,18 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
         notes.append(pattern.sentence)
     data = [part for part in evidence.data if not part.before]
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
-    left = [_left(explanation, evidence, settings, 'the recordings')]
+    left = [_left(explanation, _sure(evidence, chosen), settings, 'the recordings')]
     if unseen is not None:
-        left.append(_left(explanation, unseen, settings, 'recordings that were not used'))
-    repeated = floors if chosen.floor_in_words in (NOISE, ESTIMATED) else ()
+        sure, more = _sure(unseen, chosen), settings.thresholds.predicted
+        left.append(_left(explanation, sure, settings, 'recordings that were not used', more))
+    measured = chosen.floor_in_words in (NOISE, ESTIMATED)
     word = decide(
-        found, repeated, left, arm, chosen.floor_in_words, refitted=explanation.base is not None
+        found,
+        floors if measured else (),
+        left,
+        arm,
+        NOISE if measured else chosen.floor_in_words,
+        refitted=explanation.base is not None,
     )
     floor = evidence.sigma if unseen is None else unseen.sigma
     gap = measure_gap(explanation, unseen, floor)
@@ -341,14 +347,35 @@ def _unseen(
     return Evidence(tuple(data), tuple(sigma), tuple(noise), explanation.evidence.varies)
 
 
+def _sure(evidence: Evidence, chosen: Chosen) -> Evidence:
+    """Return data in a unit that is measured: a misfit that is but estimated excuses nothing."""
+    if chosen.floor_in_words != ESTIMATED:
+        return evidence
+    return replace(evidence, sigma=evidence.noise)
+
+
+def _harmed(
+    chosen: Chosen,
+    explanation: Explanation,
+    unseen: Evidence | None,
+    settings: DiagnosisSettings,
+) -> tuple[str, ...]:
+    """Return the joints in which the patched model is worse than the given one."""
+    measured = replace(explanation, evidence=_sure(explanation.evidence, chosen))
+    return harmed(measured, None if unseen is None else _sure(unseen, chosen), settings)
+
+
 def _left(
-    explanation: Explanation, evidence: Evidence, settings: DiagnosisSettings, where: str
+    explanation: Explanation,
+    evidence: Evidence,
+    settings: DiagnosisSettings,
+    where: str,
+    more: float = 1.0,
 ) -> Left:
-    if evidence is explanation.evidence:
+    if evidence.data is explanation.evidence.data:
         residual = explanation.fitted.residual
     else:
         residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
-    more = 1.0 if evidence is explanation.evidence else settings.thresholds.predicted
     excess = evidence.losses(residual) / (more * evidence.limits(residual, settings))
     return Left(excess, f'in {where}')
 

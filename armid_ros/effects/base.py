@@ -269,6 +269,11 @@ class Effect(ABC):
         return tuple(np.tile(s.grid, (len(self.owners), 1)) for s in self.shapes)
 
     @property
+    def said_as(self) -> str:
+        """What it is called in the catalogue."""
+        return self.name
+
+    @property
     def owners(self) -> tuple[str, ...]:
         """Joints that have the quantities once each; one empty name for the whole arm."""
         return self.joints or ('',)

@@ -121,6 +121,11 @@ class GravityVector(_GravityEffect):
     summary = 'gravity of another direction or size than in the model'
     quantities = tuple(Quantity(f'gravity_difference_{axis}', 'm/s^2') for axis in 'xyz')
 
+    @property
+    def said_as(self) -> str:
+        """Return the tilt, which is what it is beyond gravity_magnitude."""
+        return BaseTilt.name
+
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/dg of the base's axes [N m per m/s^2], shape (N, n, 3)."""
         return arm.gravity_columns(motion)

@@ -87,8 +87,10 @@ class Payload(_LinkBody):
         return robot.joints[-1:]
 
     def plausible(self, values: FloatArray, arm: ArmModel) -> bool:
-        """Return whether it weighs anything."""
-        return bool(values[0] > 0.0)
+        """Return whether it weighs anything, no farther from its joint than the arm is long."""
+        places = [placement.translation for placement in arm.robot.model.jointPlacements]
+        length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH
+        return bool(values[0] > 0.0 and np.linalg.norm(values[1:4]) < length * values[0])
 
     def spread(self, robot: Robot) -> FloatArray:
         """Return what an arm may carry at the most: as much as it weighs, a little off, (P,)."""

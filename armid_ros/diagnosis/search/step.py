@@ -300,11 +300,11 @@ def _part(group: Group, inside: Sequence[int], first: int) -> Group:
 
 
 def _survey(groups: Sequence[Group], ranking: Sequence[Trial], total: float, tried: int) -> Survey:
-    visible = {trial.group.effect.name for trial in ranking}
+    visible = {trial.group.effect.said_as for trial in ranking}
     seen = {trial.group.key[:2] for trial in ranking}
     return Survey(
         tuple(ranking),
-        frozenset(group.effect.name for group in groups) - visible,
+        frozenset(group.effect.said_as for group in groups) - visible,
         total,
         tried,
         tuple(dict.fromkeys(g.key[:2] for g in groups if g.key[:2] not in seen)),
@@ -453,7 +453,7 @@ def _contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: 
     target = projection.rest(problem.x[:, :, small.group.columns]) @ small.values
     squares = float(np.sum(target**2))
     if np.sum((columns @ big.values - target) ** 2) < _SAME * squares:
-        return True
+        return here.baseline is not None  # links do not change; a description of them may be off
     if cost(big, here.settings) <= cost(small, here.settings):
         return False
     flat = columns.reshape(-1, big.group.size)

@@ -62,7 +62,7 @@ def detectable(explanation: Explanation | None, robot: Robot) -> tuple[Detectabl
         effect = trial.group.effect
         index, size = smallest_size(trial)
         parameter = effect.parameters(robot)[index]
-        rows.append(Detectable(effect.name, effect.joints, parameter, size, trial.visible))
+        rows.append(Detectable(effect.said_as, effect.joints, parameter, size, trial.visible))
     rows += [Detectable(name, joints, None, float('inf'), 0.0) for name, joints in survey.unseen]
     order = {name: position for position, name in enumerate(CATALOGUE)}
     return tuple(sorted(rows, key=lambda row: order.get(row.name, len(order))))

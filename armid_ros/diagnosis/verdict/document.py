@@ -136,7 +136,7 @@ def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 def _candidate(trial: Trial, total: float, tried: int) -> dict[str, Any]:
     return {
-        'name': trial.group.effect.name,
+        'name': trial.group.effect.said_as,
         'joints': list(trial.group.effect.joints),
         'share': trial.gain / max(total, 1e-300),
         'held_out_gain': trial.gain,

@@ -157,7 +157,7 @@ def small_print(
         share, wide = trial.gain / total, 2.0 * float(spread) / total
         result.append(
             Finding(
-                effect.name,
+                effect.said_as,
                 effect.joints,
                 tuple(names[k] for k in kept),
                 tuple(trial.values.tolist()),
@@ -237,7 +237,7 @@ def _rivals(steps: Sequence[Step], named: set[str], arm: ArmModel) -> tuple[Riva
     for step in steps:
         here: dict[str, Trial] = {}
         for trial in sorted(step.rivals, key=lambda trial: -trial.gain):
-            here.setdefault(trial.group.effect.name, trial)
+            here.setdefault(trial.group.effect.said_as, trial)
         for name in here.keys() - named:
             best.setdefault(name, []).append(here[name])
     order = sorted(best, key=lambda name: -max(trial.gain for trial in best[name]))
