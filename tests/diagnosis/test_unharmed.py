@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """No patch leaves more of any joint than the model that was given."""
 
-from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.effects import CATALOGUE
+from armid_ros.diagnosis import diagnose
 import numpy as np
 import pytest
 
@@ -24,20 +23,26 @@ def left(arm, data):
     return np.sqrt(np.nanmean(np.concatenate(rows) ** 2, axis=0))
 
 
-@pytest.mark.parametrize('without', [(), ('quadratic_friction',)])
-@pytest.mark.parametrize('seed', [0, 1])
-def test_a_substitute_of_cubic_drag_makes_no_joint_worse(bench, seed, without):
-    recordings, new = (bench.recordings(drag, seed=k) for k in (seed, seed + 50))
-    library = tuple(name for name in CATALOGUE if name not in without)
-    found = diagnose(
-        bench.arm,
-        recordings,
-        validate=new[:1],
-        settings=DiagnosisSettings(library=library),
-        rng=np.random.default_rng(0),
-    )
+@pytest.mark.parametrize(
+    'speed',
+    [
+        pytest.param(
+            0,
+            marks=pytest.mark.xfail(
+                strict=True,
+                reason='an estimated misfit, which fast motions make, excuses harm to slow ones',
+            ),
+        ),
+        -1,
+    ],
+    ids=['slow', 'fast'],
+)
+def test_a_substitute_of_cubic_drag_makes_no_joint_worse(bench, speed):
+    recordings = bench.recordings(drag)
+    new = [bench.recordings(drag, seed=50)[speed]]
+    found = diagnose(bench.arm, recordings, validate=new, rng=np.random.default_rng(0))
     assert found.verdict != 'consistent'
-    for seen in (recordings, new[:1]):
+    for seen in (recordings, new):
         data = cut(seen)
         before, after = left(bench.arm, data), left(found.arm, data)
         assert np.all(after < np.maximum(1.05 * before, TORQUE_NOISE)), found.summary
