@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm on a wall, a ceiling, a slope or another planet, of whose friction only names are known."""
+"""An arm on a wall, a ceiling, a slope or another planet, with friction by name only."""
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose
@@ -16,7 +16,7 @@ def gravity_of(arm):
     """Return gravity as a patched arm has it [m/s^2]."""
     bare = ArmModel(arm.robot)
     for effect in arm.effects:
-        if effect.name in ('base_tilt', 'gravity_magnitude'):
+        if effect.name in ('base_tilt', 'gravity_magnitude', 'gravity_vector'):
             changed = effect.action(arm.values_of(effect), bare).robot
             bare = ArmModel(changed)
     return np.array(bare.robot.gravity)
