@@ -19,14 +19,16 @@ from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.search.candidates import candidates, Group
 from armid_ros.diagnosis.search.fit import excited, fit
-from armid_ros.diagnosis.selection import solve_products
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
+import scipy.linalg
 
 #: Columns of which what is free leaves less than this share add nothing.
 _LEAST_VISIBLE = 0.02
+#: Directions of a group with less than this share of its squares are left at zero.
+_DEPENDENT = 1e-9
 
 
 def bic_selection(
@@ -66,10 +68,14 @@ def bic_selection(
     size = problem.x.shape[2]
     free = list(range(size - reference.columns[0].shape[2], size))
     rows = int(problem.used.sum())
+    flat = problem.x.reshape(-1, size)
+    whole = np.einsum('ij,ij->j', flat, flat)
     chosen: list[Group] = []
     while True:
-        rest = project(problem, free).sweep(problem.products).sum(axis=0)
-        whole = np.diagonal(problem.products.sum(axis=0))
+        projection = project(problem, free)
+        left = projection.rest(problem.y).ravel()
+        rest = projection.products(np.column_stack([flat, problem.y.ravel()]))
+        rest[-1, -1] = left @ left
         best, group = _best(rest, whole, found.groups, rows)
         if group is None or best >= 0.0:
             return chosen
@@ -88,7 +94,7 @@ def _best(
         own, aim = rest[span, span], rest[span, -1]
         if np.trace(own) < _LEAST_VISIBLE**2 * whole[span].sum() or np.trace(own) <= 0.0:
             continue
-        values, _ = solve_products(own, aim)
+        values = scipy.linalg.lstsq(own, aim, cond=_DEPENDENT)[0]
         after = max(squares - float(values @ aim), 1e-300)
         change = rows * np.log(after / squares) + group.size * np.log(rows)
         if change < best:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A vertical arm of two links, and recordings of it that were made without the simulator."""
+"""Small arms, and recordings of them that were made without the simulator."""
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
@@ -23,7 +23,7 @@ PEDESTAL = """
 """
 JOINT = """
   <joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>
-    <origin xyz="0 0 {height}"/><axis xyz="0 1 0"/>
+    <origin xyz="0 0 {height}"/><axis xyz="{axis}"/>
     <limit lower="-3" upper="3" effort="50" velocity="6"/></joint>
 """
 URDF = (
@@ -31,8 +31,18 @@ URDF = (
     + PEDESTAL
     + LINK.format(name='upper', mass=3.0, com=0.15)
     + LINK.format(name='lower', mass=1.5, com=0.12)
-    + JOINT.format(name='shoulder', parent='base', child='upper', height=0.5)
-    + JOINT.format(name='elbow', parent='upper', child='lower', height=0.35)
+    + JOINT.format(name='shoulder', parent='base', child='upper', height=0.5, axis='0 1 0')
+    + JOINT.format(name='elbow', parent='upper', child='lower', height=0.35, axis='0 1 0')
+    + '</robot>'
+)
+UPRIGHT_URDF = (
+    '<robot name="upright"><link name="base"/>'
+    + LINK.format(name='column', mass=4.0, com=0.1)
+    + LINK.format(name='upper', mass=3.0, com=0.15)
+    + LINK.format(name='lower', mass=1.5, com=0.12)
+    + JOINT.format(name='turn', parent='base', child='column', height=0.2, axis='0 0 1')
+    + JOINT.format(name='shoulder', parent='column', child='upper', height=0.2, axis='0 1 0')
+    + JOINT.format(name='elbow', parent='upper', child='lower', height=0.35, axis='0 1 0')
     + '</robot>'
 )
 PERIODS = (5.0, 4.0, 4.0)
@@ -42,20 +52,28 @@ TORQUE_NOISE, POSITION_NOISE = 0.03, 2e-5
 
 
 class Bench:
-    """Makes recordings of the arm: three speeds of two equal periods each."""
+    """Makes recordings of an arm: three speeds of two equal periods each."""
 
-    def __init__(self):
-        self.robot = robot_from_urdf(URDF, gravity='earth')
+    def __init__(self, urdf=URDF, viscous=(0.3, 0.2), coulomb=(0.5, 0.3)):
+        self.robot = robot_from_urdf(urdf, gravity='earth')
+        self.friction = np.array([viscous, coulomb])
         arm = ArmModel(self.robot)
-        arm = arm.with_effect(make_effect('viscous_friction', self.robot), [0.3, 0.2])
-        self.arm = arm.with_effect(make_effect('coulomb_friction', self.robot), [0.5, 0.3])
+        arm = arm.with_effect(make_effect('viscous_friction', self.robot), viscous)
+        self.arm = arm.with_effect(make_effect('coulomb_friction', self.robot), coulomb)
+
+    def named_friction(self):
+        """Return the arm with friction that nobody gave values of."""
+        return self.arm.with_theta(
+            np.concatenate([self.robot.rigid_parameters, 0.0 * self.friction.ravel()])
+        )
 
     def motion(self, speed, period, seed):
         """Return a motion of sums of harmonics from the second of time 0 on, two periods."""
         rng = np.random.default_rng(seed)
         t = np.arange(round((2 * period + 1.0) * RATE)) / RATE
-        q, dq, ddq = np.zeros((3, len(t), 2))
-        for joint in range(2):
+        joints = self.robot.n_joints
+        q, dq, ddq = np.zeros((3, len(t), joints))
+        for joint in range(joints):
             phases = rng.uniform(0.0, 2 * np.pi, 4)
             sizes = rng.uniform(0.5, 1.0, 4)
             w = 2 * np.pi / period * np.arange(1, 5)
@@ -73,7 +91,7 @@ class Bench:
         Parameters
         ----------
         hidden : callable, optional
-            Torque (N, 2) of a motion and the torque of the rigid arm, added to what is measured.
+            Torque (N, n) of a motion and the torque of the rigid arm, added to what is measured.
         seed : int
             Of motions and noise.
         noise : float
@@ -101,11 +119,17 @@ class Bench:
 
     def torque(self, motion):
         """Return rigid body and known friction, written out here."""
-        friction = [0.3, 0.2] * motion.dq + [0.5, 0.3] * np.sign(motion.dq)
+        friction = self.friction[0] * motion.dq + self.friction[1] * np.sign(motion.dq)
         return inverse_dynamics(self.robot, motion) + friction
 
 
 @pytest.fixture(scope='session')
 def bench():
-    """Return the arm with what is known of it."""
+    """Return a vertical arm of two links with what is known of it."""
     return Bench()
+
+
+@pytest.fixture(scope='session')
+def upright():
+    """Return an arm that turns about an upright axis and two level ones: it feels all gravity."""
+    return Bench(UPRIGHT_URDF, (0.4, 0.3, 0.2), (0.6, 0.5, 0.3))

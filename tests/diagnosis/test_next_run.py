@@ -8,10 +8,10 @@ from types import SimpleNamespace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, next_run
+from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
 from armid_ros.diagnosis.next_run.templates import CLEARANCE, templates
-from armid_ros.diagnosis.search.explain import joint_losses_of
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.effects import CATALOGUE
@@ -52,7 +52,7 @@ def doubtful(named):
     """Return the same with two other names left possible, as poorer data would."""
     (step,) = named.explanation.steps
     rivals = [
-        next(t for t in step.league if t.score.group.key[:2] == (name, ('elbow',)))
+        next(t for t in named.explanation.survey.ranking if t.group.key[:2] == (name, ('elbow',)))
         for name in ('encoder_offset', 'torque_drift')
     ]
     steps = (replace(step, rivals=tuple(rivals)),)
@@ -72,14 +72,15 @@ def test_nothing_is_to_be_run_where_no_name_is_in_doubt(named):
     assert next_run(found, np.random.default_rng(1)) is None
 
 
-def test_a_provisional_name_is_held_against_the_next_best(named):
-    (step,) = named.explanation.steps
-    alone = replace(named.explanation, steps=(replace(step, rivals=()),))
-    found = replace(named, verdict='partial', explanation=alone)
-    run = next_run(found, np.random.default_rng(1))
-    assert {pair.name for pair in run.separations} == {'torque_offset'}
-    league = [t.score.group.effect.name for t in step.league]
-    assert {pair.rival for pair in run.separations} <= set(league) - {'torque_offset'}
+def test_a_provisional_name_is_held_against_the_next_best(bench):
+    hidden = bench.recordings(lambda m, tau: [0.0, 0.08] * m.dq * np.abs(m.dq))
+    found = diagnose(bench.arm, hidden, rng=np.random.default_rng(0))
+    (step,) = found.explanation.steps
+    alone = replace(found.explanation, steps=(replace(step, rivals=()),))
+    run = next_run(replace(found, verdict='partial', explanation=alone), np.random.default_rng(1))
+    assert {pair.name for pair in run.separations} == {'quadratic_friction'}
+    ranking = [t.group.effect.name for t in step.ranking]
+    assert {pair.rival for pair in run.separations} <= set(ranking) - {'quadratic_friction'}
 
 
 def test_the_arm_can_make_the_run_without_hitting_its_own_pedestal(bench, chosen):
@@ -149,7 +150,8 @@ def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen)
         effect = CATALOGUE[name].on(bench.robot, ('elbow',))
         kept = tuple(range(len(effect.parameters(bench.robot))))
         fitted = fit(bench.arm, [Named(effect, kept)], data, sigma, None)
-        return float(np.sum(joint_losses_of(fitted, data, sigma) * rows))
+        evidence = Evidence(tuple(data), tuple(sigma), tuple(sigma))
+        return float(np.sum(evidence.losses(fitted.residual) * rows))
 
     own = squares('torque_offset')
     for pair in chosen.separations:
@@ -162,7 +164,7 @@ def test_what_was_chosen_is_about_the_best_that_there_is(bench, doubtful, chosen
     clearance = ClearanceModel.of(collision_model(bench.robot))
     rng = np.random.default_rng(4)
     (own,) = doubtful.explanation.fitted.named
-    rivals = [t.score.group.effect for t in doubtful.explanation.steps[0].rivals]
+    rivals = [t.group.effect for t in doubtful.explanation.steps[0].rivals]
     worths = []
     for template in templates(('elbow',)):
         trajectory = template.draw(bench.arm, clearance, rng)

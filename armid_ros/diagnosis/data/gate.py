@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
@@ -68,9 +69,10 @@ def check_data(arm: ArmModel, recordings: Sequence[Recording], data: Sequence[Tr
 
 def _under_its_gravity(arm: ArmModel, data: Sequence[Trajectory]) -> ArmModel:
     """
-    Return an arm under the gravity that explains the torques, if that does so better than a sign.
+    Return an arm under the gravity that explains the torques, if no simple fault does so better.
 
-    An arm that hangs takes the opposite torques of one that stands, but for its inertia.
+    An arm that hangs takes the opposite torques of one that stands, but for its inertia. Other
+    units or exchanged joints make torques that some gravity explains in part.
 
     """
     bare = ArmModel(arm.robot, quasi_static=arm.quasi_static)
@@ -81,10 +83,23 @@ def _under_its_gravity(arm: ArmModel, data: Sequence[Trajectory]) -> ArmModel:
     flat = (columns / scale[:, np.newaxis]).reshape(-1, 3)
     change = np.linalg.lstsq(flat, (left / scale).ravel(), rcond=None)[0]
     after = np.sum(((left - columns @ change) / scale) ** 2)
-    negated = np.sum(((left - 2.0 * torque) / scale) ** 2)
-    if after >= min(negated, 0.5 * np.sum((left / scale) ** 2)):
+    if after >= min(
+        _repaired(torque / scale, (torque - left) / scale, scale),
+        0.5 * np.sum((left / scale) ** 2),
+    ):
         return arm
     return ArmModel(arm.robot.with_gravity(arm.robot.gravity + change), arm.effects, arm.values)
+
+
+def _repaired(torque: FloatArray, model: FloatArray, scale: FloatArray) -> float:
+    """Return the squares left where each joint has another one's torque, sign or unit, (N, n)."""
+    factors = [1.0, *(factor for factor, _ in _UNITS)]
+    best = np.full(len(scale), np.inf)
+    for joint, other in product(range(len(scale)), repeat=2):
+        taken = model[:, other] * scale[other] / scale[joint]
+        for factor in (sign * size for size in factors for sign in (1.0, -1.0)):
+            best[joint] = min(best[joint], np.sum((torque[:, joint] - factor * taken) ** 2))
+    return float(best.sum())
 
 
 def _time_base(recordings: Sequence[Recording]) -> list[str]:

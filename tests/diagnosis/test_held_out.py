@@ -1,0 +1,145 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a group predicts of data that it was not fitted to, beside a refit row by row."""
+
+from armid_ros.diagnosis.data.rows import Problem
+from armid_ros.diagnosis.search.candidates import Group
+from armid_ros.diagnosis.search.held_out import held_out, lead
+from armid_ros.effects import CATALOGUE
+import numpy as np
+import pytest
+from scipy import stats
+
+FOLDS = np.array([-1, -1, *np.repeat([0, 1, 2], 4)])
+ROWS_OF_A_BLOCK, JOINTS, OWN, FREE = 20, 2, 2, 3
+
+
+def make_problem(rng, cause=(0.0, 0.0), noise=1.0):
+    """Return rows of which the first columns are a group's and the others free."""
+    block = np.repeat(np.arange(len(FOLDS)), ROWS_OF_A_BLOCK)
+    weight = 1.0 * (rng.uniform(size=(len(block), JOINTS)) > 0.2)
+    x = rng.normal(size=(len(block), JOINTS, OWN + FREE)) * weight[:, :, np.newaxis]
+    x[:, :, OWN] += 0.7 * x[:, :, 0]
+    values = np.array([*cause, 1.0, -2.0, 0.5])
+    y = x @ values + noise * rng.normal(size=weight.shape) * weight
+    return Problem(x, y, weight, block, FOLDS)
+
+
+def group(bench, precision=(0.0, 0.0)):
+    """Return the group whose columns come first."""
+    effect = CATALOGUE['viscous_friction'].on(bench.robot, bench.robot.joints)
+    return Group(effect, slice(0, OWN), (0, 1), np.array(precision))
+
+
+def held(rng):
+    """Return how free values are held, and to what."""
+    root = rng.normal(size=(FREE, FREE))
+    return root @ root.T, rng.normal(size=FREE)
+
+
+def refitted(problem, columns, hold, pull, rows):
+    """Fit columns to some rows by least squares."""
+    x = problem.x[rows][:, :, columns].reshape(-1, len(columns))
+    return np.linalg.solve(x.T @ x + hold, x.T @ problem.y[rows].ravel() + pull)
+
+
+def by_brute_force(problem, precision, hold, pull, old=None):
+    """Return what is left, what the group predicts of it, and the part of every row."""
+    left, made = np.zeros_like(problem.y), np.zeros_like(problem.y)
+    fold = FOLDS[problem.block]
+    free, all_of_it = list(range(OWN, OWN + FREE)), list(range(OWN + FREE))
+    whole = np.zeros((OWN + FREE, OWN + FREE))
+    whole[:OWN, :OWN], whole[OWN:, OWN:] = np.diag(precision), hold
+    for part in range(3):
+        train, test = fold != part, fold == part
+        alone = refitted(problem, free, hold, pull, train)
+        both = refitted(problem, all_of_it, whole, np.concatenate([np.zeros(OWN), pull]), train)
+        without = problem.x[test][:, :, free] @ alone
+        left[test] = problem.y[test] - without
+        made[test] = problem.x[test] @ both - without
+    if old is not None:
+        known = problem.x[:, :, :OWN] @ old
+        left, made = left - known, made - known
+    return left, made, fold
+
+
+@pytest.mark.parametrize('before', [False, True])
+def test_products_of_blocks_say_what_a_refit_says(bench, before):
+    rng = np.random.default_rng(0)
+    problem, precision = make_problem(rng, (0.5, -0.3)), (3.0, 0.5)
+    hold, pull = held(rng)
+    old = np.array([0.4, -0.2]) if before else None
+    left, made, fold = by_brute_force(problem, precision, hold, pull, old)
+    (trial,), power = held_out(
+        problem,
+        range(OWN, OWN + FREE),
+        [group(bench, precision)],
+        hold,
+        pull,
+        [old] if before else None,
+    )
+    asked = fold >= 0
+    owner = problem.block[asked] - problem.block[asked].min()
+    products = made[asked] * left[asked], made[asked] ** 2
+    for measured, rows in zip((trial.cross, trial.square), products, strict=True):
+        np.testing.assert_allclose(measured, np.bincount(owner, rows.sum(axis=1)), rtol=1e-8)
+    gains = 2.0 * products[0] - products[1]
+    assert trial.gain == pytest.approx(gains.sum(), rel=1e-8)
+    joints = trial.joint_gains(problem, range(OWN, OWN + FREE))
+    np.testing.assert_allclose(joints, gains.sum(axis=0), rtol=1e-8)
+    if not before:
+        np.testing.assert_allclose(power, np.bincount(owner, np.sum(left[asked] ** 2, axis=1)))
+
+
+def test_values_are_those_of_least_squares_of_all_rows(bench):
+    rng = np.random.default_rng(1)
+    problem, precision = make_problem(rng, (0.5, -0.3)), (3.0, 0.5)
+    hold, pull = held(rng)
+    (trial,), _ = held_out(problem, range(OWN, OWN + FREE), [group(bench, precision)], hold, pull)
+    whole = np.zeros((OWN + FREE, OWN + FREE))
+    whole[:OWN, :OWN], whole[OWN:, OWN:] = np.diag(precision), hold
+    every = np.ones(len(problem.block), dtype=bool)
+    columns, aim = list(range(OWN + FREE)), np.concatenate([np.zeros(OWN), pull])
+    expected = refitted(problem, columns, whole, aim, every)
+    np.testing.assert_allclose(trial.values, expected[:OWN], rtol=1e-8)
+    assert 0.0 < trial.freedom < OWN
+
+
+def trial_of(bench, seed, cause):
+    """Return a group that is tried beside free columns that nothing holds."""
+    problem = make_problem(np.random.default_rng(seed), cause)
+    nothing = np.zeros((FREE, FREE)), np.zeros(FREE)
+    (trial,), power = held_out(problem, range(OWN, OWN + FREE), [group(bench)], *nothing)
+    return trial, power
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_the_slope_of_a_cause_is_one(bench, seed):
+    trial, power = trial_of(bench, seed, (0.8, -0.5))
+    assert trial.slope == pytest.approx(1.0, abs=3.0 * trial.slope / trial.z)
+    assert trial.p < 1e-4
+    assert trial.replicated == 3
+    assert 0.0 < trial.gain < power.sum()
+
+
+def test_noise_is_seldom_a_cause(bench):
+    p = np.array([trial_of(bench, seed, (0.0, 0.0))[0].p for seed in range(300)])
+    low, _ = stats.binomtest(int(np.sum(p < 0.05)), len(p)).proportion_ci()
+    assert low < 0.05
+    assert np.mean(p < 0.5) > 0.2
+
+
+def test_columns_that_free_ones_make_are_not_seen(bench):
+    problem = make_problem(np.random.default_rng(2))
+    problem.x[:, :, :OWN] = problem.x[:, :, OWN : 2 * OWN]
+    nothing = np.zeros((FREE, FREE)), np.zeros(FREE)
+    assert held_out(problem, range(OWN, OWN + FREE), [group(bench)], *nothing)[0] == []
+
+
+def test_one_cause_leads_another_by_what_it_takes_more(bench):
+    cause, _ = trial_of(bench, 3, (0.8, -0.5))
+    nothing, _ = trial_of(bench, 3, (0.0, 0.0))
+    squares, z = lead(cause, nothing)
+    assert squares == pytest.approx(cause.gain - nothing.gain)
+    assert z > 3.0
+    assert lead(nothing, cause) == (pytest.approx(-squares), pytest.approx(-z))
