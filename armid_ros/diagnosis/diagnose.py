@@ -247,7 +247,8 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     explanation, notes = chosen.explanation, list(chosen.notes)
     evidence = explanation.evidence
     unseen = _unseen(validate, explanation, prepared, chosen)
-    least = settings.thresholds.headline if np.any(chosen.misfit > 0.0) else 0.0
+    measured = chosen.floor_in_words in (NOISE, ESTIMATED)
+    least = 0.0 if measured else settings.thresholds.headline
     explanation, shares = _headline(explanation, unseen, least)
     found = findings(explanation, shares, arm, rng)
     worse = _harmed(chosen, explanation, unseen, settings)
@@ -268,7 +269,6 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     if unseen is not None:
         sure, more = _sure(unseen, chosen), settings.thresholds.predicted
         left.append(_left(explanation, sure, settings, 'recordings that were not used', more))
-    measured = chosen.floor_in_words in (NOISE, ESTIMATED)
     word = decide(
         found,
         floors if measured else (),

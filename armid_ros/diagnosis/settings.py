@@ -34,7 +34,8 @@ class Thresholds:
     misfit_share : float
         Power of a cause over that of the model's own misfit, below which it is small print.
     headline : float
-        Share that a cause takes of a gap beside a misfit, below which it is small print.
+        Share that a cause takes of a gap beside the misfit that a model had before, below which it
+        is small print.
     same_fit : float
         Factor between losses of two explanations that are as good as each other where the unit is
         a misfit of other data.
