@@ -67,9 +67,6 @@ def test_smooth_motion_shows_a_joint_only_if_it_is_softer(bench):
     assert faster['joint_elasticity', ('elbow',)] < size['joint_elasticity', ('elbow',)] / 3.0
 
 
-@pytest.mark.xfail(
-    strict=True, reason='the tilt of a base is listed as the vector of gravity, which has no name'
-)
 def test_every_effect_of_the_catalogue_is_listed(sizes):
     names = {name for name, _ in sizes}
     already = {'viscous_friction', 'coulomb_friction'}
