@@ -43,5 +43,9 @@ class IdentificationError(ArmidError):
     """The data cannot identify what was asked."""
 
 
+class RecordingEnded(RecordingError):
+    """A recording cannot go on: its disk is full, or its file is gone."""
+
+
 class OutputError(ArmidError):
     """A result cannot be written, or would take the place of another one."""

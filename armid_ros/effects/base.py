@@ -335,14 +335,14 @@ class Effect(ABC):
 
         """
 
-    def plausible(self, values: FloatArray, arm: ArmModel) -> bool:
+    def plausible(self, values: FloatArray, std: FloatArray, arm: ArmModel) -> bool:
         """
         Return whether values within the bounds are what one would call by this name.
 
         Parameters
         ----------
-        values : ndarray, shape (P,)
-            Parameter values.
+        values, std : ndarray, shape (P,)
+            Parameter values and their deviations, as far as white noise goes.
         arm : ArmModel
             The arm without them.
 

@@ -63,7 +63,7 @@ class GravityMagnitude(_GravityEffect):
         direction = _unit(arm.robot.gravity)[:, np.newaxis]
         return np.asarray(arm.gravity_columns(motion) @ direction)
 
-    def plausible(self, values: FloatArray, arm: ArmModel) -> bool:
+    def plausible(self, values: FloatArray, std: FloatArray, arm: ArmModel) -> bool:
         """Return whether gravity keeps its direction; else the base is upside down."""
         return bool(values[0] > -np.linalg.norm(arm.robot.gravity))
 

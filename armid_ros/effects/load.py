@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: How far from its joint a link's mass may be without a word in the description [m].
 _REACH = 0.1
+#: Deviations by which a mass is told from none.
+_SURELY = 3.0
 _UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 
@@ -86,11 +88,13 @@ class Payload(_LinkBody):
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         return robot.joints[-1:]
 
-    def plausible(self, values: FloatArray, arm: ArmModel) -> bool:
-        """Return whether it weighs anything, no farther from its joint than the arm is long."""
+    def plausible(self, values: FloatArray, std: FloatArray, arm: ArmModel) -> bool:
+        """Return whether it surely weighs something, not farther away than the arm is long."""
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
         length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH
-        return bool(values[0] > 0.0 and np.linalg.norm(values[1:4]) < length * values[0])
+        return bool(
+            values[0] > _SURELY * std[0] and np.linalg.norm(values[1:4]) < length * values[0]
+        )
 
     def spread(self, robot: Robot) -> FloatArray:
         """Return what an arm may carry at the most: as much as it weighs, a little off, (P,)."""

@@ -15,7 +15,7 @@ import struct
 import time
 from typing import Any, NoReturn
 
-from armid_ros.errors import ArmidError, RecordingError
+from armid_ros.errors import ArmidError, RecordingEnded, RecordingError
 from armid_ros.files import size_text
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.message_classes import installed_definition, is_stamped, message_class
@@ -267,7 +267,7 @@ class RecorderNode(ArmidNode):
         assert writer is not None
         raise self._given_up(writer, reason)
 
-    def _given_up(self, writer: BagWriter, reason: str) -> RecordingError:
+    def _given_up(self, writer: BagWriter, reason: str) -> RecordingEnded:
         """Return the error that says why a recording ended, and what there is of it."""
         lacking = ''
         try:
@@ -280,7 +280,7 @@ class RecorderNode(ArmidNode):
             kept = f'{count} messages went with it'
         elif lacking:
             kept += f', without its index ({lacking}): `armid recover` makes it whole'
-        return RecordingError(f'{reason}; recording ends: {kept}')
+        return RecordingEnded(f'{reason}; recording ends: {kept}')
 
     def _tell(self, text: str) -> str:
         if self.context.ok():  # /rosout is gone once the process is told to end

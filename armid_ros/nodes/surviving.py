@@ -8,11 +8,11 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
-from armid_ros.errors import ArmidError
+from armid_ros.errors import ArmidError, RecordingEnded
 from armid_ros.nodes.complaints import Complaints
 
 #: What is no matter of a message: a disk that is full ends a recorder, and should.
-FATAL = (OSError, MemoryError)
+FATAL = (OSError, MemoryError, RecordingEnded)
 
 
 def surviving(
@@ -41,10 +41,10 @@ def surviving(
     def survive(*args: Any) -> Any:
         try:
             return callback(*args)
-        except ArmidError as error:
-            complaints().say(what, f'{what}: {error}')
         except FATAL:
             raise
+        except ArmidError as error:
+            complaints().say(what, f'{what}: {error}')
         except Exception as error:
             if not running():
                 raise

@@ -26,13 +26,7 @@ def left(arm, data):
 @pytest.mark.parametrize(
     'speed',
     [
-        pytest.param(
-            0,
-            marks=pytest.mark.xfail(
-                strict=True,
-                reason='an estimated misfit, which fast motions make, excuses harm to slow ones',
-            ),
-        ),
+        0,
         -1,
     ],
     ids=['slow', 'fast'],

@@ -29,6 +29,8 @@ import numpy as np
 #: Free columns of which the others leave less than this share of their length are grouped.
 _EXCITED = 1e-4
 _MOST_ROUNDS = 4
+#: Squares of a column that are this share of those of the largest one are rounding.
+_ROUNDING = 1e-20
 
 
 @dataclass(frozen=True)
@@ -210,7 +212,9 @@ def _step(
     known = len(change)
     own[:known, :known] += pull
     aim[:known] -= pull @ change
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-300))
+    diagonal = np.diag(own)
+    seen = diagonal > _ROUNDING * diagonal.max(initial=1e-300)
+    scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, diagonal, 1.0)), 0.0)
     values, vectors = np.linalg.eigh(own * np.outer(scale, scale))
     good = values > 1e-10 * max(float(values[-1]), 1e-300) if size else values > 0.0
     basis = scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good])

@@ -266,7 +266,8 @@ def acceptable(trial: Trial, here: Round, tried: int) -> bool:
 def possible(trial: Trial, here: Round) -> bool:
     """Return whether the values are what could be called by the name."""
     group, arm = trial.group, here.work.arm
-    return bool(_inside(trial, here).all()) and group.effect.plausible(trial.values, arm)
+    inside = bool(_inside(trial, here).all())
+    return inside and group.effect.plausible(trial.values, trial.std, arm)
 
 
 def _inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:

@@ -29,7 +29,7 @@ def harmed(
     """Return the joints in which the patched model is worse than the given one."""
     if not explanation.steps:
         return ()
-    before, after = explanation.reference.arm, explanation.fitted.arm
+    before, after = explanation.given, explanation.fitted.arm
     sets = [explanation.evidence, *([] if unseen is None else [unseen])]
     worse = np.any([_worse(before, after, evidence, settings) for evidence in sets], axis=0)
     return tuple(j for j, bad in zip(before.robot.joints, worse, strict=True) if bad)
