@@ -290,7 +290,7 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
         summary=word.summary,
         findings=found,
         minor=small_print(explanation.minor, max(total, 1e-300), tried, arm),
-        where=locate(arm, evidence, explanation.reference.residual, limits),
+        where=_where(explanation, limits, bool(found)),
         left=locate(arm, evidence, explanation.fitted.residual, limits),
         gap=gap,
         explanation=explanation,
@@ -345,6 +345,14 @@ def _unseen(
     noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]
     sigma = [np.maximum(one, chosen.misfit) for one in noise]
     return Evidence(tuple(data), tuple(sigma), tuple(noise), explanation.evidence.varies)
+
+
+def _where(explanation: Explanation, limits: FloatArray, named: bool) -> tuple[Where, ...]:
+    """Say where the gap is; where something is named, small gaps count as well."""
+    arm, evidence = explanation.given, explanation.evidence
+    residual = explanation.reference.residual
+    places = locate(arm, evidence, residual, limits)
+    return places or (locate(arm, evidence, residual, np.ones_like(limits)) if named else ())
 
 
 def _sure(evidence: Evidence, chosen: Chosen) -> Evidence:
