@@ -279,9 +279,7 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     )
     floor = evidence.sigma if unseen is None else unseen.sigma
     gap = measure_gap(explanation, unseen, floor)
-    total = max((s.total for s in explanation.steps), default=0.0)
-    if explanation.survey is not None:
-        total = explanation.survey.total
+    total = float(attribute(explanation, None).whole.sum())
     tried = 1 if explanation.survey is None else explanation.survey.tried
     limits = evidence.limits(explanation.fitted.residual, settings)
     tell(1.0, word.word)
