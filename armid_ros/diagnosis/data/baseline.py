@@ -56,6 +56,7 @@ class Baseline:
         informative = np.concatenate([part.told for part in data])
         left = np.concatenate(residual)
         w = np.concatenate(columns)
+        informative[:, ~informative.any(axis=0)] = True  # of a joint that never moved, all of it
         scale = np.sqrt(np.mean(left**2, axis=0, where=informative))
         weight = informative / np.maximum(scale, 1e-12)
         rows = w * weight[:, :, np.newaxis]
@@ -69,11 +70,17 @@ class Baseline:
             others = np.linalg.lstsq(sum(own) - own[k], sum(to) - to[k], rcond=1e-10)[0]
             left[fold == k] += w[fold == k] @ (whole - others)
         others = np.sqrt(np.mean(left**2, axis=0, where=informative))
-        worst = np.max(
-            [np.mean(left[fold == k] ** 2, axis=0, where=informative[fold == k]) for k in folds],
-            axis=0,
+        counts = np.array([informative[fold == k].sum(axis=0) for k in folds])
+        sums = np.array(
+            [np.sum(left[fold == k] ** 2, axis=0, where=informative[fold == k]) for k in folds]
         )
-        return cls(tuple(data), tuple(residual), np.sqrt(scale * others), worst / others**2)
+        worst = np.max(sums / np.maximum(counts, 1), axis=0)
+        return cls(
+            tuple(data),
+            tuple(residual),
+            np.sqrt(scale * others),
+            worst / np.maximum(others**2, 1e-300),
+        )
 
     def values(
         self, arm: ArmModel, effect: Effect, kept: Sequence[int], precision: FloatArray

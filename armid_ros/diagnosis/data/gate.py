@@ -34,6 +34,9 @@ _UNITS = (
 _CLIPPED = 0.02
 #: Share of steps in time that differ from the median by more than half of it.
 _UNEVEN = 0.05
+#: Jitter of stamps that blurs a torque at the end of the band by less than this share of it is
+#: harmless.
+_BLURRED = 0.05
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ class Gate:
 def check_data(arm: ArmModel, recordings: Sequence[Recording], data: Sequence[Trajectory]) -> Gate:
     """Look for faults of the data."""
     slopes, correlation = _compare(_under_its_gravity(arm, data), data)
-    faults = [*_time_base(recordings), *_torques(arm, slopes, correlation)]
+    faults = [*_time_base(recordings, _band(data)), *_torques(arm, slopes, correlation)]
     return Gate(tuple(faults), tuple(_clipped(recordings)), slopes, correlation)
 
 
@@ -102,13 +105,19 @@ def _repaired(torque: FloatArray, model: FloatArray, scale: FloatArray) -> float
     return float(best.sum())
 
 
-def _time_base(recordings: Sequence[Recording]) -> list[str]:
+def _band(data: Sequence[Trajectory]) -> float:
+    """Return up to which frequency rows hold motion [Hz]."""
+    return min(data[0].used.kept_hz, *(part.motion.band_hz for part in data))
+
+
+def _time_base(recordings: Sequence[Recording], band_hz: float) -> list[str]:
     faults = []
     for recording in recordings:
         steps = np.diff(recording.t)
         median = float(np.median(steps))
         uneven = float(np.mean(np.abs(steps - median) > 0.5 * median))
-        if uneven > _UNEVEN:
+        jitter = float(np.sqrt(np.mean(np.minimum(np.abs(steps - median), median) ** 2)))
+        if uneven > _UNEVEN and 2.0 * np.pi * band_hz * jitter > _BLURRED:
             faults.append(
                 f'{recording.source or "recording"}: {100 * uneven:.0f} % of the time stamps are '
                 'uneven by more than half a period; record with the stamps of the driver'
