@@ -36,7 +36,7 @@ _CLIPPED = 0.02
 _UNEVEN = 0.05
 #: Jitter of stamps that blurs a torque at the end of the band by less than this share of it is
 #: harmless.
-_BLURRED = 0.05
+_BLURRED = 0.1
 
 
 @dataclass(frozen=True)
