@@ -41,7 +41,7 @@ ARM = """<robot name="arm"><link name="base"/>
 RATE, SECONDS, NOISE, RESOLUTION = 100.0, 4.0, 0.05, 1e-5
 COUNT = round(RATE * SECONDS)
 #: Damaged messages of a stream, and what they may make of deviations and values.
-MOST, INFLATED, SHIFTED = 5, 2.0, 3.0
+MOST, INFLATED, SHIFTED = 5, 3.0, 3.0
 USUAL = 100
 EXAMPLES = int(os.environ.get('ARMID_FUZZ', USUAL))
 
