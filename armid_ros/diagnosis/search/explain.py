@@ -25,15 +25,8 @@ from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
-from armid_ros.diagnosis.search.step import (
-    acceptable,
-    Beside,
-    material,
-    next_step,
-    Round,
-    Step,
-    Survey,
-)
+from armid_ros.diagnosis.search.round import Beside, Round
+from armid_ros.diagnosis.search.step import acceptable, material, next_step, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray

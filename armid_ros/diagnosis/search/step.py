@@ -8,15 +8,14 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.diagnosis.data.baseline import Baseline
-from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.held_out import held_out, lead, Trial
+from armid_ros.diagnosis.search.held_out import held_out, Trial
+from armid_ros.diagnosis.search.own_noise import made_of_noise
 from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.refine import refine, Workspace
-from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.effects import CATALOGUE
+from armid_ros.diagnosis.search.refine import refine
+from armid_ros.diagnosis.search.rivals import beaten, contains, likeliest
+from armid_ros.diagnosis.search.round import Beside, Round, worth
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -26,72 +25,6 @@ import numpy.typing as npt
 _LOOKED_AT, _REFINED, _PROMISING = 30, 6, 0.4
 #: Causes in the small print.
 _SMALL_PRINT = 5
-#: Columns that take less than this share of their gain without the noise of positions beyond the
-#: band of the motion are made of that noise.
-_NOT_NOISE = 0.1
-#: A group made of the measured torque that leaves less than this share of its noise explains noise
-#: with itself.
-_TAUTOLOGY = 0.8
-#: What contains a simpler cause makes all but this share of its torque; what differs from it by
-#: less is the same cause in other words.
-_CONTAINED, _SAME = 0.02, 1e-3
-
-
-@dataclass(frozen=True)
-class Beside:
-    """
-    What is fitted beside every cause.
-
-    Attributes
-    ----------
-    free : tuple of int
-        Columns of the problem.
-    hold : ndarray, shape (f, f)
-        Precision that they are held with.
-    pull : ndarray, shape (f,)
-        What they are held to, times that.
-
-    """
-
-    free: tuple[int, ...]
-    hold: FloatArray
-    pull: FloatArray
-
-    def and_columns(self, group: Group) -> Beside:
-        """Return the same with the columns of a group."""
-        span = range(group.columns.start, group.columns.stop)
-        size = len(self.free) + len(span)
-        hold = np.zeros((size, size))
-        hold[: len(self.free), : len(self.free)] = self.hold
-        hold[len(self.free) :, len(self.free) :] = np.diag(group.precision)
-        return Beside((*self.free, *span), hold, np.concatenate([self.pull, np.zeros(len(span))]))
-
-
-@dataclass(frozen=True)
-class Round:
-    """
-    What a round of the search needs to know.
-
-    Attributes
-    ----------
-    evidence : Evidence
-        The data.
-    work : Workspace
-        What columns of other shapes are computed from.
-    settings : DiagnosisSettings
-        Library and thresholds.
-    total : float or None
-        Held-out squares that shares are of; those of this round if None.
-    baseline : Baseline or None
-        Recordings in which nothing was wrong.
-
-    """
-
-    evidence: Evidence
-    work: Workspace
-    settings: DiagnosisSettings
-    total: float | None
-    baseline: Baseline | None = None
 
 
 @dataclass(frozen=True)
@@ -187,74 +120,9 @@ def next_step(
     rivals = tuple(
         trial
         for trial in tied
-        if trial is not winner and not _contains(trial, winner, problem, beside, here)
+        if trial is not winner and not contains(trial, winner, problem, beside, here)
     )
     return Step(winner, rivals, tuple(ranking), total, len(seen)), survey, problem
-
-
-def worth(trial: Trial, here: Round) -> float:
-    """Return the share of the held-out squares that a trial takes, its freedom paid for."""
-    assert here.total is not None
-    price = here.settings.thresholds.price * cost(trial, here.settings)
-    return trial.gain / max(here.total, 1e-300) - price
-
-
-def cost(trial: Trial, settings: DiagnosisSettings) -> float:
-    """Return how many values and shapes the data chose, those of what is outlandish more."""
-    effect = trial.group.effect
-    shapes = len(effect.shapes) / max(len(effect.separate), 1)
-    outside = settings.thresholds.outside if effect.external else 0.0
-    return trial.freedom + shapes + outside
-
-
-def beaten(other: Trial, first: Trial, here: Round) -> bool:
-    """Return whether one trial is so far behind another that it is no rival."""
-    assert here.total is not None
-    thresholds = here.settings.thresholds
-    squares, z = lead(first, other)
-    if squares <= thresholds.tie * here.total * 0.5 and squares <= thresholds.far * first.gain:
-        return False
-    return z >= thresholds.rival_z or squares > thresholds.far * first.gain
-
-
-def likeliest(
-    tied: Sequence[Trial],
-    gains: dict[int, FloatArray],
-    problem: Problem,
-    beside: Beside,
-    here: Round,
-) -> Trial:
-    """
-    Return the simplest of the causes that leave no gap, or the best where each leaves one.
-
-    One cause that explains everything goes before two that do it together.
-
-    """
-    if len(tied) == 1:
-        return tied[0]
-    since = problem.fold_of_block[problem.block] >= 0
-    left = project(problem, beside.free).rest(problem.y)[since]
-    squares = np.sum(left**2, axis=0)
-    count = np.maximum(here.evidence.count, 1.0)
-    limits = here.evidence.limits(here.evidence.split(left, problem.weight[since]), here.settings)
-    able = [t for t in tied if np.all((squares - gains[id(t)]) / count <= limits)]
-    return simplest(able, here) if able else tied[0]
-
-
-def simplest(tied: Sequence[Trial], here: Round) -> Trial:
-    """
-    Return the cause with the least freedom.
-
-    Of causes as free as each other the one that takes more, and of those that take the same the
-    first in the catalogue, which goes from the common to the rare.
-
-    """
-    order = {name: position for position, name in enumerate(CATALOGUE)}
-    least = min(cost(trial, here.settings) for trial in tied)
-    simple = [t for t in tied if cost(t, here.settings) < least + 0.5]
-    most = max(trial.gain for trial in simple)
-    same = [t for t in simple if t.gain >= (1.0 - here.settings.thresholds.tie) * most]
-    return min(same, key=lambda t: order.get(t.group.effect.name, len(order)))
 
 
 def acceptable(trial: Trial, here: Round, tried: int) -> bool:
@@ -412,51 +280,6 @@ def _passing(
         if result and beaten(trial, result[0], here):
             continue
         projection = projection or project(problem, beside.free)
-        if not _made_of_noise(trial, problem, projection, here.work):
+        if not made_of_noise(trial, problem, projection, here.work):
             result.append(trial)
     return result
-
-
-def _made_of_noise(
-    trial: Trial, problem: Problem, projection: Projection, work: Workspace
-) -> bool:
-    """
-    Return whether a group explains noise with that noise.
-
-    What positions have beyond the motion is in the accelerations that the model takes, and so in
-    what is left, and in columns that are derived from them. And columns that are made of the
-    measured torque can leave less than its noise.
-
-    """
-    effect, kept = trial.group.effect, trial.group.kept
-    left = projection.rest(problem.y)
-    smooth = work.smooth_columns(effect, kept) * problem.weight[:, :, np.newaxis]
-    rough = problem.x[:, :, trial.group.columns]
-    if _taken(smooth, projection, left) < _NOT_NOISE * _taken(rough, projection, left):
-        return True
-    after = problem.losses(left - projection.rest(rough) @ trial.values)
-    before = np.minimum(problem.losses(left), 1.0)
-    return bool(np.any(after < _TAUTOLOGY * before)) and work.reads_torque(effect, kept)
-
-
-def _taken(columns: FloatArray, projection: Projection, left: FloatArray) -> float:
-    """Return the squares that weighted columns (R, n, p) take of what is left."""
-    flat = columns.reshape(-1, columns.shape[2])
-    own, aim = projection.products(flat), flat.T @ left.ravel()
-    values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
-    return float(2.0 * values @ aim - values @ own @ values)
-
-
-def _contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
-    """Return whether a cause says the same, or is freer and can make what another one makes."""
-    projection = project(problem, beside.free)
-    columns = projection.rest(problem.x[:, :, big.group.columns])
-    target = projection.rest(problem.x[:, :, small.group.columns]) @ small.values
-    squares = float(np.sum(target**2))
-    if np.sum((columns @ big.values - target) ** 2) < _SAME * squares:
-        return here.baseline is not None  # links do not change; a description of them may be off
-    if cost(big, here.settings) <= cost(small, here.settings):
-        return False
-    flat = columns.reshape(-1, big.group.size)
-    fit = np.linalg.lstsq(flat, target.ravel(), rcond=1e-6)[0]
-    return bool(np.sum((target.ravel() - flat @ fit) ** 2) < _CONTAINED * squares)

@@ -20,7 +20,8 @@ from armid_ros.diagnosis.search.held_out import held_out, Trial
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
-from armid_ros.diagnosis.search.step import Beside, next_step, Round, Step, Survey
+from armid_ros.diagnosis.search.round import Beside, Round
+from armid_ros.diagnosis.search.step import next_step, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
 from armid_ros.diagnosis.ties.ties import Ties

@@ -11,7 +11,7 @@ from typing import ClassVar
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.step import cost
+from armid_ros.diagnosis.search.round import cost
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.report.notation import percent, probability, with_interval
 from armid_ros.report.page import Section

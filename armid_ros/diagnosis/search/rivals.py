@@ -1,0 +1,83 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which of the causes that explain alike is taken, and which stay possible beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.diagnosis.data.rows import Problem, project
+from armid_ros.diagnosis.search.held_out import lead, Trial
+from armid_ros.diagnosis.search.round import Beside, cost, Round
+from armid_ros.effects import CATALOGUE
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: What contains a simpler cause makes all but this share of its torque; what differs from it by
+#: less is the same cause in other words.
+_CONTAINED, _SAME = 0.02, 1e-3
+
+
+def beaten(other: Trial, first: Trial, here: Round) -> bool:
+    """Return whether one trial is so far behind another that it is no rival."""
+    assert here.total is not None
+    thresholds = here.settings.thresholds
+    squares, z = lead(first, other)
+    if squares <= thresholds.tie * here.total * 0.5 and squares <= thresholds.far * first.gain:
+        return False
+    return z >= thresholds.rival_z or squares > thresholds.far * first.gain
+
+
+def likeliest(
+    tied: Sequence[Trial],
+    gains: dict[int, FloatArray],
+    problem: Problem,
+    beside: Beside,
+    here: Round,
+) -> Trial:
+    """
+    Return the simplest of the causes that leave no gap, or the best where each leaves one.
+
+    One cause that explains everything goes before two that do it together.
+
+    """
+    if len(tied) == 1:
+        return tied[0]
+    since = problem.fold_of_block[problem.block] >= 0
+    left = project(problem, beside.free).rest(problem.y)[since]
+    squares = np.sum(left**2, axis=0)
+    count = np.maximum(here.evidence.count, 1.0)
+    limits = here.evidence.limits(here.evidence.split(left, problem.weight[since]), here.settings)
+    able = [t for t in tied if np.all((squares - gains[id(t)]) / count <= limits)]
+    return simplest(able, here) if able else tied[0]
+
+
+def simplest(tied: Sequence[Trial], here: Round) -> Trial:
+    """
+    Return the cause with the least freedom.
+
+    Of causes as free as each other the one that takes more, and of those that take the same the
+    first in the catalogue, which goes from the common to the rare.
+
+    """
+    order = {name: position for position, name in enumerate(CATALOGUE)}
+    least = min(cost(trial, here.settings) for trial in tied)
+    simple = [t for t in tied if cost(t, here.settings) < least + 0.5]
+    most = max(trial.gain for trial in simple)
+    same = [t for t in simple if t.gain >= (1.0 - here.settings.thresholds.tie) * most]
+    return min(same, key=lambda t: order.get(t.group.effect.name, len(order)))
+
+
+def contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
+    """Return whether a cause says the same, or is freer and can make what another one makes."""
+    projection = project(problem, beside.free)
+    columns = projection.rest(problem.x[:, :, big.group.columns])
+    target = projection.rest(problem.x[:, :, small.group.columns]) @ small.values
+    squares = float(np.sum(target**2))
+    if np.sum((columns @ big.values - target) ** 2) < _SAME * squares:
+        return here.baseline is not None  # links do not change; a description of them may be off
+    if cost(big, here.settings) <= cost(small, here.settings):
+        return False
+    flat = columns.reshape(-1, big.group.size)
+    fit = np.linalg.lstsq(flat, target.ravel(), rcond=1e-6)[0]
+    return bool(np.sum((target.ravel() - flat @ fit) ** 2) < _CONTAINED * squares)

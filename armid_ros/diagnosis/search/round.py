@@ -1,0 +1,88 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a round of the search knows, and what a cause is worth in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.search.candidates import Group
+from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.refine import Workspace
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.motion import FloatArray
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Beside:
+    """
+    What is fitted beside every cause.
+
+    Attributes
+    ----------
+    free : tuple of int
+        Columns of the problem.
+    hold : ndarray, shape (f, f)
+        Precision that they are held with.
+    pull : ndarray, shape (f,)
+        What they are held to, times that.
+
+    """
+
+    free: tuple[int, ...]
+    hold: FloatArray
+    pull: FloatArray
+
+    def and_columns(self, group: Group) -> Beside:
+        """Return the same with the columns of a group."""
+        span = range(group.columns.start, group.columns.stop)
+        size = len(self.free) + len(span)
+        hold = np.zeros((size, size))
+        hold[: len(self.free), : len(self.free)] = self.hold
+        hold[len(self.free) :, len(self.free) :] = np.diag(group.precision)
+        return Beside((*self.free, *span), hold, np.concatenate([self.pull, np.zeros(len(span))]))
+
+
+@dataclass(frozen=True)
+class Round:
+    """
+    What a round of the search needs to know.
+
+    Attributes
+    ----------
+    evidence : Evidence
+        The data.
+    work : Workspace
+        What columns of other shapes are computed from.
+    settings : DiagnosisSettings
+        Library and thresholds.
+    total : float or None
+        Held-out squares that shares are of; those of this round if None.
+    baseline : Baseline or None
+        Recordings in which nothing was wrong.
+
+    """
+
+    evidence: Evidence
+    work: Workspace
+    settings: DiagnosisSettings
+    total: float | None
+    baseline: Baseline | None = None
+
+
+def worth(trial: Trial, here: Round) -> float:
+    """Return the share of the held-out squares that a trial takes, its freedom paid for."""
+    assert here.total is not None
+    price = here.settings.thresholds.price * cost(trial, here.settings)
+    return trial.gain / max(here.total, 1e-300) - price
+
+
+def cost(trial: Trial, settings: DiagnosisSettings) -> float:
+    """Return how many values and shapes the data chose, those of what is outlandish more."""
+    effect = trial.group.effect
+    shapes = len(effect.shapes) / max(len(effect.separate), 1)
+    outside = settings.thresholds.outside if effect.external else 0.0
+    return trial.freedom + shapes + outside
