@@ -209,10 +209,8 @@ def _at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
 def _left_by(explanation: Explanation) -> FloatArray:
     """Return the root mean square that an explanation leaves of each joint, (n,) [N m]."""
     evidence = explanation.evidence
-    squares = np.zeros_like(evidence.count)
-    for part, left in zip(evidence.data, explanation.fitted.residual, strict=True):
-        squares += np.sum(left**2, axis=0, where=part.told)
-    return np.sqrt(squares / np.maximum(evidence.count, 1.0))
+    newton_metres = (np.ones_like(evidence.count),) * len(evidence.data)
+    return np.sqrt(replace(evidence, sigma=newton_metres).losses(explanation.fitted.residual))
 
 
 def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings) -> bool:
