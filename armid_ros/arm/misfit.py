@@ -17,11 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import ModelError
-from armid_ros.files import finite, load_yaml, read_text, reading
+from armid_ros.files import finite, parsed_yaml, read_text, reading
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
-import yaml
 
 _DATA = ('held-out', 'training')
 
@@ -92,10 +91,7 @@ def load_misfit(path: str | Path) -> Misfit | None:
     path = Path(path)
     text = read_text(path, ModelError)
     with reading(path, ModelError):
-        try:
-            document = load_yaml(text)
-        except (yaml.YAMLError, ValueError) as error:
-            raise ModelError(f'not YAML: {" ".join(str(error).split())}') from error
+        document = parsed_yaml(text, ModelError)
         block = document.get('misfit') if isinstance(document, dict) else None
         return None if block is None else _misfit(block)
 

@@ -24,7 +24,7 @@ from armid_ros.effects import CATALOGUE, Effect, Kind
 from armid_ros.effects.tied import TIED, Tied, TiedKind
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.files import finite, is_file, load_yaml, read_text, reading, write_file
+from armid_ros.files import finite, is_file, parsed_yaml, read_text, reading, write_file
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot, Robot
@@ -180,10 +180,7 @@ def load_model(path: str | Path, robot: Robot | None = None) -> ArmModel:
     path = Path(path)
     text = read_text(path, ModelError)
     with reading(path, ModelError):
-        try:
-            document = load_yaml(text)
-        except (yaml.YAMLError, ValueError) as error:
-            raise ModelError(f'not YAML: {" ".join(str(error).split())}') from error
+        document = parsed_yaml(text, ModelError)
         if not isinstance(document, dict) or document.get('schema') != SCHEMA:
             raise ModelError(f"not an arm model; its 'schema' has to be {SCHEMA}")
         return _arm(document, robot or _described(path, str(document['robot'])))

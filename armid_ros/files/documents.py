@@ -85,6 +85,14 @@ def finite(value: Any, what: str) -> float:
     return number
 
 
+def parsed_yaml(text: str, error: type[ArmidError]) -> Any:
+    """Return what a text in YAML says, as `load_yaml`; what is none is an error of the package."""
+    try:
+        return load_yaml(text)
+    except (yaml.YAMLError, ValueError) as fault:
+        raise error(f'not YAML: {" ".join(str(fault).split())}') from fault
+
+
 def load_yaml(text: str) -> Any:
     """
     Return what a text in YAML says, as plain types.
