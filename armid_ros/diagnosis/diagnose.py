@@ -170,7 +170,7 @@ def diagnose(
         small = tuple(one for one in result.findings if one.share < least)
         return replace(result, findings=large, minor=(*small, *result.minor))
     tell(0.02, 'filtering')
-    used = choose_filters([*recordings, *baseline], settings)
+    used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
     gate = check_data(arm, recordings, data)
     faults, notes = list(gate.faults), [*gate.notes]

@@ -11,6 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.checks import check_motion, check_torque
+from armid_ros.identification.cutoff import cutoff_of_torques
 from armid_ros.identification.damage import without_damage
 from armid_ros.identification.excited import excited
 from armid_ros.identification.halves import halves_error
@@ -231,6 +232,8 @@ def identify(
     # inertia of a motion that is taken as slow: as described, unless bodies are fitted to weight
     described = arm.quasi_static and settings.physical is None
     whole = replace(arm, quasi_static=False) if described else arm
+    if settings.signals.cutoff_hz is None:
+        used = cutoff_of_torques(whole, theory.independent, recordings, used)
     columns = regressions(whole, theory.independent, recordings, used, progress)
     samples = sum(len(part.motion) for part in columns)
     if samples * arm.robot.n_joints < 2 * theory.rank:

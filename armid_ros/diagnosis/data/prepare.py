@@ -11,7 +11,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import trajectories, Trajectory
 from armid_ros.diagnosis.data.floor import Floor, noise_floor
 from armid_ros.diagnosis.search.fit import excited, fit
+from armid_ros.diagnosis.search.question import with_friction
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.identification.cutoff import cutoff_of_torques
 from armid_ros.identification.interaction_recording import band_of_motion
 from armid_ros.identification.signals import Conditioning, conditioning, MODEL_BANDS
 from armid_ros.model import BaseParameters
@@ -64,9 +66,24 @@ class Prepared:
         return [floor.sigma for floor in self.floors]
 
 
-def choose_filters(recordings: Sequence[Recording], settings: DiagnosisSettings) -> Conditioning:
-    """Return the filters of an identification, narrowed to what a diagnosis needs."""
-    used = conditioning(list(recordings), settings.signals)
+def choose_filters(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    baseline: Sequence[Recording],
+    settings: DiagnosisSettings,
+    rng: np.random.Generator,
+) -> Conditioning:
+    """
+    Return the filters of an identification, narrowed to what a diagnosis needs.
+
+    What noise of positions does is seen best where nothing is wrong.
+
+    """
+    used = conditioning([*recordings, *baseline], settings.signals)
+    if settings.partner is None and settings.signals.cutoff_hz is None:
+        beside, _ = with_friction(arm)
+        told = beside.base_parameters(rng).independent
+        used = cutoff_of_torques(beside, told, baseline or recordings, used)
     if settings.partner is not None:
         return band_of_motion(recordings, used, settings.signals, _NARROW)
     if settings.signals.decimation is not None:
