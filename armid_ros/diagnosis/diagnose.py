@@ -198,7 +198,7 @@ def diagnose(
         written = None if misfit is None else misfit.of(arm.robot)
         chosen = explained(arm, prepared, known, settings, rng, tell, written)
         unseen = _unseen(validate, chosen.explanation, prepared, chosen)
-        if _harmed(chosen, chosen.explanation, unseen, settings):
+        if chosen.explanation.steps and not _helps(chosen.explanation, unseen):
             chosen = _second_choice(chosen, (arm, prepared, known, settings, rng, tell, written))
     notes += chosen.notes
     explanation, remarks = as_bodies(chosen.explanation, arm)
@@ -206,6 +206,13 @@ def diagnose(
         replace(chosen, explanation=explanation, notes=(*notes, *remarks)),
         (arm, gate, prepared, validate, settings, rng, tell),
     )
+
+
+def _helps(explanation: Explanation, unseen: Evidence | None) -> bool:
+    """Return whether names make all joints together better on data they were not fitted to."""
+    if unseen is None:
+        return True
+    return attribute(explanation, unseen).share(range(len(explanation.steps))) > 0.0
 
 
 def _second_choice(chosen: Chosen, asked: _Asked) -> Chosen:
@@ -255,9 +262,11 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     patched = explanation.fitted.arm
     if worse:
         names = ', '.join(one.name.replace('_', ' ') for one in found)
-        notes.append(f'{names} would make the model worse in {", ".join(worse)}: not patched')
-        found, patched = (), arm
-        explanation = explanation.withdrawn()
+        notes.append(
+            f'{names} would make the model worse in {", ".join(worse)}, of which the model as given '
+            'is off as well: not patched'
+        )
+        patched = arm
     pattern = None
     if not explanation.steps and explanation.base is not None:
         pattern = find_pattern(explanation, arm, evidence.data, evidence.sigma)
@@ -265,10 +274,13 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
         notes.append(pattern.sentence)
     data = [part for part in evidence.data if not part.before]
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
-    left = [_left(explanation, _sure(evidence, chosen), settings, 'the recordings')]
+    rest = explanation
+    if chosen.rest is not None and explanation.steps:
+        rest = _with_names_of(chosen.rest, explanation)
+    left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings')]
     if unseen is not None:
         sure, more = _sure(unseen, chosen), settings.thresholds.predicted
-        left.append(_left(explanation, sure, settings, 'recordings that were not used', more))
+        left.append(_left(rest, sure, settings, 'recordings that were not used', more))
     word = decide(
         found,
         floors if measured else (),
@@ -302,6 +314,15 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
     )
+
+
+def _with_names_of(rest: Explanation, explanation: Explanation) -> Explanation:
+    """Return an explanation with the names that are left of it in another one."""
+    kept = {id(step) for step in explanation.steps}
+    gone = [k for k, step in enumerate(rest.steps) if id(step) not in kept]
+    for k in reversed(gone):
+        rest = rest.without(k)
+    return rest
 
 
 def _headline(

@@ -32,6 +32,8 @@ _LOWEST = 1.0 / 32.0
 _STRETCHES = 16
 #: Rows that are enough to compare cut-offs, some hundred for every parameter of seven joints.
 _ROWS = 6000
+#: Directions of the columns with less than this share of the squares are dependent.
+_DEPENDENT = 1e-10
 
 
 def cutoff_of_torques(
@@ -130,7 +132,9 @@ def _fit(
     """Fit weighted rows by least squares, shape (r,)."""
     weights = told * weight
     rows = (x * weights[:, :, np.newaxis]).reshape(-1, x.shape[2])
-    size = np.sqrt(np.sum(rows**2, axis=0))
-    size[size == 0.0] = 1.0
-    rows = rows / size
-    return np.asarray(np.linalg.lstsq(rows, (y * weights).ravel(), rcond=1e-6)[0] / size)
+    own = rows.T @ rows
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-300))
+    values, vectors = np.linalg.eigh(own * np.outer(scale, scale))
+    good = values > _DEPENDENT * max(float(values[-1]), 1e-300)
+    basis = scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good])
+    return np.asarray(basis @ (basis.T @ (rows.T @ (y * weights).ravel())))

@@ -16,10 +16,11 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
-from armid_ros.diagnosis.data.rows import fold_rows
+from armid_ros.diagnosis.data.rows import fold_rows, weighted_rows
 from armid_ros.diagnosis.search.candidates import sensitivity_rows
-from armid_ros.diagnosis.search.fit import excited
+from armid_ros.diagnosis.search.fit import excited, Told
 from armid_ros.effects import Effect
+from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -82,15 +83,18 @@ class Baseline:
             worst / np.maximum(others**2, 1e-300),
         )
 
-    def values(
-        self, arm: ArmModel, effect: Effect, kept: Sequence[int], precision: FloatArray
-    ) -> FloatArray:
-        """Return the values of an effect that explain most of these recordings, shape (p,)."""
-        own, aim = np.diag(precision), np.zeros(len(kept))
-        for part, left in zip(self.data, self.residual, strict=True):
-            weight = part.told / self.misfit
-            columns = sensitivity_rows(arm, effect, part)[:, :, list(kept)]
-            columns = columns * weight[:, :, np.newaxis]
-            own = own + np.einsum('rnp,rnq->pq', columns, columns)
-            aim = aim + np.einsum('rnp,rn->p', columns, left * weight)
-        return np.asarray(np.linalg.lstsq(own, aim, rcond=1e-8)[0])
+    def told(self, arm: ArmModel, base: BaseParameters) -> Told:
+        """Return what these recordings tell of what is free of an arm."""
+        rows = [
+            part.reduce(arm.columns(part.motion)[:, :, base.independent]) for part in self.data
+        ]
+        left = [part.residual(arm) for part in self.data]
+        return Told(self.data, self._weighted(rows), self._weighted(left))
+
+    def columns(self, arm: ArmModel, effect: Effect, kept: Sequence[int]) -> FloatArray:
+        """Return the columns of an effect over the misfit, one row a row and joint, (S, p)."""
+        rows = [sensitivity_rows(arm, effect, part)[:, :, list(kept)] for part in self.data]
+        return np.concatenate([part.reshape(-1, len(kept)) for part in self._weighted(rows)])
+
+    def _weighted(self, rows: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+        return tuple(weighted_rows(rows, self.data, [self.misfit] * len(self.data)))

@@ -11,16 +11,15 @@ where there are recordings from before, no cause is named that a body common to 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
-from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.prepare import Prepared
-from armid_ros.diagnosis.search.explain import explain, Explanation, View
+from armid_ros.diagnosis.search.explain import explain, Explanation
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.held_out import held_out
 from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -48,6 +47,8 @@ class Chosen:
         What the floor of the gap is.
     notes : tuple of str
         What a reader should know.
+    rest : Explanation or None
+        The same names beside a body that is common to both days, which tells what they leave.
 
     """
 
@@ -55,6 +56,7 @@ class Chosen:
     misfit: FloatArray
     floor_in_words: str
     notes: tuple[str, ...] = ()
+    rest: Explanation | None = None
 
 
 def explained(
@@ -155,49 +157,51 @@ def _since(
     """Explain what has changed since the baseline."""
     tell(0.2, 'what has changed')
     noise = prepared.as_told
-    sigma = tuple(np.maximum(one, baseline.misfit) for one in noise)
+    misfit = baseline.misfit * _louder(prepared, baseline)
+    sigma = tuple(np.maximum(one, misfit) for one in noise)
     evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
-    given = as_given(arm, prepared.data, 2 * settings.thresholds.few_causes)
-    found = explain(given, evidence, settings, baseline=baseline)
+    most = 2 * settings.thresholds.few_causes
+    free = fitted_anew(arm, [*prepared.data, *baseline.data], most, rng)
+    assert free.base is not None and free.beside_base is not None
+    told = baseline.told(free.arm, free.base)
+    beside = told if free.beside is arm else baseline.told(free.beside, free.beside_base)
+    question = replace(free, told=told, beside_told=beside)
+    found = explain(question, evidence, settings, baseline=baseline)
     if not found.steps:
-        return Chosen(found, baseline.misfit, OWN_MISFIT)
-    tell(0.7, 'a body common to both')
-    both = _with_before(evidence, baseline)
-    anew = fitted_anew(arm, both.data, settings.thresholds.few_causes, rng)
-    whole, common = _common_body(arm, evidence, both, anew)
-    ahead = found.steps[0].trial.gains - (whole - common)
-    if ahead.sum() > settings.thresholds.tie * whole.sum():
-        return Chosen(found, baseline.misfit, OWN_MISFIT)
-    note = (
-        'the baseline did not determine the model for these motions: a rigid body and friction '
-        'common to both were fitted'
+        return Chosen(found, misfit, OWN_MISFIT)
+    return Chosen(_in_model_as_given(found), misfit, OWN_MISFIT, rest=found)
+
+
+def _louder(prepared: Prepared, baseline: Baseline) -> FloatArray:
+    """
+    Return by how much more torque the data have than the baseline, at least 1, shape (n,).
+
+    What a model gets wrong of an arm grows with what the arm does.
+
+    """
+    now, before = (_torque_rms(data) for data in (prepared.data, baseline.data))
+    return np.maximum(now / np.maximum(before, 1e-12), 1.0)
+
+
+def _torque_rms(data: Sequence[Trajectory]) -> FloatArray:
+    unit = tuple(np.ones(part.motion.n_joints) for part in data)
+    return Evidence(tuple(data), unit, unit).torque_rms
+
+
+def _in_model_as_given(found: Explanation) -> Explanation:
+    """Return what the names explain beside a rigid body that stays as it is."""
+    arm, evidence, fitted = found.given, found.evidence, found.fitted
+    reference = fit(arm, (), evidence.data, evidence.sigma, None)
+    alone = fit(
+        arm,
+        fitted.named,
+        evidence.data,
+        evidence.sigma,
+        None,
+        fitted.values,
+        known=fitted.estimate,
     )
-    return Chosen(explain(anew, both, settings), baseline.misfit, OWN_MISFIT, (note,))
-
-
-def _with_before(evidence: Evidence, baseline: Baseline) -> Evidence:
-    """Return the data with the baseline, in which nothing that is named acts."""
-    before = tuple(replace(part, before=True) for part in baseline.data)
-    unit = (baseline.misfit,) * len(before)
-    return Evidence(
-        (*evidence.data, *before),
-        (*evidence.sigma, *unit),
-        (*evidence.noise, *unit),
-        evidence.varies,
-    )
-
-
-def _common_body(
-    arm: ArmModel, evidence: Evidence, both: Evidence, anew: Question
-) -> tuple[FloatArray, FloatArray]:
-    """Return the held-out squares of the model as given, and of one fitted to both, (B,)."""
-    common = fit(arm, (), both.data, both.sigma, anew.base)
-    problem = View.of(common, both).problem
-    free = tuple(range(problem.x.shape[2]))
-    _, left = held_out(problem, free, [], common.hold, common.pull)
-    alone = fit(arm, (), evidence.data, evidence.sigma, None)
-    _, whole = held_out(View.of(alone, evidence).problem, (), [], np.zeros((0, 0)), np.zeros(0))
-    return whole, left
+    return replace(found, base=None, told=None, fitted=alone, reference=reference)
 
 
 def _at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:

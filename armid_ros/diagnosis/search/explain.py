@@ -19,13 +19,13 @@ from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import make_problem, Problem
 from armid_ros.diagnosis.search.candidates import Candidates, candidates, Group
-from armid_ros.diagnosis.search.fit import fit, Fitted
+from armid_ros.diagnosis.search.fit import fit, Fitted, Told
 from armid_ros.diagnosis.search.held_out import held_out, Trial
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
-from armid_ros.diagnosis.search.round import Beside, Round
+from armid_ros.diagnosis.search.round import Before, Beside, Round
 from armid_ros.diagnosis.search.step import acceptable, material, next_step, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.model import BaseParameters
@@ -56,6 +56,8 @@ class Explanation:
         The data.
     minor : tuple of Trial
         Causes of the last look that are there beyond chance and do not matter.
+    told : Told or None
+        What other data tell of what was free.
 
     """
 
@@ -67,6 +69,7 @@ class Explanation:
     survey: Survey | None
     evidence: Evidence
     minor: tuple[Trial, ...] = ()
+    told: Told | None = None
 
     def without(self, name: int) -> Explanation:
         """Return the explanation without one of its names, the others fitted anew."""
@@ -78,6 +81,7 @@ class Explanation:
             self.evidence.sigma,
             self.base,
             [self.fitted.values[k] for k in keep],
+            self.told,
         )
         minor = (*self.minor, self.steps[name].trial)
         steps = tuple(self.steps[k] for k in keep)
@@ -107,22 +111,49 @@ def explain(
 ) -> Explanation:
     """Take causes as long as any passes, then name the friction that matters, and prune."""
     found = _forward(question, evidence, settings, start, baseline)
+    width = max((trial.gain for trial in found[5].ranking), default=0.0) if found[5] else 0.0
+    if any(_undecided(step, width) for step in found[1][len(start) :]):
+        found = _forward(question, evidence, settings, start, baseline, width)
+    found = found[:5]
     named, steps, values, survey, minor = found
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
     kept = _friction(question, named, values, evidence, settings, whole)
     named = [*named, *(own for own, _, _ in kept)]
     steps = [*steps, *(step for _, step, _ in kept)]
     values = [*values, *(value for _, _, value in kept)]
-    reference = fit(question.arm, (), evidence.data, evidence.sigma, question.base)
+    reference = fit(
+        question.arm, (), evidence.data, evidence.sigma, question.base, (), question.told
+    )
     named, steps, fitted = _pruned(question, named, steps, values, evidence, settings)
     taken = {own.effect.name for own in named}
     small = tuple(trial for trial in minor if trial.group.effect.name not in taken)
     return Explanation(
-        question.arm, question.base, fitted, reference, tuple(steps), survey, evidence, small
+        question.arm,
+        question.base,
+        fitted,
+        reference,
+        tuple(steps),
+        survey,
+        evidence,
+        small,
+        question.told,
     )
 
 
-_Found = tuple[list[Named], list[Step], list[FloatArray], Survey | None, tuple[Trial, ...]]
+def _undecided(step: Step, width: float) -> bool:
+    """Tell whether a cause was taken for a lead over a simpler one that decides nothing."""
+    close = [t for t in step.ranking if 0.0 < t.gain and step.trial.gain - t.gain <= width]
+    return any(t is not step.trial and t.freedom < step.trial.freedom - 0.5 for t in close)
+
+
+_Found = tuple[
+    list[Named],
+    list[Step],
+    list[FloatArray],
+    Survey | None,
+    tuple[Trial, ...],
+    Survey | None,
+]
 
 
 def _forward(
@@ -131,6 +162,7 @@ def _forward(
     settings: DiagnosisSettings,
     start: Sequence[tuple[Named, Step, FloatArray]],
     baseline: Baseline | None,
+    width: float = 0.0,
 ) -> _Found:
     """Take the cause that explains most, and ask again, until none passes."""
     data, sigma = evidence.data, evidence.sigma
@@ -138,10 +170,11 @@ def _forward(
     steps = [row[1] for row in start]
     values = [row[2] for row in start]
     arm, base = question.beside, question.beside_base
-    current = fit(arm, named, data, sigma, base, values)
+    current = fit(arm, named, data, sigma, base, values, question.beside_told)
     total: float | None = None
     survey: Survey | None = None
     minor: tuple[Trial, ...] = ()
+    look: Survey | None = None
     found: Candidates | None = None
     problem, beside = None, None
     for _ in range(question.most):
@@ -150,7 +183,10 @@ def _forward(
             problem, beside = _problem(found, current, evidence)
         assert problem is not None and beside is not None
         work = Workspace(memoized_arm(current.arm), data)
-        here = Round(evidence, work, settings, total, baseline)
+        before = None
+        if baseline is not None and question.beside_told is not None:
+            before = Before(baseline, question.beside_told, current.change)
+        here = Round(evidence, work, settings, total, before, width)
         step, look, problem = next_step(problem, beside, found.groups, here)
         total, survey, minor = look.total, survey or look, look.there
         if step is None:
@@ -164,10 +200,10 @@ def _forward(
         if group.effect.linear and not group.effect.shapes:
             beside = beside.and_columns(group)
         else:
-            current = fit(arm, named, data, sigma, base, values)
+            current = fit(arm, named, data, sigma, base, values, question.beside_told)
             named, values = list(current.named), list(current.values)
             found = None
-    return named, steps, values, survey, minor
+    return named, steps, values, survey, minor, look
 
 
 def _problem(found: Candidates, current: Fitted, evidence: Evidence) -> tuple[Problem, Beside]:
@@ -290,7 +326,9 @@ def _friction(
         return []
     arm, base = question.beside, question.beside_base
     assert base is not None
-    fitted = fit(arm, named, evidence.data, evidence.sigma, base, values)
+    fitted = fit(
+        arm, named, evidence.data, evidence.sigma, base, values, question.beside_told
+    )
     view = View.of(fitted, evidence)
     where = {int(column): k for k, column in enumerate(base.independent)}
     names = [(p.name, p.joint) for p in arm.parameters]
@@ -314,7 +352,7 @@ def _friction(
             good = False
             if trial is not None:
                 here = Round(evidence, work, settings, total)
-                gains = trial.joint_gains(problem, beside.free)
+                gains = trial.joint_gains(problem, problem.x[:, :, group.columns], beside.rows(problem))
                 good = acceptable(trial, here, whole[1]) and material(gains, here)
                 judged[k] = trial, total
             gain = trial.gain if trial is not None else -np.inf
@@ -345,7 +383,7 @@ def _pruned(
     data, sigma = evidence.data, evidence.sigma
     named, steps, values = list(named), list(steps), list(values)
     while True:
-        fitted = fit(question.arm, named, data, sigma, question.base, values)
+        fitted = fit(question.arm, named, data, sigma, question.base, values, question.told)
         if not named:
             return named, steps, fitted
         view = View.of(fitted, evidence)
@@ -362,7 +400,7 @@ def _pruned(
                 needless.append((-np.inf, k))
                 continue
             here = Round(evidence, work, settings, step.total)
-            gains = trial.joint_gains(problem, beside.free)
+            gains = trial.joint_gains(problem, problem.x[:, :, group.columns], beside.rows(problem))
             if not (acceptable(trial, here, step.tried) and material(gains, here)):
                 needless.append((trial.gain, k))
         if not needless:

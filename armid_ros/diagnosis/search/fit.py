@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
@@ -56,6 +57,8 @@ class Fitted:
         All values of each named effect.
     hold : ndarray, shape (f, f)
         Precision that what was free is held with, and ``pull``, shape (f,), what to, times that.
+    change : ndarray, shape (r,)
+        What was added to the base parameters that were free.
 
     """
 
@@ -68,6 +71,60 @@ class Fitted:
     values: tuple[FloatArray, ...]
     hold: FloatArray
     pull: FloatArray
+    change: FloatArray
+
+
+@dataclass(frozen=True)
+class Told:
+    """
+    What other data tell of base parameters.
+
+    Attributes
+    ----------
+    data : tuple of Trajectory
+        Those data.
+    rows : tuple of ndarray, each (M, n, r)
+        Their columns over the unit of the gap.
+    rest : tuple of ndarray, each (M, n)
+        What the arm leaves of them, over the unit.
+
+    """
+
+    data: tuple[Trajectory, ...]
+    rows: tuple[FloatArray, ...]
+    rest: tuple[FloatArray, ...]
+
+    @cached_property
+    def columns(self) -> FloatArray:
+        """A row for every joint and sample, shape (S, r)."""
+        return np.concatenate([rows.reshape(-1, rows.shape[2]) for rows in self.rows])
+
+    @cached_property
+    def left(self) -> FloatArray:
+        """What is left in these rows, shape (S,)."""
+        return np.concatenate([rest.ravel() for rest in self.rest])
+
+    @cached_property
+    def precision(self) -> FloatArray:
+        """Products of the columns, shape (r, r)."""
+        return np.asarray(self.columns.T @ self.columns)
+
+    @cached_property
+    def aim(self) -> FloatArray:
+        """Products of the columns with what is left, shape (r,)."""
+        return np.asarray(self.columns.T @ self.left)
+
+    def regressions(self, change: FloatArray, named: int) -> list[Regression]:
+        """Return the data as a problem in which so many more columns do not act."""
+        return [
+            Regression(
+                part.at_rows.with_torque(rest - rows @ change),
+                np.concatenate([rows, np.zeros((*rest.shape, named))], axis=2),
+                part.told,
+                part.source,
+            )
+            for part, rows, rest in zip(self.data, self.rows, self.rest, strict=True)
+        ]
 
 
 def excited(
@@ -96,6 +153,8 @@ def fit(
     sigma: Sequence[FloatArray],
     base: BaseParameters | None,
     start: Sequence[FloatArray] = (),
+    told: Told | None = None,
+    known: Estimate | None = None,
 ) -> Fitted:
     """
     Fit what is free.
@@ -114,26 +173,39 @@ def fit(
         What is free of the arm; None keeps it as it is.
     start : sequence of ndarray
         Values of the named effects to start from; zero by default.
+    told : Told, optional
+        What other data tell of what is free of the arm.
+    known : Estimate, optional
+        Of the named effects, whose values and shapes stay as they are.
 
     """
     values = list(start) or [np.zeros(len(n.effect.parameters(arm.robot))) for n in named]
     state = Patch(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
     pull = np.zeros((0, 0)) if base is None else _described(base, arm)
+    aim = np.zeros(len(pull))
+    if told is not None and base is not None:
+        pull, aim = pull + told.precision, told.aim
     residual = _residuals(state, data)
-    loss = _loss(residual, data, sigma)
-    rounds = _MOST_ROUNDS if named else int(base is not None)
+
+    def loss_of(patch: Patch, left: Sequence[FloatArray]) -> float:
+        held = patch.change @ pull @ patch.change - 2.0 * aim @ patch.change
+        return _loss(left, data, sigma) + float(held)
+
+    loss = loss_of(state, residual)
+    rounds = _MOST_ROUNDS if named else int(base is not None and told is None)
+    rounds = 0 if known is not None else rounds
     columns = [patch_columns(state, part, base) for part in data]
     for _ in range(rounds):
-        step = _step(columns, residual, data, sigma, pull, state.change)
+        step = _step(columns, residual, data, sigma, pull, aim - pull @ state.change)
         moved, after = state, residual
         for share in (1.0, 0.5, 0.2):
             trial = state.moved(share * step, base)
             left = _residuals(trial, data)
-            if _loss(left, data, sigma) < loss:
+            if loss_of(trial, left) < loss:
                 moved, after = trial, left
                 break
-        new = _loss(after, data, sigma)
-        settled = loss - new < 1e-4 * max(new, 1e-12)
+        new = loss_of(moved, after)
+        settled = loss - new < 1e-4 * max(abs(new), 1e-12)
         if moved is not state:
             columns = [patch_columns(moved, part, base) for part in data]
         state, residual, loss = moved, after, new
@@ -141,22 +213,27 @@ def fit(
             break
     size = 0 if base is None else base.rank
     names, numbers = state.parameters()
-    covariance = np.zeros((size, size))
-    if named:
-        covariance = _covariance(columns, residual, data, sigma)
+    estimate = known
+    if estimate is None:
+        covariance = np.zeros((size, size))
+        if named:
+            more = [] if told is None else told.regressions(state.change, len(numbers))
+            covariance = _covariance(columns, residual, data, sigma, more)
+        estimate = Estimate(names, numbers, covariance[size:, size:])
     whole = columns[0].shape[2]
     hold, held_to = np.zeros((whole, whole)), np.zeros(whole)
-    hold[:size, :size], held_to[:size] = pull, -pull @ state.change
+    hold[:size, :size], held_to[:size] = pull, aim - pull @ state.change
     return Fitted(
         state.model,
         state.named,
-        Estimate(names, numbers, covariance[size:, size:]),
+        estimate,
         tuple(residual),
         tuple(columns),
         state.arm,
         state.values,
         hold,
         held_to,
+        state.change,
     )
 
 
@@ -198,8 +275,8 @@ def _step(
     residual: Sequence[FloatArray],
     data: Sequence[Trajectory],
     sigma: Sequence[FloatArray],
+    hold: FloatArray,
     pull: FloatArray,
-    change: FloatArray,
 ) -> FloatArray:
     """Solve with weights, the description pulling; what nothing tells gets no step."""
     size = columns[0].shape[2]
@@ -209,9 +286,9 @@ def _step(
         flat = block.reshape(-1, size)
         own += flat.T @ flat
         aim += flat.T @ left.ravel()
-    known = len(change)
-    own[:known, :known] += pull
-    aim[:known] -= pull @ change
+    known = len(pull)
+    own[:known, :known] += hold
+    aim[:known] += pull
     diagonal = np.diag(own)
     seen = diagonal > _ROUNDING * diagonal.max(initial=1e-300)
     scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, diagonal, 1.0)), 0.0)
@@ -226,11 +303,13 @@ def _covariance(
     residual: Sequence[FloatArray],
     data: Sequence[Trajectory],
     sigma: Sequence[FloatArray],
+    more: Sequence[Regression] = (),
 ) -> FloatArray:
     """Return the covariance, colour of the residual included; infinite where others make it."""
     size = columns[0].shape[2]
     weighted = list(weighted_rows(columns, data, sigma))
-    stacked = np.concatenate([block.reshape(-1, size) for block in weighted])
+    every = [*weighted, *(part.columns for part in more)]
+    stacked = np.concatenate([block.reshape(-1, size) for block in every])
     names = tuple(ParameterName(str(k), '', '') for k in range(size))
     kept = group_columns(stacked, names, tolerance=1e-5).independent
     lefts = weighted_rows(residual, data, sigma)
@@ -243,6 +322,7 @@ def _covariance(
         )
         for part, block, left in zip(data, weighted, lefts, strict=True)
     ]
+    problem += [part.restrict(kept) for part in more]
     covariance = np.diag(np.full(size, np.inf))
     if not len(kept):
         return covariance

@@ -53,8 +53,6 @@ class Trial:
         The free values without each part, changed by the group, and ``held_alone`` without it.
     piece : ndarray of int, shape (B,)
         The part that each block is left out with.
-    before : ndarray, shape (p,), or None
-        Values that it had before, of which what they explain is not new.
 
     """
 
@@ -69,7 +67,6 @@ class Trial:
     held_free: FloatArray
     held_alone: FloatArray
     piece: npt.NDArray[np.intp]
-    before: FloatArray | None = None
 
     @property
     def gains(self) -> FloatArray:
@@ -104,23 +101,34 @@ class Trial:
         """Parts of the data that lose squares."""
         return int(np.sum(np.bincount(self.piece, self.gains) > 0.0))
 
-    def joint_gains(self, problem: Problem, free: Sequence[int]) -> FloatArray:
-        """Return the squares that go in every joint, shape (n,)."""
+    def joint_gains(self, problem: Problem, own: FloatArray, beside: FloatArray) -> FloatArray:
+        """
+        Return the squares that go in every joint, shape (n,).
+
+        What the group spares the data that hold the free values is shared out among the joints.
+
+        Parameters
+        ----------
+        problem : Problem
+            The rows.
+        own : ndarray, shape (R, n, p)
+            Columns of the group.
+        beside : ndarray, shape (R, n, f)
+            Columns that were free.
+
+        """
         piece = np.where(problem.fold_of_block < 0, -1, 0)
         piece[problem.fold_of_block >= 0] = self.piece
         piece = piece[problem.block]
-        own = problem.x[:, :, self.group.columns]
-        left = problem.y.copy()
-        torque = np.einsum('rnp,rp->rn', own, self.held_values[piece])
-        if len(free):
-            beside = problem.x[:, :, list(free)]
-            left -= np.einsum('rnf,rf->rn', beside, self.held_alone[piece])
-            change = self.held_free - self.held_alone
-            torque += np.einsum('rnf,rf->rn', beside, change[piece])
-        if self.before is not None:
-            known = own @ self.before
-            left, torque = left - known, torque - known
-        return np.asarray(np.sum((2.0 * torque * left - torque**2)[piece >= 0], axis=0))
+        gains = np.zeros(problem.y.shape[1])
+        for part in range(len(self.held_values)):
+            rows = piece == part
+            left = problem.y[rows] - beside[rows] @ self.held_alone[part]
+            torque = own[rows] @ self.held_values[part]
+            torque += beside[rows] @ (self.held_free[part] - self.held_alone[part])
+            gains += np.sum(2.0 * torque * left - torque**2, axis=0)
+        seen = float(gains.sum())
+        return np.asarray(gains * max(self.gain / seen, 1.0) if seen > 0.0 else gains)
 
 
 def lead(first: Trial, other: Trial) -> tuple[float, float]:
@@ -195,6 +203,59 @@ def products(problem: Problem, free: Sequence[int], groups: Sequence[Group]) -> 
     )
 
 
+def with_group(known: Products, problem: Problem, beside: FloatArray, own: FloatArray) -> Products:
+    """
+    Return the products of one group beside what is free.
+
+    Parameters
+    ----------
+    known : Products
+        Of what is free.
+    problem : Problem
+        The rows.
+    beside : ndarray, shape (R, n, f)
+        Columns that are free.
+    own : ndarray, shape (R, n, p)
+        Columns of the group.
+
+    """
+    blocks, size = len(known.power), own.shape[2]
+    border = np.empty((blocks, beside.shape[2], size))
+    target, inner = np.empty((blocks, size)), np.empty((blocks, size, size))
+    for block in range(blocks):
+        rows = problem.block == block
+        x = own[rows].reshape(-1, size)
+        border[block] = beside[rows].reshape(len(x), -1).T @ x
+        target[block] = x.T @ problem.y[rows].ravel()
+        inner[block] = x.T @ x
+    return replace(
+        known,
+        border=border,
+        target=target,
+        diagonal=np.diagonal(inner, axis1=1, axis2=2),
+        own=(inner,),
+    )
+
+
+def with_own_again(known: Products) -> Products:
+    """Return the products of one group that is free as well, ahead of what else is free."""
+    inner, border = known.own[0], known.border
+    across = np.swapaxes(border, 1, 2)
+    free = np.concatenate(
+        [
+            np.concatenate([inner, across], axis=2),
+            np.concatenate([border, known.free], axis=2),
+        ],
+        axis=1,
+    )
+    return replace(
+        known,
+        free=free,
+        aim=np.concatenate([known.target, known.aim], axis=1),
+        border=np.concatenate([inner, border], axis=1),
+    )
+
+
 @dataclass(frozen=True)
 class _Base:
     """What is free, fitted to some blocks."""
@@ -226,7 +287,7 @@ def held_out(
     groups: Sequence[Group],
     hold: FloatArray,
     pull: FloatArray,
-    before: Sequence[FloatArray] | None = None,
+    whole: bool = True,
 ) -> tuple[list[Trial], FloatArray]:
     """
     Try every group beside what is free.
@@ -243,8 +304,9 @@ def held_out(
         Precision that free values are held with.
     pull : ndarray, shape (f,)
         What they are held to, times that.
-    before : sequence of ndarray, optional
-        Values that the groups had before; what they explain with those is not new.
+    whole : bool
+        Whether what holds the free values counts as data: what a group spares them there is a
+        gain as well.
 
     Returns
     -------
@@ -254,16 +316,27 @@ def held_out(
         Held-out squares without any of them.
 
     """
-    known = products(problem, free, groups)
-    whole = np.ones(len(known.power), dtype=bool)
+    return tried_beside(products(problem, free, groups), problem, groups, hold, pull, whole)
+
+
+def tried_beside(
+    known: Products,
+    problem: Problem,
+    groups: Sequence[Group],
+    hold: FloatArray,
+    pull: FloatArray,
+    whole: bool = True,
+) -> tuple[list[Trial], FloatArray]:
+    """Try every group, of which products are known; see `held_out`."""
+    every = np.ones(len(known.power), dtype=bool)
     folding = problem.fold_of_block
-    everything = _Base.of(known, whole, hold, pull)
+    everything = _Base.of(known, every, hold, pull)
     bases = [_Base.of(known, folding != part, hold, pull) for part in range(folding.max() + 1)]
     power = _left(known, bases, folding)
-    values = [None] * len(groups) if before is None else before
+    counted = (hold, pull) if whole else (np.zeros_like(hold), np.zeros_like(pull))
     trials = [
-        _tried(known, group, k, everything, bases, folding, old)
-        for k, (group, old) in enumerate(zip(groups, values, strict=True))
+        _tried(known, group, k, everything, bases, folding, counted)
+        for k, group in enumerate(groups)
     ]
     asked = problem.fold_of_block >= 0
     return [
@@ -290,7 +363,7 @@ def _tried(
     everything: _Base,
     bases: Sequence[_Base],
     folding: npt.NDArray[np.intp],
-    old: FloatArray | None = None,
+    counted: tuple[FloatArray, FloatArray],
 ) -> Trial | None:
     span, own = group.columns, known.own[position]
     hold = np.diag(group.precision)
@@ -304,7 +377,7 @@ def _tried(
     aim = target.sum(axis=0) - everything.border[:, span].T @ everything.theta
     inverse = _inverse(rest + hold, whole)
     values = inverse @ aim
-    cross, square, was_cross, was_square, both = np.zeros((5, len(folding)))
+    cross, square = np.zeros((2, len(folding)))
     held_values, held_free = [], []
     for part, base in enumerate(bases):
         test = folding == part
@@ -323,17 +396,11 @@ def _tried(
             + 2.0 * np.einsum('f,bfp,p->b', change, border[test], v)
             + np.einsum('f,bfg,g->b', change, known.free[test], change)
         )
-        if old is not None:
-            was_cross[test] = own_left @ old
-            was_square[test] = np.einsum('p,bpq,q->b', old, own[test], old)
-            both[test] = np.einsum('p,bpq,q->b', v, own[test], old)
-            both[test] += np.einsum('f,bfp,p->b', change, border[test], old)
+        share = 1.0 / (len(bases) * max(int(test.sum()), 1))
+        cross[test] += share * change @ (counted[1] - counted[0] @ base.theta)
+        square[test] += share * change @ counted[0] @ change
         held_values.append(v)
         held_free.append(base.theta + change)
-    old = old if np.sum(2.0 * was_cross - was_square) > 0.0 else None
-    if old is not None:
-        cross += was_square - both - was_cross
-        square += was_square - 2.0 * both
     return Trial(
         group,
         values,
@@ -346,7 +413,6 @@ def _tried(
         np.array(held_free),
         np.array([base.theta for base in bases]),
         folding,
-        old,
     )
 
 

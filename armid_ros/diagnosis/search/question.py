@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
-from armid_ros.diagnosis.search.fit import excited
+from armid_ros.diagnosis.search.fit import excited, Told
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.model import BaseParameters, group_columns
 import numpy as np
@@ -37,6 +37,8 @@ class Question:
         That friction, joint by joint.
     most : int
         Causes that are looked for.
+    told, beside_told : Told or None
+        What other data tell of what is free.
 
     """
 
@@ -46,6 +48,8 @@ class Question:
     beside_base: BaseParameters | None
     unknown: tuple[Effect, ...]
     most: int
+    told: Told | None = None
+    beside_told: Told | None = None
 
 
 def as_given(arm: ArmModel, data: Sequence[Trajectory], most: int) -> Question:

@@ -23,6 +23,8 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
     assert here.total is not None
     thresholds = here.settings.thresholds
     squares, z = lead(first, other)
+    if squares <= here.width:
+        return False
     if squares <= thresholds.tie * here.total * 0.5 and squares <= thresholds.far * first.gain:
         return False
     return z >= thresholds.rival_z or squares > thresholds.far * first.gain
@@ -75,7 +77,7 @@ def contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: R
     target = projection.rest(problem.x[:, :, small.group.columns]) @ small.values
     squares = float(np.sum(target**2))
     if np.sum((columns @ big.values - target) ** 2) < _SAME * squares:
-        return here.baseline is not None  # links do not change; a description of them may be off
+        return here.before is not None  # links do not change; a description of them may be off
     if cost(big, here.settings) <= cost(small, here.settings):
         return False
     flat = columns.reshape(-1, big.group.size)

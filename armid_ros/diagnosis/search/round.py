@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.fit import Told
+from armid_ros.diagnosis.search.held_out import Products, products, Trial
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -36,6 +39,10 @@ class Beside:
     hold: FloatArray
     pull: FloatArray
 
+    def rows(self, problem: Problem) -> FloatArray:
+        """Return the columns that are fitted beside, shape (R, n, f)."""
+        return problem.x[:, :, list(self.free)]
+
     def and_columns(self, group: Group) -> Beside:
         """Return the same with the columns of a group."""
         span = range(group.columns.start, group.columns.stop)
@@ -44,6 +51,46 @@ class Beside:
         hold[: len(self.free), : len(self.free)] = self.hold
         hold[len(self.free) :, len(self.free) :] = np.diag(group.precision)
         return Beside((*self.free, *span), hold, np.concatenate([self.pull, np.zeros(len(span))]))
+
+
+@dataclass(frozen=True)
+class Before:
+    """
+    Recordings in which nothing was wrong, beside an arm of which something is free.
+
+    Attributes
+    ----------
+    baseline : Baseline
+        The recordings.
+    told : Told
+        What they tell of what is free.
+    change : ndarray, shape (r,)
+        What was added to that.
+
+    """
+
+    baseline: Baseline
+    told: Told
+    change: FloatArray
+
+    def beside(self, group: Group, arm: ArmModel, beside: Beside) -> Beside:
+        """
+        Return what is fitted beside a group: also the values that it had before already.
+
+        Their columns are ahead of the others.
+
+        """
+        own = self.baseline.columns(arm, group.effect, group.kept)
+        left = self.told.left - self.told.columns @ self.change
+        size, known = own.shape[1], self.told.columns.shape[1]
+        whole = size + len(beside.pull)
+        hold, pull = np.zeros((whole, whole)), np.zeros(whole)
+        hold[size:, size:], pull[size:] = beside.hold, beside.pull
+        hold[:size, :size] = own.T @ own + np.diag(group.precision)
+        hold[:size, size : size + known] = own.T @ self.told.columns
+        hold[size : size + known, :size] = hold[:size, size : size + known].T
+        pull[:size] = own.T @ left
+        return Beside((), hold, pull)
 
 
 @dataclass(frozen=True)
@@ -61,8 +108,12 @@ class Round:
         Library and thresholds.
     total : float or None
         Held-out squares that shares are of; those of this round if None.
-    baseline : Baseline or None
+    before : Before or None
         Recordings in which nothing was wrong.
+    width : float
+        Squares that any cause takes of what nothing explains: a lead of less decides nothing.
+    known : dict
+        Products that were made already.
 
     """
 
@@ -70,7 +121,15 @@ class Round:
     work: Workspace
     settings: DiagnosisSettings
     total: float | None
-    baseline: Baseline | None = None
+    before: Before | None = None
+    width: float = 0.0
+    known: dict[int, Products] = field(default_factory=dict)
+
+    def of_free(self, problem: Problem, beside: Beside) -> Products:
+        """Return the products of what is free, which a round makes once."""
+        if id(beside) not in self.known:
+            self.known[id(beside)] = products(problem, beside.free, ())
+        return self.known[id(beside)]
 
 
 def worth(trial: Trial, here: Round) -> float:

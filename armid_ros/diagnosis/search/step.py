@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.data.rows import Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.held_out import held_out, Trial
+from armid_ros.diagnosis.search.held_out import held_out, Trial, tried_beside, with_group, with_own_again
 from armid_ros.diagnosis.search.own_noise import made_of_noise
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.refine import refine
@@ -204,7 +204,7 @@ def _with_refined_shapes(
             first += len(inside)
             found.append(own / np.where(problem.weight > 0.0, problem.weight, 1.0)[:, :, None])
             bounded = _alone(problem, beside, group, own, here)
-            refined += [] if bounded is None else [bounded[0]]
+            refined += [] if bounded is None else [replace(bounded[0], group=group)]
             continue
         if not effect.shapes:
             continue
@@ -215,8 +215,9 @@ def _with_refined_shapes(
         first = span.stop
         found.append(columns)
         weighted = columns * problem.weight[:, :, np.newaxis]
-        better = _alone(problem, beside, replace(group, columns=span), weighted, here)
-        refined += [] if better is None else [better[0]]
+        better = _alone(problem, beside, group, weighted, here)
+        own_group = replace(group, columns=span)
+        refined += [] if better is None else [replace(better[0], group=own_group)]
     if found:
         problem = problem.with_columns(np.concatenate(found, axis=2))
     return _best_per_key([*ranking, *refined], here), problem
@@ -228,8 +229,8 @@ def _examined(
     """
     Return the ranking, and what the causes that could be taken take of every joint.
 
-    Where there are recordings from before, what a cause explains with the values that it has in
-    those is not new.
+    Where there are recordings from before, the values that a cause had in those already are free
+    beside it: what is judged is the change.
 
     """
     result, gains = [], {}
@@ -239,7 +240,7 @@ def _examined(
             found = _alone(problem, beside, group, problem.x[:, :, group.columns], here)
             if found is None:
                 continue
-            trial, taken = found
+            trial, taken = replace(found[0], group=group), found[1]
             gains[id(trial)] = taken
         result.append(trial)
     return sorted(result, key=lambda t: -worth(t, here)), gains
@@ -249,17 +250,16 @@ def _alone(
     problem: Problem, beside: Beside, group: Group, own: FloatArray, here: Round
 ) -> tuple[Trial, FloatArray] | None:
     """Try a group with weighted columns beside what is free."""
-    size = group.size
-    x = np.concatenate([own, problem.x[:, :, list(beside.free)]], axis=2)
-    alone, small = replace(group, columns=slice(0, size)), replace(problem, x=x)
-    free = range(size, x.shape[2])
-    before = None
-    if here.baseline is not None:
-        before = [here.baseline.values(here.work.arm, group.effect, group.kept, group.precision)]
-    trials, _ = held_out(small, free, [alone], beside.hold, beside.pull, before)
+    group = replace(group, columns=slice(0, group.size))
+    free, held = beside.rows(problem), beside
+    known = with_group(here.of_free(problem, beside), problem, free, own)
+    if here.before is not None:
+        free = np.concatenate([own, free], axis=2)
+        known, held = with_own_again(known), here.before.beside(group, here.work.arm, beside)
+    trials, _ = tried_beside(known, problem, [group], held.hold, held.pull)
     if not trials:
         return None
-    return replace(trials[0], group=group), trials[0].joint_gains(small, free)
+    return trials[0], trials[0].joint_gains(problem, own, free)
 
 
 def _passing(

@@ -126,7 +126,7 @@ def _left_out(
             span = slice(start, start + len(columns[k]))
             groups.append(Group.of(named[k].effect, span, named[k].kept, arm.robot))
             start = span.stop
-        trials, power = held_out(problem, free, groups, hold, pull)
+        trials, power = held_out(problem, free, groups, hold, pull, whole=False)
         whole = power if whole is None else whole
         if not taken.size:
             taken, made = np.zeros((2, len(named), len(power)))
