@@ -52,7 +52,7 @@ def bic_selection(
         Draws the states over which base parameters are found.
 
     """
-    used = choose_filters(recordings, settings)
+    used = choose_filters(arm, recordings, (), settings, rng)
     data = trajectories(recordings, used)
     base, _ = excited(arm, arm.base_parameters(rng), data)
     one = [np.ones(arm.robot.n_joints)] * len(data)

@@ -20,7 +20,13 @@ from armid_ros.diagnosis.data.floor import Floor, noise_floor
 from armid_ros.diagnosis.data.gate import check_data, Gate
 from armid_ros.diagnosis.data.prepare import choose_filters, prepare, Prepared
 from armid_ros.diagnosis.search.bodies import as_bodies
-from armid_ros.diagnosis.search.choice import Chosen, ESTIMATED, explained, NOISE
+from armid_ros.diagnosis.search.choice import (
+    Chosen,
+    ESTIMATED,
+    explained,
+    in_model_as_given,
+    NOISE,
+)
 from armid_ros.diagnosis.search.explain import Explanation
 from armid_ros.diagnosis.search.unharmed import harmed
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -40,6 +46,11 @@ import numpy as np
 #: Told the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
+#: Said where only a body that is common to both days shows what a cause does.
+_COMMON = (
+    'the baseline did not determine the model for these motions: a rigid body and friction common '
+    'to both were fitted'
+)
 #: Recordings hardly show what takes less than this share of the share it takes of others.
 _HARDLY = 0.1
 
@@ -198,7 +209,7 @@ def diagnose(
         written = None if misfit is None else misfit.of(arm.robot)
         chosen = explained(arm, prepared, known, settings, rng, tell, written)
         unseen = _unseen(validate, chosen.explanation, prepared, chosen)
-        if chosen.explanation.steps and not _helps(chosen.explanation, unseen):
+        if chosen.explanation.steps and not _helps(chosen.rest or chosen.explanation, unseen):
             chosen = _second_choice(chosen, (arm, prepared, known, settings, rng, tell, written))
     notes += chosen.notes
     explanation, remarks = as_bodies(chosen.explanation, arm)
@@ -256,15 +267,24 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     unseen = _unseen(validate, explanation, prepared, chosen)
     measured = chosen.floor_in_words in (NOISE, ESTIMATED)
     least = 0.0 if measured else settings.thresholds.headline
-    explanation, shares = _headline(explanation, unseen, least)
+    explanation, shares = _headline(chosen.rest or explanation, unseen, least)
+    rest = explanation
+    if chosen.rest is not None and explanation.steps:
+        as_told = in_model_as_given(explanation)
+        told = _shares(as_told, unseen)[0]
+        if told.share(range(len(as_told.steps))) >= least:
+            explanation, shares = as_told, told
+        else:
+            explanation, remarks = as_bodies(explanation, arm)
+            notes += [_COMMON, *remarks]
     found = findings(explanation, shares, arm, rng)
     worse = _harmed(chosen, explanation, unseen, settings)
     patched = explanation.fitted.arm
     if worse:
         names = ', '.join(one.name.replace('_', ' ') for one in found)
         notes.append(
-            f'{names} would make the model worse in {", ".join(worse)}, of which the model as given '
-            'is off as well: not patched'
+            f'{names} would make the model worse in {", ".join(worse)}, where it is off as well: '
+            'not patched'
         )
         patched = arm
     pattern = None
@@ -272,11 +292,8 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
         pattern = find_pattern(explanation, arm, evidence.data, evidence.sigma)
     if pattern is not None:
         notes.append(pattern.sentence)
-    data = [part for part in evidence.data if not part.before]
+    data = evidence.data
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
-    rest = explanation
-    if chosen.rest is not None and explanation.steps:
-        rest = _with_names_of(chosen.rest, explanation)
     left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings')]
     if unseen is not None:
         sure, more = _sure(unseen, chosen), settings.thresholds.predicted
@@ -316,15 +333,6 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     )
 
 
-def _with_names_of(rest: Explanation, explanation: Explanation) -> Explanation:
-    """Return an explanation with the names that are left of it in another one."""
-    kept = {id(step) for step in explanation.steps}
-    gone = [k for k, step in enumerate(rest.steps) if id(step) not in kept]
-    for k in reversed(gone):
-        rest = rest.without(k)
-    return rest
-
-
 def _headline(
     explanation: Explanation, unseen: Evidence | None, least: float
 ) -> tuple[Explanation, Attribution]:
@@ -335,20 +343,24 @@ def _headline(
     what was named.
 
     """
-    shares = left_out = attribute(explanation, None)
-    names = range(len(explanation.steps))
-    if unseen is not None:
-        seen = attribute(explanation, unseen)
-        for k in reversed(seen.order):
-            if seen.denied(k):
-                return _headline(explanation.without(k), unseen, least)
-        if seen.share(names) > _HARDLY * left_out.share(names):
-            shares = seen
-    small = [k for k in names if shares.share([k]) < least]
-    if small:
-        least_of_all = min(small, key=lambda k: shares.share([k]))
-        return _headline(explanation.without(least_of_all), unseen, least)
+    shares, denied = _shares(explanation, unseen)
+    small = [k for k in range(len(explanation.steps)) if shares.share([k]) < least]
+    gone = denied or sorted(small, key=lambda k: shares.share([k]))
+    if gone:
+        return _headline(explanation.without(gone[0]), unseen, least)
     return explanation, shares
+
+
+def _shares(explanation: Explanation, unseen: Evidence | None) -> tuple[Attribution, list[int]]:
+    """Share out the gap, and return the names that other data deny, the least first."""
+    left_out = attribute(explanation, None)
+    if unseen is None:
+        return left_out, []
+    names = range(len(explanation.steps))
+    seen = attribute(explanation, unseen)
+    denied = [k for k in reversed(seen.order) if seen.denied(k)]
+    shown = seen.share(names) > _HARDLY * left_out.share(names)
+    return (seen if shown else left_out), denied
 
 
 def _unseen(

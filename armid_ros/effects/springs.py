@@ -22,6 +22,9 @@ _BUMPER = 0.15
 #: ... and shares of the range that was moved through between which a search looks for them.
 _EDGES = (0.02, 0.05, 0.1, 0.2, 0.3)
 
+#: Deviations by which a stiffness has to differ from zero.
+_SURELY = 3.0
+
 
 @dataclass(frozen=True)
 class JointSpring(Effect):
@@ -54,6 +57,10 @@ class JointSpring(Effect):
             return np.asarray(stiffness * q + preload)
 
         return Action(link_torque=torque)
+
+    def plausible(self, values: FloatArray, std: FloatArray, arm: ArmModel) -> bool:
+        """Return whether there is surely a stiffness; a preload alone is an offset."""
+        return bool(abs(values[0]) > _SURELY * std[0])
 
 
 @dataclass(frozen=True)

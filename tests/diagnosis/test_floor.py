@@ -4,8 +4,7 @@
 
 from armid_ros.diagnosis.data.evidence import trajectories
 from armid_ros.diagnosis.data.floor import noise_floor
-from armid_ros.diagnosis.data.prepare import choose_filters
-from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.identification.signals import conditioning, SignalSettings
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -14,7 +13,7 @@ from tests.diagnosis.conftest import PERIODS
 
 
 def cut(recordings):
-    return trajectories(recordings, choose_filters(recordings, DiagnosisSettings()))
+    return trajectories(recordings, conditioning(recordings, SignalSettings()))
 
 
 def test_the_period_is_found_in_the_positions(bench):
@@ -52,7 +51,7 @@ def test_a_floor_without_repetition_is_assumed(bench):
 
 def test_the_assumed_floor_is_that_of_the_periods_or_a_little_more(bench):
     recordings = bench.recordings()
-    used = choose_filters(recordings, DiagnosisSettings())
+    used = conditioning(recordings, SignalSettings())
     whole = trajectories(recordings, used)
     pieces = trajectories([r.select(slice(0, 700)) for r in recordings], used)
     for known, assumed in zip(whole, pieces, strict=True):

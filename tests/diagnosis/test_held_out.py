@@ -2,15 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a group predicts of data that it was not fitted to, beside a refit row by row."""
 
+from dataclasses import replace
+
 from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.held_out import held_out, lead
+from armid_ros.diagnosis.search.held_out import (
+    held_out,
+    lead,
+    products,
+    tried_beside,
+    with_group,
+    with_own_again,
+)
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
 from scipy import stats
 
-FOLDS = np.array([-1, -1, *np.repeat([0, 1, 2], 4)])
+FOLDS = np.repeat(np.arange(6), 6)
 ROWS_OF_A_BLOCK, JOINTS, OWN, FREE = 20, 2, 2, 3
 
 
@@ -43,52 +52,74 @@ def refitted(problem, columns, hold, pull, rows):
     return np.linalg.solve(x.T @ x + hold, x.T @ problem.y[rows].ravel() + pull)
 
 
-def by_brute_force(problem, precision, hold, pull, old=None):
+def by_brute_force(problem, precision, hold, pull):
     """Return what is left, what the group predicts of it, and the part of every row."""
     left, made = np.zeros_like(problem.y), np.zeros_like(problem.y)
     fold = FOLDS[problem.block]
     free, all_of_it = list(range(OWN, OWN + FREE)), list(range(OWN + FREE))
     whole = np.zeros((OWN + FREE, OWN + FREE))
     whole[:OWN, :OWN], whole[OWN:, OWN:] = np.diag(precision), hold
-    for part in range(3):
+    for part in range(6):
         train, test = fold != part, fold == part
         alone = refitted(problem, free, hold, pull, train)
         both = refitted(problem, all_of_it, whole, np.concatenate([np.zeros(OWN), pull]), train)
         without = problem.x[test][:, :, free] @ alone
         left[test] = problem.y[test] - without
         made[test] = problem.x[test] @ both - without
-    if old is not None:
-        known = problem.x[:, :, :OWN] @ old
-        left, made = left - known, made - known
     return left, made, fold
 
 
-@pytest.mark.parametrize('before', [False, True])
-def test_products_of_blocks_say_what_a_refit_says(bench, before):
+def test_products_of_blocks_say_what_a_refit_says(bench):
     rng = np.random.default_rng(0)
     problem, precision = make_problem(rng, (0.5, -0.3)), (3.0, 0.5)
     hold, pull = held(rng)
-    old = np.array([0.4, -0.2]) if before else None
-    left, made, fold = by_brute_force(problem, precision, hold, pull, old)
-    (trial,), power = held_out(
-        problem,
-        range(OWN, OWN + FREE),
-        [group(bench, precision)],
-        hold,
-        pull,
-        [old] if before else None,
-    )
-    asked = fold >= 0
-    owner = problem.block[asked] - problem.block[asked].min()
-    products = made[asked] * left[asked], made[asked] ** 2
-    for measured, rows in zip((trial.cross, trial.square), products, strict=True):
+    left, made, _ = by_brute_force(problem, precision, hold, pull)
+    one, free = [group(bench, precision)], range(OWN, OWN + FREE)
+    (trial,), power = held_out(problem, free, one, hold, pull, whole=False)
+    owner = problem.block
+    expected = made * left, made**2
+    for measured, rows in zip((trial.cross, trial.square), expected, strict=True):
         np.testing.assert_allclose(measured, np.bincount(owner, rows.sum(axis=1)), rtol=1e-8)
-    gains = 2.0 * products[0] - products[1]
+    gains = 2.0 * expected[0] - expected[1]
     assert trial.gain == pytest.approx(gains.sum(), rel=1e-8)
-    joints = trial.joint_gains(problem, range(OWN, OWN + FREE))
+    own, beside = problem.x[:, :, :OWN], problem.x[:, :, OWN:]
+    joints = trial.joint_gains(problem, own, beside)
     np.testing.assert_allclose(joints, gains.sum(axis=0), rtol=1e-8)
-    if not before:
-        np.testing.assert_allclose(power, np.bincount(owner, np.sum(left[asked] ** 2, axis=1)))
+    np.testing.assert_allclose(power, np.bincount(owner, np.sum(left**2, axis=1)))
+
+
+def test_what_a_group_spares_the_data_that_hold_the_rest_is_a_gain(bench):
+    """The precision of free values stands for rows: it is worth what those rows are worth."""
+    rng = np.random.default_rng(3)
+    problem = make_problem(rng, (0.5, -0.3))
+    one, free = [group(bench)], range(OWN, OWN + FREE)
+    rows = rng.normal(size=(40, FREE))
+    left = rows @ np.array([1.5, -2.0, 0.0]) + rng.normal(size=40)
+    hold, pull = rows.T @ rows, rows.T @ left
+    (with_rows,), _ = held_out(problem, free, one, hold, pull)
+    (without,), _ = held_out(problem, free, one, hold, pull, whole=False)
+    spared = []
+    for alone, both in zip(without.held_alone, without.held_free, strict=True):
+        before, after = left - rows @ alone, left - rows @ both
+        spared.append(before @ before - after @ after)
+    assert with_rows.gain - without.gain == pytest.approx(np.mean(spared), rel=1e-6)
+
+
+def test_a_group_that_was_there_before_has_its_old_value_free_beside_it(bench):
+    rng = np.random.default_rng(4)
+    problem, precision = make_problem(rng, (0.5, -0.3)), (3.0, 0.5)
+    own, beside = problem.x[:, :, :OWN], problem.x[:, :, OWN:]
+    size = OWN + FREE
+    root = rng.normal(size=(size, size))
+    wide, to = root @ root.T, rng.normal(size=size)
+    one = [group(bench, precision)]
+    twice = replace(problem, x=np.concatenate([own, own, beside], axis=2))
+    (expected,), _ = held_out(twice, range(OWN, OWN + size), one, wide, to)
+    of_free = products(problem, range(OWN, size), ())
+    known = with_own_again(with_group(of_free, problem, beside, own))
+    (trial,), _ = tried_beside(known, problem, one, wide, to)
+    np.testing.assert_allclose(trial.values, expected.values, rtol=1e-8)
+    np.testing.assert_allclose(trial.gains, expected.gains, rtol=1e-8)
 
 
 def test_values_are_those_of_least_squares_of_all_rows(bench):

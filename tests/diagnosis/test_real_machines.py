@@ -78,7 +78,7 @@ def test_friction_of_a_tx40_goes_with_the_load_in_both_halves_of_its_recording(
     bare, recording = Machines(real_data, tmp_path).bare('tx40')
     arm = known_arm(bare, 'tx40', None)
     settings = DiagnosisSettings()
-    used = choose_filters([recording], settings)
+    used = choose_filters(arm, [recording], (), settings, np.random.default_rng(0))
     friction = CATALOGUE['load_dependent_friction'].on(arm.robot, ('joint_3',))
     middle = len(recording.t) // 2
     values, std = [], []

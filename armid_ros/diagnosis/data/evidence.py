@@ -65,8 +65,6 @@ class Trajectory:
         False where a joint rests or turns round: friction is undetermined there.
     sensors : SensorNoise or None
         What their noise does beside another machine; None where there is none.
-    before : bool
-        Whether it was recorded when nothing was wrong: what is named does not act in it.
 
     """
 
@@ -77,7 +75,6 @@ class Trajectory:
     rows: npt.NDArray[np.intp]
     told: npt.NDArray[np.bool_]
     sensors: SensorNoise | None = None
-    before: bool = False
 
     def reduce(self, values: FloatArray) -> FloatArray:
         """Filter and decimate samples (N, ...) to rows (M, ...)."""
@@ -136,7 +133,7 @@ class Evidence:
     @cached_property
     def count(self) -> FloatArray:
         """Informative rows of each joint, shape (n,)."""
-        parts = [part.told.sum(axis=0) for part in self.data if not part.before]
+        parts = [part.told.sum(axis=0) for part in self.data]
         return np.asarray(np.sum(parts, axis=0, dtype=float))
 
     @cached_property
@@ -144,8 +141,6 @@ class Evidence:
         """Root mean square of the measured torque of each joint, shape (n,) [N m]."""
         squares = np.zeros_like(self.count)
         for part in self.data:
-            if part.before:
-                continue
             assert part.motion.tau is not None
             squares += np.sum(part.reduce(part.motion.tau) ** 2, axis=0, where=part.told)
         return np.sqrt(squares / np.maximum(self.count, 1.0))
@@ -154,8 +149,7 @@ class Evidence:
         """Return the mean square over the unit of each joint, shape (n,)."""
         squares = np.zeros_like(self.count)
         for part, sigma, left in zip(self.data, self.sigma, residual, strict=True):
-            if not part.before:
-                squares += np.sum((left / sigma) ** 2, axis=0, where=part.told)
+            squares += np.sum((left / sigma) ** 2, axis=0, where=part.told)
         return np.asarray(squares / np.maximum(self.count, 1.0))
 
     def split(self, weighted: FloatArray, weight: FloatArray) -> list[FloatArray]:
@@ -178,9 +172,8 @@ class Evidence:
         free = np.maximum(count / self._lasting(residual), 4.0)
         each = 1.0 - (1.0 - thresholds.confidence) / len(count)
         noise = stats.f.ppf(each, free, free)
-        parts = [k for k, part in enumerate(self.data) if not part.before]
-        sigma = np.mean([self.sigma[k] ** 2 for k in parts], axis=0)
-        own = np.mean([self.noise[k] ** 2 for k in parts], axis=0) / sigma
+        sigma = np.mean([own**2 for own in self.sigma], axis=0)
+        own = np.mean([one**2 for one in self.noise], axis=0) / sigma
         varies = 1.0 if self.varies is None else np.maximum(self.varies, 1.0)
         beside = thresholds.same_fit * varies
         misfit = np.where(own < 1.0 / thresholds.same_fit, beside, 1.0)
@@ -191,8 +184,6 @@ class Evidence:
         """Return for how many rows what is left lasts, as squares go, shape (n,)."""
         products = np.zeros((_LAGS + 1, len(self.count)))
         for part, left in zip(self.data, residual, strict=True):
-            if part.before:
-                continue
             rows = np.where(part.told, left, 0.0)
             for lag in range(min(_LAGS + 1, len(rows))):
                 products[lag] += np.sum(rows[lag:] * rows[: len(rows) - lag], axis=0)
@@ -205,8 +196,6 @@ class Evidence:
         wanted = (settings.material * self.torque_rms) ** 2
         total = np.zeros_like(self.count)
         for part, sigma, noise in zip(self.data, self.sigma, self.noise, strict=True):
-            if part.before:
-                continue
             misfit = share * np.maximum(sigma**2 - noise**2, 0.0)
             total += part.told.sum(axis=0) * np.maximum(wanted, misfit) / sigma**2
         return np.maximum(total, 1e-12)

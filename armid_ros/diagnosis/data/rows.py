@@ -39,8 +39,7 @@ class Problem:
     block : ndarray of int, shape (R,)
         Stretch of the data that a row belongs to; longer than any correlation.
     fold_of_block : ndarray of int, shape (B,)
-        Part of the data that a block belongs to; -1 where nothing is held out, as what was
-        recorded when nothing was wrong.
+        Part of the data that a block belongs to.
 
     """
 
@@ -110,18 +109,15 @@ def weighted_rows(
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
-    """Return the part of the data of every row, a stretch of a recording; -1 if from before."""
-    recordings = len({part.fold for part in data if not part.before})
+    """Return the part of the data of every row, a stretch of a recording."""
+    recordings = len({part.fold for part in data})
     pieces = max(2, -(-PARTS // max(recordings, 1)))
     rows = []
     for part in data:
-        if part.before:
-            rows.append(np.full(len(part.rows), -1))
-            continue
         span = np.linspace(0, pieces, len(part.rows), endpoint=False).astype(np.intp)
         rows.append(part.fold * pieces + span)
-    known, index = np.unique(np.concatenate(rows), return_inverse=True)
-    return np.asarray(index - int(known[0] < 0), dtype=np.intp)
+    _, index = np.unique(np.concatenate(rows), return_inverse=True)
+    return np.asarray(index, dtype=np.intp)
 
 
 @dataclass(frozen=True)
@@ -155,13 +151,15 @@ class Projection:
         return np.asarray(columns.T @ columns - made.T @ made)
 
 
-def project(problem: Problem, free: Sequence[int]) -> Projection:
-    """Find what the free columns can make."""
+def project(problem: Problem, free: Sequence[int], hold: FloatArray | None = None) -> Projection:
+    """Find what the free columns can make, as far as their precision (f, f) lets them."""
     if not len(free):
         return Projection(np.empty((problem.y.size, 0)), np.empty((0, 0)), ())
     rows = problem.x[:, :, list(free)].reshape(-1, len(free))
     scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
     own = (rows / scale).T @ (rows / scale)
+    if hold is not None:
+        own += hold / np.outer(scale, scale)
     values, vectors = scipy.linalg.eigh(own)
     good = values > _DEPENDENT * values[-1]
     fit = vectors[:, good] / np.sqrt(values[good]) / scale[:, np.newaxis]

@@ -161,14 +161,7 @@ def candidates(
 
 
 def effect_rows(arm: ArmModel, effect: Effect, part: Trajectory) -> FloatArray:
-    """Return the columns of an effect in the rows of a trajectory, shape (M, n, P), as it acts."""
-    if part.before:
-        return np.zeros((len(part.rows), arm.robot.n_joints, len(effect.parameters(arm.robot))))
-    return sensitivity_rows(arm, effect, part)
-
-
-def sensitivity_rows(arm: ArmModel, effect: Effect, part: Trajectory) -> FloatArray:
-    """Return the same, whether it acts in that trajectory or not."""
+    """Return the columns of an effect in the rows of a trajectory, shape (M, n, P)."""
     if effect.smooth:
         return arm.columns_of(effect, part.at_rows)
     return part.reduce(arm.columns_of(effect, part.motion))

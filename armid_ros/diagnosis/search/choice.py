@@ -20,7 +20,7 @@ from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.search.explain import explain, Explanation
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question
+from armid_ros.diagnosis.search.question import as_given, fitted_anew
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -169,7 +169,7 @@ def _since(
     found = explain(question, evidence, settings, baseline=baseline)
     if not found.steps:
         return Chosen(found, misfit, OWN_MISFIT)
-    return Chosen(_in_model_as_given(found), misfit, OWN_MISFIT, rest=found)
+    return Chosen(in_model_as_given(found), misfit, OWN_MISFIT, rest=found)
 
 
 def _louder(prepared: Prepared, baseline: Baseline) -> FloatArray:
@@ -188,7 +188,7 @@ def _torque_rms(data: Sequence[Trajectory]) -> FloatArray:
     return Evidence(tuple(data), unit, unit).torque_rms
 
 
-def _in_model_as_given(found: Explanation) -> Explanation:
+def in_model_as_given(found: Explanation) -> Explanation:
     """Return what the names explain beside a rigid body that stays as it is."""
     arm, evidence, fitted = found.given, found.evidence, found.fitted
     reference = fit(arm, (), evidence.data, evidence.sigma, None)

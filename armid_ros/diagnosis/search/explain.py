@@ -25,6 +25,7 @@ from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
+from armid_ros.diagnosis.search.rivals import undecided
 from armid_ros.diagnosis.search.round import Before, Beside, Round
 from armid_ros.diagnosis.search.step import acceptable, material, next_step, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -112,10 +113,11 @@ def explain(
     """Take causes as long as any passes, then name the friction that matters, and prune."""
     found = _forward(question, evidence, settings, start, baseline)
     width = max((trial.gain for trial in found[5].ranking), default=0.0) if found[5] else 0.0
-    if any(_undecided(step, width) for step in found[1][len(start) :]):
+    here = Round(evidence, Workspace(memoized_arm(question.arm), evidence.data), settings, None)
+    here = replace(here, width=width)
+    if any(undecided(step.trial, step.ranking, here) for step in found[1][len(start) :]):
         found = _forward(question, evidence, settings, start, baseline, width)
-    found = found[:5]
-    named, steps, values, survey, minor = found
+    named, steps, values, survey, minor, _ = found
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
     kept = _friction(question, named, values, evidence, settings, whole)
     named = [*named, *(own for own, _, _ in kept)]
@@ -138,12 +140,6 @@ def explain(
         small,
         question.told,
     )
-
-
-def _undecided(step: Step, width: float) -> bool:
-    """Tell whether a cause was taken for a lead over a simpler one that decides nothing."""
-    close = [t for t in step.ranking if 0.0 < t.gain and step.trial.gain - t.gain <= width]
-    return any(t is not step.trial and t.freedom < step.trial.freedom - 0.5 for t in close)
 
 
 _Found = tuple[
@@ -326,9 +322,7 @@ def _friction(
         return []
     arm, base = question.beside, question.beside_base
     assert base is not None
-    fitted = fit(
-        arm, named, evidence.data, evidence.sigma, base, values, question.beside_told
-    )
+    fitted = fit(arm, named, evidence.data, evidence.sigma, base, values, question.beside_told)
     view = View.of(fitted, evidence)
     where = {int(column): k for k, column in enumerate(base.independent)}
     names = [(p.name, p.joint) for p in arm.parameters]
@@ -352,7 +346,9 @@ def _friction(
             good = False
             if trial is not None:
                 here = Round(evidence, work, settings, total)
-                gains = trial.joint_gains(problem, problem.x[:, :, group.columns], beside.rows(problem))
+                gains = trial.joint_gains(
+                    problem, problem.x[:, :, group.columns], beside.rows(problem)
+                )
                 good = acceptable(trial, here, whole[1]) and material(gains, here)
                 judged[k] = trial, total
             gain = trial.gain if trial is not None else -np.inf
@@ -400,7 +396,9 @@ def _pruned(
                 needless.append((-np.inf, k))
                 continue
             here = Round(evidence, work, settings, step.total)
-            gains = trial.joint_gains(problem, problem.x[:, :, group.columns], beside.rows(problem))
+            gains = trial.joint_gains(
+                problem, problem.x[:, :, group.columns], beside.rows(problem)
+            )
             if not (acceptable(trial, here, step.tried) and material(gains, here)):
                 needless.append((trial.gain, k))
         if not needless:

@@ -239,7 +239,7 @@ def fit(
 
 def _residuals(state: Patch, data: Sequence[Trajectory]) -> list[FloatArray]:
     model = state.model
-    return [part.residual(state.arm if part.before else model) for part in data]
+    return [part.residual(model) for part in data]
 
 
 def _loss(

@@ -117,9 +117,7 @@ class Trial:
             Columns that were free.
 
         """
-        piece = np.where(problem.fold_of_block < 0, -1, 0)
-        piece[problem.fold_of_block >= 0] = self.piece
-        piece = piece[problem.block]
+        piece = self.piece[problem.block]
         gains = np.zeros(problem.y.shape[1])
         for part in range(len(self.held_values)):
             rows = piece == part
@@ -338,12 +336,7 @@ def tried_beside(
         _tried(known, group, k, everything, bases, folding, counted)
         for k, group in enumerate(groups)
     ]
-    asked = problem.fold_of_block >= 0
-    return [
-        replace(t, cross=t.cross[asked], square=t.square[asked], piece=t.piece[asked])
-        for t in trials
-        if t is not None
-    ], power[asked]
+    return [trial for trial in trials if trial is not None], power
 
 
 def _left(known: Products, bases: Sequence[_Base], folding: npt.NDArray[np.intp]) -> FloatArray:

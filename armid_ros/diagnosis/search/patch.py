@@ -153,8 +153,6 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def patch_columns(state: Patch, part: Trajectory, base: BaseParameters | None) -> FloatArray:
     """Return the columns of base parameters, values and shapes in rows, shape (M, n, f)."""
-    if part.before:
-        return _columns_before(state, part, base)
     model, motion = memoized_arm(state.model), part.motion
     blocks = [np.empty((len(part.rows), motion.n_joints, 0))]
     if base is not None:
@@ -166,16 +164,6 @@ def patch_columns(state: Patch, part: Trajectory, base: BaseParameters | None) -
             position = len(model.effects) - 1 - model.effects[::-1].index(named.effect)
             blocks.append(part.reduce(_shape_columns(model, position, motion)))
     return np.concatenate(blocks, axis=2)
-
-
-def _columns_before(state: Patch, part: Trajectory, base: BaseParameters | None) -> FloatArray:
-    """Return the columns where nothing that was named acts."""
-    sizes = [len(own.kept) + len(own.effect.shape) for own in state.named]
-    nothing = np.zeros((len(part.rows), part.motion.n_joints, sum(sizes)))
-    if base is None:
-        return nothing
-    own = part.reduce(_base_columns(state, memoized_arm(state.arm), part.motion, base))
-    return np.concatenate([own, nothing], axis=2)
 
 
 def _base_columns(

@@ -45,11 +45,10 @@ def likeliest(
     """
     if len(tied) == 1:
         return tied[0]
-    since = problem.fold_of_block[problem.block] >= 0
-    left = project(problem, beside.free).rest(problem.y)[since]
+    left = project(problem, beside.free, beside.hold).rest(problem.y)
     squares = np.sum(left**2, axis=0)
     count = np.maximum(here.evidence.count, 1.0)
-    limits = here.evidence.limits(here.evidence.split(left, problem.weight[since]), here.settings)
+    limits = here.evidence.limits(here.evidence.split(left, problem.weight), here.settings)
     able = [t for t in tied if np.all((squares - gains[id(t)]) / count <= limits)]
     return simplest(able, here) if able else tied[0]
 
@@ -62,17 +61,30 @@ def simplest(tied: Sequence[Trial], here: Round) -> Trial:
     first in the catalogue, which goes from the common to the rare.
 
     """
-    order = {name: position for position, name in enumerate(CATALOGUE)}
     least = min(cost(trial, here.settings) for trial in tied)
     simple = [t for t in tied if cost(t, here.settings) < least + 0.5]
     most = max(trial.gain for trial in simple)
-    same = [t for t in simple if t.gain >= (1.0 - here.settings.thresholds.tie) * most]
-    return min(same, key=lambda t: order.get(t.group.effect.name, len(order)))
+    close = max(here.settings.thresholds.tie * most, here.width)
+    return min((t for t in simple if t.gain >= most - close), key=rarity)
+
+
+def undecided(first: Trial, ranking: Sequence[Trial], here: Round) -> bool:
+    """Tell whether a cause was taken for a lead over a likelier one that decides nothing."""
+    close = [t for t in ranking if t.gain > 0.0 and 0.0 <= first.gain - t.gain <= here.width]
+    own = round(cost(first, here.settings)), rarity(first)
+    return any((round(cost(t, here.settings)), rarity(t)) < own for t in close)
+
+
+def rarity(trial: Trial) -> int:
+    """Return the position in the catalogue, which goes from the common to the rare."""
+    names = list(CATALOGUE)
+    name = trial.group.effect.name
+    return names.index(name) if name in CATALOGUE else len(names)
 
 
 def contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
     """Return whether a cause says the same, or is freer and can make what another one makes."""
-    projection = project(problem, beside.free)
+    projection = project(problem, beside.free, beside.hold)
     columns = projection.rest(problem.x[:, :, big.group.columns])
     target = projection.rest(problem.x[:, :, small.group.columns]) @ small.values
     squares = float(np.sum(target**2))

@@ -10,11 +10,17 @@ from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.data.rows import Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.held_out import held_out, Trial, tried_beside, with_group, with_own_again
+from armid_ros.diagnosis.search.held_out import (
+    held_out,
+    Trial,
+    tried_beside,
+    with_group,
+    with_own_again,
+)
 from armid_ros.diagnosis.search.own_noise import made_of_noise
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.refine import refine
-from armid_ros.diagnosis.search.rivals import beaten, contains, likeliest
+from armid_ros.diagnosis.search.rivals import beaten, contains, likeliest, rarity
 from armid_ros.diagnosis.search.round import Beside, Round, worth
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -23,6 +29,8 @@ import numpy.typing as npt
 #: Best groups that are looked at row by row; shapes of this many are refined, of groups that have
 #: this share of the best worth.
 _LOOKED_AT, _REFINED, _PROMISING = 30, 6, 0.4
+#: Rivals that are told of a name: the likeliest; more than two help nobody.
+_RIVALS = 2
 #: Causes in the small print.
 _SMALL_PRINT = 5
 
@@ -117,12 +125,13 @@ def next_step(
     first = passing[0]
     tied = [first, *(t for t in passing[1:] if not beaten(t, first, here))]
     winner = likeliest(tied, gains, problem, beside, here)
-    rivals = tuple(
+    rivals = [
         trial
         for trial in tied
         if trial is not winner and not contains(trial, winner, problem, beside, here)
-    )
-    return Step(winner, rivals, tuple(ranking), total, len(seen)), survey, problem
+    ]
+    likely = tuple(sorted(rivals, key=rarity)[:_RIVALS])
+    return Step(winner, likely, tuple(ranking), total, len(seen)), survey, problem
 
 
 def acceptable(trial: Trial, here: Round, tried: int) -> bool:
@@ -208,7 +217,7 @@ def _with_refined_shapes(
             continue
         if not effect.shapes:
             continue
-        projection = projection or project(problem, beside.free)
+        projection = projection or project(problem, beside.free, beside.hold)
         left = projection.rest(problem.y)
         group, columns = refine(problem, projection, trial.group, left, here.work)
         span = slice(first, first + columns.shape[2])
@@ -279,7 +288,7 @@ def _passing(
             continue
         if result and beaten(trial, result[0], here):
             continue
-        projection = projection or project(problem, beside.free)
+        projection = projection or project(problem, beside.free, beside.hold)
         if not made_of_noise(trial, problem, projection, here.work):
             result.append(trial)
     return result

@@ -38,8 +38,7 @@ def harmed(
 def _worse(
     before: ArmModel, after: ArmModel, evidence: Evidence, settings: DiagnosisSettings
 ) -> npt.NDArray[np.bool_]:
-    data = [part for part in evidence.data if not part.before]
-    sigma = [s for s, part in zip(evidence.sigma, evidence.data, strict=True) if not part.before]
+    data, sigma = evidence.data, evidence.sigma
     squares = [
         [(part.residual(arm) * part.told / s) ** 2 for part, s in zip(data, sigma, strict=True)]
         for arm in (before, after)

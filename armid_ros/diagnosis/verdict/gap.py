@@ -97,11 +97,7 @@ def measure_gap(
     """
     before, after = explanation.reference.arm, explanation.fitted.arm
     evidence = explanation.evidence if unseen is None else unseen
-    parts = [
-        (part, sigma, least)
-        for part, sigma, least in zip(evidence.data, evidence.sigma, floor, strict=True)
-        if not part.before
-    ]
+    parts = list(zip(evidence.data, evidence.sigma, floor, strict=True))
     overlays = [_overlay(part, sigma, before, after) for part, sigma, _ in parts]
     told = np.concatenate([part.told for part, _, _ in parts])
     count = np.maximum(told.sum(axis=0), 1)

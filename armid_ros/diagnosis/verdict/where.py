@@ -84,9 +84,7 @@ def locate(
     """
     losses = evidence.losses(residual)
     beyond = np.where(losses > limits, losses - 1.0, 0.0)
-    pairs = zip(evidence.data, residual, strict=True)
-    now = [(part, rows) for part, rows in pairs if not part.before]
-    data, residual = [part for part, _ in now], [rows for _, rows in now]
+    data = evidence.data
     total = max(float(beyond.sum()), 1e-300)
     rows = [_quantities(arm, part) for part in data]
     told = np.concatenate([part.told for part in data])
