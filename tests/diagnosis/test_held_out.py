@@ -149,7 +149,7 @@ def test_the_slope_of_a_cause_is_one(bench, seed):
     trial, power = trial_of(bench, seed, (0.8, -0.5))
     assert trial.slope == pytest.approx(1.0, abs=3.0 * trial.slope / trial.z)
     assert trial.p < 1e-4
-    assert trial.replicated == 3
+    assert trial.replicated == 6
     assert 0.0 < trial.gain < power.sum()
 
 

@@ -156,7 +156,8 @@ def project(problem: Problem, free: Sequence[int], hold: FloatArray | None = Non
     if not len(free):
         return Projection(np.empty((problem.y.size, 0)), np.empty((0, 0)), ())
     rows = problem.x[:, :, list(free)].reshape(-1, len(free))
-    scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    length = np.linalg.norm(rows, axis=0)
+    scale = np.where(length > 0.0, length, 1.0)
     own = (rows / scale).T @ (rows / scale)
     if hold is not None:
         own += hold / np.outer(scale, scale)
