@@ -174,11 +174,18 @@ class Evidence:
         noise = stats.f.ppf(each, free, free)
         sigma = np.mean([own**2 for own in self.sigma], axis=0)
         own = np.mean([one**2 for one in self.noise], axis=0) / sigma
-        varies = 1.0 if self.varies is None else np.maximum(self.varies, 1.0)
-        beside = thresholds.same_fit * varies
-        misfit = np.where(own < 1.0 / thresholds.same_fit, beside, 1.0)
-        matters = (settings.material * self.torque_rms) ** 2 / sigma
-        return np.asarray(np.maximum(noise, misfit) + matters)
+        misfit = np.where(own < 1.0 / thresholds.same_fit, self.as_good(settings), 1.0)
+        return np.asarray(np.maximum(noise, misfit) + self.matters(settings))
+
+    def as_good(self, settings: DiagnosisSettings) -> FloatArray:
+        """Return the loss of each joint up to which another motion is predicted as well, (n,)."""
+        varies = np.ones_like(self.count) if self.varies is None else self.varies
+        return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
+
+    def matters(self, settings: DiagnosisSettings) -> FloatArray:
+        """Return the loss of each joint that matters to the user, shape (n,)."""
+        sigma = np.mean([own**2 for own in self.sigma], axis=0)
+        return np.asarray((settings.material * self.torque_rms) ** 2 / sigma)
 
     def _lasting(self, residual: Sequence[FloatArray]) -> FloatArray:
         """Return for how many rows what is left lasts, as squares go, shape (n,)."""

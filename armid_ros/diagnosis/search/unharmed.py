@@ -54,5 +54,7 @@ def _worse(
     total = more.sum(axis=1)
     floor = np.maximum(sums[0].sum(axis=1), evidence.count)
     left = [part.residual(after) for part in evidence.data]
-    gap = evidence.losses(left) > evidence.limits(left, settings)
-    return np.asarray((total > _SURELY * spread) & (total > _SLIGHTLY * floor) & gap)
+    gap = evidence.losses(left) > evidence.as_good(settings) + evidence.matters(settings)
+    surely = (total > _SURELY * spread) & (total > _SLIGHTLY * floor)
+    by_far = total > (settings.thresholds.same_fit - 1.0) * floor
+    return np.asarray((surely | by_far) & gap)
