@@ -84,7 +84,7 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
     metavar='E,...',
     help="Effects that the model has already, fitted anew; 'E@joint+joint' for some joints only.",
 )
-@click.option('--cutoff', type=float, help='Of the position filter [Hz]; from the noise if none.')
+@click.option('--cutoff', type=float, help='Of the position filter [Hz]; from the data if none.')
 @click.option('--decimation', type=int, help='Keep one sample of this many.')
 @columns.options
 @click.option('--topic', help='JointState topic, where a bag has several.')

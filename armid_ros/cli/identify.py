@@ -70,7 +70,7 @@ OUTPUTS = (
     help='All joints alike, weighted by their noise, or robust against outliers as well.',
 )
 @click.option(
-    '--cutoff', type=float, help='Of the position filter [Hz]; from the noise by default.'
+    '--cutoff', type=float, help='Of the position filter [Hz]; from the data by default.'
 )
 @click.option('--decimation', type=int, help='Keep one sample of this many.')
 @click.option('--quasi-static', is_flag=True, help='Weight and effects only, for slow motions.')
