@@ -1,0 +1,48 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Between two days only what differs is named: not what was there, nor what the body can do."""
+
+from armid_ros.diagnosis import diagnose
+from armid_ros.identification import identify
+import numpy as np
+import pytest
+
+HOSE = np.array([1.5, 0.8])
+
+
+def hose(motion, tau):
+    """Return the torque of springs that hang on the arm on both days."""
+    return HOSE * np.sin(1.3 * motion.q + 0.4)
+
+
+def asked(bench, before, after, new):
+    """Ask what has changed since a model was identified from other recordings."""
+    rng = np.random.default_rng(0)
+    arm = identify(bench.arm, before, rng=rng).arm
+    return diagnose(arm, after, validate=new, baseline=before, rng=rng)
+
+
+def test_what_was_there_already_is_not_named(bench):
+    before = bench.recordings(hose, seed=1)
+    found = asked(bench, before, bench.recordings(hose, seed=2), bench.recordings(hose, seed=3))
+    assert found.verdict == 'consistent', found.summary
+    assert not found.findings
+
+
+def test_a_change_beside_it_is(bench):
+    def with_drag(motion, tau):
+        return hose(motion, tau) + np.array([0.0, 1.2]) * np.sign(motion.dq)
+
+    before = bench.recordings(hose, seed=1)
+    after, new = (bench.recordings(with_drag, seed=seed) for seed in (2, 3))
+    (first, *others) = asked(bench, before, after, new).findings
+    assert (first.name, first.joints, others) == ('coulomb_friction', ('elbow',), [])
+    assert first.values[0] == pytest.approx(1.2, abs=4.0 * first.std[0])
+
+
+def test_what_slow_motion_does_not_tell_of_a_body_is_no_change(bench):
+    """Inertias that are off show first in faster motion, which is no change of the arm."""
+    slow = [bench.recordings(seed=seed)[0] for seed in (1, 2, 3)]
+    fast = [bench.recordings(seed=seed)[2] for seed in (4, 5, 6)]
+    found = asked(bench, slow, fast[:2], fast[2:])
+    assert not found.findings, found.summary
