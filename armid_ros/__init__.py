@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from armid_ros.api.inspection import inspect, InspectionResult
     from armid_ros.api.simulation import design_excitation, ExcitationResult, simulate
     from armid_ros.arm import ArmModel, load_model, save_model
-    from armid_ros.effects import Effect, make_effect, Quantity
+    from armid_ros.effects import Effect, make_effect, Quantity, register
     from armid_ros.errors import ArmidError
     from armid_ros.estimate import Estimate
     from armid_ros.identification.online import OnlineIdentifier
@@ -54,6 +54,7 @@ _HOMES = {
     'Effect': 'armid_ros.effects',
     'Quantity': 'armid_ros.effects',
     'make_effect': 'armid_ros.effects',
+    'register': 'armid_ros.effects',
     'regressor': 'armid_ros.model',
     'Motion': 'armid_ros.motion',
     'Recording': 'armid_ros.recording',
@@ -85,6 +86,7 @@ __all__ = [
     'Effect',
     'Quantity',
     'make_effect',
+    'register',
     'regressor',
     'Motion',
     'Recording',

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.arm import ArmModel
+from armid_ros.effects import USUAL_EFFECTS
 from armid_ros.errors import RecordingError
 from armid_ros.recording import Recording
 from armid_ros.recording.anything import read_anything
@@ -26,7 +27,7 @@ RecordingLike = Recording | str | Path
 Rng = np.random.Generator | int
 
 #: What is fitted beside the rigid body where nothing is said.
-USUAL_EFFECTS = 'viscous_friction,coulomb_friction,torque_offset'
+USUAL = ','.join(USUAL_EFFECTS)
 
 
 def generator(rng: Rng) -> np.random.Generator:
@@ -49,7 +50,7 @@ def source_of(robot: Robot) -> str:
     return robot.name if robot.path is None else str(Path(robot.path).resolve())
 
 
-def arm_of(arm: RobotLike, effects: str = USUAL_EFFECTS) -> ArmModel:
+def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
     """Return the model that is meant; a robot alone gets the usual friction."""
     if isinstance(arm, ArmModel):
         return arm

@@ -24,6 +24,7 @@ from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel, save_model
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
+from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
 from armid_ros.recording import Recording
 
@@ -208,7 +209,9 @@ def diagnose(
     held_out = recordings_of(validate, model.robot)
     before = recordings_of(baseline, model.robot)
     more: dict[str, Any] = {'baseline': before} if before else {}
-    settings = DiagnosisSettings(signals=SignalSettings(cutoff, decimation))
+    settings = DiagnosisSettings(
+        library=tuple(CATALOGUE), signals=SignalSettings(cutoff, decimation)
+    )
     result = run(
         model, looked_at, validate=held_out, settings=settings, rng=generator(rng), **more
     )

@@ -19,7 +19,7 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     source_of,
-    USUAL_EFFECTS,
+    USUAL,
 )
 from armid_ros.api.table import html_table, Shown, Summary
 from armid_ros.arm import ArmModel, save_model
@@ -215,7 +215,7 @@ def identify(
     recordings: RecordingLike | Sequence[RecordingLike],
     *,
     validate: RecordingLike | Sequence[RecordingLike] = (),
-    effects: str = USUAL_EFFECTS,
+    effects: str = USUAL,
     method: Method = 'wls',
     cutoff: float | None = None,
     decimation: int | None = None,

@@ -4,17 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from armid_ros.arm.arm_model import ArmModel
+from armid_ros.effects import Effect
 from armid_ros.model.mjcf_export import export_mjcf
 from armid_ros.model.urdf_export import export_urdf
 import numpy as np
-
-#: What each format has a place for, of every joint.
-_URDF = {'viscous_friction': 'damping', 'coulomb_friction': 'friction'}
-_MJCF = {**_URDF, 'rotor_inertia': 'armature'}
 
 
 @dataclass(frozen=True)
@@ -48,11 +45,12 @@ def arm_urdf(arm: ArmModel) -> Exported:
         If the parameters of a link are not those of a body.
 
     """
-    missing = _without_place(arm, _URDF)
+    missing = _without_place(arm, lambda effect: effect.urdf_attribute)
+    found = _of_joints(arm, lambda effect: effect.urdf_attribute)
     text = export_urdf(
         arm.body,
-        damping=_of_joints(arm, 'viscous_friction'),
-        friction=_of_joints(arm, 'coulomb_friction'),
+        damping=found.get('damping'),
+        friction=found.get('friction'),
         remarks=_remarks('a URDF', missing),
     )
     return Exported(text, missing)
@@ -68,31 +66,33 @@ def arm_mjcf(arm: ArmModel) -> Exported:
         If the parameters of a link are not those of a body.
 
     """
-    missing = _without_place(arm, _MJCF)
+    missing = _without_place(arm, lambda effect: effect.mjcf_attribute)
+    found = _of_joints(arm, lambda effect: effect.mjcf_attribute)
     text = export_mjcf(
         arm.body,
-        damping=_of_joints(arm, 'viscous_friction'),
-        friction=_of_joints(arm, 'coulomb_friction'),
-        armature=_of_joints(arm, 'rotor_inertia'),
+        damping=found.get('damping'),
+        friction=found.get('frictionloss'),
+        armature=found.get('armature'),
         remarks=_remarks('MuJoCo', missing),
     )
     return Exported(text, missing)
 
 
-def _of_joints(arm: ArmModel, name: str) -> dict[str, float]:
-    """Return the value of an effect with one quantity per joint, by joint."""
-    found: dict[str, float] = {}
+def _of_joints(arm: ArmModel, place: Callable[[Effect], str]) -> dict[str, dict[str, float]]:
+    """Return values by attribute and joint, of effects that have a place in the format."""
+    found: dict[str, dict[str, float]] = {}
     for effect, values in zip(arm.effects, arm.values, strict=True):
-        if effect.name == name:
+        if place(effect):
+            own = found.setdefault(place(effect), {})
             for joint, value in zip(effect.joints, values, strict=True):
-                found[joint] = found.get(joint, 0.0) + float(value)
+                own[joint] = own.get(joint, 0.0) + float(value)
     return found
 
 
-def _without_place(arm: ArmModel, places: Collection[str]) -> tuple[str, ...]:
+def _without_place(arm: ArmModel, place: Callable[[Effect], str]) -> tuple[str, ...]:
     lines = []
     for effect, values in zip(arm.effects, arm.values, strict=True):
-        if effect.name in places or effect.changes_body:
+        if place(effect) or effect.changes_body:
             continue
         names = [*effect.parameters(arm.robot), *effect.shape_parameters(arm.robot)]
         numbers = [*values, *np.ravel(effect.shape_values)]

@@ -21,11 +21,10 @@ from typing import Any
 from armid_ros.arm.arm_model import ArmModel
 from armid_ros.arm.misfit import Misfit
 from armid_ros.effects import CATALOGUE, Effect, Kind
-from armid_ros.effects.tied import TIED, Tied, TiedKind
+from armid_ros.effects.tied import tied_kind
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.files import finite, is_file, parsed_yaml, read_text, reading, write_file
-from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot, Robot
 import numpy as np
@@ -75,12 +74,11 @@ def model_document(arm: ArmModel, robot: str, estimate: Estimate | None = None) 
     effects, start = [], size
     for effect, values in zip(arm.effects, arm.values, strict=True):
         rows = table[start : start + len(values)]
-        entry = {'name': effect.name, 'joints': list(effect.joints), 'parameters': rows}
+        entry: dict[str, Any] = {'name': effect.name, 'joints': list(effect.joints)}
+        entry['parameters'] = rows
         if effect.shapes:
             entry['shapes'] = _shape_table(effect, arm.robot, known)
-        if isinstance(effect, Tied):
-            entry |= {'partner': effect.partner, 'ties': [_tie_row(tie) for tie in effect.ties]}
-        effects.append(entry)
+        effects.append(entry | effect.particulars())
         start += len(values)
     return {
         'schema': SCHEMA,
@@ -97,35 +95,6 @@ def _shape_table(
     names = effect.shape_parameters(robot)
     std = [known.get((name.name, name.joint)) for name in names]
     return parameter_table(names, np.array(effect.shape), std)
-
-
-def _tie_row(tie: Tie) -> dict[str, Any]:
-    return {
-        'name': tie.name,
-        'joint': tie.joint,
-        'point': list(tie.point),
-        'partner_joint': tie.other_joint,
-        'partner_point': list(tie.other_point),
-    }
-
-
-def _tied(kind: type[Tied], entry: dict[str, Any]) -> TiedKind:
-    ties = [
-        Tie(
-            str(row['name']),
-            str(row['joint']),
-            str(row['partner_joint']),
-            _point(row['point']),
-            _point(row['partner_point']),
-        )
-        for row in entry['ties']
-    ]
-    return TiedKind(kind, tuple(ties), str(entry['partner']))
-
-
-def _point(values: Sequence[float]) -> tuple[float, float, float]:
-    x, y, z = (finite(value, 'a coordinate of a tie') for value in values)
-    return x, y, z
 
 
 def save_model(
@@ -195,13 +164,9 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
     arm = ArmModel(robot.with_gravity(np.array(document['gravity'], dtype=float)))
     arm = arm.with_theta(_values(document['rigid_parameters'], arm.parameters))
     for entry in document['effects']:
-        if entry['name'] not in CATALOGUE:
-            raise ModelError(
-                f"no effect '{entry['name']}'; the catalogue has {', '.join(CATALOGUE)}"
-            )
-        kind: Kind = CATALOGUE[entry['name']]
+        kind: Kind = CATALOGUE.find(str(entry['name']))
         if 'ties' in entry:
-            kind = _tied(TIED[entry['name']], entry)
+            kind = tied_kind(kind.name, entry)
         effect = kind.on(robot, tuple(entry['joints']))
         if 'shapes' in entry:
             shape = _values(entry['shapes'], effect.shape_parameters(robot))

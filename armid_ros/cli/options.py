@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli import columns
-from armid_ros.effects import make_effect
+from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.files import default_memory_limit, result_folder, write_file
 from armid_ros.motion import FloatArray
@@ -26,8 +26,6 @@ Corners = tuple[Sequence[float], Sequence[float]]
 
 #: Where the context keeps what its commands share.
 _FORCE, _CRC, _MEMORY = 'armid.force', 'armid.crc', 'armid.memory'
-
-DEFAULT_EFFECTS = 'viscous_friction,coulomb_friction,torque_offset'
 
 robot = click.option(
     '--robot',
@@ -46,7 +44,7 @@ joints = click.option(
 )
 effects = click.option(
     '--effects',
-    default=DEFAULT_EFFECTS,
+    default=','.join(USUAL_EFFECTS),
     show_default=True,
     metavar='E,...',
     help="What acts beside the rigid body; 'E@joint+joint' for some joints only.",

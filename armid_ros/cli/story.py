@@ -20,7 +20,7 @@ from armid_ros.cli.diagnose import show
 from armid_ros.cli.diagnosis_files import Case, Extras, write_results
 from armid_ros.cli.terminal import progress, say
 from armid_ros.diagnosis import diagnose, Diagnosis
-from armid_ros.effects import Effect, make_effect, parse_effect
+from armid_ros.effects import CATALOGUE, Effect, make_effect, parse_effect
 from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.identification.online import OnlineIdentifier
 from armid_ros.motion import FloatArray, Motion
@@ -30,23 +30,10 @@ from armid_ros.robots import collision_model
 from armid_ros.simulation import Sensors, SimulatedArm
 import numpy as np
 
-#: What may be hidden: effects of one joint that a person would know.
-HIDEABLE = (
-    'viscous_friction',
-    'coulomb_friction',
-    'stribeck_friction',
-    'quadratic_friction',
-    'load_dependent_friction',
-    'torque_offset',
-    'torque_gain',
-    'encoder_offset',
-    'payload',
-    'joint_spring',
-)
 #: Torque of what is hidden over that of its joint, both root mean square: seen by an engineer who
 #: looks at the curves, and not by one who looks at the arm.
 _SIZE = (0.15, 0.4)
-#: Of a payload its mass over that of the link, and how far from the joint its centre is [m].
+#: Of a body its mass over that of the link, and how far from the joint its centre is [m].
 _MASS, _REACH = (0.4, 0.8), 0.06
 #: A run: seconds of a period, and harmonics.
 _PERIOD, _HARMONICS = 8.0, 5
@@ -234,12 +221,12 @@ def draw_hidden(
 
 def _drawn(arm: ArmModel, motion: Motion, rng: np.random.Generator, asked: str) -> Hidden:
     head, at, joints = asked.partition('@')
-    name = head or str(rng.choice(HIDEABLE))
+    name = head or str(rng.choice([n for n, kind in CATALOGUE.items() if kind.familiar]))
     effect = make_effect(f'{name}@{joints}' if at else name, arm.robot)
     if not at and len(effect.joints) > 1:
         effect = make_effect(f'{name}@{rng.choice(effect.joints)}', arm.robot)
-    if name == 'payload':
-        return Hidden(effect, _payload(arm, effect, rng))
+    if effect.adds_to(arm.robot):
+        return Hidden(effect, _body(arm, effect, rng))
     return Hidden(effect, _sized(arm, effect, motion, rng))
 
 
@@ -251,7 +238,7 @@ def _shows(arm: ArmModel, hidden: Hidden, motion: Motion) -> bool:
     return bool(share.max() > 0.9 * _SIZE[0])
 
 
-def _payload(arm: ArmModel, effect: Effect, rng: np.random.Generator) -> FloatArray:
+def _body(arm: ArmModel, effect: Effect, rng: np.random.Generator) -> FloatArray:
     """Return a ball on the axis from a joint to the centre of mass of its link."""
     body = arm.robot.joints.index(effect.joints[0])
     rigid = arm.robot.rigid_parameters.reshape(-1, 10)[body]

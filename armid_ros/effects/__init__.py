@@ -1,6 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What acts on the joints of an arm beside its rigid body, one family a file."""
+"""
+What acts on the joints of an arm beside its rigid body, one family a file.
+
+An effect of one's own derives from ``Effect``; ``register`` puts it into the catalogue,
+``joint_columns`` and ``scatter`` place what acts on each joint alone, and
+``armid_ros.effects.testing`` checks it.
+
+"""
 
 from armid_ros.effects.action import (
     Action,
@@ -10,14 +17,24 @@ from armid_ros.effects.action import (
     TorqueLaw,
     Transmission,
 )
-from armid_ros.effects.base import Effect, Kind, Quantity, Shape
-from armid_ros.effects.catalogue import CATALOGUE, make_effect, parse_effect
+from armid_ros.effects.base import Effect, Kind
+from armid_ros.effects.catalogue import (
+    CATALOGUE,
+    make_effect,
+    parse_effect,
+    register,
+    USUAL_EFFECTS,
+)
+from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.merge import merge_actions
+from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
 from armid_ros.effects.slipping import Hysteresis
 
 __all__ = [
     'CATALOGUE',
+    'USUAL_EFFECTS',
+    'register',
     'make_effect',
     'parse_effect',
     'Effect',
@@ -34,4 +51,6 @@ __all__ = [
     'TorqueLaw',
     'law_derivatives',
     'merge_actions',
+    'joint_columns',
+    'scatter',
 ]

@@ -18,9 +18,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import ClassVar, Protocol, Self, TYPE_CHECKING
+from typing import Any, ClassVar, Protocol, Self, TYPE_CHECKING
 
 from armid_ros.effects.action import Action
+from armid_ros.effects.quantities import joint_unit, Quantity, Shape
+from armid_ros.effects.smooth import SmoothColumns
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
@@ -30,72 +32,6 @@ import numpy.typing as npt
 
 if TYPE_CHECKING:
     from armid_ros.arm import ArmModel
-
-#: A unit of a revolute joint and what it becomes on a prismatic one.
-_PRISMATIC_UNITS = {
-    'N m': 'N',
-    'N m s/rad': 'N s/m',
-    'N m s^2/rad^2': 'N s^2/m^2',
-    'N m/rad': 'N/m',
-    'rad/(N m)': 'm/N',
-    'kg m^2': 'kg',
-    'rad': 'm',
-    'rad/s': 'm/s',
-    '1/rev': '1/(2 pi m)',
-}
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """
-    One physical quantity that an effect has per joint, or once for the arm.
-
-    Attributes
-    ----------
-    name : str
-        Standard term, such as 'viscous_coefficient'.
-    unit : str
-        SI unit on a revolute joint.
-    lower, upper : float
-        What is physically possible.
-    typical : tuple of float, or None
-        Smallest and largest size that arms of 1 to 10 kg have, where it matters; a sign does not.
-
-    """
-
-    name: str
-    unit: str
-    lower: float = -np.inf
-    upper: float = np.inf
-    typical: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class Shape:
-    """
-    One parameter that the torque does not depend on linearly, per owner of an effect.
-
-    Attributes
-    ----------
-    name : str
-        Standard term, such as 'stribeck_velocity'.
-    unit : str
-        SI unit on a revolute joint.
-    lower, upper : float
-        What is physically possible.
-    default : float
-        Value of an effect that was given none.
-    grid : tuple of float
-        Where a search starts from; values between which the best one is refined.
-
-    """
-
-    name: str
-    unit: str
-    lower: float
-    upper: float
-    default: float
-    grid: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -129,6 +65,19 @@ class Effect(ABC):
     changes_body: ClassVar[bool] = False
     #: Whether every joint may be taken to have it.
     everywhere: ClassVar[bool] = False
+    #: Whether it is fitted where nothing is said: nearly every arm has it.
+    usual: ClassVar[bool] = False
+    #: Whether it is friction: all that a joint has of it may change at once.
+    friction: ClassVar[bool] = False
+    #: Shapes with which it is learned as a nuisance where nobody asked for it; () if it is not.
+    nuisance: ClassVar[tuple[tuple[float, ...], ...]] = ()
+    #: Whether it comes and goes all day: a change is put down to it where it explains as well.
+    comes_and_goes: ClassVar[bool] = False
+    #: Whether an engineer knows it by its curve; the demo hides one of these.
+    familiar: ClassVar[bool] = False
+    #: Attributes of a joint of URDF and of MJCF that hold its one quantity; '' if none does.
+    urdf_attribute: ClassVar[str] = ''
+    mjcf_attribute: ClassVar[str] = ''
     #: Whether it comes from outside the arm: a person, another machine.
     external: ClassVar[bool] = False
     #: Whether its torque changes smoothly with position and velocity.
@@ -192,6 +141,10 @@ class Effect(ABC):
         """
         joints = cls._default_joints(robot)
         return tuple((joint,) for joint in joints) or ((),)
+
+    def particulars(self) -> dict[str, Any]:
+        """Return what model.yaml holds of it beside joints, parameters and shapes."""
+        return {}
 
     def named_as(self, values: FloatArray, arm: ArmModel) -> tuple[tuple[Effect, FloatArray], ...]:
         """Return the effects, with values, that say the same in the words of the catalogue."""
@@ -292,6 +245,26 @@ class Effect(ABC):
         upper = np.array([q.upper for q in self.quantities] * len(self.owners))
         return lower, upper
 
+    def adds_to(self, robot: Robot) -> tuple[int, ...]:
+        """Return the rigid parameters that its own add to, one each; none for most effects."""
+        return ()
+
+    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns | None:
+        """
+        Return columns that are smooth in the motion, with their gradient, if these are known.
+
+        The search for a motion takes finite differences where they are not.
+
+        Parameters
+        ----------
+        motion : Motion
+            N samples.
+        width : ndarray, shape (n,)
+            Velocity below which the direction of motion is blurred [rad/s or m/s].
+
+        """
+        return None
+
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the points beside the arm that it ends at."""
@@ -370,10 +343,3 @@ class Kind(Protocol):
 
     def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
         """Return the sets of joints on which it is one cause."""
-
-
-def joint_unit(unit: str, joint: str, robot: Robot) -> str:
-    """Return a unit as it is on the joint: 'N m' is 'N' on a prismatic one."""
-    if joint and robot.prismatic[robot.joints.index(joint)]:
-        return _PRISMATIC_UNITS.get(unit, unit)
-    return unit

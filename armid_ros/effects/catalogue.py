@@ -1,11 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The catalogue: every effect that can be simulated, estimated and named."""
+"""
+The catalogue: every effect that can be simulated, estimated and named.
+
+Those below are shipped. Others come from installed packages, see ``registry``, or by ``register``.
+
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
+from typing import TypeVar
 
 from armid_ros.effects.base import Effect
 from armid_ros.effects.drive import ActuatorSaturation, RotorInertia, TorqueRipple
@@ -22,6 +26,7 @@ from armid_ros.effects.hysteresis import LoadDependentFriction, PreslidingHyster
 from armid_ros.effects.interaction import HumanInteraction, InterfaceSlack
 from armid_ros.effects.load import LinkInertia, Payload
 from armid_ros.effects.pairs import CoupledJointFriction, JointCoupling, TorqueCrosstalk
+from armid_ros.effects.registry import Catalogue
 from armid_ros.effects.sensing import EncoderOffset, TorqueDrift, TorqueGain, TorqueOffset
 from armid_ros.effects.springs import JointSpring, SoftLimit
 from armid_ros.effects.timing import TimeDelay, TorqueLag
@@ -64,7 +69,37 @@ _EFFECTS: tuple[type[Effect], ...] = (
     InterfaceSlack,
 )
 
-CATALOGUE: Mapping[str, type[Effect]] = MappingProxyType({e.name: e for e in _EFFECTS})
+CATALOGUE = Catalogue(_EFFECTS)
+
+#: What is fitted beside the rigid body where nothing is said.
+USUAL_EFFECTS = tuple(effect.name for effect in _EFFECTS if effect.usual)
+
+_Kind = TypeVar('_Kind', bound=type[Effect])
+
+
+def register(kind: _Kind) -> _Kind:
+    """
+    Put an effect of one's own into the catalogue; a decorator of its class.
+
+    From then on it can be named like those that are shipped: by ``make_effect``, in model.yaml,
+    in ``effects='...'``, and the diagnosis looks for it. A class that is defined anew, as in a
+    notebook, takes the place of the old one.
+
+    Raises
+    ------
+    ModelError
+        If something is missing in the class, or its name or that of a quantity is taken.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> @ar.register  # doctest: +SKIP
+    ... class Hose(ar.Effect):
+    ...     name = 'hose'
+
+    """
+    CATALOGUE.add(kind)
+    return kind
 
 
 def make_effect(text: str, robot: Robot) -> Effect:
@@ -85,9 +120,7 @@ def make_effect(text: str, robot: Robot) -> Effect:
 
     """
     name, _, joints = text.strip().partition('@')
-    if name not in CATALOGUE:
-        raise ModelError(f"no effect '{name}'; the catalogue has {', '.join(CATALOGUE)}")
-    return CATALOGUE[name].on(robot, tuple(joints.split('+')) if joints else None)
+    return CATALOGUE.find(name).on(robot, tuple(joints.split('+')) if joints else None)
 
 
 def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:

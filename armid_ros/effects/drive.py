@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Effect, Quantity, Shape
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.base import Effect
+from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
+from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import TorqueReading
+from armid_ros.effects.smooth import SmoothColumns
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
@@ -36,11 +38,16 @@ class RotorInertia(Effect):
 
     name = 'rotor_inertia'
     summary = 'inertia of rotor and gear, seen by its own joint only'
+    mjcf_attribute = 'armature'
     quantities = (Quantity('rotor_inertia', 'kg m^2', lower=0.0, typical=(0.001, 1.1)),)
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/dIa = ddq [rad/s^2], shape (N, n, P)."""
         return joint_columns(self, motion, motion.ddq)
+
+    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
+        """Return the same with its gradient."""
+        return smooth_joint_columns(self, motion, (motion.ddq, 2, np.ones_like(motion.ddq)))
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the inertia on the diagonal."""

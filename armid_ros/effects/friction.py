@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, DryFriction
-from armid_ros.effects.base import Effect, Quantity, Shape
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.base import Effect
+from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
+from armid_ros.effects.quantities import Quantity, Shape
+from armid_ros.effects.smooth import smooth_direction, SmoothColumns
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
@@ -29,12 +31,21 @@ class ViscousFriction(Effect):
 
     name = 'viscous_friction'
     summary = 'torque proportional to joint velocity'
+    friction = True
+    familiar = True
+    nuisance = ((),)
+    urdf_attribute = mjcf_attribute = 'damping'
+    usual = True
     everywhere = True
     quantities = (Quantity('viscous_coefficient', 'N m s/rad', lower=0.0, typical=(0.004, 10.0)),)
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/dFv = dq [rad/s], shape (N, n, P)."""
         return joint_columns(self, motion, motion.dq)
+
+    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
+        """Return the same with its gradient."""
+        return smooth_joint_columns(self, motion, (motion.dq, 1, np.ones_like(motion.dq)))
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the damping matrix."""
@@ -55,6 +66,12 @@ class CoulombFriction(Effect):
 
     name = 'coulomb_friction'
     summary = 'constant torque against the direction of motion; holds at rest'
+    friction = True
+    familiar = True
+    nuisance = ((),)
+    urdf_attribute = 'friction'
+    mjcf_attribute = 'frictionloss'
+    usual = True
     everywhere = True
     quantities = (Quantity('coulomb_torque', 'N m', lower=0.0, typical=(0.005, 10.0)),)
     holds_at_rest = True
@@ -62,6 +79,10 @@ class CoulombFriction(Effect):
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/dFc = sign(dq) [-], shape (N, n, P)."""
         return joint_columns(self, motion, np.sign(motion.dq))
+
+    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
+        """Return the same with a smooth direction."""
+        return smooth_joint_columns(self, motion, smooth_direction(motion.dq, width))
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return dry friction between -Fc and Fc."""
@@ -82,6 +103,7 @@ class AsymmetricFriction(Effect):
 
     name = 'asymmetric_friction'
     summary = 'friction that differs between the two directions of motion'
+    friction = True
     quantities = (
         Quantity('coulomb_asymmetry', 'N m', typical=(0.005, 2.0)),
         Quantity('viscous_asymmetry', 'N m s/rad', typical=(0.002, 5.0)),
@@ -91,6 +113,16 @@ class AsymmetricFriction(Effect):
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/d(dFc, dFv) = (|sign(dq)|, |dq|), shape (N, n, P)."""
         return joint_columns(self, motion, np.abs(np.sign(motion.dq)), np.abs(motion.dq))
+
+    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
+        """Return the same with a smooth direction."""
+        sign, _, slope = smooth_direction(motion.dq, width)
+        return smooth_joint_columns(
+            self,
+            motion,
+            (sign**2, 1, 2.0 * sign * slope),
+            (sign * motion.dq, 1, sign + motion.dq * slope),
+        )
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the shift of the dry friction's levels, and the torque that grows with |dq|."""
@@ -118,6 +150,8 @@ class QuadraticFriction(Effect):
 
     name = 'quadratic_friction'
     summary = 'friction that grows with the square of the velocity, or flattens'
+    friction = True
+    familiar = True
     quantities = (Quantity('quadratic_coefficient', 'N m s^2/rad^2', typical=(0.0004, 1.0)),)
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
@@ -149,6 +183,9 @@ class StribeckFriction(Effect):
 
     name = 'stribeck_friction'
     summary = 'breakaway torque beyond Coulomb friction, gone at higher velocity'
+    friction = True
+    familiar = True
+    nuisance = ((0.03, 2.0), (0.1, 2.0), (0.3, 2.0))  # humps at low velocities
     quantities = (Quantity('stribeck_torque', 'N m', lower=0.0, typical=(0.001, 10.0)),)
     shapes = (
         Shape('stribeck_velocity', 'rad/s', 1e-4, 20.0, 0.1, (0.01, 0.03, 0.1, 0.3, 1.0)),
@@ -191,6 +228,7 @@ class ThermalFriction(Effect):
 
     name = 'thermal_friction'
     summary = 'viscous friction that changes while the joint warms up'
+    friction = True
     quantities = (Quantity('viscous_change', 'N m s/rad', typical=(0.001, 6.0)),)
     shapes = (Shape('warm_up_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 

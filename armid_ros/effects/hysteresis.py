@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, DryFriction
-from armid_ros.effects.base import Effect, Quantity, Shape
+from armid_ros.effects.base import Effect
 from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.slipping import Hysteresis
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -31,6 +32,9 @@ class LoadDependentFriction(Effect):
 
     name = 'load_dependent_friction'
     summary = 'dry friction in proportion to the torque that the gear passes on'
+    friction = True
+    familiar = True
+    nuisance = ((),)
     quantities = (Quantity('load_coefficient', '', lower=0.0, upper=1.0, typical=(0.01, 0.4)),)
     holds_at_rest = True
 

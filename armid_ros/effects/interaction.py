@@ -17,7 +17,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Effect, Quantity, Shape
+from armid_ros.effects.base import Effect
+from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.model import LinkFrames, point_motion
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Effect, Quantity
+from armid_ros.effects.base import Effect
+from armid_ros.effects.quantities import Quantity
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -44,9 +45,13 @@ class _LinkBody(Effect):
         """Return what descriptions of the links are off by at the most, shape (P,)."""
         return described_spread(robot).ravel()[self._rows(robot)]
 
-    def _rows(self, robot: Robot) -> list[int]:
+    def adds_to(self, robot: Robot) -> tuple[int, ...]:
+        """Return the parameters of its links."""
         size = len(LINK_PARAMETERS)
-        return [size * joint + i for joint in self.indices(robot.joints) for i in range(size)]
+        return tuple(size * joint + i for joint in self.indices(robot.joints) for i in range(size))
+
+    def _rows(self, robot: Robot) -> list[int]:
+        return list(self.adds_to(robot))
 
 
 def described_spread(robot: Robot) -> FloatArray:
@@ -74,6 +79,8 @@ class Payload(_LinkBody):
 
     name = 'payload'
     summary = 'a body fixed to a link'
+    familiar = True
+    comes_and_goes = True
     quantities = tuple(
         Quantity(
             f'payload_{name}',

@@ -10,8 +10,10 @@ from itertools import combinations, pairwise, permutations
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, DryFriction
-from armid_ros.effects.base import Effect, joint_unit, Quantity
+from armid_ros.effects.base import Effect
+from armid_ros.effects.quantities import joint_unit, Quantity
 from armid_ros.effects.readings import TorqueReading
+from armid_ros.effects.smooth import Gradient, smooth_direction, SmoothColumns
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
@@ -89,6 +91,7 @@ class CoupledJointFriction(_Pairs):
 
     name = 'coupled_joint_friction'
     summary = 'friction and inertia of a shaft that turns with the sum of two joints'
+    friction = True
     quantities = (
         Quantity('coupled_inertia', 'kg m^2'),
         Quantity('coupled_viscous_coefficient', 'N m s/rad'),
@@ -106,6 +109,33 @@ class CoupledJointFriction(_Pairs):
                 columns[:, row, 3 * position + 1] = motion.dq[:, other]
                 columns[:, row, 3 * position + 2] = direction
         return columns
+
+    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
+        """Return the same with a smooth direction of the shaft."""
+        pairs = self.pairs(motion.joints)
+        columns = np.zeros((*motion.q.shape, 3 * len(pairs)))
+        slopes = []
+        for position, (i, k) in enumerate(pairs):
+            shaft = motion.dq[:, i] + motion.dq[:, k]
+            sign, _, slope = smooth_direction(shaft, np.minimum(width[i], width[k]))
+            slopes.append(slope)
+            for row, other in ((i, k), (k, i)):
+                columns[:, row, 3 * position] = motion.ddq[:, other]
+                columns[:, row, 3 * position + 1] = motion.dq[:, other]
+                columns[:, row, 3 * position + 2] = sign
+
+        def pullback(weights: FloatArray) -> Gradient:
+            by_dq, by_ddq = np.zeros_like(motion.q), np.zeros_like(motion.q)
+            for position, (i, k) in enumerate(pairs):
+                for row, other in ((i, k), (k, i)):
+                    by_ddq[:, other] += weights[:, row, 3 * position]
+                    by_dq[:, other] += weights[:, row, 3 * position + 1]
+                    turn = weights[:, row, 3 * position + 2] * slopes[position]
+                    by_dq[:, i] += turn
+                    by_dq[:, k] += turn
+            return np.zeros_like(motion.q), by_dq, by_ddq
+
+        return SmoothColumns(columns, pullback)
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return inertia and damping between the joints, and dry friction of the shaft."""

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, Displacement
-from armid_ros.effects.base import Effect, Quantity, Shape
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.base import Effect
+from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
+from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
+from armid_ros.effects.smooth import SmoothColumns
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
@@ -31,12 +33,19 @@ class TorqueOffset(Effect):
 
     name = 'torque_offset'
     summary = 'constant torque, in motion and at rest'
+    familiar = True
+    usual = True
     everywhere = True
     quantities = (Quantity('torque_offset', 'N m', typical=(0.004, 2.0)),)
 
     def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
         """Return dtau/doffset = 1 [-], shape (N, n, P)."""
         return joint_columns(self, motion, np.ones_like(motion.q))
+
+    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
+        """Return the same with its gradient."""
+        one = np.ones_like(motion.q)
+        return smooth_joint_columns(self, motion, (one, 0, 0.0 * one))
 
     def action(self, values: FloatArray, arm: ArmModel) -> Action:
         """Return the constant torque."""
@@ -61,6 +70,7 @@ class TorqueGain(TorqueReading):
 
     name = 'torque_gain'
     summary = 'torque readings too large or too small by a share'
+    familiar = True
     quantities = (Quantity('gain_error', '', lower=-0.95, typical=(0.005, 0.3)),)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
@@ -130,6 +140,7 @@ class EncoderOffset(Displacing):
 
     name = 'encoder_offset'
     summary = 'zero of a position encoder that is off'
+    familiar = True
     quantities = (Quantity('encoder_offset', 'rad', typical=(0.001, 0.1)),)
     linear = False
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Effect, Quantity, Shape
+from armid_ros.effects.base import Effect
 from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -40,6 +41,7 @@ class JointSpring(Effect):
 
     name = 'joint_spring'
     summary = 'spring on a joint: cable, hose, balancer'
+    familiar = True
     quantities = (
         Quantity('spring_stiffness', 'N m/rad', typical=(0.05, 50.0)),
         Quantity('spring_preload', 'N m', typical=(0.01, 50.0)),

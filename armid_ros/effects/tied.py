@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import ClassVar, Self, TYPE_CHECKING
+from typing import Any, ClassVar, Self, TYPE_CHECKING
 
 from armid_ros.effects.base import Effect
 from armid_ros.effects.interaction import Attached, HumanInteraction, InterfaceSlack
 from armid_ros.errors import ModelError
+from armid_ros.files import finite
 from armid_ros.model import LinkFrames
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray, Motion
@@ -104,6 +104,10 @@ class Tied(Attached):
     def _default_shape(self, robot: Robot) -> FloatArray:
         return self.shape_values
 
+    def particulars(self) -> dict[str, Any]:
+        """Return the other machine and the points of both where the springs end."""
+        return {'partner': self.partner, 'ties': [_tie_row(tie) for tie in self.ties]}
+
 
 @dataclass(frozen=True)
 class TiedInteraction(Tied, HumanInteraction):
@@ -120,10 +124,14 @@ class TiedSlack(Tied, InterfaceSlack):
     shapes = (replace(InterfaceSlack.shapes[-1], default=0.003, grid=_SLACKS),)
 
 
-#: Tied effects by their names in the catalogue.
-TIED: Mapping[str, type[Tied]] = MappingProxyType(
-    {TiedInteraction.name: TiedInteraction, TiedSlack.name: TiedSlack}
-)
+def _tie_row(tie: Tie) -> dict[str, Any]:
+    return {
+        'name': tie.name,
+        'joint': tie.joint,
+        'point': list(tie.point),
+        'partner_joint': tie.other_joint,
+        'partner_point': list(tie.other_point),
+    }
 
 
 @dataclass(frozen=True)
@@ -187,6 +195,39 @@ class TiedKind:
         return self.effect(
             chosen, ties=tuple(by_joint[joint] for joint in chosen), partner=self.partner
         )
+
+
+def tied_kind(name: str, particulars: Mapping[str, Any]) -> TiedKind:
+    """
+    Return what makes a tied effect with the ``particulars`` that another one gave.
+
+    Raises
+    ------
+    ModelError
+        If effects of that name are not tied.
+    ValueError
+        If a coordinate is no number.
+
+    """
+    known = {kind.name: kind for kind in (TiedInteraction, TiedSlack)}
+    if name not in known:
+        raise ModelError(f"{name} has 'ties'; those that can be tied are {', '.join(known)}")
+    ties = [
+        Tie(
+            str(row['name']),
+            str(row['joint']),
+            str(row['partner_joint']),
+            _point(row['point']),
+            _point(row['partner_point']),
+        )
+        for row in particulars['ties']
+    ]
+    return TiedKind(known[name], tuple(ties), str(particulars['partner']))
+
+
+def _point(values: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = (finite(value, 'a coordinate of a tie') for value in values)
+    return x, y, z
 
 
 @dataclass(frozen=True)

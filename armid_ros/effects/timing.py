@@ -7,8 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from armid_ros.effects.base import Quantity
 from armid_ros.effects.layout import joint_columns
+from armid_ros.effects.quantities import Quantity
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion

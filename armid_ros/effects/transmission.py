@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, Displacement, Transmission
-from armid_ros.effects.base import Quantity, Shape
 from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing
 from armid_ros.effects.timing import low_pass, rate_of_change, within_band
 from armid_ros.motion import FloatArray, Motion

@@ -8,16 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from armid_ros.effects import Effect
-from armid_ros.effects.load import Payload
+from armid_ros.effects.smooth import Gradient, SmoothColumns
 from armid_ros.excitation.chain import Chain
-from armid_ros.excitation.effect_gradient import (
-    columns_by_state,
-    Gradient,
-    payload_columns,
-    smooth_columns,
-    SmoothColumns,
-    STEP,
-)
+from armid_ros.excitation.effect_gradient import columns_by_state, rigid_columns, STEP
 from armid_ros.excitation.fourier import fourier_basis
 from armid_ros.excitation.problem import Problem
 from armid_ros.excitation.rigid_gradient import RigidRegressor
@@ -151,12 +144,13 @@ class Objective:
 
     def _effect(self, effect: Effect, motion: Motion, x: FloatArray) -> SmoothColumns:
         arm = self.problem.arm
-        if isinstance(effect, Payload):
+        rows = effect.adds_to(arm.robot)
+        if rows:
             felt = arm.felt(motion)
-            return payload_columns(
-                effect, motion, RigidRegressor.of(self.chain, felt.q, felt.dq, felt.ddq)
+            return rigid_columns(
+                rows, motion, RigidRegressor.of(self.chain, felt.q, felt.dq, felt.ddq)
             )
-        known = smooth_columns(effect, motion, self.width)
+        known = effect.smooth_columns(motion, self.width)
         if known is not None:
             return known
         if effect.instantaneous:

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
+from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.model import BaseParameters, LINK_PARAMETERS
+from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
@@ -38,6 +38,8 @@ class Candidate:
         What a unit of each adds to the base parameters.
     reopened : ndarray, shape (P, k)
         All that may have changed with them, independent directions.
+    common : bool
+        Whether it happens all day.
 
     """
 
@@ -46,6 +48,7 @@ class Candidate:
     parameters: tuple[ParameterName, ...]
     directions: FloatArray
     reopened: FloatArray
+    common: bool = False
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -126,12 +129,14 @@ def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[Candidate, .
         for owner in effect.owners:
             columns = list(range(first, first + count))
             found.append(_candidate(effect.name, owner, columns, base))
-            if 'friction' in effect.name:
+            if effect.friction:
                 friction.setdefault(owner, []).extend(columns)
             first += count
     several = {joint: c for joint, c in friction.items() if len(c) > 1}
     found += [_candidate('friction', joint, c, base) for joint, c in several.items()]
-    return tuple(c for c in (*found, _payload(arm, base)) if c.parameters)
+    carried = [kind.on(arm.robot) for kind in CATALOGUE.values() if kind.comes_and_goes]
+    found += [_carried(effect, arm, base) for effect in carried if effect.adds_to(arm.robot)]
+    return tuple(candidate for candidate in found if candidate.parameters)
 
 
 def _candidate(name: str, joint: str, columns: Sequence[int], base: BaseParameters) -> Candidate:
@@ -142,20 +147,18 @@ def _candidate(name: str, joint: str, columns: Sequence[int], base: BaseParamete
     )
 
 
-def _payload(arm: ArmModel, base: BaseParameters) -> Candidate:
-    """Return the body that the last link may hold; its parameters add to the link's own."""
-    payload = make_effect('payload', arm.robot)
-    names = payload.parameters(arm.robot)
-    size = len(LINK_PARAMETERS)
-    first = size * arm.robot.joints.index(payload.joints[0])
-    columns = base.grouping[:, first : first + size]
+def _carried(effect: Effect, arm: ArmModel, base: BaseParameters) -> Candidate:
+    """Return a body that a link may hold; its parameters add to the link's own."""
+    names = effect.parameters(arm.robot)
+    columns = base.grouping[:, list(effect.adds_to(arm.robot))]
     kept = [k for k in _independent(columns) if k < _REPORTED]
     return Candidate(
-        payload.name,
-        payload.joints[0],
+        effect.name,
+        effect.joints[0],
         tuple(names[k] for k in kept),
         columns[:, kept],
         columns[:, _independent(columns)],
+        common=True,
     )
 
 

@@ -231,7 +231,7 @@ class ChangeWatch:
     @staticmethod
     def _most_common(best: Candidate, alike: Sequence[Candidate]) -> Candidate:
         """Return the load where it explains the torques as well: arms pick things up all day."""
-        return next((c for c in alike if c.name == 'payload'), best)
+        return next((c for c in alike if c.common), best)
 
     def _likelihood(self, ratios: FloatArray) -> FloatArray:
         """Return logarithms of likelihoods, each free parameter being charged for."""

@@ -16,12 +16,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import Effect, make_effect
+from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
-
-#: Velocities [rad/s or m/s] and exponent of the humps.
-_HUMPS, _EXPONENT = (0.03, 0.1, 0.3), 2.0
 
 
 class FrictionBeside:
@@ -71,15 +68,13 @@ class FrictionBeside:
 
 def _lacking(arm: ArmModel) -> list[Effect]:
     """Return the friction that an arm may have, but for what is known of it."""
-    curve = make_effect('stribeck_friction', arm.robot)
-    friction = [
-        make_effect('viscous_friction', arm.robot),
-        make_effect('coulomb_friction', arm.robot),
-        *(curve.with_shape((velocity, _EXPONENT)) for velocity in _HUMPS),
-        make_effect('load_dependent_friction', arm.robot),
-    ]
     known = {effect.name for effect in arm.effects}
-    return [effect for effect in friction if effect.name not in known]
+    return [
+        kind.on(arm.robot).with_shape(shape) if shape else kind.on(arm.robot)
+        for kind in CATALOGUE.values()
+        for shape in kind.nuisance
+        if kind.name not in known
+    ]
 
 
 def by_joint(torques: FloatArray) -> FloatArray:

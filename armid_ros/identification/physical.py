@@ -176,7 +176,7 @@ def _heavy(robot: Robot, rigid: FloatArray) -> tuple[str, ...]:
         return ()
     return (
         f'more than {HEAVY:g} times as heavy as described: {"; ".join(named)}; look for what is '
-        'not the links, such as rotor_inertia, joint_spring or payload, or correct the masses',
+        'not the links, such as rotors, springs or a load, or correct the masses',
     )
 
 

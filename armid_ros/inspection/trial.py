@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
+from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import ArmidError
 from armid_ros.identification import (
     Conditioning,
@@ -22,8 +22,6 @@ from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
-#: What is fitted beside the rigid body.
-EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 #: A fit that leaves less than this needs no other cut-off [%].
 _GOOD = 3.0
 #: Shares of the cut-off that are tried below it, and what they have to leave of the error.
@@ -85,7 +83,7 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
 
     """
     arm = ArmModel(robot)
-    for name in EFFECTS:
+    for name in USUAL_EFFECTS:
         arm = arm.with_effect(make_effect(name, robot))
     try:
         result = identify(arm, [recording], rng=rng)

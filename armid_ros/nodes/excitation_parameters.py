@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
+from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
@@ -57,7 +57,7 @@ EXCITATION_PARAMETERS = (
     ),
     NodeParameter(
         'effects',
-        ['viscous_friction', 'coulomb_friction', 'torque_offset'],
+        list(USUAL_EFFECTS),
         'Effects that are to be seen, beside the rigid body.',
     ),
     NodeParameter('clearance', 0.01, 'Kept between bodies.', 'm', lower=0.0, upper=1.0),

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
+from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.identification.change_watch import ChangeSettings
 from armid_ros.identification.online import OnlineIdentifier, OnlineSettings
 from armid_ros.nodes.parameters import NodeParameter
@@ -30,7 +30,7 @@ IDENTIFIER_PARAMETERS = (
     NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
     NodeParameter(
         'effects',
-        ['viscous_friction', 'coulomb_friction', 'torque_offset'],
+        list(USUAL_EFFECTS),
         'Effects to estimate beside the rigid body, each as NAME[@joint+joint].',
     ),
     NodeParameter(

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Action, Transmission
-from armid_ros.effects.transmission import Backlash, JointElasticity
 from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
@@ -242,7 +241,7 @@ def _sensing(arm: ArmModel) -> Action:
     kept = [
         (effect, values)
         for effect, values in zip(arm.effects, arm.values, strict=True)
-        if not isinstance(effect, JointElasticity | Backlash)
+        if effect.action(values, ArmModel(arm.robot)).transmission is None
     ]
     bare = ArmModel(arm.robot, tuple(e for e, _ in kept), tuple(v for _, v in kept))
     return bare.action()

@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
+from armid_ros.effects import make_effect, testing
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot, Robot
 import numpy as np
@@ -24,22 +25,7 @@ def robot() -> Robot:
 @pytest.fixture(scope='session')
 def sines(robot) -> Callable[..., Motion]:
     """Return a maker of motions in sines, different ones in every joint, without torque."""
-
-    def make(duration: float = 0.5, rate: float = 200.0) -> Motion:
-        t = np.arange(0.0, duration, 1.0 / rate)
-        frequency = 2.0 * np.pi * np.linspace(0.4, 2.1, robot.n_joints)
-        phase = frequency * t[:, None] + np.arange(robot.n_joints)
-        middle = (robot.lower + robot.upper) / 2
-        amplitude = 0.45 * (robot.upper - robot.lower)
-        return Motion(
-            robot.joints,
-            t,
-            middle + amplitude * np.sin(phase),
-            amplitude * frequency * np.cos(phase),
-            -amplitude * frequency**2 * np.sin(phase),
-        )
-
-    return make
+    return partial(testing.sines, robot)
 
 
 @pytest.fixture(scope='session')

@@ -4,8 +4,8 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, make_effect, parse_effect
+from armid_ros.effects.testing import CHECKS, Trial
 from armid_ros.errors import ModelError
-from armid_ros.model import inverse_dynamics
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -18,7 +18,6 @@ DESIGNED = """
     torque_ripple joint_spring joint_coupling soft_limit actuator_saturation human_interaction
     interface_slack
 """.split()
-LINEAR = [name for name, effect in CATALOGUE.items() if effect.linear]
 #: These twist transmissions by the load of the arm as it is, which counts as given.
 LOADED = {'joint_elasticity', 'backlash'}
 #: Sizes that are far from zero where the typical ones would not do.
@@ -27,6 +26,14 @@ SIZES = {'link_inertia': 0.02, 'payload': 0.05, 'interface_slack': 300.0, 'soft_
 
 def test_the_catalogue_has_every_name():
     assert sorted(CATALOGUE) == sorted(DESIGNED)
+
+
+@pytest.mark.parametrize('check', CHECKS, ids=lambda check: check.__name__)
+@pytest.mark.parametrize('name', CATALOGUE)
+def test_every_effect_keeps_the_contract(robot, name, check):
+    """The one that is public, with sizes far from zero and with typical ones."""
+    check(Trial.of(CATALOGUE[name], robot))
+    check(Trial.of(CATALOGUE[name], robot, size=SIZES.get(name), seed=6))
 
 
 def derivative(function, values, parameter, lower):
@@ -113,62 +120,6 @@ def test_columns_pass_through_sensors_that_come_after_one_another(robot, motion)
         )
         scale = 1.0 + np.abs(columns[:, :, parameter]).max()
         np.testing.assert_allclose(difference, columns[:, :, parameter], atol=3e-5 * scale)
-
-
-@pytest.mark.parametrize('name', LINEAR)
-def test_linear_effects_are_exact_far_from_zero(robot, motion, with_values, name):
-    rng = np.random.default_rng(6)
-    motion = motion.with_torque(rng.normal(scale=10.0, size=motion.q.shape))
-    values = sizes(name, robot, rng)
-    expected = (
-        inverse_dynamics(robot, motion)
-        + ArmModel(robot).columns_of(make_effect(name, robot), motion) @ values
-    )
-    np.testing.assert_allclose(with_values(name, values).torque(motion), expected, atol=1e-9)
-
-
-@pytest.mark.parametrize('name', CATALOGUE)
-def test_an_effect_of_size_zero_changes_nothing(robot, motion, with_values, name):
-    tau = with_values(name, 0.0).torque(motion)
-    np.testing.assert_allclose(tau, inverse_dynamics(robot, motion), atol=1e-12)
-
-
-@pytest.mark.parametrize('name', CATALOGUE)
-def test_instantaneous_columns_are_those_of_each_sample_alone(robot, motion, name):
-    arm, effect = ArmModel(robot), make_effect(name, robot)
-    whole = arm.columns_of(effect, motion)[40:60]
-    if effect.instantaneous:
-        part = arm.columns_of(effect, motion.select(slice(40, 60)))
-        np.testing.assert_allclose(part, whole, atol=1e-9)
-    else:
-        assert np.any(np.abs(whole) > 0.0)
-
-
-@pytest.mark.parametrize('name', CATALOGUE)
-def test_every_effect_says_what_it_is(robot, name):
-    effect = CATALOGUE[name]
-    assert effect.name == name
-    assert effect.summary
-    assert effect.__doc__
-    assert len(effect.__doc__.strip().splitlines()) > 2
-    for quantity in effect.quantities:
-        assert quantity.lower < quantity.upper
-        if quantity.typical is not None:
-            assert 0.0 < quantity.typical[0] < quantity.typical[1]
-            assert quantity.typical[1] <= quantity.upper
-    names = [(p.name, p.joint) for p in make_effect(name, robot).parameters(robot)]
-    assert len(set(names)) == len(names)
-
-
-@pytest.mark.parametrize('name', [name for name, effect in CATALOGUE.items() if effect.shapes])
-def test_shapes_start_and_search_within_what_is_possible(robot, motion, name):
-    effect = make_effect(name, robot)
-    grids = effect.shape_grids(motion, ArmModel(robot))
-    assert effect.shape_values.shape == (len(effect.owners), len(effect.shapes))
-    for column, (shape, grid) in enumerate(zip(effect.shapes, grids, strict=True)):
-        assert len(grid) == len(effect.owners)
-        for value in (effect.shape_values[:, column], grid):
-            assert np.all((shape.lower <= value) & (value <= shape.upper))
 
 
 def test_a_shape_belongs_to_each_joint(robot, motion):

@@ -1,0 +1,83 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What describes an effect in numbers: its quantities, its shapes, and their units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.robots import Robot
+import numpy as np
+
+#: A unit of a revolute joint and what it becomes on a prismatic one.
+_PRISMATIC_UNITS = {
+    'N m': 'N',
+    'N m s/rad': 'N s/m',
+    'N m s^2/rad^2': 'N s^2/m^2',
+    'N m/rad': 'N/m',
+    'rad/(N m)': 'm/N',
+    'kg m^2': 'kg',
+    'rad': 'm',
+    'rad/s': 'm/s',
+    '1/rev': '1/(2 pi m)',
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """
+    One physical quantity that an effect has per joint, or once for the arm.
+
+    Attributes
+    ----------
+    name : str
+        Standard term, such as 'viscous_coefficient'.
+    unit : str
+        SI unit on a revolute joint.
+    lower, upper : float
+        What is physically possible.
+    typical : tuple of float, or None
+        Smallest and largest size that arms of 1 to 10 kg have, where it matters; a sign does not.
+
+    """
+
+    name: str
+    unit: str
+    lower: float = -np.inf
+    upper: float = np.inf
+    typical: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Shape:
+    """
+    One parameter that the torque does not depend on linearly, per owner of an effect.
+
+    Attributes
+    ----------
+    name : str
+        Standard term, such as 'stribeck_velocity'.
+    unit : str
+        SI unit on a revolute joint.
+    lower, upper : float
+        What is physically possible.
+    default : float
+        Value of an effect that was given none.
+    grid : tuple of float
+        Where a search starts from; values between which the best one is refined.
+
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    default: float
+    grid: tuple[float, ...]
+
+
+def joint_unit(unit: str, joint: str, robot: Robot) -> str:
+    """Return a unit as it is on the joint: 'N m' is 'N' on a prismatic one."""
+    if joint and robot.prismatic[robot.joints.index(joint)]:
+        return _PRISMATIC_UNITS.get(unit, unit)
+    return unit

@@ -1,0 +1,191 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The registry of effects: those that are shipped, those of other packages, and one's own.
+
+A package brings effects by an entry point of the group ``armid_ros.effects``, which names a class
+or a module that registers classes. Packages are looked for when something that is not shipped is
+asked for, or everything is.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from importlib.metadata import entry_points, EntryPoint
+import inspect
+import logging
+import re
+from types import ModuleType
+
+from armid_ros.effects.base import Effect
+from armid_ros.effects.quantities import Quantity, Shape
+from armid_ros.errors import ModelError
+
+#: Entry-point group of packages that bring effects.
+GROUP = 'armid_ros.effects'
+#: Names stand in files, on command lines and between '@', '+', ':' and ','.
+_NAME = re.compile(r'[a-z][a-z0-9_]*')
+
+
+class Catalogue(Mapping[str, type[Effect]]):
+    """
+    Classes of effects by name, the shipped ones first.
+
+    Attributes
+    ----------
+    broken : dict of str to str
+        Packages whose effects cannot be loaded, and why.
+
+    """
+
+    def __init__(self, shipped: tuple[type[Effect], ...]) -> None:
+        self._kinds = {kind.name: kind for kind in shipped}
+        self._shipped = frozenset(self._kinds)
+        self._complete = False
+        self.broken: dict[str, str] = {}
+
+    def __getitem__(self, name: str) -> type[Effect]:
+        """Return a class, of a package too."""
+        if name not in self._kinds:
+            self._complete_once()
+        return self._kinds[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over all names, those of packages and one's own last."""
+        self._complete_once()
+        return iter(tuple(self._kinds))
+
+    def __len__(self) -> int:
+        """Count all of them."""
+        self._complete_once()
+        return len(self._kinds)
+
+    def find(self, name: str) -> type[Effect]:
+        """
+        Return a class by its name.
+
+        Raises
+        ------
+        ModelError
+            If there is none; the message lists the names, and packages that cannot be loaded.
+
+        """
+        if name in self:
+            return self[name]
+        lost = ''.join(f'; {package} cannot be loaded: {why}' for package, why in self.lost())
+        raise ModelError(
+            f"no effect '{name}'; the catalogue has {', '.join(self)}{lost}"
+            '; effects of other packages are there once those are installed'
+        )
+
+    def lost(self) -> tuple[tuple[str, str], ...]:
+        """Return packages whose effects cannot be loaded, and why."""
+        self._complete_once()
+        return tuple(self.broken.items())
+
+    def add(self, kind: type[Effect]) -> None:
+        """
+        Add a class, or put a new version of it in the place of the old one.
+
+        Raises
+        ------
+        ModelError
+            If something is missing in it, or its name or that of a quantity is taken.
+
+        """
+        check_kind(kind)
+        there = self._kinds.get(kind.name)
+        if there is not None and _home(there) != _home(kind):
+            raise ModelError(
+                f"the name '{kind.name}' of {_home(kind)} is that of {_home(there)}; choose "
+                'another one'
+            )
+        self._check_quantities(kind)
+        self._kinds[kind.name] = kind
+
+    def remove(self, name: str) -> None:
+        """Take away a class that is not shipped; nothing happens if it is not there."""
+        if name not in self._shipped:
+            self._kinds.pop(name, None)
+
+    def _check_quantities(self, kind: type[Effect]) -> None:
+        taken = {
+            name: other.name
+            for other in self._kinds.values()
+            if other.name != kind.name
+            for name in part_names(other)
+        }
+        for name in part_names(kind):
+            if name in taken:
+                raise ModelError(
+                    f"{kind.name}: the name '{name}' is that of a quantity of "
+                    f'{taken[name]}; one model may have both, so choose another name'
+                )
+
+    def _complete_once(self) -> None:
+        """Load the effects of all packages, the first time."""
+        if self._complete:
+            return
+        self._complete = True
+        for entry in entry_points(group=GROUP):
+            try:
+                self._load(entry)
+            except Exception as error:  # a package of somebody else may fail in any way
+                package = entry.dist.name if entry.dist else entry.value
+                self.broken[package] = f'{type(error).__name__}: {error}'
+                logging.getLogger('armid_ros').warning(
+                    'armid_ros: effects of %s cannot be loaded: %s; mend or uninstall it',
+                    package,
+                    self.broken[package],
+                )
+
+    def _load(self, entry: EntryPoint) -> None:
+        loaded = entry.load()
+        if isinstance(loaded, ModuleType):
+            return
+        if not (inspect.isclass(loaded) and issubclass(loaded, Effect)):
+            raise ModelError(f'{entry.name} = {entry.value} is no class of effects and no module')
+        self.add(loaded)
+
+
+def check_kind(kind: type[Effect]) -> None:
+    """
+    Check that a class has what every effect has.
+
+    Raises
+    ------
+    ModelError
+        Naming the class and what is missing in it.
+
+    """
+    if not (inspect.isclass(kind) and issubclass(kind, Effect)):
+        raise ModelError(f'{kind!r} is no class of effects; derive it from armid_ros.Effect')
+    where = _home(kind)
+    name = getattr(kind, 'name', None)
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise ModelError(f"{where}: 'name' has to be like 'viscous_friction', not {name!r}")
+    lacking = sorted(getattr(kind, '__abstractmethods__', ()))
+    if lacking:
+        raise ModelError(f'{name} ({where}) has no {" and no ".join(lacking)}')
+    summary = getattr(kind, 'summary', None)
+    if not isinstance(summary, str) or not summary.strip():
+        raise ModelError(f"{name} ({where}): 'summary' has to say in one line what it is")
+    quantities: tuple[Quantity, ...] = getattr(kind, 'quantities', ())
+    if not quantities or not all(isinstance(one, Quantity) for one in quantities):
+        raise ModelError(f"{name} ({where}): 'quantities' has to be a tuple of Quantity")
+    if not all(isinstance(one, Shape) for one in kind.shapes):
+        raise ModelError(f"{name} ({where}): 'shapes' has to be a tuple of Shape")
+    names = part_names(kind)
+    twice = [part for part in names if names.count(part) > 1]
+    if twice:
+        raise ModelError(f"{name} ({where}): two quantities are called '{twice[0]}'")
+
+
+def part_names(kind: type[Effect]) -> list[str]:
+    """Return the names of quantities and shapes."""
+    return [*(one.name for one in kind.quantities), *(one.name for one in kind.shapes)]
+
+
+def _home(kind: type[Effect]) -> str:
+    return f'{kind.__module__}.{kind.__qualname__}'

@@ -1,0 +1,296 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The contract of effects, for the tests of whoever writes one.
+
+In a test of a package that brings an effect::
+
+    from armid_ros.effects.testing import check_effect
+
+    def test_hose_keeps_the_contract():
+        check_effect(Hose)
+
+Simulation, identification and diagnosis rely on what is checked, and on nothing else. Each check
+is a function of a ``Trial`` that raises AssertionError; ``CHECKS`` has them all.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import pickle
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects.base import Effect
+from armid_ros.effects.registry import check_kind
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import load_robot, Robot
+import numpy as np
+import numpy.typing as npt
+
+#: Size of a quantity that does not say what is typical.
+_SIZE = 0.1
+#: Step of the differences, and how far derivatives may be from them, relative to the largest.
+_STEP, _TOLERANCE = 1e-6, 2e-5
+
+
+@dataclass(frozen=True)
+class Trial:
+    """
+    An effect on a robot, with values and a motion to try it with.
+
+    Attributes
+    ----------
+    effect : Effect
+        On all joints that it acts on by default.
+    robot : Robot
+        The arm.
+    motion : Motion
+        N samples in sines, with a measured torque.
+    values : ndarray, shape (P,)
+        Typical ones, of both signs where both are possible.
+
+    """
+
+    effect: Effect
+    robot: Robot
+    motion: Motion
+    values: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        kind: type[Effect],
+        robot: Robot | None = None,
+        *,
+        size: npt.ArrayLike | None = None,
+        seed: int = 3,
+    ) -> Trial:
+        """
+        Make the trial of a class.
+
+        Parameters
+        ----------
+        kind : type of Effect
+            The class.
+        robot : Robot, optional
+            The shipped arm by default.
+        size : array_like, optional
+            Of each quantity; the geometric mean of what is typical by default.
+        seed : int
+            Of values and torque.
+
+        """
+        robot = robot or load_robot('humanoid_arm')
+        effect, rng = kind.on(robot), np.random.default_rng(seed)
+        motion = sines(robot)
+        motion = motion.with_torque(rng.normal(scale=20.0, size=motion.q.shape))
+        if size is None:
+            size = [np.sqrt(np.prod(q.typical)) if q.typical else _SIZE for q in kind.quantities]
+        count = len(effect.parameters(robot))
+        lower = np.resize([q.lower for q in kind.quantities], count)
+        sign = np.where(lower < 0.0, rng.choice([-1.0, 1.0], count), 1.0)
+        values = sign * np.resize(size, count) * rng.uniform(0.7, 1.3, count)
+        return cls(effect, robot, motion, np.clip(values, *effect.bounds()))
+
+    def arm(self, values: npt.ArrayLike) -> ArmModel:
+        """Return the arm with the effect."""
+        return ArmModel(self.robot).with_effect(self.effect, values)
+
+    def torque(self, values: FloatArray) -> FloatArray:
+        """Return what the arm with the effect takes along the motion, shape (N, n)."""
+        return np.asarray(self.arm(values).torque(self.motion))
+
+
+def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
+    """Return a motion in sines inside the limits, a different one in every joint, no torque."""
+    t = np.arange(0.0, duration, 1.0 / rate)
+    frequency = 2.0 * np.pi * np.linspace(0.4, 2.1, robot.n_joints)
+    phase = frequency * t[:, np.newaxis] + np.arange(robot.n_joints)
+    bounded = np.isfinite(robot.upper - robot.lower)
+    lower, upper = np.where(bounded, robot.lower, -1.0), np.where(bounded, robot.upper, 1.0)
+    amplitude = 0.45 * (upper - lower)
+    return Motion(
+        robot.joints,
+        t,
+        (lower + upper) / 2 + amplitude * np.sin(phase),
+        amplitude * frequency * np.cos(phase),
+        -amplitude * frequency**2 * np.sin(phase),
+    )
+
+
+def check_effect(kind: type[Effect], robot: Robot | None = None, *, seed: int = 3) -> None:
+    """
+    Check that a class of effects keeps its contract.
+
+    Parameters
+    ----------
+    kind : type of Effect
+        The class; it need not be registered.
+    robot : Robot, optional
+        An arm that it is meant for; the shipped one by default.
+    seed : int
+        Of values and torque.
+
+    Raises
+    ------
+    AssertionError
+        Naming all that is wrong.
+    ModelError
+        If something that every class has is missing.
+
+    Examples
+    --------
+    >>> from armid_ros.effects import CATALOGUE
+    >>> from armid_ros.effects.testing import check_effect
+    >>> check_effect(CATALOGUE['viscous_friction'])
+
+    """
+    check_kind(kind)
+    trial = Trial.of(kind, robot, seed=seed)
+    wrong = []
+    for check in CHECKS:
+        try:
+            check(trial)
+        except Exception as fault:  # code of somebody else may fail in any way
+            said = ' '.join(str(fault).split())
+            kind_of_fault = '' if isinstance(fault, AssertionError) else type(fault).__name__ + ' '
+            wrong.append(f'{check.__name__.replace("_", " ")}: {kind_of_fault}{said}')
+    if wrong:
+        raise AssertionError(f'{kind.name} breaks the contract of effects: ' + '; '.join(wrong))
+
+
+def it_says_what_it_is(trial: Trial) -> None:
+    """Fail where docstring, bounds or names are missing."""
+    kind = type(trial.effect)
+    assert kind.__doc__ and not kind.__doc__.startswith(f'{kind.__name__}('), 'no docstring'
+    for quantity in kind.quantities:
+        assert quantity.lower < quantity.upper, f'{quantity.name} has no range'
+        if quantity.typical is not None:
+            smallest, largest = quantity.typical
+            within = 0.0 < smallest < largest <= quantity.upper
+            assert within, f'typical sizes of {quantity.name} are {quantity.typical}'
+    names = [(p.name, p.joint) for p in trial.effect.parameters(trial.robot)]
+    assert len(set(names)) == len(names), f'parameters share a name: {names}'
+    assert len(names) == len(trial.effect.bounds()[0]), 'not one bound for each parameter'
+
+
+def columns_have_one_place_per_parameter(trial: Trial) -> None:
+    """Fail where columns are not finite, or not of shape (N, n, P)."""
+    columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
+    wanted = (*trial.motion.q.shape, len(trial.values))
+    assert columns.shape == wanted, f'columns have shape {columns.shape}, not {wanted}'
+    assert np.all(np.isfinite(columns)), 'columns are not finite'
+
+
+def size_zero_changes_nothing(trial: Trial) -> None:
+    """Fail where the effect acts without being there."""
+    bare = ArmModel(trial.robot).torque(trial.motion)
+    np.testing.assert_allclose(trial.torque(0.0 * trial.values), bare, atol=1e-12)
+
+
+def columns_are_the_derivative_at_zero(trial: Trial) -> None:
+    """Fail where ``columns`` and ``action`` do not agree for a small effect."""
+    columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
+    _compare(trial, np.zeros_like(trial.values), columns)
+
+
+def columns_are_the_derivative_at_any_size(trial: Trial) -> None:
+    """Fail where they do not agree for an effect of typical size."""
+    columns = trial.arm(trial.values).columns(trial.motion)
+    _compare(trial, trial.values, columns[:, :, -len(trial.values) :])
+
+
+def linear_means_exact(trial: Trial) -> None:
+    """Fail where the torque of an effect that says it is linear is not columns times values."""
+    if trial.effect.linear:
+        bare = ArmModel(trial.robot)
+        columns = bare.columns_of(trial.effect, trial.motion)
+        expected = bare.torque(trial.motion) + columns @ trial.values
+        size = 1.0 + np.abs(expected).max()
+        np.testing.assert_allclose(trial.torque(trial.values), expected, atol=1e-9 * size)
+
+
+def instantaneous_means_sample_by_sample(trial: Trial) -> None:
+    """Fail where columns depend on the samples around, and the effect says they do not."""
+    if trial.effect.instantaneous:
+        arm, part = ArmModel(trial.robot), slice(40, 60)
+        whole = arm.columns_of(trial.effect, trial.motion)[part]
+        alone = arm.columns_of(trial.effect, trial.motion.select(part))
+        size = 1.0 + np.abs(whole).max()
+        np.testing.assert_allclose(alone, whole, atol=1e-9 * size)
+
+
+def shapes_stay_possible(trial: Trial) -> None:
+    """Fail where default shapes or the starts of a search are outside of the bounds."""
+    effect = trial.effect
+    grids = effect.shape_grids(trial.motion, ArmModel(trial.robot))
+    assert effect.shape_values.shape == (len(effect.owners), len(effect.shapes))
+    for column, (shape, grid) in enumerate(zip(effect.shapes, grids, strict=True)):
+        assert len(grid) == len(effect.owners), f'{shape.name}: a grid has a row per owner'
+        for value in (effect.shape_values[:, column], grid):
+            inside = np.all((shape.lower <= value) & (value <= shape.upper))
+            assert inside, f'{shape.name}: {value} is beyond its bounds'
+
+
+def smooth_columns_have_their_gradient(trial: Trial) -> None:
+    """Fail where smooth columns, if there are any, are others or have another gradient."""
+    motion, width = trial.motion, np.full(trial.robot.n_joints, 1e-9)
+    sharp = trial.effect.smooth_columns(motion, width)
+    if sharp is None:
+        return
+    columns = ArmModel(trial.robot).columns_of(trial.effect, motion)
+    np.testing.assert_allclose(sharp.columns, columns, atol=1e-9)
+    width = np.full(trial.robot.n_joints, 0.5)
+    smooth = trial.effect.smooth_columns(motion, width)
+    weights = np.random.default_rng(0).normal(size=columns.shape)
+    assert smooth is not None
+    gradient = smooth.pullback(weights)
+    state = np.array([motion.q, motion.dq, motion.ddq])
+    for argument, joint in np.ndindex(3, motion.n_joints):
+        ends = []
+        for step in (_STEP, -_STEP):
+            moved = state.copy()
+            moved[argument, :, joint] += step
+            at = trial.effect.smooth_columns(Motion(motion.joints, motion.t, *moved), width)
+            assert at is not None
+            ends.append(np.sum(weights * at.columns, axis=(1, 2)))
+        difference = (ends[0] - ends[1]) / (2.0 * _STEP)
+        np.testing.assert_allclose(gradient[argument][:, joint], difference, atol=1e-4)
+
+
+def it_goes_to_other_processes(trial: Trial) -> None:
+    """Fail where it does not survive being pickled."""
+    assert pickle.loads(pickle.dumps(trial.effect)) == trial.effect
+
+
+def _compare(trial: Trial, values: FloatArray, columns: FloatArray) -> None:
+    """Compare columns with differences, to one side at a lower bound."""
+    lower, _ = trial.effect.bounds()
+    for parameter, step in enumerate(_STEP * np.eye(len(values))):
+        if values[parameter] - _STEP > lower[parameter]:
+            difference = trial.torque(values + step) - trial.torque(values - step)
+        else:
+            near, far = trial.torque(values + step), trial.torque(values + 2.0 * step)
+            difference = 4.0 * near - far - 3.0 * trial.torque(values)
+        wanted = columns[:, :, parameter]
+        size = 1.0 + np.abs(wanted).max()
+        np.testing.assert_allclose(
+            difference / (2.0 * _STEP), wanted, atol=_TOLERANCE * size, err_msg='columns'
+        )
+
+
+#: All checks, in the order in which they are made.
+CHECKS: tuple[Callable[[Trial], None], ...] = (
+    it_says_what_it_is,
+    columns_have_one_place_per_parameter,
+    size_zero_changes_nothing,
+    columns_are_the_derivative_at_zero,
+    columns_are_the_derivative_at_any_size,
+    linear_means_exact,
+    instantaneous_means_sample_by_sample,
+    shapes_stay_possible,
+    smooth_columns_have_their_gradient,
+    it_goes_to_other_processes,
+)

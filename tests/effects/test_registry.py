@@ -1,0 +1,176 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Effects of one's own: registered, named like those that are shipped, and checked."""
+
+from dataclasses import replace
+
+import armid_ros as ar
+from armid_ros.diagnosis import DiagnosisSettings
+from armid_ros.effects import Action, CATALOGUE, joint_columns, scatter, USUAL_EFFECTS
+from armid_ros.effects.testing import check_effect
+import numpy as np
+import pytest
+
+
+class Hose(ar.Effect):
+    """A hose along a joint that stiffens as it bends, tau = k q^3."""
+
+    name = 'hose'
+    summary = 'hose that stiffens as it bends'
+    quantities = (ar.Quantity('hose_stiffness', 'N m/rad^3', typical=(0.1, 10.0)),)
+
+    def columns(self, motion, arm):
+        """Return dtau/dk = q^3."""
+        return joint_columns(self, motion, motion.q**3)
+
+    def action(self, values, arm):
+        """Return the torque."""
+        (stiffness,) = scatter(self, values, arm.robot)
+        return Action(link_torque=lambda t, q, dq: stiffness * q**3)
+
+
+class Twice(Hose):
+    """A hose of which the identification knows twice too much."""
+
+    def columns(self, motion, arm):
+        """Return too much."""
+        return 2.0 * super().columns(motion, arm)
+
+
+class Bent(Hose):
+    """A hose that says that it is linear, and bends."""
+
+    def action(self, values, arm):
+        """Return the torque, and a little more."""
+        (stiffness,) = scatter(self, values, arm.robot)
+        return Action(link_torque=lambda t, q, dq: (stiffness + stiffness**3) * q**3)
+
+
+class Biased(Hose):
+    """A hose that pulls before it is there."""
+
+    def action(self, values, arm):
+        """Return the torque."""
+        (stiffness,) = scatter(self, values, arm.robot)
+        return Action(link_torque=lambda t, q, dq: 0.1 + stiffness * q**3)
+
+
+class Remembering(Hose):
+    """A hose whose columns depend on how long a recording is."""
+
+    def columns(self, motion, arm):
+        """Return columns without their mean."""
+        columns = super().columns(motion, arm)
+        return columns - columns.mean(axis=0)
+
+
+class Wide(Hose):
+    """A hose with a column too many."""
+
+    def columns(self, motion, arm):
+        """Return columns twice."""
+        return np.concatenate([super().columns(motion, arm)] * 2, axis=2)
+
+
+class Untold(Hose):
+    """A hose that is typically of no size."""
+
+    quantities = (replace(Hose.quantities[0], typical=(2.0, 1.0)),)
+
+
+@pytest.fixture
+def hose():
+    ar.register(Hose)
+    yield Hose
+    CATALOGUE.remove('hose')
+
+
+def test_a_registered_effect_is_named_like_those_that_are_shipped(hose, tmp_path):
+    arm = ar.ArmModel.of('two_link_elastic', effects='hose@joint1')
+    assert arm.effects[0] == Hose(('joint1',))
+    arm = arm.with_theta(np.r_[arm.theta[:-1], 2.5])
+    ar.save_model(tmp_path / 'model.yaml', arm, 'two_link_elastic')
+    read = ar.load_model(tmp_path / 'model.yaml')
+    assert read.effects == arm.effects
+    np.testing.assert_array_equal(read.values[0], [2.5])
+
+
+def test_the_diagnosis_looks_for_it(hose):
+    settings = DiagnosisSettings(library=tuple(CATALOGUE))
+    assert hose in settings.kinds
+
+
+def test_it_is_gone_with_its_registration(tmp_path):
+    with pytest.raises(ar.ArmidError, match="no effect 'hose'; the catalogue has viscous"):
+        ar.make_effect('hose', ar.load_robot('two_link_elastic'))
+    CATALOGUE.remove('viscous_friction')
+    assert 'viscous_friction' in CATALOGUE
+
+
+def test_a_class_that_is_defined_anew_takes_the_place_of_the_old(hose):
+    again = type('Hose', (Hose,), {'__module__': Hose.__module__, 'summary': 'a longer hose'})
+    assert ar.register(again) is again
+    assert CATALOGUE['hose'].summary == 'a longer hose'
+
+
+def test_the_contract_holds_for_what_is_right():
+    check_effect(Hose)
+    check_effect(Hose, ar.load_robot('two_link_elastic'))
+
+
+@pytest.mark.parametrize(
+    ('kind', 'breach'),
+    [
+        (Twice, 'columns are the derivative at zero'),
+        (Bent, 'columns are the derivative at any size'),
+        (Bent, 'linear means exact'),
+        (Biased, 'size zero changes nothing'),
+        (Remembering, 'instantaneous means sample by sample'),
+        (Wide, 'columns have one place per parameter'),
+        (Untold, 'typical sizes of hose_stiffness'),
+    ],
+)
+def test_breaches_of_the_contract_are_named(kind, breach):
+    with pytest.raises(AssertionError, match=breach):
+        check_effect(kind)
+
+
+def test_what_cannot_go_to_other_processes_is_named():
+    class Inner(Hose):
+        """A hose that only this test knows."""
+
+    with pytest.raises(AssertionError, match='goes to other processes'):
+        check_effect(Inner)
+
+
+@pytest.mark.parametrize(
+    ('facts', 'message'),
+    [
+        ({'name': 'Hose 2'}, "'name' has to be like"),
+        ({'name': 'payload'}, "the name 'payload'"),
+        ({'summary': ''}, "'summary'"),
+        ({'quantities': ()}, "'quantities'"),
+        ({'quantities': Hose.quantities * 2}, 'two quantities'),
+        ({'quantities': (ar.Quantity('coulomb_torque', 'N m'),)}, 'that of a quantity of coulomb'),
+        ({'shapes': ('q',)}, "'shapes'"),
+    ],
+)
+def test_classes_that_lack_something_are_refused(facts, message):
+    kind = type('Odd', (Hose,), facts)
+    with pytest.raises(ar.ArmidError, match=message):
+        ar.register(kind)
+    assert kind not in CATALOGUE.values()
+
+
+def test_a_class_without_its_methods_is_refused():
+    kind = type(
+        'Bare', (ar.Effect,), {'name': 'bare', 'summary': 'no', 'quantities': Hose.quantities}
+    )
+    with pytest.raises(ar.ArmidError, match='has no action and no columns'):
+        ar.register(kind)
+    with pytest.raises(ar.ArmidError, match='no class of effects'):
+        ar.register(Hose(('joint1',)))
+
+
+def test_every_arm_gets_the_usual_effects():
+    assert USUAL_EFFECTS == ('viscous_friction', 'coulomb_friction', 'torque_offset')

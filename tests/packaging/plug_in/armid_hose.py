@@ -1,0 +1,29 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""An effect that the catalogue does not have, as a package of its own."""
+
+import armid_ros as ar
+from armid_ros.effects import Action, joint_columns, scatter
+
+
+class Hose(ar.Effect):
+    """
+    A hose along a joint that stiffens as it bends, tau = k q^3.
+
+    Confounded with joint_spring over a small range of positions.
+
+    """
+
+    name = 'hose'
+    summary = 'hose that stiffens as it bends'
+    quantities = (ar.Quantity('hose_stiffness', 'N m/rad^3', lower=0.0, typical=(0.1, 10.0)),)
+    smooth = True
+
+    def columns(self, motion, arm):
+        """Return dtau/dk = q^3, which the identification needs."""
+        return joint_columns(self, motion, motion.q**3)
+
+    def action(self, values, arm):
+        """Return the torque, which the simulation needs."""
+        (stiffness,) = scatter(self, values, arm.robot)
+        return Action(link_torque=lambda t, q, dq: stiffness * q**3)

@@ -1,0 +1,97 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What an effect is and needs stands in the effect: elsewhere nobody knows its name."""
+
+import ast
+import re
+
+from armid_ros.effects import CATALOGUE
+import pytest
+
+#: Files that name effects still, and how often; a number goes down, and no file comes in.
+LEFT = {
+    # what acts on an arm that is shipped
+    'cli/demo.py': 3,
+    'simulation/elastic_two_link.py': 4,
+    # advice and examples for a person
+    'cli/record.py': 2,
+    'nodes/interaction_identifier.py': 1,
+    'simulation/elastic_plant.py': 3,
+    'simulation/elastic_setup.py': 3,
+    # fields of springs.json that are called as an effect is
+    'cli/springs.py': 4,
+    'identification/two_inertia/output.py': 3,
+    # knowledge that effects ought to have
+    'diagnosis/next_run/plan.py': 1,
+    'diagnosis/search/shapes.py': 2,
+    'diagnosis/verdict/experiment.py': 30,
+    'diagnosis/verdict/pattern.py': 3,
+    'diagnosis/verdict/words.py': 1,
+}
+
+
+def _docstrings(tree):
+    """Return the constants that are docstrings, which may explain by example."""
+    found = set()
+    for node in ast.walk(tree):
+        body = getattr(node, 'body', None)
+        if isinstance(body, list) and body and isinstance(body[0], ast.Expr):
+            found.add(body[0].value)
+    return found
+
+
+def _says(text, name):
+    """Return how often a text has a name; words of plain English count where they stand alone."""
+    if '_' in name:
+        return len(re.findall(rf'(?<![a-z_]){name}(?![a-z_])', text))
+    return int(text == name) + len(re.findall(rf'\b{name}[@:]', text))
+
+
+def count_names(source):
+    """Return how often code says the name, or imports the class, of an effect."""
+    tree = ast.parse(source)
+    docstrings = _docstrings(tree)
+    classes = {kind.__name__ for kind in CATALOGUE.values()}
+    count = 0
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            if node not in docstrings:
+                count += sum(_says(node.value, name) for name in CATALOGUE)
+        elif isinstance(node, ast.ImportFrom) and (node.module or '').startswith(
+            'armid_ros.effects'
+        ):
+            count += sum(alias.name in classes for alias in node.names)
+    return count
+
+
+@pytest.fixture(scope='module')
+def counts(root):
+    """Return how often each file outside of ``effects`` names effects."""
+    package = root / 'armid_ros'
+    files = [path for path in package.rglob('*.py') if path.parent != package / 'effects']
+    assert len(files) > 100
+    found = {
+        path.relative_to(package).as_posix(): count_names(path.read_text('utf-8'))
+        for path in files
+    }
+    return {path: count for path, count in found.items() if count}
+
+
+def test_no_file_names_effects_but_those_that_are_known(counts):
+    assert counts == LEFT
+
+
+@pytest.mark.parametrize(
+    ('source', 'count'),
+    [
+        ("x = 'viscous_friction'", 1),
+        ("x = f'{y}: viscous_friction,coulomb_friction'", 2),
+        ("x = 'the same motion with a payload'", 0),
+        ("x = {'payload': 1, 'payload@wrist': 2}", 2),
+        ('"""viscous_friction is an example."""', 0),
+        ('from armid_ros.effects.load import Payload', 1),
+        ("x = 'coupled_viscous_friction_sum'", 0),
+    ],
+)
+def test_names_are_seen_where_they_are_meant(source, count):
+    assert count_names(source) == count
