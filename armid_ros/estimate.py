@@ -72,6 +72,16 @@ class Estimate:
                 f'and a covariance of shape {self.covariance.shape}'
             )
 
+    def __repr__(self) -> str:
+        """Return the first values with their deviations, in ten lines at most."""
+        rows = [
+            f'  {(p.joint + " ") if p.joint else ""}{p.name} {value:.4g} ± {std:.2g} {p.unit}'
+            for p, value, std in zip(self.parameters, self.values, self.std, strict=True)
+        ]
+        more = [f'  ... and {len(rows) - 8} more'] if len(rows) > 9 else []
+        shown = rows[:8] if more else rows
+        return '\n'.join([f'Estimate of {len(rows)} parameters', *shown, *more])
+
     @property
     def std(self) -> FloatArray:
         """Standard deviations, shape (P,)."""

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,18 @@ def recordings_of(
                 f'{", ".join(robot.joints)}; read it with that robot'
             )
     return read
+
+
+def told_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
+    """Return recordings of which each has a source of its own, numbered where two are alike."""
+    taken: dict[str, int] = {}
+
+    def named(recording: Recording) -> Recording:
+        source = recording.source or 'recording'
+        taken[source] = count = taken.get(source, 0) + 1
+        return replace(recording, source=source if count == 1 else f'{source} {count}')
+
+    return tuple([named(recording) for recording in group] for group in groups)
 
 
 def read_recording(

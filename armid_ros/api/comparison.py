@@ -16,6 +16,7 @@ from armid_ros.identification.comparison import Comparison
 from armid_ros.identification.parameters_file import Parameters, parameters_of, read_parameters
 
 if TYPE_CHECKING:
+    from armid_ros.report.page import Section
     import pandas
 
 
@@ -87,6 +88,16 @@ class ComparisonResult(Shown):
         badge = 'changed' if self.anything else 'unchanged'
         first, *more = tell(self.core)
         return Summary(first, badge, heads, rows, lines=more[:1])
+
+    def tone(self) -> str:
+        """Return the colour that stands for a change."""
+        return 'fair' if self.anything else 'good'
+
+    def sections(self) -> list[Section]:
+        """Return the parameters, those that changed first to be seen."""
+        from armid_ros.report.sections.changes import Changes
+
+        return [Changes(self.core)]
 
 
 def compare(

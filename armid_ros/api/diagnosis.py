@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 import json
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -19,16 +18,20 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     source_of,
+    told_apart,
 )
 from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel, save_model
+from armid_ros.arm.export import arm_urdf
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
 from armid_ros.recording import Recording
+from armid_ros.report.notation import with_interval
 
 if TYPE_CHECKING:
+    from armid_ros.report.page import Section
     import pandas
 
 
@@ -73,6 +76,13 @@ class DiagnosisResult(Shown):
         """The model with what was found added."""
         return self.core.arm
 
+    def urdf(self, path: str | Path | None = None) -> str:
+        """Return the description with what was found; write it where a path is given."""
+        text = arm_urdf(self.arm).text
+        if path is not None:
+            Path(path).write_text(text, encoding='utf-8')
+        return text
+
     def to_dataframe(self) -> pandas.DataFrame:
         """Return what was named as a pandas table, a row a parameter."""
         from pandas import DataFrame
@@ -114,50 +124,42 @@ class DiagnosisResult(Shown):
         """Return what was named, with values."""
         rows = []
         for finding in self.core.findings:
-            where = ', '.join(finding.joints) or 'whole arm'
             for parameter, value, std in zip(
                 finding.parameters, finding.values, finding.std, strict=True
             ):
-                said = f'{value:.4g} ± {std:.2g} {parameter.unit}'
+                said = with_interval(value, std, parameter.unit)
+                where = finding.place_of(parameter.joint) or 'whole arm'
                 rows.append((finding.name, where, parameter.name, said))
         gap = self.core.gap
         below = []
         if gap is not None and rows:
             below.append(f'{100 * gap.closed:.0f} % of the gap closed on data not used to fit')
         return Summary(
-            self.core.summary,
+            self.core.summary.replace('+-', '±'),
             self.core.verdict.replace('_', ' '),
-            ('effect', 'joint', 'parameter', 'value') if rows else (),
+            ('effect', 'joint', 'parameter', 'value, 95 %') if rows else (),
             rows,
             lines=below,
-            details=self._details(),
         )
+
+    def tone(self) -> str:
+        """Return the colour of the verdict."""
+        from armid_ros.report.diagnosis_report import TONES
+
+        return TONES.get(self.verdict, 'bad')
+
+    def sections(self) -> list[Section]:
+        """Return the gap of every joint, before and after."""
+        from armid_ros.report.sections.gap import GapBars
+
+        gap, robot = self.core.gap, self.description.robot
+        if gap is None:
+            return []
+        return [GapBars(robot, gap, self.core.baseline, bool(self.core.findings))]
 
     @property
     def _robot(self) -> str:
         return source_of(self.description.robot)
-
-    def _details(self) -> str:
-        """Return the gap of every joint, before and after, as bars."""
-        gap = self.core.gap
-        if gap is None:
-            return ''
-        robot, largest = self.description.robot, max(float(gap.before.max()), 1e-12)
-        lines = []
-        for k, joint in enumerate(robot.joints):
-            for label, value, colour in (
-                ('before', gap.before[k], '#e69f00'),
-                ('after', gap.after[k], '#0072b2'),
-                ('noise', gap.floor[k], '#8c9196'),
-            ):
-                width = 100.0 * float(value) / largest
-                lines.append(
-                    f'<tr><td>{escape(joint) if label == "before" else ""}</td><td>{label}</td>'
-                    f'<td>{value:.3g} {robot.torque_units[k]}</td><td style="min-width:14em">'
-                    f'<div style="background:{colour};height:.6em;width:{width:.0f}%"></div>'
-                    '</td></tr>'
-                )
-        return f'<details open><summary>gap</summary><table>{"".join(lines)}</table></details>'
 
 
 def diagnose(
@@ -205,9 +207,9 @@ def diagnose(
 
     """
     model = arm_of(arm, effects)
-    looked_at = recordings_of(recordings, model.robot)
-    held_out = recordings_of(validate, model.robot)
-    before = recordings_of(baseline, model.robot)
+    looked_at, held_out, before = told_apart(
+        *(recordings_of(group, model.robot) for group in (recordings, validate, baseline))
+    )
     more: dict[str, Any] = {'baseline': before} if before else {}
     settings = DiagnosisSettings(
         library=tuple(CATALOGUE), signals=SignalSettings(cutoff, decimation)

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -19,9 +18,10 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     source_of,
+    told_apart,
     USUAL,
 )
-from armid_ros.api.table import html_table, Shown, Summary
+from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.estimate import Estimate
@@ -42,6 +42,7 @@ from armid_ros.identification.least_squares import Method
 from armid_ros.recording import Recording
 
 if TYPE_CHECKING:
+    from armid_ros.report.page import Section
     import pandas
 
 
@@ -176,16 +177,37 @@ class IdentificationResult(Shown):
             for k, joint in enumerate(robot.joints)
         ]
         count = len(self.estimate.parameters)
-        below = f'{count} parameters, condition number {self.core.condition_number:.4g}'
+        below = (
+            f'{count} parameters, condition number {self.core.condition_number:.4g}; ± is one '
+            'standard deviation'
+        )
         return Summary(
             f'{robot.name}: {said}',
             self.grade,
             ('joint', 'residual', 'relative', 'viscous', 'Coulomb'),
             rows,
-            [float(value) / 100.0 for value in score.joint_relative_error_percent],
-            (below,),
-            self._details(),
+            (below, *self.notes),
         )
+
+    def tone(self) -> str:
+        """Return the colour of the grade."""
+        from armid_ros.report.identification_report import TONES
+
+        return TONES[self.grade]
+
+    def sections(self) -> list[Section]:
+        """Return the errors of the joints, and all parameters."""
+        from armid_ros.report.sections.fit import JointErrors
+        from armid_ros.report.sections.parameters import Parameters
+
+        training: dict[str, list[Fit]] = {}
+        for fit in self.core.training:
+            training.setdefault(fit.source, []).append(fit)
+        described = self.core.base.values(self.description.theta)
+        return [
+            JointErrors(self.arm.robot, training, self.validation),
+            Parameters(self.estimate, described, self.core.unidentified),
+        ]
 
     @property
     def _robot(self) -> str:
@@ -197,17 +219,6 @@ class IdentificationResult(Shown):
                 value, std = self.estimate.values[k], self.estimate.std[k]
                 return f'{value:.3g} ± {std:.1g}' if abs(value) > 1.96 * std else '~ 0'
         return '-'
-
-    def _details(self) -> str:
-        rows = [
-            (row['name'], row['joint'], f'{row["value"]:.5g}', f'{row["std"]:.2g}', row['unit'])
-            for row in self.document()['parameters']
-        ]
-        table = html_table(('parameter', 'joint', 'value', 'std', 'unit'), rows)
-        notes = ''.join(f'<li>{escape(note)}</li>' for note in self.notes)
-        return f'<details><summary>{len(rows)} parameters</summary>{table}</details>' + (
-            f'<details><summary>notes</summary><ul>{notes}</ul></details>' if notes else ''
-        )
 
 
 def identify(
@@ -263,13 +274,11 @@ def identify(
 
     """
     model = arm_of(arm, effects)
-    training = recordings_of(recordings, model.robot)
-    held_out = recordings_of(validate, model.robot)
+    training, held_out = told_apart(
+        recordings_of(recordings, model.robot), recordings_of(validate, model.robot)
+    )
     known = PhysicalSettings() if physical is True else physical or None
     settings = IdentificationSettings(method, SignalSettings(cutoff, decimation), known)
     result = run(model, training, settings, rng=generator(rng))
-    validation = {
-        recording.source or f'held out {k + 1}': result.predict([recording])
-        for k, recording in enumerate(held_out)
-    }
+    validation = {recording.source: result.predict([recording]) for recording in held_out}
     return IdentificationResult(result, model, tuple(training), tuple(held_out), validation)

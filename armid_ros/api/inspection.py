@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
     generator,
@@ -17,8 +17,9 @@ from armid_ros.api.arguments import (
     RobotLike,
 )
 from armid_ros.api.table import Shown, Summary
+from armid_ros.files import json_text
 from armid_ros.inspection import inspect as look
-from armid_ros.inspection import Inspection
+from armid_ros.inspection import Inspection, inspection_document
 from armid_ros.recording import Recording
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.contents import bag_contents, TopicContent
@@ -59,12 +60,24 @@ class InspectionResult(Shown):
 
         return DataFrame(self.core.joints)
 
+    def document(self) -> dict[str, Any]:
+        """Return what ``armid inspect --json`` prints."""
+        return inspection_document(self.core)
+
     def report(self, path: str | Path = 'inspection.html') -> Path:
         """Write the page with all curves; return where it is."""
         from armid_ros.report.inspection_report import inspection_report
 
         Path(path).write_text(inspection_report(self.core), encoding='utf-8')
         return Path(path)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write inspection.json and inspection.html."""
+        out = Path(folder)
+        out.mkdir(parents=True, exist_ok=True)
+        (out / 'inspection.json').write_text(json_text(self.document(), indent=1), 'utf-8')
+        self.report(out / 'inspection.html')
+        return out
 
     def summary(self) -> Summary:
         """Return the joints, and the worst of what was remarked."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import arm_of, generator, Rng, RobotLike
 from armid_ros.api.table import Shown, Summary
@@ -27,6 +27,9 @@ from armid_ros.robots import collision_model
 from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run
 import numpy as np
+
+if TYPE_CHECKING:
+    import pandas
 
 #: Waypoints per second of a JointTrajectory; controllers interpolate between them.
 WAYPOINT_RATE = 50.0
@@ -65,6 +68,17 @@ class ExcitationResult(Shown):
     def motion(self, rate: float = WAYPOINT_RATE) -> Motion:
         """Return positions, velocities and accelerations at a rate [Hz]."""
         return self.trajectory.motion(rate)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return the waypoints as a pandas table: t, and q, dq, ddq of every joint."""
+        from pandas import DataFrame
+
+        motion = self.motion()
+        columns = {'t': motion.t}
+        for k, joint in enumerate(motion.joints):
+            parts = {'q': motion.q, 'dq': motion.dq, 'ddq': motion.ddq}
+            columns |= {f'{name}_{joint}': values[:, k] for name, values in parts.items()}
+        return DataFrame(columns)
 
     def report(self, path: str | Path = 'report.html') -> Path:
         """Write the page on its quality; return where it is."""

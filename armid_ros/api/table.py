@@ -6,9 +6,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from html import escape
+from dataclasses import dataclass
 import textwrap
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from armid_ros.report.page import Section
 
 #: Lines of a result in a terminal.
 LINES = 10
@@ -30,12 +33,8 @@ class Summary:
         Of the columns.
     rows : sequence of sequence of str
         Cells; the first is a name.
-    bars : sequence of float
-        A share from 0 to 1 for each row, drawn in a notebook; empty for none.
     lines : sequence of str
         What stands below.
-    details : str
-        HTML that a notebook shows folded.
 
     """
 
@@ -43,9 +42,7 @@ class Summary:
     badge: str = ''
     heads: Sequence[str] = ()
     rows: Sequence[Sequence[str]] = ()
-    bars: Sequence[float] = ()
     lines: Sequence[str] = ()
-    details: str = field(default='', repr=False)
 
     def text(self) -> str:
         """Return at most ten lines of 80 columns."""
@@ -59,23 +56,6 @@ class Summary:
             rows = [*rows[: room - 1], (f'... and {left} more',)]
         return '\n'.join([*title, *_aligned(self.heads, rows), *below])
 
-    def html(self) -> str:
-        """Return the same for a notebook."""
-        parts = ['<div style="font-family:system-ui,sans-serif;max-width:62em">', '<p><b>']
-        if self.badge:
-            parts.append(
-                '<span style="border:1px solid currentColor;border-radius:1em;'
-                f'padding:0 .6em;margin-right:.5em">{escape(self.badge)}</span>'
-            )
-        parts.append(f'{escape(self.title)}</b></p>')
-        if self.rows:
-            parts.append(self._html_table())
-        parts += [f'<p>{escape(line)}</p>' for line in self.lines]
-        return ''.join([*parts, self.details, '</div>'])
-
-    def _html_table(self) -> str:
-        return html_table(self.heads, self.rows, self.bars)
-
 
 class Shown(ABC):
     """A result that prints as its summary."""
@@ -88,28 +68,21 @@ class Shown(ABC):
         """Return at most ten lines."""
         return self.summary().text()
 
+    def tone(self) -> str:
+        """Return the colour of the badge in a notebook: good, fair, bad, or none."""
+        return ''
+
+    def sections(self) -> Sequence[Section]:
+        """Return sections of the report that a notebook shows below the summary."""
+        return ()
+
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
-        return self.summary().html()
+        from armid_ros.report.fragment import fragment, InShort
 
-
-def html_table(
-    heads: Sequence[str], rows: Sequence[Sequence[str]], bars: Sequence[float] = ()
-) -> str:
-    """Return a table in HTML, with a bar behind each row where shares are given."""
-    cells = [f'<th style="text-align:left">{escape(head)}</th>' for head in heads]
-    lines = ['<table><thead><tr>', *cells, '</tr></thead><tbody>']
-    for number, row in enumerate(rows):
-        lines.append('<tr>')
-        lines += [f'<td style="text-align:left">{escape(cell)}</td>' for cell in row]
-        if bars:
-            width = 100.0 * min(max(bars[number], 0.0), 1.0)
-            lines.append(
-                '<td style="min-width:10em"><div style="background:#0072b2;height:.7em;'
-                f'width:{width:.0f}%"></div></td>'
-            )
-        lines.append('</tr>')
-    return ''.join([*lines, '</tbody></table>'])
+        said = self.summary()
+        top = InShort(said.badge, self.tone(), said.title, said.heads, said.rows, said.lines)
+        return fragment([top, *self.sections()])
 
 
 def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -4,18 +4,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-import json
 from pathlib import Path
 import textwrap
-from typing import Any
 
 from armid_ros.cli import columns, options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.errors import RecordingError
+from armid_ros.files import json_text
 from armid_ros.inspection import inspect as look
-from armid_ros.inspection import Inspection
+from armid_ros.inspection import Inspection, inspection_document
 from armid_ros.recording import Recording
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.contents import bag_contents, TopicContent
@@ -86,7 +84,7 @@ def inspect(
         )
         (out / 'inspection.html').write_text(page, encoding='utf-8')
     if as_json:
-        click.echo(json.dumps(_document(found)))
+        click.echo(json_text(inspection_document(found)))
         return
     _print(found)
     if out is not None:
@@ -153,26 +151,3 @@ def _wrapped(text: str, indent: str = '  ') -> str:
     return textwrap.fill(
         text, 80, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
     )
-
-
-def _document(found: Inspection) -> dict[str, Any]:
-    """Return an inspection for programs to read."""
-    trial = None
-    if found.trial is not None:
-        trial = asdict(found.trial)
-        scale = found.trial.scale
-        trial['scale'] = (
-            None if scale is None else [s if np.isfinite(s) else None for s in scale.tolist()]
-        )
-    return {
-        'schema': 'armid/inspection/1',
-        'source': found.recording.source,
-        'topic': found.recording.topic,
-        'topics': [asdict(topic) for topic in found.topics],
-        'samples': len(found.recording),
-        'sampling': asdict(found.sampling),
-        'joints': [asdict(joint) for joint in found.joints],
-        'remarks': [asdict(remark) for remark in found.remarks],
-        'trial': trial,
-        'verdict': found.verdict,
-    }

@@ -75,6 +75,11 @@ class Fit:
     predicted: FloatArray
     informative: npt.NDArray[np.bool_]
 
+    def __repr__(self) -> str:
+        """Return what it is, and how far off, in a line."""
+        error = Score.of([self]).relative_error_percent
+        return f'Fit of {self.source}: {len(self.motion)} samples, {error:.2f} % relative error'
+
     @property
     def residual(self) -> FloatArray:
         """Measured minus predicted torque, shape (M, n) [N m]."""
@@ -167,6 +172,14 @@ class Identification:
     halves_error: float
     physical: PhysicalCertificate | None = None
     passes: int = 1
+
+    def __repr__(self) -> str:
+        """Return what was found in a few lines."""
+        error = Score.of(self.training).relative_error_percent
+        return (
+            f'Identification of {self.arm.robot.name}: {error:.2f} % relative error, condition '
+            f'number {self.condition_number:.4g}\n{self.estimate}'
+        )
 
     @property
     def unidentified(self) -> tuple[Unidentified, ...]:

@@ -9,7 +9,16 @@ Nothing is changed and nothing is hidden: the curves are those of the file.
 
 from armid_ros.inspection.inspect import inspect, Inspection, Remark
 from armid_ros.inspection.joints import JointFacts
+from armid_ros.inspection.output import inspection_document
 from armid_ros.inspection.sampling import Sampling
 from armid_ros.inspection.trial import Trial
 
-__all__ = ['Inspection', 'JointFacts', 'Remark', 'Sampling', 'Trial', 'inspect']
+__all__ = [
+    'Inspection',
+    'JointFacts',
+    'Remark',
+    'Sampling',
+    'Trial',
+    'inspect',
+    'inspection_document',
+]

@@ -31,7 +31,8 @@ from armid_ros.report.sections.story import Story
 from armid_ros.report.sections.verdict import Verdict
 from armid_ros.report.sources import short_names, with_names
 
-_TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
+#: Colour of each verdict; the others are bad.
+TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
 
 
 def diagnosis_report(
@@ -107,7 +108,7 @@ def diagnosis_report(
 
 
 def _verdict(diagnosis: Diagnosis, names: Mapping[str, str]) -> Verdict:
-    tone = _TONES.get(diagnosis.verdict, 'bad')
+    tone = TONES.get(diagnosis.verdict, 'bad')
     notes = [with_names(note, names) for note in diagnosis.notes]
     summary = with_names(diagnosis.summary, names).replace('+-', '±')
     return Verdict(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)

@@ -30,7 +30,8 @@ from armid_ros.report.sections.verdict import Verdict
 from armid_ros.report.sections.whiteness import WhitenessSection
 from armid_ros.report.statistics import directions, torque_reach, torque_scale
 
-_TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
+#: Colour of each grade.
+TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
 
 
 def identification_report(
@@ -97,7 +98,7 @@ def identification_report(
     ]
     sections: list[Section] = [
         Verdict(
-            grade.word, _TONES[grade.word], _first(grade, judgement.sentences), judgement.beware
+            grade.word, TONES[grade.word], _first(grade, judgement.sentences), judgement.beware
         ),
         Asked(_asked(result, robot, list(training), list(validation))),
         DataQuality(quality, arm.robot),

@@ -72,11 +72,11 @@ class Page:
     def html(self) -> str:
         """Return the whole file, scripts and styles included."""
         assets = {
-            'chart_library': _asset('uPlot.iife.min.js'),
-            'chart_licence': _asset('uPlot.LICENSE'),
-            'chart_style': _asset('uPlot.min.css'),
-            'script': _asset('report.js'),
-            'style': _asset('report.css'),
+            'chart_library': asset('uPlot.iife.min.js'),
+            'chart_licence': asset('uPlot.LICENSE'),
+            'chart_style': asset('uPlot.min.css'),
+            'script': asset('report.js'),
+            'style': asset('report.css'),
         }
         return str(render('page.html', {'page': self, **assets}))
 
@@ -100,6 +100,6 @@ def _environment() -> Environment:
     return environment
 
 
-def _asset(name: str) -> Markup:
+def asset(name: str) -> Markup:
     """Return a file of assets/, which is part of this package and trusted."""
     return Markup((files('armid_ros.report') / 'assets' / name).read_text(encoding='utf-8'))

@@ -71,6 +71,13 @@ class Robot:
     notes: tuple[str, ...] = ()
     path: Path | None = None
 
+    def __repr__(self) -> str:
+        """Return name, joints and mass in two lines."""
+        return (
+            f'Robot {self.name}: {self.n_joints} joints ({", ".join(self.joints)})\n'
+            f'  {self.rigid_parameters[::10].sum():.4g} kg moving, from {self.path or "text"}'
+        )
+
     def __post_init__(self) -> None:
         """Freeze the arrays and check that model and names agree."""
         for name in (

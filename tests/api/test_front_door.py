@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `import armid_ros` offers: late, complete, and readable."""
 
+import json
 import os
 from pathlib import Path
 import subprocess
@@ -9,6 +10,7 @@ import sys
 
 import armid_ros as ar
 from armid_ros.api.table import LINES, Summary, WIDTH
+from armid_ros.report.fragment import fragment, InShort
 import numpy as np
 import pytest
 
@@ -89,7 +91,8 @@ def test_an_identification_shows_itself_in_ten_lines_and_in_a_notebook(model, tm
     assert 'elbow_pitch' in repr(model)
     html = model._repr_html_()
     assert html.count('<tr>') > 50
-    assert 'background:#0072b2' in html
+    assert html.count('class="bar role-after"') == 6
+    assert 'class="badge">good' in html
     assert model.report(tmp_path / 'page.html').read_text().startswith('<!')
     table = model.to_dataframe()
     assert list(table.columns) == ['name', 'joint', 'value', 'std', 'unit']
@@ -130,6 +133,8 @@ def test_an_inspection_and_an_excitation_show_themselves(runs, excitation, tmp_p
     assert short(found)
     assert 'armid identify takes it' in ' '.join(repr(found).split())
     assert found.report(tmp_path / 'page.html').is_file()
+    saved = found.save(tmp_path / 'inspection')
+    assert json.loads((saved / 'inspection.json').read_text())['verdict'] == found.core.verdict
     assert short(excitation)
     assert (excitation.save(tmp_path / 'plan') / 'trajectory').is_dir()
     again = ar.simulate('humanoid_arm', tmp_path / 'plan' / 'trajectory', rate=100.0)
@@ -179,5 +184,39 @@ def test_a_summary_of_many_joints_stays_short_and_says_so():
 
 
 def test_names_are_escaped_in_a_notebook():
-    html = Summary('<b>', heads=('<i>',), rows=[('<u>',)], lines=['<s>']).html()
-    assert all(tag not in html for tag in ('<i>', '<u>', '<s>'))
+    html = fragment([InShort('<em>', '', '<q>', ('<i>',), [('<u>',)], ['<s>'])])
+    assert all(tag not in html for tag in ('<em>', '<q>', '<i>', '<u>', '<s>'))
+
+
+def test_what_a_notebook_shows_keeps_its_style_to_itself(model):
+    """Every rule stands below the class of the result; what is nested is closed."""
+    html = model._repr_html_()
+    style = html[html.index('<style>') + 7 : html.index('</style>')]
+    assert style.startswith('.armid-result {')
+    assert style.count('{') == style.count('}')
+    assert not any(word in style for word in (':root', 'html {', 'body {', '@page'))
+
+
+def test_what_lies_inside_of_results_prints_in_a_few_lines(model, runs):
+    """A person looks at these, too; arrays of a recording are no answer."""
+    for one in (model.estimate, model.core, model.arm.robot, *model.predict(runs[0])):
+        assert len(repr(one)) < 800
+        assert len(repr(one).splitlines()) <= LINES + 1
+
+
+def test_recordings_of_one_name_are_told_apart(model, runs):
+    assert model.document()['validation'][0]['bag'] == 'simulation 2'
+    found = ar.identify(model.description, runs[:1], validate=[runs[1], runs[1]])
+    assert list(found.validation) == ['simulation 2', 'simulation 3']
+
+
+def test_what_is_found_goes_into_a_urdf(runs):
+    found = ar.diagnose(ar.ArmModel.of('humanoid_arm'), runs[0])
+    assert 'damping="0.' in found.urdf() or 'friction="0.' in found.urdf()
+
+
+def test_a_trajectory_is_a_table(excitation):
+    table = excitation.to_dataframe()
+    joint = 'shoulder_pitch'
+    assert list(table.columns[:4]) == ['t', f'q_{joint}', f'dq_{joint}', f'ddq_{joint}']
+    assert table.t.iloc[-1] == pytest.approx(excitation.duration, abs=0.05)

@@ -38,6 +38,58 @@ class Shown:
 
 
 @dataclass(frozen=True)
+class JointErrors(Section):
+    """
+    How large the errors are, without a curve.
+
+    Attributes
+    ----------
+    robot : Robot
+        Gives joints and units.
+    training : mapping of str to sequence of Fit
+        Data it was fitted to, by recording.
+    validation : mapping of str to sequence of Fit
+        Held-out data, by recording.
+
+    """
+
+    title: ClassVar[str] = 'Errors'
+    template: ClassVar[str] = 'joint_errors.html'
+
+    robot: Robot
+    training: Mapping[str, Sequence[Fit]]
+    validation: Mapping[str, Sequence[Fit]]
+
+    @property
+    def bars(self) -> BarChart:
+        """Relative error of each joint, held-out and training."""
+        groups: list[tuple[Role, Mapping[str, Sequence[Fit]], str]] = [
+            ('after', self.validation, 'held-out'),
+            ('faint', self.training, 'training'),
+        ]
+        roles = [(role, label) for role, fits, label in groups if fits]
+        scores = [
+            (role, Score.of([fit for part in fits.values() for fit in part]))
+            for role, fits, _ in groups
+            if fits
+        ]
+        rows = []
+        for joint, name in enumerate(self.robot.joints):
+            unit = torque_unit(self.robot, joint)
+            bars = [
+                Bar(
+                    float(score.joint_relative_error_percent[joint]),
+                    role,
+                    f'{digits(score.joint_relative_error_percent[joint])} % '
+                    f'({digits(score.rms[joint])} {unit} rms)',
+                )
+                for role, score in scores
+            ]
+            rows.append((name, bars))
+        return BarChart(rows, '%', roles)
+
+
+@dataclass(frozen=True)
 class FitSection(Section):
     """
     How well the model predicts the torques.
@@ -74,30 +126,7 @@ class FitSection(Section):
     @property
     def bars(self) -> BarChart:
         """Relative error of each joint, held-out and training."""
-        groups: list[tuple[Role, Mapping[str, Sequence[Fit]], str]] = [
-            ('after', self.validation, 'held-out'),
-            ('faint', self.training, 'training'),
-        ]
-        roles = [(role, label) for role, fits, label in groups if fits]
-        scores = [
-            (role, Score.of([fit for part in fits.values() for fit in part]))
-            for role, fits, _ in groups
-            if fits
-        ]
-        rows = []
-        for joint, name in enumerate(self.robot.joints):
-            unit = torque_unit(self.robot, joint)
-            bars = [
-                Bar(
-                    float(score.joint_relative_error_percent[joint]),
-                    role,
-                    f'{digits(score.joint_relative_error_percent[joint])} % '
-                    f'({digits(score.rms[joint])} {unit} rms)',
-                )
-                for role, score in scores
-            ]
-            rows.append((name, bars))
-        return BarChart(rows, '%', roles)
+        return JointErrors(self.robot, self.training, self.validation).bars
 
     @property
     def errors(self) -> list[tuple[str, str, float]]:

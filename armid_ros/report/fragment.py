@@ -1,0 +1,82 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Sections of a report inside another page, such as a notebook.
+
+The style of the reports is put below one class, so that it changes nothing around it; sections
+that need the script of a report have no place here.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+import re
+from typing import ClassVar
+
+from armid_ros.report.page import asset, render, Section
+
+CLASS = 'armid-result'
+
+
+@dataclass(frozen=True)
+class InShort(Section):
+    """
+    A result as it is printed: a sentence, a table, and what stands below it.
+
+    Attributes
+    ----------
+    badge : str
+        One word; empty for none.
+    tone : {'good', 'fair', 'bad', ''}
+        Colour of the badge.
+    sentence : str
+        What it is, with the number that matters most.
+    heads : sequence of str
+        Of the columns.
+    rows : sequence of sequence of str
+        Cells.
+    lines : sequence of str
+        What stands below.
+
+    """
+
+    title: ClassVar[str] = ''
+    template: ClassVar[str] = 'in_short.html'
+
+    badge: str
+    tone: str
+    sentence: str
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    lines: Sequence[str]
+
+
+def fragment(sections: Sequence[Section], n_open: int = 2) -> str:
+    """
+    Return sections as HTML to be put into another page.
+
+    Parameters
+    ----------
+    sections : sequence of Section
+        In order; those without a title are shown as they are.
+    n_open : int
+        As many of them are unfolded.
+
+    """
+    values = {'class': CLASS, 'style': _style(), 'sections': sections, 'n_open': n_open}
+    return str(render('fragment.html', values))
+
+
+@cache
+def _style() -> str:
+    """Return the style of the reports, below one class."""
+    css = str(asset('report.css'))
+    css = css[: css.index('@media print')]
+    css = re.sub(r'/\*.*?\*/', '', css, flags=re.DOTALL)
+    css = re.sub(r'(?m)^html \{.*\}\n', '', css)
+    css = re.sub(r':root(:not\(\.paper\))?(?= \{)', '&', css)
+    css = re.sub(r'(?m)^( *)body(?= \{)', r'\1&', css)
+    return f'.{CLASS} {{{css}& {{ margin: 0; padding: 8px 12px; }}}}'
