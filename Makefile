@@ -127,8 +127,7 @@ $(STAMPS)/armid_msgs: $(MESSAGES) $(STAMPS)/run
 
 # Not editable, for pip then leaves out the files that ROS 2 looks for. What a build left behind
 # would be installed again, files that are gone included.
-$(STAMPS)/armid_ros: $(TREE) setup.py setup.cfg package.xml requirements/run.in requirements/ros.in \
-		requirements/test.in $(STAMPS)/armid_msgs
+$(STAMPS)/armid_ros: $(TREE) setup.py setup.cfg package.xml $(wildcard requirements/*.in) $(STAMPS)/armid_msgs
 	@rm -rf build/lib build/bdist.*
 	$(PIP) --no-deps --no-build-isolation --force-reinstall .
 	@touch $@

@@ -66,6 +66,8 @@ setup(
     extras_require={
         'ros': requirements('ros'),
         'convert': requirements('convert'),
+        'view': requirements('view'),
+        'notebook': requirements('notebook'),
         'test': requirements('test'),
         'bench': requirements('bench'),
     },

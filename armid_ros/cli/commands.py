@@ -26,6 +26,7 @@ COMMANDS = {
     'exo': 'exo',
     'compare': 'compare',
     'recover': 'record',
+    'view': 'view',
     'layout': 'layout',
     'robots': 'catalogues',
     'effects': 'catalogues',

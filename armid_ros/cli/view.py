@@ -1,0 +1,121 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A recording to look at, with the arm that moves."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from armid_ros.arm import ArmModel, load_model
+from armid_ros.cli import columns, options
+from armid_ros.cli.terminal import say
+from armid_ros.errors import ArmidError
+from armid_ros.view import log_scene, make_scene, open_stream, rerun
+import click
+
+
+@click.command(epilog='Example: armid view run.mcap --model found --out run.rrd')
+@click.argument('bag', required=False, type=click.Path(path_type=Path))
+@click.option(
+    '--model',
+    type=click.Path(path_type=Path),
+    help='A model.yaml, or the folder that identify or diagnose wrote: its torque is predicted, '
+    'and joints that the diagnosis names are coloured.',
+)
+@click.option(
+    '--robot', 'robot_source', metavar='R', help='As elsewhere; of the model by default.'
+)
+@click.option('--out', type=click.Path(path_type=Path), help='File to write, .rrd; no window.')
+@click.option('--mark', metavar='A,B,...', help='Joints to be coloured.')
+@click.option('--live', is_flag=True, help='Show joint_states as they come; no BAG.')
+@click.option('--namespace', default='', help='With --live: of the nodes, such as left_arm.')
+@columns.options
+@click.option('--topic', help='JointState topic, where a bag has several.')
+@options.gravity
+@options.joints
+@options.reading
+def view(
+    bag: Path | None,
+    model: Path | None,
+    robot_source: str | None,
+    out: Path | None,
+    mark: str | None,
+    live: bool,
+    namespace: str,
+    topic: str | None,
+    gravity: str,
+    joints: str | None,
+) -> None:
+    """
+    Look at a recording in rerun: the moving arm, torques, and what a model does not explain.
+
+    With --live the arm is shown as it moves; the online identifier beside it has the predictions.
+
+    """
+    if live == (bag is not None):
+        raise ArmidError('armid view shows a BAG, or with --live what is on the topics: name one')
+    if live:
+        _live(
+            {
+                'robot': robot_source if robot_source != '-' else '',
+                'joints': joints.split(',') if joints else [],
+                'mark': mark.split(',') if mark else [],
+                'out': str(out or ''),
+            },
+            namespace,
+        )
+        return
+    assert bag is not None
+    arm = _arm(bag, model, robot_source, gravity, joints)
+    (recording,) = columns.read([bag], arm.robot, topic)
+    marked = tuple(mark.split(',')) if mark else _named(model)
+    scene = make_scene(arm, recording, marked)
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
+    stream = open_stream(scene.name, out)
+    log_scene(scene, stream)
+    stream.disconnect()
+    for note in scene.notes:
+        say(f'note: {note}')
+    said = f', coloured: {", ".join(marked)}' if marked else ''
+    if out is not None:
+        say(f'{out}: {len(recording)} samples of {arm.robot.n_joints} joints{said}; rerun {out}')
+
+
+def _live(parameters: dict[str, Any], namespace: str) -> None:
+    rerun()  # is it there at all?
+    try:
+        from armid_ros.nodes.viewer import show_topics
+    except ImportError as error:
+        raise ArmidError(
+            f'--live needs ROS 2, of which {error.name} is not there: source a workspace or '
+            '.venv/setup.bash first'
+        ) from None
+    show_topics(parameters, namespace)
+
+
+def _arm(
+    bag: Path, model: Path | None, source: str | None, gravity: str, joints: str | None
+) -> ArmModel:
+    """Return the model that is meant; without one, the bodies of the description."""
+    robot = None
+    if source is not None:
+        robot = options.open_robot(source, gravity, joints, [bag])
+    if model is not None:
+        return load_model(model / 'model.yaml' if model.is_dir() else model, robot)
+    if robot is None:
+        robot = options.open_robot('-', gravity, joints, [bag])
+    return ArmModel(robot)
+
+
+def _named(model: Path | None) -> tuple[str, ...]:
+    """Return the joints of what a diagnosis beside the model names."""
+    if model is None:
+        return ()
+    path = (model if model.is_dir() else model.parent) / 'diagnosis.json'
+    if not path.is_file():
+        return ()
+    effects = json.loads(path.read_text(encoding='utf-8'))['effects']
+    return tuple(dict.fromkeys(joint for effect in effects for joint in effect['joints']))

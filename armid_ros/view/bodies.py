@@ -1,0 +1,163 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What an arm looks like: triangles in the frames of its joints.
+
+They are those of <visual>, or of <collision> where a link has none; an arm without either is drawn
+as bars from joint to joint.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+from armid_ros.errors import RobotError
+from armid_ros.motion import FloatArray, read_only
+from armid_ros.robots import Robot
+from armid_ros.robots.description import parse_xml
+from armid_ros.robots.meshes import find_mesh
+import coal
+import numpy as np
+import pinocchio as pin
+from scipy.spatial import ConvexHull
+
+#: Corners of a circle, points of a sphere, and how thick a bar is [m].
+_ROUND, _SPHERE, _BAR = 24, 200, 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """
+    One piece of a link.
+
+    Attributes
+    ----------
+    link : str
+        The link.
+    joint : int
+        Index among the driven joints of the one that carries it; -1 for the base.
+    corners : ndarray, shape (T, 3, 3)
+        Corners of T triangles in the frame of that joint [m].
+
+    """
+
+    link: str
+    joint: int
+    corners: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the triangles."""
+        object.__setattr__(self, 'corners', read_only(self.corners))
+
+
+def bodies(robot: Robot) -> tuple[tuple[Body, ...], tuple[str, ...]]:
+    """
+    Return the pieces of an arm, and notes on meshes that were not found.
+
+    Raises
+    ------
+    RobotError
+        If a shape has no numbers, or a mesh cannot be read.
+
+    """
+    found: list[Body] = []
+    notes: list[str] = []
+    frames = {f.name: f for f in robot.model.frames if f.type == pin.FrameType.BODY}
+    for link in parse_xml(robot.urdf, robot.name).findall('link'):
+        name = link.get('name', '')
+        frame = frames[name]
+        for element in link.findall('visual') or link.findall('collision'):
+            try:
+                corners = _triangles(element, robot.path)
+            except (TypeError, ValueError) as error:
+                raise RobotError(f"{robot.name}: a shape of link '{name}': {error}") from None
+            if corners is None:
+                notes.append(f"link '{name}': its mesh is not found; it is not drawn")
+                continue
+            placed = frame.placement * _origin(element)
+            turned = corners @ np.array(placed.rotation).T + np.array(placed.translation)
+            found.append(Body(name, int(frame.parentJoint) - 1, turned))
+    return tuple(found) or _bars(robot), tuple(notes)
+
+
+def _triangles(element: ElementTree.Element, urdf: Path | None) -> FloatArray | None:
+    """Return the triangles of a <visual> or <collision>; None where its mesh is nowhere."""
+    for shape in element.findall('geometry/*'):
+        if shape.tag == 'box':
+            return _hull(0.5 * np.array(_numbers(shape.get('size', ''))) * _CUBE)
+        if shape.tag == 'sphere':
+            return _hull(float(shape.get('radius', '')) * _sphere())
+        if shape.tag in ('cylinder', 'capsule'):
+            radius, length = float(shape.get('radius', '')), float(shape.get('length', ''))
+            ends = _RING if shape.tag == 'cylinder' else _sphere()
+            shift = np.array([0.0, 0.0, 0.5 * length])
+            return _hull(np.concatenate([radius * ends + shift, radius * ends - shift]))
+        if shape.tag == 'mesh':
+            path = find_mesh(shape.get('filename', ''), urdf)
+            scale = np.array(_numbers(shape.get('scale', '1 1 1')))
+            return None if path is None else _mesh(path, scale)
+    raise ValueError('no geometry that is a box, sphere, cylinder, capsule or mesh')
+
+
+def _mesh(path: Path, scale: FloatArray) -> FloatArray:
+    try:
+        mesh = coal.MeshLoader().load(str(path), scale)
+    except (RuntimeError, ValueError) as error:
+        raise ValueError(f'{path} cannot be read as a mesh: {error}') from None
+    faces = np.array(
+        [[face[0], face[1], face[2]] for face in map(mesh.tri_indices, range(mesh.num_tris))]
+    )
+    return np.asarray(np.array(mesh.vertices())[faces])
+
+
+def _bars(robot: Robot) -> tuple[Body, ...]:
+    """Return a bar from each joint to those that it carries, and to the centre of the last."""
+    model, found = robot.model, []
+    for joint in range(model.njoints):
+        carried = [k for k in range(1, model.njoints) if int(model.parents[k]) == joint]
+        ends = [np.array(model.jointPlacements[k].translation) for k in carried]
+        if joint and not ends:
+            ends = [2.0 * np.array(model.inertias[joint].lever)]
+        link = robot.links[joint - 1] if joint else 'base'
+        ball = _BAR * _sphere()
+        found += [Body(link, joint - 1, _hull(np.concatenate([ball, end + ball]))) for end in ends]
+    return tuple(found)
+
+
+def _hull(points: FloatArray) -> FloatArray:
+    """Return the triangles around points, their corners counter-clockwise from outside."""
+    hull = ConvexHull(points)
+    corners = points[hull.simplices]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inwards = np.sum(normals * hull.equations[:, :3], axis=1) < 0.0
+    corners[inwards] = corners[inwards][:, ::-1]
+    return np.asarray(corners)
+
+
+def _sphere() -> FloatArray:
+    """Return points spread evenly over the unit sphere, shape (S, 3)."""
+    k = np.arange(_SPHERE) + 0.5
+    z, turn = 1.0 - 2.0 * k / _SPHERE, np.pi * (1.0 + np.sqrt(5.0)) * k
+    wide = np.sqrt(1.0 - z**2)
+    return np.column_stack([wide * np.cos(turn), wide * np.sin(turn), z])
+
+
+def _origin(element: ElementTree.Element) -> pin.SE3:
+    origin = element.find('origin')
+    if origin is None:
+        return pin.SE3.Identity()
+    rotation = pin.rpy.rpyToMatrix(*_numbers(origin.get('rpy', '0 0 0')))
+    return pin.SE3(rotation, np.array(_numbers(origin.get('xyz', '0 0 0'))))
+
+
+def _numbers(text: str) -> tuple[float, float, float]:
+    x, y, z = (float(number) for number in text.split())
+    return x, y, z
+
+
+_CUBE = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+_ANGLES = 2.0 * np.pi * np.arange(_ROUND) / _ROUND
+_RING = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES), np.zeros(_ROUND)])
