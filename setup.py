@@ -46,6 +46,8 @@ setup(
     version='0.1.0',
     description='Dynamic identification of robot arms: excite, record, identify, and find what '
     'the model lacks.',
+    long_description=(HERE / 'README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
     author='The armid_ros developers',
     author_email='armid_ros@example.org',
     maintainer='The armid_ros developers',
@@ -75,7 +77,7 @@ setup(
     entry_points={
         'console_scripts': [
             f'armid = {NAME}.cli:main',
-            *(f'{node} = {NAME}.nodes.{node}:main' for node in NODES),
+            *(f'{node} = {NAME}.cli.node:main' for node in NODES),
         ]
     },
 )

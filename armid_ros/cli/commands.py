@@ -10,8 +10,10 @@ import sys
 from typing import Any
 
 from armid_ros import __version__
+from armid_ros.cli.node import lacking
 from armid_ros.errors import ArmidError, visible
 import click
+from click.shell_completion import CompletionItem
 
 #: Command and module, in the order of the work; a module is imported when its command is called.
 COMMANDS = {
@@ -30,6 +32,7 @@ COMMANDS = {
     'layout': 'layout',
     'robots': 'catalogues',
     'effects': 'catalogues',
+    'completion': 'completion',
 }
 
 
@@ -48,12 +51,23 @@ class Commands(click.Group):
         command: click.Command = getattr(module, cmd_name)
         return command
 
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Complete a command without importing all of them, or an option."""
+        names = [CompletionItem(name) for name in COMMANDS if name.startswith(incomplete)]
+        return [*names, *click.Command.shell_complete(self, ctx, incomplete)]
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
         try:
             return super().invoke(ctx)
         except ArmidError as error:
             click.echo(f'armid: {" ".join(str(error).split())}', err=True)
+            sys.exit(2)
+        except ModuleNotFoundError as error:
+            said = lacking(error)
+            if said is None:
+                raise
+            click.echo(f'armid: {said}', err=True)
             sys.exit(2)
         except OSError as error:  # a disk that is full, a folder that went away
             if error.errno == errno.EPIPE:

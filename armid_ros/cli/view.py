@@ -86,13 +86,8 @@ def view(
 
 def _live(parameters: dict[str, Any], namespace: str) -> None:
     rerun()  # is it there at all?
-    try:
-        from armid_ros.nodes.viewer import show_topics
-    except ImportError as error:
-        raise ArmidError(
-            f'--live needs ROS 2, of which {error.name} is not there: source a workspace or '
-            '.venv/setup.bash first'
-        ) from None
+    from armid_ros.nodes.viewer import show_topics
+
     show_topics(parameters, namespace)
 
 

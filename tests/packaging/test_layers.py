@@ -14,7 +14,7 @@ import pytest
 LAYERS = (
     ('cli',),
     ('api', 'nodes'),
-    ('report',),
+    ('report', 'view'),
     ('diagnosis', 'inspection'),
     ('identification',),
     ('recording', 'simulation', 'excitation'),

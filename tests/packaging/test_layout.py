@@ -65,9 +65,9 @@ def test_scripts_are_executable_in_the_source_tree(root):
         assert stat.S_IMODE(path.stat().st_mode) & 0o111 == 0o111, path
 
 
-def test_console_scripts_name_the_module_like_the_node(console_scripts):
-    """The scripts rely on it: they import the module named like themselves."""
-    expected = {node: f'armid_ros.nodes.{node}:main' for node in NODES}
+def test_console_scripts_of_nodes_say_what_is_missing_of_ros(console_scripts):
+    """They run the node that is named like them."""
+    expected = dict.fromkeys(NODES, 'armid_ros.cli.node:main')
     assert console_scripts == expected | {'armid': 'armid_ros.cli:main'}
 
 

@@ -1,0 +1,53 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the executables of the nodes run, and what is said where ROS 2 is not there."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+import sys
+
+#: Modules of ROS 2 that the nodes import.
+_ROS = (
+    'builtin_interfaces',
+    'diagnostic_msgs',
+    'rcl_interfaces',
+    'rclpy',
+    'rosgraph_msgs',
+    'rosidl_runtime_py',
+    'sensor_msgs',
+    'std_msgs',
+    'std_srvs',
+    'trajectory_msgs',
+)
+
+
+def main() -> None:
+    """Run the node that the executable is called after."""
+    name = Path(sys.argv[0]).name
+    try:
+        node = import_module(f'armid_ros.nodes.{name}')
+    except ModuleNotFoundError as error:
+        said = lacking(error)
+        if said is None:
+            raise
+        print(f'{name}: {said}', file=sys.stderr)
+        raise SystemExit(2) from None
+    node.main()
+
+
+def lacking(error: ModuleNotFoundError) -> str | None:
+    """Say what to install for a module that is not there; None if it is none of ROS 2."""
+    module = (error.name or '').partition('.')[0]
+    if module == 'armid_msgs':
+        return (
+            'the message package armid_msgs is not there; it is compiled against ROS 2 and on no '
+            'index: `make` in a clone builds it, or `colcon build` of msg_schemas in a workspace'
+        )
+    if module in _ROS:
+        return (
+            f'{module} is not there: nodes need ROS 2 Jazzy. `make` in a clone sets it up, '
+            "pip install 'armid_ros[ros]' installs it from wheels, or source a Jazzy workspace"
+        )
+    return None

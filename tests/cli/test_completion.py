@@ -1,0 +1,50 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Shells complete commands and options, without waiting for all of the package."""
+
+import os
+import subprocess
+import sys
+
+from armid_ros.cli import main
+from click.shell_completion import ShellComplete
+import pytest
+
+from .conftest import armid
+
+
+def completed(*words):
+    """Return what completes the last word."""
+    shell = ShellComplete(main, {}, 'armid', '_ARMID_COMPLETE')
+    return [item.value for item in shell.get_completions(list(words[:-1]), words[-1])]
+
+
+def test_commands_and_options_are_completed():
+    assert completed('id') == ['identify']
+    assert {'robots', 'recover'} <= set(completed('r'))
+    assert completed('identify', '--effects') == ['--effects']
+    assert completed('completion', 'f') == ['fish']
+    assert '--version' in completed('--v')
+
+
+@pytest.mark.parametrize('shell', ['bash', 'zsh', 'fish'])
+def test_a_script_is_printed_for_each_shell(shell):
+    said = armid('completion', shell).output
+    assert '_ARMID_COMPLETE' in said and f'{shell}_complete' in said
+
+
+def test_names_are_completed_without_importing_what_computes(pytestconfig):
+    code = (
+        'import os, sys\n'
+        'from armid_ros.cli import main\n'
+        'try:\n    main(prog_name="armid")\n'
+        'finally:\n    print(sorted({"numpy", "pinocchio"} & set(sys.modules)))'
+    )
+    asked = {'_ARMID_COMPLETE': 'bash_complete', 'COMP_WORDS': 'armid ins', 'COMP_CWORD': '1'}
+    done = subprocess.run(
+        [sys.executable, '-c', code],
+        env={**os.environ, **asked, 'PYTHONPATH': str(pytestconfig.rootpath)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.splitlines() == ['plain,inspect', '[]'], done.stderr
