@@ -172,8 +172,10 @@ def show(result: Diagnosis) -> None:
     """Print the sentence first, then the values, then the small print."""
     say(f'{result.verdict.replace("_", " ").upper()}: {result.summary}')
     if result.findings:
+        for finding in result.findings:
+            say(_share(finding))
         rows = [row for finding in result.findings for row in _rows(finding)]
-        print_rows(rows, as_json=False, right=('value, 95 %', 'share of the gap'))
+        print_rows(rows, as_json=False, right=('value, 95 %',))
     if result.minor:
         say('small print: there beyond chance, and smaller than what matters')
         rows = [_minor(finding) for finding in result.minor]
@@ -183,9 +185,7 @@ def show(result: Diagnosis) -> None:
 
 
 def _rows(finding: Finding) -> list[dict[str, str]]:
-    """Return a row for every value that is told from zero; the first one says the share."""
-    low, high = finding.share_interval
-    share = f'{percent(finding.share)} ({percent(low)} to {percent(high)})'
+    """Return a row for every value that is told from zero."""
     every = list(zip(finding.parameters, finding.values, finding.std, strict=True))
     values = [row for row in every if told_from_zero(row[1], row[2])] or every
     return [
@@ -194,10 +194,17 @@ def _rows(finding: Finding) -> list[dict[str, str]]:
             'joint': finding.place_of(name.joint) or 'whole arm',
             'parameter': name.name.replace('_', ' '),
             'value, 95 %': with_interval(value, std, name.unit),
-            'share of the gap': '' if number else share,
         }
         for number, (name, value, std) in enumerate(values)
     ]
+
+
+def _share(finding: Finding) -> str:
+    """Say how much of the gap a cause is."""
+    low, high = (percent(share) for share in finding.share_interval)
+    where = ', '.join(finding.joints) or 'the whole arm'
+    name = finding.name.replace('_', ' ')
+    return f'  {name} of {where}: {percent(finding.share)} of the gap ({low} to {high})'
 
 
 def _minor(finding: Finding) -> dict[str, str]:

@@ -127,7 +127,7 @@ def identify(
     """Fit a model with uncertainties to recordings."""
     options.hold(out, SCHEMA, robot_source)
     options.require_own(out, OUTPUTS, 'identify')
-    robot = options.open_robot(robot_source, gravity, joints, bags)
+    robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
     if not physical and (total_mass is not None or boxes):
         raise IdentificationError('--total-mass and --box go with --physical')

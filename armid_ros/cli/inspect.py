@@ -141,7 +141,7 @@ def _print(found: Inspection) -> None:
     rows = [dict(zip(heads, row, strict=True)) for row in joint_rows(found)]
     for row in rows:
         del row['step']
-    print_rows(rows, as_json=False, right=heads[1:])
+    print_rows(rows, as_json=False, right=heads[1:], spare=('moving', heads[3]))
     for remark in found.remarks:
         say(_wrapped(f'{_SIGNS[remark.weight]} {remark.text}'))
     say(_wrapped(found.verdict, ''))

@@ -11,13 +11,13 @@ from typing import Any, TypeVar
 from armid_ros.arm import ArmModel
 from armid_ros.cli import columns
 from armid_ros.effects import make_effect, USUAL_EFFECTS
-from armid_ros.errors import RecordingError, RobotError
+from armid_ros.errors import RecordingError, RobotError, visible
 from armid_ros.files import default_memory_limit, result_folder, write_file
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.ros1 import is_ros1
 from armid_ros.recording.tables import is_table
-from armid_ros.robots import load_robot, Robot, robot_from_urdf
+from armid_ros.robots import driven_in_words, load_robot, Robot, robot_from_urdf
 import click
 import numpy as np
 
@@ -110,9 +110,24 @@ def read_settings() -> ReadSettings:
     return ReadSettings(check_crc=bool(meta.get(_CRC, True)), memory_limit=size)
 
 
-def open_robot(source: str, gravity: str, joints: str | None, bags: Sequence[Path] = ()) -> Robot:
-    """Load the robot that --robot, --gravity and --joints ask for."""
-    chosen = tuple(joints.split(',')) if joints else None
+def open_robot(
+    source: str,
+    gravity: str,
+    joints: str | None,
+    bags: Sequence[Path] = (),
+    tell: bool = True,
+) -> Robot:
+    """Load the robot that --robot, --gravity and --joints ask for; say what is not driven."""
+    robot = _loaded(source, gravity, tuple(joints.split(',')) if joints else None, bags)
+    if tell and joints is None:
+        for line in driven_in_words(robot):
+            click.echo(visible(f'note: {line}'), err=True)
+    return robot
+
+
+def _loaded(
+    source: str, gravity: str, chosen: tuple[str, ...] | None, bags: Sequence[Path]
+) -> Robot:
     if source != '-':
         return load_robot(source, gravity=gravity, joints=chosen)
     for path in bags:

@@ -25,9 +25,10 @@ from rich.text import Text
 Tick = Callable[..., None]
 
 
-def say(text: str) -> None:
-    """Print a line."""
-    click.echo(visible(text))
+def say(text: str, colour: str | None = None) -> None:
+    """Print a line, on a terminal in a colour."""
+    shown = visible(text)
+    click.echo(shown if colour is None else click.style(shown, fg=colour))
 
 
 @contextmanager
@@ -112,22 +113,54 @@ class ProgressLines:
             thread.join()
 
 
-def print_rows(rows: Sequence[dict[str, Any]], as_json: bool, right: Sequence[str] = ()) -> None:
-    """Print rows as a table, or as JSON; numeric columns are named in `right`."""
+def print_rows(
+    rows: Sequence[dict[str, Any]],
+    as_json: bool,
+    right: Sequence[str] = (),
+    spare: Sequence[str] = (),
+) -> None:
+    """
+    Print rows as a table, or as JSON.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        Cells by the heads of their columns.
+    as_json : bool
+        Whether for programs, with all columns.
+    right : sequence of str
+        Columns of numbers, which are never broken.
+    spare : sequence of str
+        Columns that are left out, the first one first, where there is no room for all.
+
+    """
     if as_json:
         click.echo(json_text(list(rows), indent=1))
         return
+    console = Console()
+    heads = list(rows[0]) if rows else []
+    for head in spare:
+        if _width(rows, heads) > console.width:
+            heads.remove(head)
     table = Table(box=None, header_style='bold')
-    for head in rows[0] if rows else ():
+    for head in heads:
         table.add_column(
-            head,
+            Text(head),
             justify='right' if head in right else 'left',
-            no_wrap=head in ('name', 'joint'),
+            no_wrap=head in ('name', 'joint', *right),
             overflow='fold',
         )
     for row in rows:
-        table.add_row(*(Text(_cell(value)) for value in row.values()))
-    Console().print(table)
+        table.add_row(*(Text(_cell(row[head])) for head in heads))
+    console.print(table)
+
+
+def _width(rows: Sequence[dict[str, Any]], heads: Sequence[str]) -> int:
+    """Return how many columns of a terminal a table takes."""
+    return sum(
+        2 + max(len(text) for text in (head, *(_cell(row[head]) for row in rows)))
+        for head in heads
+    )
 
 
 def print_parameters(rows: Sequence[dict[str, Any]]) -> None:

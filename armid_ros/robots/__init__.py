@@ -14,12 +14,14 @@ from armid_ros.robots.gravity import GRAVITIES, parse_gravity
 from armid_ros.robots.load import load_robot, robot_from_urdf
 from armid_ros.robots.mounting import Mounting, read_mounting
 from armid_ros.robots.robot import PARAMETERS_PER_BODY, Robot
+from armid_ros.robots.selection import driven_in_words
 from armid_ros.robots.shipped import shipped_robots
 
 __all__ = [
     'load_robot',
     'robot_from_urdf',
     'shipped_robots',
+    'driven_in_words',
     'Robot',
     'PARAMETERS_PER_BODY',
     'parse_gravity',

@@ -7,11 +7,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.errors import RobotError
-from armid_ros.robots.description import Description, Joint
+from armid_ros.robots.description import Description, Joint, parse_description, parse_xml
+from armid_ros.robots.robot import Robot
 
 #: Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70.
 MAX_DRIVEN = 150
 GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
+#: Joints that a line names.
+_NAMED = 8
 #: Branches of fewer joints are no arms: a head, a trunk.
 SHORTEST_ARM = 3
 
@@ -87,6 +90,22 @@ def _beside(joint: Joint, other: Joint, after: dict[str, list[Joint]]) -> bool:
 
 def _driven_before(joint: Joint, after: dict[str, list[Joint]]) -> set[str]:
     return {name for name, beyond in after.items() if joint in beyond}
+
+
+def driven_in_words(robot: Robot) -> tuple[str, ...]:
+    """Say which joints that could move are not driven, and whether those of several arms are."""
+    description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
+    locked = []
+    for joint in description.movable():
+        if joint.name not in robot.joints:
+            follows = f' (follows {joint.mimic.joint})' if joint.mimic else ''
+            locked.append(joint.name + follows)
+    arms = several_arms(description, [description.by_name[name] for name in robot.joints])
+    if not locked:
+        return arms
+    more = f' and {len(locked) - _NAMED} more' if len(locked) > _NAMED else ''
+    named = ', '.join(locked[:_NAMED])
+    return (f'not driven, and locked: {named}{more}; --joints A,B,... chooses others', *arms)
 
 
 def standing_position(description: Description, joint: Joint) -> float:

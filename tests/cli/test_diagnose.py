@@ -119,9 +119,10 @@ def test_the_sentence_comes_first_and_then_the_values_with_their_share(files, tm
     document = json.loads((out / 'diagnosis.json').read_text())
     lines = result.stdout.splitlines()
     assert lines[0] == f'{document["verdict"].upper()}: {document["summary"]}'
-    assert 'value, 95 %' in lines[1]
-    assert ' to ' in lines[2]
-    assert document['effects'][0]['name'].replace('_', ' ') in lines[2]
+    assert 'of the gap (' in lines[1] and ' to ' in lines[1]
+    assert document['effects'][0]['name'].replace('_', ' ') in lines[1]
+    heads = next(line for line in lines if 'value, 95 %' in line)
+    assert 'joint' in heads and 'parameter' in heads
 
 
 def test_an_extra_that_fails_costs_no_result(files, tmp_path, monkeypatch):

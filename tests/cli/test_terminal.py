@@ -2,7 +2,40 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a log sees of long work."""
 
-from armid_ros.cli.terminal import ProgressLines
+from armid_ros.cli.terminal import print_rows, ProgressLines, say
+import pytest
+
+ROW = {
+    'joint': 'a_joint_of_a_long_name',
+    'from [rad]': '-1.22',
+    'to': '0.0396',
+    'moving': '100 %',
+    'value, 95 %': '0.20003 ± 0.00011 kg m²',
+    'note': 'words that may be broken where there is no room for all of them',
+}
+
+
+def test_tables_say_their_units_and_break_no_number(capsys, monkeypatch):
+    monkeypatch.setenv('COLUMNS', '80')
+    print_rows([ROW], as_json=False, right=('from [rad]', 'to', 'value, 95 %'), spare=('moving',))
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert 'from [rad]' in lines[0]
+    assert 'moving' not in lines[0]
+    assert '0.20003 ± 0.00011 kg m²' in lines[1]
+
+
+def test_what_there_is_room_for_is_not_left_out(capsys, monkeypatch):
+    monkeypatch.setenv('COLUMNS', '200')
+    print_rows([ROW], as_json=False, spare=('moving',))
+    assert '100 %' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('colour', [None, 'green'])
+def test_a_line_without_a_terminal_has_no_colour_and_no_escapes(capsys, colour):
+    """Colours are of terminals; text of a file has no say in it."""
+    say('fit \x1b[31m', colour)
+    assert capsys.readouterr().out == 'fit \\x1b[31m\n'
 
 
 def test_progress_without_a_terminal_is_a_line_every_ten_seconds():
