@@ -5,13 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import PurePath
 
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.comparison import Change, Comparison, GroupChange
 from armid_ros.identification.identifiability import HALF_WIDTH, told_from_zero
 from armid_ros.report.families import full_label
-from armid_ros.report.notation import counted, measured, pretty
+from armid_ros.report.notation import counted, measured, pretty, robot_label
 from armid_ros.report.page import Page
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.changes import Changes
@@ -55,7 +54,7 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
         Changes(comparison),
         Origin(provenance or Provenance()),
     ]
-    robot = PurePath(comparison.after.robot).name
+    robot = robot_label(comparison.after.robot)
     title = f'Comparison of two identifications of {robot}'
     subtitle = f'{comparison.before.source} · {comparison.after.source}'
     return Page(title, subtitle, sections).html()

@@ -6,13 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import PurePath
 
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, NextRun
 from armid_ros.diagnosis.verdict.detectable import detectable
 from armid_ros.identification.verification import ForwardValidation
 from armid_ros.recording import Recording
-from armid_ros.report.notation import counted
+from armid_ros.report.notation import counted, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.candidates import CandidateTable
@@ -99,7 +98,7 @@ def diagnosis_report(
         sections.append(Patch(diagnosis.findings, patch))
     sections.append(Origin(provenance or Provenance()))
     subtitle = (
-        f'{PurePath(robot).name or robot} · {counted(len(recordings), "recording")} · '
+        f'{robot_label(robot)} · {counted(len(recordings), "recording")} · '
         f'{counted(len(validation), "held-out recording")}'
     )
     if baseline:

@@ -27,7 +27,7 @@ from armid_ros.excitation.fitness import FIT, UNFIT
 from armid_ros.excitation.heights import vertical
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.report.families import full_label
-from armid_ros.report.notation import counted, digits, pretty, torque_unit
+from armid_ros.report.notation import counted, digits, pretty, robot_label, torque_unit
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.facts import Asked
@@ -126,7 +126,7 @@ def excitation_report(
         Origin(provenance or Provenance()),
     ]
     subtitle = (
-        f'{robot} · {whole_run.duration:.4g} s · {excitation.n_periods} periods · '
+        f'{robot_label(robot)} · {whole_run.duration:.4g} s · {excitation.n_periods} periods · '
         f'{design.settings.speed}'
     )
     return Page(f'Excitation of {arm.robot.name}', subtitle, sections).html()

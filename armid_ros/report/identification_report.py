@@ -11,7 +11,7 @@ from armid_ros.identification import Fit, Grade, Identification, Verification
 from armid_ros.identification import grade as graded
 from armid_ros.recording import Recording
 from armid_ros.report.judgement import judge
-from armid_ros.report.notation import counted
+from armid_ros.report.notation import counted, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.correlations import Correlations
@@ -119,7 +119,7 @@ def identification_report(
         Origin(provenance or Provenance()),
     ]
     subtitle = (
-        f'{robot} · {counted(len(training), "training recording")} · '
+        f'{robot_label(robot)} · {counted(len(training), "training recording")} · '
         f'{counted(len(validation), "held-out recording")}'
     )
     return Page(f'Identification of {arm.robot.name}', subtitle, sections).html()

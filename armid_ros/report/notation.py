@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import PurePath
 
 from armid_ros.robots import Robot
 
@@ -88,3 +89,9 @@ def torque_unit(robot: Robot, joint: int) -> str:
 def position_unit(robot: Robot, joint: int) -> str:
     """Return the unit of a joint's position."""
     return 'm' if robot.prismatic[joint] else 'rad'
+
+
+def robot_label(source: str) -> str:
+    """Return what a robot is called in a heading: its name, or that of its file."""
+    path, *arguments = source.split(' ') if ':=' in source else [source]
+    return ' '.join([PurePath(path).name or path, *arguments])
