@@ -85,6 +85,16 @@ def register(kind: _Kind) -> _Kind:
     in ``effects='...'``, and the diagnosis looks for it. A class that is defined anew, as in a
     notebook, takes the place of the old one.
 
+    Parameters
+    ----------
+    kind : type of Effect
+        The class.
+
+    Returns
+    -------
+    type of Effect
+        The same class.
+
     Raises
     ------
     ModelError
@@ -93,9 +103,22 @@ def register(kind: _Kind) -> _Kind:
     Examples
     --------
     >>> import armid_ros as ar
-    >>> @ar.register  # doctest: +SKIP
+    >>> from armid_ros.effects import Action, CATALOGUE, joint_columns, scatter
+    >>> @ar.register
     ... class Hose(ar.Effect):
     ...     name = 'hose'
+    ...     summary = 'hose that stiffens as it bends'
+    ...     quantities = (ar.Quantity('hose_stiffness', 'N m/rad^3'),)
+    ...
+    ...     def columns(self, motion, arm):
+    ...         return joint_columns(self, motion, motion.q**3)
+    ...
+    ...     def action(self, values, arm):
+    ...         (stiffness,) = scatter(self, values, arm.robot)
+    ...         return Action(link_torque=lambda t, q, dq: stiffness * q**3)
+    >>> ar.ArmModel.of('humanoid_arm', effects='hose@elbow_pitch:hose_stiffness=1.5').values[0]
+    array([1.5])
+    >>> CATALOGUE.remove('hose')  # only if nobody is to name it any more
 
     """
     CATALOGUE.add(kind)

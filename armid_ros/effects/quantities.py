@@ -39,6 +39,12 @@ class Quantity:
     typical : tuple of float, or None
         Smallest and largest size that arms of 1 to 10 kg have, where it matters; a sign does not.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> ar.Quantity('hose_stiffness', 'N m/rad^3', lower=0.0, typical=(0.1, 10.0)).unit
+    'N m/rad^3'
+
     """
 
     name: str

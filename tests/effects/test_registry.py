@@ -3,6 +3,7 @@
 """Effects of one's own: registered, named like those that are shipped, and checked."""
 
 from dataclasses import replace
+import doctest
 
 import armid_ros as ar
 from armid_ros.diagnosis import DiagnosisSettings
@@ -174,3 +175,13 @@ def test_a_class_without_its_methods_is_refused():
 
 def test_every_arm_gets_the_usual_effects():
     assert USUAL_EFFECTS == ('viscous_friction', 'coulomb_friction', 'torque_offset')
+
+
+@pytest.mark.parametrize('documented', [ar.register, ar.Quantity, check_effect])
+def test_examples_run(documented):
+    (found,) = doctest.DocTestFinder(recurse=False).find(documented, 'example', globs={})
+    runner = doctest.DocTestRunner()
+    runner.run(found)
+    assert runner.tries > 0
+    assert not runner.failures
+    assert 'hose' not in CATALOGUE
