@@ -138,7 +138,14 @@ def shown(joints: Sequence[str], marked: Sequence[str] = ()) -> Any:
     import rerun.blueprint as layout
 
     def plots(kind: str, names: Sequence[str]) -> list[Any]:
-        return [layout.TimeSeriesView(origin=f'{kind}/{part(j)}', name=j) for j in names]
+        return [
+            layout.TimeSeriesView(
+                origin=f'{kind}/{part(joint)}',
+                name=joint,
+                plot_legend=layout.PlotLegend(visible=number == 0),  # the same in all
+            )
+            for number, joint in enumerate(names)
+        ]
 
     first = [*marked, *(joint for joint in joints if joint not in marked)]
     tabs = layout.Tabs(

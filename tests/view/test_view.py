@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording in rerun: what the file holds is what was recorded, predicted, and drawn."""
 
+from importlib.metadata import files
 import json
 import sys
 
@@ -103,6 +104,18 @@ def test_bodies_have_the_size_of_the_description():
 def volume(corners):
     """Return the volume that triangles enclose; negative where they are inside out."""
     return np.einsum('ti,ti->', corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+
+
+def test_meshes_are_drawn_as_they_are():
+    """Those of a shipped description, from their files, in the frames of their joints."""
+    paths = [entry for entry in files('example-robot-data') or [] if entry.name == 'panda.urdf']
+    robot = ar.load_robot(paths[0].locate())
+    found, notes = bodies(robot)
+    assert not notes
+    assert {body.joint for body in found} == set(range(-1, robot.n_joints))
+    for body in found:
+        assert len(body.corners) > 500
+        assert 0.03 < np.ptp(body.corners, axis=(0, 1)).max() < 0.5
 
 
 def test_an_arm_without_bodies_is_drawn_as_bars():
