@@ -112,17 +112,9 @@ $(STAMPS)/bench: requirements/bench.txt $(STAMPS)/run
 	$(LOCKED) -r $<
 	@touch $@
 
-MESSAGES_BUILD := $(VENV)/build/armid_msgs
 $(STAMPS)/armid_msgs: $(MESSAGES) $(STAMPS)/run
 	@echo 'compiling armid_msgs'
-	@rm -rf $(MESSAGES_BUILD) && mkdir -p $(MESSAGES_BUILD)
-	@( PATH="$(abspath $(BIN)):$$PATH" && \
-	cmake -S msg_schemas -B $(MESSAGES_BUILD) -G Ninja -DCMAKE_BUILD_TYPE=Release \
-		-DBUILD_TESTING=OFF -DCMAKE_INSTALL_PREFIX=$(abspath $(VENV)) \
-		-DCMAKE_PREFIX_PATH=$(abspath $(VENV)) \
-		-DPython3_EXECUTABLE=$(abspath $(BIN))/python && \
-	cmake --build $(MESSAGES_BUILD) && cmake --install $(MESSAGES_BUILD) \
-	) >$(MESSAGES_BUILD)/log 2>&1 || { cat $(MESSAGES_BUILD)/log; exit 1; }
+	$(PIP) --no-deps --no-build-isolation --force-reinstall ./msg_schemas
 	@touch $@
 
 # Not editable, for pip then leaves out the files that ROS 2 looks for. What a build left behind

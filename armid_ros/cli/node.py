@@ -42,8 +42,8 @@ def lacking(error: ModuleNotFoundError) -> str | None:
     module = (error.name or '').partition('.')[0]
     if module == 'armid_msgs':
         return (
-            'the message package armid_msgs is not there; it is compiled against ROS 2 and on no '
-            'index: `make` in a clone builds it, or `colcon build` of msg_schemas in a workspace'
+            'the message package armid_msgs is not there; it is compiled and on no index: in a '
+            'clone `make`, or pip install --no-build-isolation ./msg_schemas, or `colcon build`'
         )
     if module in _ROS:
         return (

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The compiled messages travel between processes."""
 
+from importlib import metadata
+import importlib.util
+from pathlib import Path
 import subprocess
 import sys
 import time
@@ -67,3 +70,25 @@ def test_estimate_arrives_from_another_process():
     assert list(estimate.std_dev) == [0.5, float('inf')]
     assert estimate.samples == 2**63
     assert estimate.condition_number == 112.9
+
+
+def test_pip_put_them_where_python_and_ros_look():
+    """And knows which files they are, so that it can take them away."""
+    files = {path.locate().resolve() for path in metadata.files('armid_msgs')}
+    prefix = Path(sys.prefix).resolve()
+    index = prefix / 'share' / 'ament_index' / 'resource_index'
+    assert index / 'packages' / 'armid_msgs' in files
+    assert index / 'rosidl_interfaces' / 'armid_msgs' in files
+    assert prefix / 'lib' / 'libarmid_msgs__rosidl_typesupport_c.so' in files
+    assert Path(armid_msgs.__file__).resolve() in files
+
+
+def test_without_ros_it_is_said_what_comes_first(root, tmp_path, monkeypatch):
+    path = root / 'msg_schemas' / 'wheel_of_messages.py'
+    spec = importlib.util.spec_from_file_location('wheel_of_messages', path)
+    backend = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(backend)
+    monkeypatch.setattr(sys, 'prefix', str(tmp_path))
+    with pytest.raises(SystemExit, match=r'armid_ros\[ros\]'):
+        backend.build_wheel(str(tmp_path))
+    assert not list(tmp_path.iterdir())
