@@ -28,7 +28,7 @@ PIP := $(BIN)/python -m pip install -qq
 LOCKED := $(PIP) --require-hashes --no-build-isolation
 TREE := $(shell find armid_ros scripts launch config resource -name __pycache__ -prune \
 	-o -print 2>/dev/null)
-MESSAGES := $(shell find msg_schemas -type f)
+MESSAGES := $(shell find msg_schemas -name __pycache__ -prune -o -type f -print)
 
 .DEFAULT_GOAL := all
 .PHONY: all demo test fuzz chaos coverage lint bench benchmark lock clean help check
