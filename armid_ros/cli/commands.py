@@ -36,6 +36,10 @@ COMMANDS = {
 }
 
 
+#: Where the context keeps what is said on stderr when the work was done: an error is one line.
+NOTES = 'armid.notes'
+
+
 class Commands(click.Group):
     """Imports commands late, and reports bad input as one line on stderr and exit code 2."""
 
@@ -59,7 +63,10 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
         try:
-            return super().invoke(ctx)
+            result = super().invoke(ctx)
+            for note in ctx.meta.get(NOTES, ()):
+                click.echo(note, err=True)
+            return result
         except ArmidError as error:
             click.echo(f'armid: {" ".join(str(error).split())}', err=True)
             sys.exit(2)

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli import columns
+from armid_ros.cli.commands import NOTES
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import RecordingError, RobotError, visible
 from armid_ros.files import default_memory_limit, result_folder, write_file
@@ -120,8 +121,8 @@ def open_robot(
     """Load the robot that --robot, --gravity and --joints ask for; say what is not driven."""
     robot = _loaded(source, gravity, tuple(joints.split(',')) if joints else None, bags)
     if tell and joints is None:
-        for line in driven_in_words(robot):
-            click.echo(visible(f'note: {line}'), err=True)
+        notes = click.get_current_context().meta.setdefault(NOTES, [])
+        notes += [visible(f'note: {line}') for line in driven_in_words(robot)]
     return robot
 
 

@@ -44,6 +44,12 @@ def test_grippers_and_a_second_arm_are_said(urdf, tmp_path):
     assert said.count('--joints') == 2
 
 
+def test_an_error_stays_one_line(urdf, tmp_path):
+    refused = armid('layout', '--robot', urdf, '--out', urdf / 'below', code=2)
+    assert refused.stderr.count('\n') == 1
+    assert 'not driven' not in refused.stderr
+
+
 def test_who_chooses_is_told_nothing(urdf, tmp_path):
     done = armid(
         'layout', '--robot', urdf, '--joints', 'left_0,left_1,left_2', '--out', tmp_path / 'one'
