@@ -359,7 +359,7 @@ def _tell(
         f'{result.settings.speed}: condition number {document["condition_number"] or np.inf:.1f}, '
         f'{len(document["parameters"])} parameters' + (f', {unseen} not seen' if unseen else '')
     )
-    say(click.style(str(written.fitness), fg='green' if written.fitness.word == FIT else 'yellow'))
+    say(str(written.fitness), 'green' if written.fitness.word == FIT else 'yellow')
     whose = 'as given' if given else 'the zero of the description'
     if zero_fault:
         whose = f'the zero of the description is not free: {zero_fault}'

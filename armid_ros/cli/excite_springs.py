@@ -68,4 +68,4 @@ def write_course(
     )
     say(f'starts at rest in the middle of the ranges, {first}: bring the arm there first')
     for missing in not_checked(Limits.of(robot), collision, floor, obstacles):
-        say(click.style(f'not checked: {missing}', fg='yellow'))
+        say(f'not checked: {missing}', 'yellow')

@@ -25,9 +25,9 @@ from rich.text import Text
 Tick = Callable[..., None]
 
 
-def say(text: str) -> None:
-    """Print a line."""
-    click.echo(visible(text))
+def say(text: str, colour: str | None = None) -> None:
+    """Print a line, on a terminal in a colour."""
+    click.secho(visible(text), fg=colour)
 
 
 @contextmanager
