@@ -61,6 +61,12 @@ class Quantity:
     typical : tuple of float, or None
         Smallest and largest size that arms of 1 to 10 kg have, where it matters; a sign does not.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> ar.Quantity('hose_stiffness', 'N m/rad^3', lower=0.0, typical=(0.1, 10.0)).unit
+    'N m/rad^3'
+
     """
 
     name: str
@@ -109,6 +115,27 @@ class Effect(ABC):
         The joints it acts on; empty for an effect of the whole arm.
     shape : tuple of float
         Shape parameters, owner by owner; the defaults if none are given.
+
+    Examples
+    --------
+    A hose that stiffens as it bends:
+
+    >>> import armid_ros as ar
+    >>> from armid_ros.effects import Action
+    >>> from armid_ros.effects.layout import joint_columns, scatter
+    >>> class Hose(ar.Effect):
+    ...     name = 'hose'
+    ...     summary = 'hose that stiffens as it bends'
+    ...     quantities = (ar.Quantity('hose_stiffness', 'N m/rad^3'),)
+    ...
+    ...     def columns(self, motion, arm):
+    ...         return joint_columns(self, motion, motion.q**3)
+    ...
+    ...     def action(self, values, arm):
+    ...         (stiffness,) = scatter(self, values, arm.robot)
+    ...         return Action(link_torque=lambda t, q, dq: stiffness * q**3)
+    >>> Hose.on(ar.load_robot('my_arm.urdf'), ('elbow',)).joints
+    ('elbow',)
 
     """
 

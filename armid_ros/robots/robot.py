@@ -54,6 +54,15 @@ class Robot:
     path : Path or None
         The file that was loaded; meshes and collision exceptions (SRDF) are looked for from here.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> robot = ar.load_robot('my_arm.urdf')
+    >>> robot.joints
+    ('waist', 'shoulder', 'elbow')
+    >>> print(robot.rigid_parameters[::10], 'kg')
+    [2. 2. 1.] kg
+
     """
 
     name: str

@@ -13,8 +13,8 @@ import pytest
 LOCKS = {
     'build': ['build'],
     'run': ['run', 'ros'],
-    'test': ['test', 'convert', 'run', 'ros'],
-    'bench': ['bench', 'test', 'convert', 'run', 'ros'],
+    'test': ['test', 'convert', 'docs', 'run', 'ros'],
+    'bench': ['bench', 'test', 'convert', 'docs', 'run', 'ros'],
 }
 
 
