@@ -10,7 +10,7 @@ import inspect
 from armid_ros.cli import main
 import click
 
-from docsite.markdown import cell, table
+from docsite.markdown import cell, prose, table
 
 
 def commands_page() -> str:
@@ -31,7 +31,7 @@ def commands_page() -> str:
 
 
 def _command(command: click.Command, context: click.Context) -> Iterator[str]:
-    yield from (f'## {context.command_path}', '', inspect.cleandoc(command.help or ''), '')
+    yield from (f'## {context.command_path}', '', prose(command.help or ''), '')
     usage = ' '.join([context.command_path, *command.collect_usage_pieces(context)])
     yield from ('```text', usage, '```', '')
     if command.epilog:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+import inspect
 
 _ESCAPES = str.maketrans({'|': '\\|', '<': '&lt;', '>': '&gt;', '*': '\\*', '_': '\\_'})
 
@@ -12,6 +13,11 @@ _ESCAPES = str.maketrans({'|': '\\|', '<': '&lt;', '>': '&gt;', '*': '\\*', '_':
 def cell(text: str) -> str:
     """Return a text as it stands in a table, whatever characters it has."""
     return ' '.join(text.split()).translate(_ESCAPES)
+
+
+def prose(text: str) -> str:
+    """Return a docstring as paragraphs, in which no angle bracket is a tag."""
+    return inspect.cleandoc(text).replace('<', '&lt;')
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:

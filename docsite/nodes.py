@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-import inspect
-
 from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode, EXECUTOR
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
@@ -16,7 +14,7 @@ from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.nodes.simulated_pair import SimulatedPairNode
 
-from docsite.markdown import cell, table
+from docsite.markdown import cell, prose, table
 
 #: Executable and class, in the order of the work.
 NODES: dict[str, type[ArmidNode]] = {
@@ -42,7 +40,7 @@ def nodes_page(introduction: str) -> str:
 
 def _told(node: type[ArmidNode]) -> str:
     """Return what the docstring says before its sections."""
-    return inspect.cleandoc(node.__doc__ or '').split('\nAttributes\n')[0].strip()
+    return prose(node.__doc__ or '').split('\nAttributes\n')[0].strip()
 
 
 def _row(parameter: NodeParameter) -> tuple[str, ...]:

@@ -58,7 +58,7 @@ def load_robot(
         they follow, names with finger, gripper or jaw). Other joints are locked at 0, or at their
         limit nearest to it, and their links become part of the body that carries them.
     xacro_arguments : mapping of str to str, optional
-        Values of <xacro:arg>.
+        Values of ``<xacro:arg>``.
 
     Returns
     -------

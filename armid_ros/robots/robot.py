@@ -48,7 +48,7 @@ class Robot:
     urdf : str
         The description, xacro expanded.
     urdf_damping, urdf_friction : ndarray, shape (n,)
-        What the description says in <dynamics> [N m s/rad, N m]; zero where it says nothing.
+        What the description says in ``<dynamics>`` [N m s/rad, N m]; zero where it says nothing.
     notes : tuple of str
         What was assumed or is doubtful in the description, for a person to read.
     path : Path or None
