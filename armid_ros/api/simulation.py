@@ -123,7 +123,10 @@ def design_excitation(
     **settings: Any,
 ) -> ExcitationResult:
     """
-    Find a trajectory that shows the parameters, inside all limits and free of collisions.
+    Find a trajectory that shows the parameters, inside all limits and clear of the arm itself.
+
+    Floor and surroundings are not known to it: before a robot runs it, look at the lowest point in
+    its report, or let ``armid excite`` design it, which keeps clear of both.
 
     Parameters
     ----------
