@@ -53,11 +53,15 @@ def test_an_identification_and_its_model(at_desk):
     check('identification', ar.identify('my_arm.urdf', 'monday', physical=box).document())
 
 
-@pytest.mark.parametrize('held_out', ['today_2', 'tuesday'], ids=['named', 'unknown'])
-def test_a_diagnosis_and_its_model(held_out, at_desk):
+@pytest.mark.parametrize(
+    'recordings',
+    [('today_1', '--validate', 'today_2', '--baseline', 'monday'), ('friday',)],
+    ids=['with a baseline', 'one recording alone'],
+)
+def test_a_diagnosis_and_its_model(recordings, at_desk):
     armid(
-        *('diagnose', 'today_1', '--validate', held_out, '--baseline', 'monday', '--all'),
-        *('--robot', 'my_arm.urdf', '--model', 'monday_result/model.yaml', '--out', 'found'),
+        *('diagnose', *recordings, '--robot', 'my_arm.urdf', '--all'),
+        *('--model', 'monday_result/model.yaml', '--out', 'found'),
     )
     check('diagnosis', read(at_desk / 'found' / 'diagnosis.json'))
     check('model', read(at_desk / 'found' / 'model.yaml'))
