@@ -15,7 +15,7 @@ from docsite.markdown import cell, prose, table
 
 def commands_page() -> str:
     """Return the page: usage, text and options of every command, in the order of the work."""
-    group = click.Context(main, info_name='armid')
+    group = click.Context(main, info_name='armid', **main.context_settings)
     lines = [
         '# Commands',
         '',
@@ -37,6 +37,12 @@ def _command(command: click.Command, context: click.Context) -> Iterator[str]:
     if command.epilog:
         title, _, example = inspect.cleandoc(command.epilog).partition(': ')
         yield from (f'{title}:', '', '```text', example, '```', '')
-    records = (parameter.get_help_record(context) for parameter in command.get_params(context))
-    rows = [(f'`{option}`', cell(text)) for option, text in filter(None, records)]
+    options = (p for p in command.get_params(context) if isinstance(p, click.Option))
+    records = (option.get_help_record(context) for option in options)
+    rows = [(_names(option), cell(text)) for option, text in filter(None, records)]
     yield from table(('option', 'what it does'), rows)
+
+
+def _names(option: str) -> str:
+    """Return the names of an option, each a piece that is not broken."""
+    return ', '.join(f'`{name}`' for name in option.replace(', -', '\n-').split('\n'))

@@ -72,9 +72,9 @@ found.to_dataframe()
 # which was not fitted:
 
 # %%
+motion = model.predict(friday[1])[0].motion
 figure, axes = plt.subplots(figsize=(8, 3))
 for label, arm in (('as on Monday', model.arm), ('with the spring', found.arm)):
-    motion = fit.motion
     axes.plot(motion.t, motion.tau[:, 2] - arm.torque(motion)[:, 2], label=label)
 axes.set(xlabel='time [s]', ylabel='residual of the elbow [N m]')
 axes.legend()
