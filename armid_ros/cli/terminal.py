@@ -27,7 +27,8 @@ Tick = Callable[..., None]
 
 def say(text: str, colour: str | None = None) -> None:
     """Print a line, on a terminal in a colour."""
-    click.secho(visible(text), fg=colour)
+    shown = visible(text)
+    click.echo(shown if colour is None else click.style(shown, fg=colour))
 
 
 @contextmanager
