@@ -31,7 +31,7 @@ TREE := $(shell find armid_ros scripts launch config resource -name __pycache__ 
 MESSAGES := $(shell find msg_schemas -name __pycache__ -prune -o -type f -print)
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test fuzz chaos coverage lint bench benchmark lock clean help check
+.PHONY: all demo test docs fuzz chaos coverage lint bench benchmark lock clean help check
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
 
@@ -44,6 +44,10 @@ demo: $(STAMPS)/armid_ros $(VENV)/setup.bash  ## identify the shipped arm on the
 test: lint  ## lint, types, layers, and every test
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest \
 		--durations=15 --numprocesses=auto --dist=loadfile $(PYTEST)
+
+docs: $(STAMPS)/armid_ros $(STAMPS)/test  ## the documentation site, in build/site; notebooks are executed
+	NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m mkdocs build
+	@echo 'open build/site/index.html; to search it:  python3 -m http.server --directory build/site'
 
 fuzz: $(STAMPS)/armid_ros $(STAMPS)/test  ## read 10,000 damaged files of every kind, and keep what fails in tests/fuzz/failures
 	ARMID_FUZZ=$(or $(FUZZ),10000) OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest \

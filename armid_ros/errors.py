@@ -16,7 +16,19 @@ def visible(text: str) -> str:
 
 
 class ArmidError(Exception):
-    """Base of every error that bad input can cause; the command line prints it and exits 2."""
+    """
+    Base of every error that bad input can cause; the command line prints it and exits 2.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> try:
+    ...     ar.load_robot('nowhere.urdf')
+    ... except ar.ArmidError as error:
+    ...     print(error)
+    nowhere.urdf: neither a file nor a shipped robot; shipped are humanoid_arm, ...
+
+    """
 
     def __str__(self) -> str:
         """Return the message, fit for a terminal."""

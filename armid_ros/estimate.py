@@ -55,6 +55,15 @@ class Estimate:
     covariance : ndarray, shape (P, P)
         Covariance of the values, units multiplied.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> estimate = ar.identify('my_arm.urdf', 'monday').estimate
+    >>> k = estimate.index('viscous_coefficient', 'elbow')
+    >>> low, high = estimate.interval()[k]  # 95 %
+    >>> bool(0.29 < low < high < 0.31)
+    True
+
     """
 
     parameters: tuple[ParameterName, ...]

@@ -79,6 +79,16 @@ class Motion:
     beside : MovingPoints or None
         What moved beside the arm and was recorded with it.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> import numpy as np
+    >>> t = np.linspace(0.0, 1.0, 101)
+    >>> q = np.sin(t)[:, None]
+    >>> motion = ar.Motion(('hinge',), t, q, np.cos(t)[:, None], -q)
+    >>> len(motion), motion.n_joints
+    (101, 1)
+
     """
 
     joints: tuple[str, ...]

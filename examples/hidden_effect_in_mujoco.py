@@ -22,9 +22,8 @@ data = mujoco.MjData(model)
 def record(plan, seed):
     """Return what an ideal servo needs to follow a plan in MuJoCo, with noise."""
     motion, tau = plan.motion(200.0), []
-    for data.qpos[:], data.qvel[:], data.qacc[:] in zip(
-        motion.q, motion.dq, motion.ddq, strict=True
-    ):
+    for q, dq, ddq in zip(motion.q, motion.dq, motion.ddq, strict=True):
+        data.qpos, data.qvel, data.qacc = q, dq, ddq
         mujoco.mj_inverse(model, data)
         tau.append(data.qfrc_inverse.copy())
     noise = np.random.default_rng(seed).normal(0.0, 0.03, motion.q.shape)

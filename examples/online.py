@@ -15,7 +15,7 @@ URDF = Path(__file__).with_name('arm.urdf')
 
 
 class Identifier(Node):
-    """Prints the error of the model every second."""
+    """Says every second what it knows of the friction of each joint."""
 
     def __init__(self, urdf=URDF, **settings):
         super().__init__('identifier', **settings)

@@ -120,6 +120,13 @@ def read_recording(
     RecordingError
         Naming the file, and the topic, joint, column or line, and what to do.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> run = ar.read_recording('log.csv', 'my_arm.urdf', effort='amps_{}', effort_scale=4.0)
+    >>> run.tau.shape == (len(run), 3)
+    True
+
     """
     if isinstance(robot, (Robot, ArmModel, str, Path)):
         described = robot_of(robot)

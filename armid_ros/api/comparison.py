@@ -30,6 +30,13 @@ class ComparisonResult(Shown):
     core : Comparison
         Everything that was found.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> changed = ar.compare('monday_result', 'friday_result')
+    >>> changed.anything, round(changed.load, 1)  # [kg]
+    (True, 0.4)
+
     """
 
     core: Comparison
@@ -116,10 +123,16 @@ def compare(
     ComparisonResult
         Prints what changed; ``report``, ``save``, ``to_dataframe``.
 
+    Raises
+    ------
+    ArmidError
+        A folder has no result, or the two are not of one robot.
+
     Examples
     --------
     >>> import armid_ros as ar
-    >>> print(ar.compare('monday', 'friday'))  # doctest: +SKIP
+    >>> print(ar.compare('monday_result', 'friday_result'))
+    CHANGED: ... parameters changed beyond uncertainty, at ...elbow...
 
     """
     return ComparisonResult(run(_parameters('before', before), _parameters('after', after)))

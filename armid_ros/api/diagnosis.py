@@ -49,6 +49,16 @@ class DiagnosisResult(Shown):
     recordings, held_out : tuple of Recording
         What was looked at, and what was only predicted.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> arm = ar.load_model('monday_result/model.yaml')
+    >>> found = ar.diagnose(arm, 'today_1', validate='today_2', baseline='monday')
+    >>> found.verdict, found.names
+    ('named', ('joint_spring',))
+    >>> found.arm.effects[-1].joints  # the model with the spring added
+    ('elbow',)
+
     """
 
     core: Diagnosis
@@ -200,10 +210,18 @@ def diagnose(
     DiagnosisResult
         Prints its verdict; ``report``, ``save``, ``to_dataframe``, ``arm``.
 
+    Raises
+    ------
+    ArmidError
+        A recording or the model cannot be used; the message names it and what to do.
+
     Examples
     --------
     >>> import armid_ros as ar
-    >>> found = ar.diagnose(model.arm, 'today.mcap')  # doctest: +SKIP
+    >>> arm = ar.load_model('monday_result/model.yaml')
+    >>> found = ar.diagnose(arm, 'today_1', validate='today_2', baseline='monday')
+    >>> found.verdict
+    'named'
 
     """
     model = arm_of(arm, effects)

@@ -61,6 +61,17 @@ class IdentificationResult(Shown):
         What it was fitted to.
     held_out : tuple of Recording
         What it only predicted.
+    validation : dict of str to tuple of Fit
+        Predictions of the held-out recordings, by their names.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> model = ar.identify('my_arm.urdf', 'monday', validate='tuesday')
+    >>> model.relative_error_percent < 1.0
+    True
+    >>> sorted(path.name for path in model.save('result').iterdir())
+    ['identification.json', 'model.yaml', 'report.html']
 
     """
 
@@ -270,7 +281,9 @@ def identify(
     Examples
     --------
     >>> import armid_ros as ar
-    >>> model = ar.identify('ur10.urdf', 'monday.mcap', validate='tuesday.mcap')  # doctest: +SKIP
+    >>> model = ar.identify('my_arm.urdf', 'monday', validate='tuesday')
+    >>> model.grade
+    'good'
 
     """
     model = arm_of(arm, effects)

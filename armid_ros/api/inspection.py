@@ -40,6 +40,13 @@ class InspectionResult(Shown):
     core : Inspection
         Everything that was found.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> found = ar.inspect('monday', 'my_arm.urdf')
+    >>> found.report('inspection.html').name
+    'inspection.html'
+
     """
 
     core: Inspection
@@ -118,10 +125,16 @@ def inspect(
     InspectionResult
         Prints as a table; ``remarks``, ``report``.
 
+    Raises
+    ------
+    ArmidError
+        The file or the description cannot be read; the message names it and what to do.
+
     Examples
     --------
     >>> import armid_ros as ar
-    >>> print(ar.inspect('run.csv', 'ur10.urdf'))  # doctest: +SKIP
+    >>> ar.inspect('monday', 'my_arm.urdf').remarks
+    ()
 
     """
     described = None if robot is None else robot_of(robot)

@@ -50,6 +50,13 @@ class ExcitationResult(Shown):
     arm : ArmModel
         What it was made for.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> plan = ar.design_excitation('my_arm.urdf', duration=6.0, starts=1, iterations=1)
+    >>> sorted(path.name for path in plan.save('short_plan').iterdir())
+    ['excitation.csv', 'excitation.yaml', 'report.html', 'trajectory']
+
     """
 
     core: Design
@@ -130,7 +137,10 @@ def design_excitation(
     **settings: Any,
 ) -> ExcitationResult:
     """
-    Find a trajectory that shows the parameters, inside all limits and free of collisions.
+    Find a trajectory that shows the parameters, inside all limits and clear of the arm itself.
+
+    Floor and surroundings are not known to it: before a robot runs it, look at the lowest point in
+    its report, or let ``armid excite`` design it, which keeps clear of both.
 
     Parameters
     ----------
@@ -153,10 +163,17 @@ def design_excitation(
     ExcitationResult
         Prints as a table; ``motion``, ``report``, ``save``.
 
+    Raises
+    ------
+    TrajectoryError
+        No trajectory is inside the limits; the message names the limit or the bodies that touch.
+
     Examples
     --------
     >>> import armid_ros as ar
-    >>> run = ar.design_excitation('humanoid_arm', duration=12.0)  # doctest: +SKIP
+    >>> plan = ar.design_excitation('my_arm.urdf', duration=12.0, starts=1, iterations=5)
+    >>> round(plan.duration, 1)
+    12.0
 
     """
     model = arm_of(arm)
@@ -207,10 +224,17 @@ def simulate(
     Recording
         What the sensors read.
 
+    Raises
+    ------
+    ArmidError
+        The trajectory cannot be read, or does not fit the arm.
+
     Examples
     --------
     >>> import armid_ros as ar
-    >>> recording = ar.simulate('humanoid_arm', torque_noise=0.01)  # doctest: +SKIP
+    >>> run = ar.simulate('my_arm.urdf', 'plan/excitation.yaml', torque_noise=0.05, rng=1)
+    >>> run.tau.shape == (len(run), 3)
+    True
 
     """
     model = arm_of(arm, '')

@@ -61,6 +61,16 @@ class ArmModel:
         Whether the rigid body is felt by its weight alone, as in motions slow enough for inertia
         not to matter: tau = Y(q, 0, 0) pi + effects.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> friction = ['viscous_friction:viscous_coefficient=0.3', 'coulomb_friction']
+    >>> ar.ArmModel.of('my_arm.urdf', effects=friction, gravity='moon')
+    ArmModel of arm: 3 joints (waist, shoulder, elbow)
+      gravity 0, 0, -1.62 m/s^2, 5 kg moving
+      viscous_friction: 0.3, 0.3, 0.3
+      coulomb_friction: 0, 0, 0
+
     """
 
     robot: Robot

@@ -120,6 +120,19 @@ def save_model(
     misfit : Misfit, optional
         What the model leaves of recordings.
 
+    Raises
+    ------
+    OSError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> arm = ar.ArmModel.of('my_arm.urdf', effects='viscous_friction:viscous_coefficient=0.3')
+    >>> ar.save_model('rubbing.yaml', arm, 'my_arm.urdf')
+    >>> print(ar.load_model('rubbing.yaml').values[0])
+    [0.3 0.3 0.3]
+
     """
     document = model_document(arm, robot, estimate)
     if misfit is not None:
@@ -140,10 +153,22 @@ def load_model(path: str | Path, robot: Robot | None = None) -> ArmModel:
         The description, where the one that the file names is not to be used; its inertial
         parameters and gravity are replaced by the file's.
 
+    Returns
+    -------
+    ArmModel
+        The robot with the masses and effects of the file.
+
     Raises
     ------
     ModelError
         Naming the file and what is wrong in it.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> arm = ar.load_model('monday_result/model.yaml')
+    >>> [effect.name for effect in arm.effects]
+    ['viscous_friction', 'coulomb_friction', 'torque_offset']
 
     """
     path = Path(path)

@@ -160,6 +160,7 @@ def diagnose(
         )
         write_results(out, result, case, Extras())
         extras = make_extras(result, case, seed, tick)
+        tick(1.0, 'writing')
         document = write_results(out, result, case, extras)
     if as_json:
         click.echo(json_text(document))

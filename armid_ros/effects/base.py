@@ -46,6 +46,27 @@ class Effect(ABC):
     shape : tuple of float
         Shape parameters, owner by owner; the defaults if none are given.
 
+    Examples
+    --------
+    A hose that stiffens as it bends:
+
+    >>> import armid_ros as ar
+    >>> from armid_ros.effects import Action
+    >>> from armid_ros.effects.layout import joint_columns, scatter
+    >>> class Hose(ar.Effect):
+    ...     name = 'hose'
+    ...     summary = 'hose that stiffens as it bends'
+    ...     quantities = (ar.Quantity('hose_stiffness', 'N m/rad^3'),)
+    ...
+    ...     def columns(self, motion, arm):
+    ...         return joint_columns(self, motion, motion.q**3)
+    ...
+    ...     def action(self, values, arm):
+    ...         (stiffness,) = scatter(self, values, arm.robot)
+    ...         return Action(link_torque=lambda t, q, dq: stiffness * q**3)
+    >>> Hose.on(ar.load_robot('my_arm.urdf'), ('elbow',)).joints
+    ('elbow',)
+
     """
 
     joints: tuple[str, ...] = ()

@@ -141,6 +141,18 @@ def make_effect(text: str, robot: Robot) -> Effect:
     ModelError
         If the catalogue has no such effect or the robot no such joint; the message lists them.
 
+    Returns
+    -------
+    Effect
+        Without values; ``ArmModel.with_effect`` takes them.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> robot = ar.load_robot('my_arm.urdf')
+    >>> ar.make_effect('joint_spring@elbow', robot).joints
+    ('elbow',)
+
     """
     name, _, joints = text.strip().partition('@')
     return CATALOGUE.find(name).on(robot, tuple(joints.split('+')) if joints else None)

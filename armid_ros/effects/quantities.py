@@ -45,6 +45,12 @@ class Quantity:
     >>> ar.Quantity('hose_stiffness', 'N m/rad^3', lower=0.0, typical=(0.1, 10.0)).unit
     'N m/rad^3'
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> ar.Quantity('hose_stiffness', 'N m/rad^3', lower=0.0, typical=(0.1, 10.0)).unit
+    'N m/rad^3'
+
     """
 
     name: str

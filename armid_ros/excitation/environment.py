@@ -11,7 +11,7 @@ from typing import Any
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.files import load_yaml, read_text, reading
-from armid_ros.robots import CollisionModel
+from armid_ros.robots import CollisionModel, Robot
 import coal
 import numpy as np
 import pinocchio as pin
@@ -24,6 +24,8 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     'mesh': ('scale',),
     'plane': (),
 }
+#: Radius of what stands for a link without a body [m].
+_POINT = 1e-4
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,8 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
     Return the collision bodies of a robot together with what stands around it.
 
     Every body that moves is checked against every obstacle, except for the links the obstacle
-    ignores.
+    ignores. A link without a body is where the frame of its joint is: nobody knows its size, but
+    it must not be led through the floor.
 
     Raises
     ------
@@ -121,6 +124,7 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
     if not obstacles:
         return collision
     geometry = collision.geometry.copy()
+    _add_points(geometry, collision.robot)
     bodies = list(geometry.geometryObjects)
     links = [str(collision.robot.model.frames[body.parentFrame].name) for body in bodies]
     names = [obstacle.name for obstacle in obstacles]
@@ -130,8 +134,8 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
         unknown = [link for link in obstacle.ignore if link not in links]
         if unknown:
             raise TrajectoryError(
-                f"obstacle '{obstacle.name}' ignores link '{unknown[0]}', which has no collision "
-                f'body; those with one are {", ".join(dict.fromkeys(links))}'
+                f"obstacle '{obstacle.name}' ignores link '{unknown[0]}', which has no body; "
+                f'those with one are {", ".join(dict.fromkeys(links))}'
             )
         rotation = pin.rpy.rpyToMatrix(*obstacle.rpy)
         placement = pin.SE3(rotation, np.array(obstacle.position))
@@ -142,6 +146,19 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
             if body.parentJoint > 0 and link not in obstacle.ignore:
                 geometry.addCollisionPair(pin.CollisionPair(other, number))
     return replace(collision, geometry=geometry)
+
+
+def _add_points(geometry: pin.GeometryModel, robot: Robot) -> None:
+    """Add the joint frames of links without a body."""
+    model = robot.model
+    seen = {int(body.parentJoint) for body in geometry.geometryObjects}
+    for joint, link in enumerate(robot.links, start=1):
+        if joint not in seen:
+            frame = model.getFrameId(link, pin.FrameType.BODY)
+            point = coal.Sphere(_POINT)
+            geometry.addGeometryObject(
+                pin.GeometryObject(f'{link}_frame', joint, frame, pin.SE3.Identity(), point)
+            )
 
 
 def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:

@@ -140,13 +140,8 @@ def touching_links(collision: CollisionModel, floor: Floor, margin: float) -> tu
     lower, upper = _range(robot)
     q = np.random.default_rng(_SEED).uniform(lower, upper, (_POSES, robot.n_joints))
     highest: dict[str, FloatArray] = {}
-    bodies = {
-        str(robot.model.frames[body.parentFrame].name)
-        for body in collision.geometry.geometryObjects
-    }
     for link, lowest, _ in link_heights(collision, floor.up, q):
-        if link in bodies:
-            highest[link] = np.minimum(highest.get(link, np.inf), lowest)
+        highest[link] = np.minimum(highest.get(link, np.inf), lowest)
     return tuple(link for link, lowest in highest.items() if lowest.max() < floor.height + margin)
 
 

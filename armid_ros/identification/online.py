@@ -89,6 +89,19 @@ class OnlineIdentifier:
     latest : tuple of OnlineSample
         What the last update brought: several samples where some had waited for it.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> import numpy as np
+    >>> run = ar.read_recording('monday', 'my_arm.urdf')
+    >>> arm = ar.ArmModel.of('my_arm.urdf', effects='viscous_friction,coulomb_friction')
+    >>> online = ar.OnlineIdentifier(arm, rng=np.random.default_rng(0))
+    >>> for t, q, tau in zip(run.t, run.q, run.tau, strict=True):
+    ...     _ = online.update(t, q, None, tau)
+    >>> estimate = online.estimate()
+    >>> print(estimate.values[estimate.index('viscous_coefficient', 'elbow')].round(1))
+    0.3
+
     """
 
     def __init__(

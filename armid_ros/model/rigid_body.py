@@ -86,6 +86,13 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
     """
     Compute the matrix Y of tau = Y pi for every sample of a motion.
 
+    Parameters
+    ----------
+    robot : Robot
+        Gives axes, lengths and gravity; its inertial parameters do not matter.
+    motion : Motion
+        N samples of the n joints.
+
     Returns
     -------
     ndarray, shape (N, n, 10 n)
@@ -94,6 +101,16 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
     Notes
     -----
     Source: Atkeson, An and Hollerbach 1986; Pinocchio's computeJointTorqueRegressor.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> robot = ar.load_robot('my_arm.urdf')
+    >>> motion = ar.design_excitation(robot, duration=6.0, starts=1, iterations=1).motion(100.0)
+    >>> y = ar.regressor(robot, motion)
+    >>> y.shape == (len(motion), 3, 30)
+    True
+    >>> tau = y @ robot.rigid_parameters  # [N m]
 
     """
     model = robot.model

@@ -149,6 +149,14 @@ def write_recording(
     RecordingError
         The bag exists already, or names and columns do not agree.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> run = ar.read_recording('log.csv', 'my_arm.urdf', effort='amps_{}', effort_scale=4.0)
+    >>> ar.write_recording('log_bag', run)
+    >>> len(ar.read_recording('log_bag', 'my_arm.urdf')) == len(run)
+    True
+
     """
     joints = tuple(measured.joints if joint_names is None else joint_names)
     if measured.q.shape != (len(measured.t), len(joints)):

@@ -152,6 +152,20 @@ class Recording:
     beside : Beside or None
         Another machine that was recorded with the arm.
 
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> run = ar.read_recording('monday', 'my_arm.urdf')
+    >>> run.joints, run.q.shape == run.tau.shape
+    (('waist', 'shoulder', 'elbow'), True)
+
+    Of arrays of yours:
+
+    >>> import numpy as np
+    >>> t = np.arange(200) / 100.0
+    >>> ar.Recording(joints=('hinge',), t=t, q=np.sin(t)[:, None]).duration
+    1.99
+
     """
 
     joints: tuple[str, ...]

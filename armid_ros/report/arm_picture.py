@@ -159,7 +159,9 @@ def _middle(robot: Robot) -> FloatArray:
     """Return the pose in the middle of the range, zero where there is no end."""
     lower, upper = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
     ended = np.isfinite(lower) & np.isfinite(upper) & (upper - lower < 1e3)
-    return np.where(ended, (lower + upper) / 2.0, 0.0)
+    middle = np.zeros(len(lower))
+    middle[ended] = (lower[ended] + upper[ended]) / 2.0
+    return middle
 
 
 def _bodies(model: pin.Model) -> list[tuple[int, FloatArray, FloatArray]]:

@@ -58,7 +58,12 @@ def load_robot(
         they follow, names with finger, gripper or jaw). Other joints are locked at 0, or at their
         limit nearest to it, and their links become part of the body that carries them.
     xacro_arguments : mapping of str to str, optional
-        Values of <xacro:arg>.
+        Values of ``<xacro:arg>``.
+
+    Returns
+    -------
+    Robot
+        Rigid body, driven joints and limits.
 
     Raises
     ------
@@ -68,9 +73,9 @@ def load_robot(
 
     Examples
     --------
-    >>> robot = load_robot('humanoid_arm', gravity='moon')
-    >>> robot.joints[0]
-    'shoulder_pitch'
+    >>> import armid_ros as ar
+    >>> ar.load_robot('my_arm.urdf', gravity='moon').joints
+    ('waist', 'shoulder', 'elbow')
 
     """
     if isinstance(source, str) and source.lstrip().startswith('<'):

@@ -48,11 +48,20 @@ class Robot:
     urdf : str
         The description, xacro expanded.
     urdf_damping, urdf_friction : ndarray, shape (n,)
-        What the description says in <dynamics> [N m s/rad, N m]; zero where it says nothing.
+        What the description says in ``<dynamics>`` [N m s/rad, N m]; zero where it says nothing.
     notes : tuple of str
         What was assumed or is doubtful in the description, for a person to read.
     path : Path or None
         The file that was loaded; meshes and collision exceptions (SRDF) are looked for from here.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> robot = ar.load_robot('my_arm.urdf')
+    >>> robot.joints
+    ('waist', 'shoulder', 'elbow')
+    >>> print(robot.rigid_parameters[::10], 'kg')
+    [2. 2. 1.] kg
 
     """
 

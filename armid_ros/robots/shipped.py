@@ -32,7 +32,21 @@ _SHIPPED = {
 
 
 def shipped_robots() -> dict[str, str]:
-    """Return the names of the robots that come with the package, each with one line on it."""
+    """
+    Return the names of the robots that come with the package, each with one line on it.
+
+    Returns
+    -------
+    dict of str to str
+        Name and description.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> 'humanoid_arm' in ar.shipped_robots()
+    True
+
+    """
     return {name: description for name, (_, description) in _SHIPPED.items()}
 
 

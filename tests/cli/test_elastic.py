@@ -17,6 +17,8 @@ from click.testing import CliRunner
 import numpy as np
 import pytest
 
+from docsite.schemas import faults
+
 
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory):
@@ -38,6 +40,7 @@ def test_demo_finds_the_springs(folder) -> None:
     document = json.loads((folder / 'elastic.json').read_text())
     wanted = two_link_set('after').parameters.stiffness.tolist()
     assert document['schema'] == 'armid/elastic/1'
+    assert faults('elastic', document) == []
     assert stiffness(document) == pytest.approx(wanted, rel=0.02)
     assert {path.name for path in folder.glob('*.png')} == {
         'bode.png',
@@ -54,6 +57,7 @@ def test_bags_give_the_same_again_and_no_steps_leave_out_the_tuning(folder, tmp_
     assert 'antiresonance' in result.stdout
     again = json.loads((tmp_path / 'again' / 'elastic.json').read_text())
     assert 'tuning' not in again
+    assert faults('elastic', again) == []
     assert again['untuned'] == json.loads((folder / 'elastic.json').read_text())['untuned']
 
 

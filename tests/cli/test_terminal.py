@@ -2,7 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a log sees of long work."""
 
+from pathlib import Path
+
+import armid_ros.cli
 from armid_ros.cli.terminal import print_rows, ProgressLines, say
+import click
+from click.testing import CliRunner
 import pytest
 
 ROW = {
@@ -65,3 +70,17 @@ def test_the_watch_ends_with_the_work():
     progress = ProgressLines('reading', print, lambda: 0.0)
     with progress.watched():
         progress.tick(0.5)
+
+
+@pytest.mark.parametrize(
+    ('terminal', 'shown'), [(True, '\x1b[32mfit to run\x1b[0m\n'), (False, 'fit to run\n')]
+)
+def test_a_colour_is_for_terminals_and_leaves_no_codes_in_a_pipe(terminal, shown):
+    command = click.Command('excite', callback=lambda: say('fit to run', 'green'))
+    assert CliRunner().invoke(command, color=terminal).output == shown
+
+
+def test_no_command_styles_what_it_says_itself():
+    """What is said is made visible, escape codes included, so colours belong to `say`."""
+    for path in Path(armid_ros.cli.__file__).parent.glob('*.py'):
+        assert 'say(click.style' not in path.read_text(), path.name

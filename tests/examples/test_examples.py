@@ -60,6 +60,11 @@ def test_every_example_is_run():
     assert {path.stem for path in EXAMPLES} == {*FOUND, 'online'}
 
 
+def test_every_example_is_in_the_list_of_them():
+    listed = (ROOT / 'examples' / 'README.md').read_text()
+    assert [path.name for path in EXAMPLES if f'| {path.name} |' not in listed] == []
+
+
 def test_the_node_of_the_example_learns_the_friction_while_the_arm_moves():
     from armid_ros.nodes.domains import private_context
     from sensor_msgs.msg import JointState

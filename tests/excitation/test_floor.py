@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the floor of an arm is, who says so, and how low a motion comes."""
 
+import re
+
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
@@ -23,6 +25,7 @@ from .conftest import urdf
 
 Z = np.array([0.0, 0.0, 1.0])
 ABOVE = ('shoulder', 'revolute', 'base', 'upper', '0 0 0.3', '0 1 0', -2.5, 2.5, 60)
+LOW = ('shoulder', 'revolute', 'base', 'upper', '0 0 0.15', '0 1 0', -2.5, 2.5, 60)
 BELOW = ('shoulder', 'revolute', 'base', 'upper', '0 0 -0.5', '0 1 0', -2.5, 2.5, 60)
 TURRET = ('turn', 'revolute', 'base', 'upper', '0 0 0.0', '0 0 1', -3, 3, 60)
 ON_TURRET = ('lift', 'revolute', 'upper', 'lower', '0 0 0.3', '0 1 0', -2.5, 2.5, 30)
@@ -107,6 +110,27 @@ def test_a_turret_may_stand_on_the_floor_and_what_it_carries_may_not():
     assert touching_links(collision, floor, 0.01) == ('upper',)
     (obstacle,) = floor_obstacles(collision, floor, 0.01)
     assert obstacle.ignore == ('upper',)
+
+
+@pytest.mark.parametrize('bare', [('lower',), ('upper', 'lower')])
+def test_a_pose_that_is_clear_of_the_floor_is_above_it_with_links_that_have_no_body(bare):
+    """What is said of a run is what a search has kept."""
+    text = urdf(LOW, ON_TURRET)
+    for link in bare:
+        body = rf'(<link name="{link}">.*?)<collision>.*?</collision>'
+        text = re.sub(body, r'\1', text, count=1, flags=re.DOTALL)
+    collision = collision_model(robot_from_urdf(text))
+    assert len(collision.geometry.geometryObjects) == 2 - len(bare)
+    floor = find_floor(collision)
+    around = floor_obstacles(collision, floor, 0.01)
+    model = ClearanceModel.of(with_obstacles(collision, around))
+    clear = []
+    for pose in np.random.default_rng(0).uniform(-2.5, 2.5, (200, 1, 2)):
+        motion = Motion(collision.robot.joints, np.zeros(1), pose, 0.0 * pose, 0.0 * pose)
+        above = lowest_point(collision, floor.up, motion, around[0].ignore).height > 0.0
+        clear.append(model.closest(motion).distance > 0.0)
+        assert above or not clear[-1]
+    assert 20 < sum(clear) < 180
 
 
 def test_heights_are_those_of_points_on_the_bodies():

@@ -22,6 +22,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 import yaml
 
+from docsite.schemas import faults
+
 PENDULUM = """<robot name="pendulum">
 <link name="base"/>
 <link name="upper"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
@@ -279,6 +281,7 @@ def test_reset_and_save(bench, arm, samples, tmp_path):
         base.values(model.theta), node.identifier.estimate().values, rtol=1e-6, atol=1e-9
     )
     document = yaml.safe_load((folder / 'estimate.yaml').read_text())
+    assert faults('estimate', document) == []
     assert document['samples'] == node.identifier.samples
     assert bench.call('online_identifier/reset').success
     assert node.identifier.samples == 0

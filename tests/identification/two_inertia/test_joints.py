@@ -4,13 +4,17 @@
 
 from __future__ import annotations
 
+import json
+
 from armid_ros.arm import ArmModel
 from armid_ros.cli.elastic import elastic
 from armid_ros.effects import make_effect, parse_effect
 from armid_ros.errors import ArmidError
+from armid_ros.files import json_text
 from armid_ros.identification.two_inertia import write_runs
 from armid_ros.identification.two_inertia.files import read_sides
 from armid_ros.identification.two_inertia.joints import fit_springs
+from armid_ros.identification.two_inertia.output import springs_document
 from armid_ros.motion import Motion
 from armid_ros.recording import write_recording
 from armid_ros.report.springs_report import springs_report
@@ -22,6 +26,8 @@ from armid_ros.simulation.elastic_setup import make_elastic_arm
 from click.testing import CliRunner
 import numpy as np
 import pytest
+
+from docsite.schemas import faults
 
 ROBOT = load_robot('humanoid_arm')
 STIFFNESS = np.array([2000.0, 3000.0, 1500.0, 1000.0, 500.0, 500.0])
@@ -91,6 +97,11 @@ def test_frequencies_are_those_of_a_motor_and_a_link_on_a_spring(found):
     k, link, rotor = one.transmission.stiffness[0], one.inertia, one.motor[0]
     assert one.antiresonance == pytest.approx(np.sqrt(k / link) / (2.0 * np.pi))
     assert one.resonance == pytest.approx(np.sqrt(k / link + k / rotor) / (2.0 * np.pi))
+
+
+def test_the_document_is_as_its_schema_says(found):
+    document = json.loads(json_text(springs_document(found, 'humanoid_arm')))
+    assert faults('springs', document) == []
 
 
 def test_the_report_names_every_joint_and_its_stiffness(found):

@@ -1,0 +1,90 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Code blocks of pages, and a script that runs those of a page one after the other.
+
+A block in `bash` or `python` is run. One that cannot be is marked in the line above it, with the
+reason: ``<!-- not run: needs a robot -->``. What a program prints, and formulas, are `text`.
+
+A page finds all files of the desk. One that makes some of them itself says in its first line what
+it starts with: ``<!-- starts with: my_arm.urdf -->``.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+import re
+
+#: Languages of blocks that are run.
+RUN = ('bash', 'python')
+#: Languages of all blocks that a page may have.
+LANGUAGES = (*RUN, 'text', 'yaml', 'json', 'xml', 'mermaid')
+
+_FENCE = re.compile(r'^```(\w*)$')
+_EXCUSE = re.compile(r'^<!-- not run: (.+) -->$')
+_START = re.compile(r'\A<!-- starts with: (.+) -->$', re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Block:
+    """
+    A code block.
+
+    Attributes
+    ----------
+    line : int
+        Where it begins, from 1.
+    language : str
+        As the fence says; 'indented' for a block without one.
+    text : str
+        What is in it.
+    excuse : str
+        Why it is not run; empty if it is.
+
+    """
+
+    line: int
+    language: str
+    text: str
+    excuse: str = ''
+
+
+def blocks(path: Path) -> tuple[Block, ...]:
+    """Return the code blocks of a page, in their order."""
+    lines = path.read_text(encoding='utf-8').splitlines()
+    found, k = [], 0
+    while k < len(lines):
+        fence = _FENCE.match(lines[k])
+        if fence:
+            end = next((m for m in range(k + 1, len(lines)) if lines[m] == '```'), len(lines))
+            excuse = _EXCUSE.match(lines[k - 1]) if k else None
+            text = '\n'.join(lines[k + 1 : end])
+            found.append(Block(k + 1, fence[1], text, excuse[1] if excuse else ''))
+            k = end
+        elif lines[k].startswith('    ') and k and not lines[k - 1].strip():
+            found.append(Block(k + 1, 'indented', lines[k].strip()))
+        k += 1
+    return tuple(found)
+
+
+def starts_with(path: Path) -> tuple[str, ...] | None:
+    """Return the files that a page starts with; None for all of the desk."""
+    said = _START.search(path.read_text(encoding='utf-8'))
+    return None if said is None else tuple(said[1].split())
+
+
+def script(page: tuple[Block, ...]) -> str:
+    """Return a shell script that runs the blocks of a page that are run, and stops at an error."""
+    lines = ['set -eu -o pipefail']
+    for block in page:
+        if block.language not in RUN or block.excuse:
+            continue
+        lines.append(f'echo "line {block.line}" >&2')
+        if block.language == 'python':
+            lines += [f"python - <<'PYTHON_OF_LINE_{block.line}'", block.text]
+            lines.append(f'PYTHON_OF_LINE_{block.line}')
+        else:
+            lines.append(block.text)
+    return '\n'.join([*lines, ''])

@@ -1,0 +1,25 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The page of all examples, from their files."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+import re
+
+
+def examples_page(folder: Path) -> str:
+    """Return the page: what each example is about, and all of it."""
+    lines = [
+        '# Examples',
+        '',
+        'One job each, complete: `python examples/own_urdf.py`. The tests run all of them.',
+        '',
+    ]
+    for path in sorted(folder.glob('*.py')):
+        source = path.read_text(encoding='utf-8')
+        title = ast.get_docstring(ast.parse(source)) or path.stem
+        code = re.sub(r'\A(#.*\n)+', '', source).rstrip()
+        lines += [f'## {path.stem}', '', title, '', '```python', code, '```', '']
+    return '\n'.join(lines)

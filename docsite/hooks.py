@@ -1,0 +1,49 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What mkdocs is given beside the files of docs/: pages that are made from the code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+from docsite.commands import commands_page
+from docsite.effects import effects_page
+from docsite.examples import examples_page
+from docsite.nodes import nodes_page
+from docsite.notebooks import executed
+from docsite.schemas import schemas_page
+
+ROOT = Path(__file__).parents[1]
+NOTEBOOKS = ROOT / 'examples' / 'notebooks'
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages that are generated."""
+    reference = Path(config.docs_dir) / 'reference'
+    pages = {
+        'reference/commands.md': commands_page(),
+        'reference/effects.md': effects_page(),
+        'reference/examples.md': examples_page(ROOT / 'examples'),
+        'reference/nodes.md': nodes_page(_taken(files, reference / 'nodes.md')),
+        'reference/files.md': schemas_page(_taken(files, reference / 'files.md')),
+    }
+    for uri, text in pages.items():
+        files.append(File.generated(config, uri, content=text))
+    for path in sorted(NOTEBOOKS.glob('*.py')):
+        page = executed(path)
+        uri = f'notebooks/{path.stem}.md'
+        files.append(File.generated(config, uri, content=page.markdown))
+        for name, content in page.files.items():
+            files.append(File.generated(config, f'notebooks/{name}', content=content))
+    return files
+
+
+def _taken(files: Files, path: Path) -> str:
+    """Return the written beginning of a page; the whole page takes its place."""
+    for file in list(files):
+        if file.abs_src_path and Path(file.abs_src_path) == path:
+            files.remove(file)
+    return path.read_text(encoding='utf-8')

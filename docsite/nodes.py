@@ -1,0 +1,62 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The page of all nodes, with the tables that declare their parameters."""
+
+from __future__ import annotations
+
+from armid_ros.nodes.bag_player import BagPlayerNode
+from armid_ros.nodes.base import ArmidNode, EXECUTOR
+from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
+from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
+from armid_ros.nodes.online_identifier import OnlineIdentifierNode
+from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.recorder import RecorderNode
+from armid_ros.nodes.simulated_arm import SimulatedArmNode
+from armid_ros.nodes.simulated_pair import SimulatedPairNode
+
+from docsite.markdown import cell, prose, table
+
+#: Executable and class, in the order of the work.
+NODES: dict[str, type[ArmidNode]] = {
+    'excitation_publisher': ExcitationPublisherNode,
+    'simulated_arm': SimulatedArmNode,
+    'online_identifier': OnlineIdentifierNode,
+    'recorder': RecorderNode,
+    'bag_player': BagPlayerNode,
+    'simulated_pair': SimulatedPairNode,
+    'interaction_identifier': InteractionIdentifierNode,
+}
+
+
+def nodes_page(introduction: str) -> str:
+    """Return the introduction, and below it what every node does and its parameters."""
+    lines = [introduction]
+    for name, node in NODES.items():
+        lines += [f'## {name}', '', _told(node), '']
+        rows = [_row(parameter) for parameter in (*node.table, EXECUTOR)]
+        lines += table(('parameter', 'default', 'range', 'what it is'), rows)
+    return '\n'.join(lines)
+
+
+def _told(node: type[ArmidNode]) -> str:
+    """Return what the docstring says before its sections."""
+    return prose(node.__doc__ or '').split('\nAttributes\n')[0].strip()
+
+
+def _row(parameter: NodeParameter) -> tuple[str, ...]:
+    changeable = '' if parameter.read_only else ' May be set while the node runs.'
+    unit = f' [{parameter.unit}]' if parameter.unit else ''
+    return (
+        f'`{parameter.name}`',
+        f'`{parameter.default}`' if parameter.default != '' else 'empty',
+        _range(parameter),
+        cell(f'{parameter.description}{unit}{changeable}'),
+    )
+
+
+def _range(parameter: NodeParameter) -> str:
+    if parameter.choices:
+        return ', '.join(f'`{choice}`' for choice in parameter.choices)
+    if parameter.lower is None or parameter.upper is None:
+        return ''
+    return f'{parameter.lower:g} to {parameter.upper:g}'

@@ -1,0 +1,82 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Pages of notebooks, executed anew whenever the site is built."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+import os
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import jupytext
+from nbconvert import MarkdownExporter
+from nbconvert.preprocessors import ExecutePreprocessor
+
+#: What a cell may take [s]; a notebook that hangs has to end.
+CELL_TIMEOUT = 600
+
+
+@dataclass(frozen=True)
+class NotebookPage:
+    """
+    A notebook as a page.
+
+    Attributes
+    ----------
+    markdown : str
+        Text, code and what the code showed.
+    files : dict of str to bytes
+        Pictures, by the name that the page has for them.
+
+    """
+
+    markdown: str
+    files: dict[str, bytes]
+
+
+def executed(path: Path) -> NotebookPage:
+    """
+    Return a notebook with what its cells show.
+
+    It runs in its own folder, as an editor would run it.
+
+    Parameters
+    ----------
+    path : Path
+        A script in jupytext's percent format.
+
+    Raises
+    ------
+    nbclient.exceptions.CellExecutionError
+        Where a cell fails, with the cell and the traceback.
+
+    """
+    notebook = jupytext.read(path)
+    with _own_kernel():
+        run = ExecutePreprocessor(timeout=CELL_TIMEOUT, startup_timeout=CELL_TIMEOUT)
+        run.preprocess(notebook, {'metadata': {'path': str(path.parent)}})
+    exporter = MarkdownExporter()
+    names = {'unique_key': path.stem, 'output_files_dir': 'pictures'}
+    markdown, resources = exporter.from_notebook_node(notebook, resources=names)
+    return NotebookPage(markdown, dict(resources['outputs']))
+
+
+@contextmanager
+def _own_kernel() -> Iterator[None]:
+    """Let the kernel import this tree, and leave nothing in the home directory."""
+    before = dict(os.environ)
+    folders = (str(Path(__file__).parents[1]), before.get('PYTHONPATH', ''))
+    with TemporaryDirectory() as folder:
+        os.environ |= {
+            'PYTHONPATH': os.pathsep.join(filter(None, folders)),
+            'JUPYTER_RUNTIME_DIR': folder,
+            'IPYTHONDIR': folder,
+        }
+        try:
+            yield
+        finally:
+            os.environ.clear()
+            os.environ.update(before)
