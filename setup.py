@@ -66,6 +66,7 @@ setup(
     extras_require={
         'ros': requirements('ros'),
         'convert': requirements('convert'),
+        'fleet': requirements('fleet'),
         'test': requirements('test'),
         'bench': requirements('bench'),
     },
