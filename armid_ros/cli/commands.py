@@ -25,6 +25,7 @@ COMMANDS = {
     'elastic': 'elastic',
     'exo': 'exo',
     'compare': 'compare',
+    'fleet': 'fleet',
     'recover': 'record',
     'layout': 'layout',
     'robots': 'catalogues',
