@@ -192,3 +192,38 @@ def _print(outcome: FleetOutcome, out: str, seconds: float, as_json: bool) -> No
         if len(refused) > _SHOWN:
             say(f'... and {len(refused) - _SHOWN} more, in {out}/refused')
     say(f'{out}: bags, parameters, arms, refused (Parquet), fleet.json')
+
+
+@fleet.command(epilog='Example: armid fleet watch --out results')
+@_out
+@click.option(
+    '--alpha',
+    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+    default=0.05,
+    show_default=True,
+    help='Share of healthy arms among those named, in the long run.',
+)
+@options.as_json
+def watch(out: str, alpha: float, as_json: bool) -> None:
+    """Find changes and wear over time, and draw the overview."""
+    from armid_ros.fleet.store import Store
+    from armid_ros.fleet.watch import change_rows, write_watch
+    from armid_ros.fleet.watch import watch as look
+
+    store = Store(out)
+    with progress('reading results') as tick:
+        found = look(store, alpha)
+        tick(0.5, 'writing')
+        write_watch(store, found)
+    rows = [row for arm in found.arms for row in change_rows(arm)[:1]]
+    if as_json:
+        click.echo(json_text({'schema': 'armid/fleet-watch/1', 'changes': rows}, indent=1))
+        return
+    counts = {word: 0 for word in ('changed', 'wearing', 'healthy', 'too few bags')}
+    for arm in found.arms:
+        counts[arm.health] += 1
+    say(', '.join(f'{count} {word}' for word, count in counts.items() if count))
+    for row in rows[:_SHOWN]:
+        say(f'{row["arm"]}: {row["text"]}')
+    if len(rows) > _SHOWN:
+        say(f'... and {len(rows) - _SHOWN} more, in {out}/alarms.jsonl')

@@ -119,7 +119,7 @@ def _bags(
     filesystem: Any, listed: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[tuple[str, int, str]]:
     """Yield path, size and version of all bags; files of a bag that is there too are parts."""
-    whole = []
+    whole: list[str] = []
     for path, info in sorted(listed.items()):
         path = path.rstrip('/')
         if any(path.startswith(f'{folder}/') for folder in whole[-1:]):

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 import hashlib
 import json
-from typing import Any, Literal
+from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import FleetError
@@ -164,6 +164,3 @@ def _refusal(name: str) -> str:
         f'--effects {name}: the torque is not linear in its parameters, so bags cannot be merged '
         'with it; name others, and look for it with `armid diagnose`'
     )
-
-
-Status = Literal['done', 'refused', 'failed']

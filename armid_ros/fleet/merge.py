@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from armid_ros.estimate import ParameterName
 from armid_ros.fleet.job import Job

@@ -235,7 +235,9 @@ def _rows(
     parameters: tuple[ParameterName, ...], values: FloatArray, std: FloatArray
 ) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = parameter_table(parameters, values, list(std))
-    return [{name: row[name] for name in ('name', 'joint', 'unit', 'value', 'std')} for row in rows]
+    return [
+        {name: row[name] for name in ('name', 'joint', 'unit', 'value', 'std')} for row in rows
+    ]
 
 
 def _same(row: dict[str, object], bag: BagFile, job: Job) -> bool:

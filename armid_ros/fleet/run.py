@@ -267,9 +267,7 @@ def _submitted(
     return _UnderWay(arm, bags, prepared, fit, noise, last)
 
 
-def _tree(
-    submit: Callable[..., Future], join: Callable[..., Any], leaves: list[Future]
-) -> Future:
+def _tree(submit: Callable[..., Future], join: Callable[..., Any], leaves: list[Future]) -> Future:
     """Join results, a few at a time."""
     level = leaves
     while True:

@@ -54,9 +54,7 @@ def check_motion(
 
     """
     for recording in recordings:
-        check_positions(
-            robot, recording.source, recording.q.min(axis=0), recording.q.max(axis=0)
-        )
+        check_positions(robot, recording.source, recording.q.min(axis=0), recording.q.max(axis=0))
         if recording.duration < SHORTEST or not _outlasts(recording, used):
             raise _too_short(recording)
     ranges = np.max([np.ptp(recording.q, axis=0) for recording in recordings], axis=0)

@@ -100,7 +100,8 @@ def solve(
     """
     triangle = Triangle.of(problem) if triangle is None else triangle
     used = np.concatenate([part.informative for part in problem])
-    fit, relative = fit_triangle(triangle, weighted=method == 'wls'), used.astype(float)
+    fit = fit_triangle(triangle, weighted=method == 'wls')
+    relative: FloatArray = used.astype(float)
     if method == 'irls':
         fit, relative = _robust(problem, used, fit)
     values = fit.values if bounds is None else within(fit, bounds)

@@ -133,21 +133,22 @@ def streamed(
         As of ``read_recording``.
 
     """
-    cuts: Cuts | None = None
+    cuts: list[Cuts] = []  # made with the first piece, before any cut
     start = -np.inf
     for piece, last in read_pieces(
         path,
         joints=arm.robot.joints,
         topic=topic,
         samples=samples,
-        keep=lambda piece: 0 if cuts is None else cuts.keep(piece),
+        keep=lambda piece: cuts[0].keep(piece),
         settings=settings,
     ):
-        cuts = cuts or Cuts(choose(piece))
-        signals = SignalSettings(cuts.used.cutoff_hz, cuts.used.decimation)
-        (repaired,), _ = without_damage([piece], signals)
-        stop = np.inf if last else float(cuts.end(piece))
-        parts = regressions(arm, columns, [repaired], cuts.used)
+        if not cuts:
+            cuts.append(Cuts(choose(piece)))
+        used = cuts[0].used
+        (repaired,), _ = without_damage([piece], SignalSettings(used.cutoff_hz, used.decimation))
+        stop = np.inf if last else float(cuts[0].end(piece))
+        parts = regressions(arm, columns, [repaired], used)
         owned = [_owned(piece, rows, start, stop) for rows in parts]
         yield repaired, [rows for rows in owned if rows is not None]
         start = stop

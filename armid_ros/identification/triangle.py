@@ -133,7 +133,10 @@ class Triangle:
         for factor in self.factors:
             active = np.flatnonzero(factor.any(axis=0))
             compact = factor[: len(active), active]
-            pieces += [[len(active)], active, compact[np.triu_indices(len(active))]]
+            pieces += [
+                np.array([len(active), *active], dtype=float),
+                compact[np.triu_indices(len(active))],
+            ]
         return np.concatenate(pieces)
 
     @classmethod
