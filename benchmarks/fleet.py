@@ -48,10 +48,10 @@ VISCOUS, COULOMB = np.array([0.6, 0.6, 0.3]), np.array([0.5, 0.5, 0.25])
 TEMPERATURE = 0.01
 #: What happens to arms: effect of the catalogue, and the range its size is drawn from.
 CHANGES = {
-    'friction': (0.25, 0.6),  # share by which the dry friction of a joint steps up
-    'load': (0.15, 0.4),  # mass in the hand [kg]
-    'wear': (0.05, 0.12),  # share of its viscous friction that a joint gains a day
-    'unmodelled': (0.3, 0.8),  # spring of a cable at a joint [N m/rad]
+    'friction': (0.08, 0.3),  # share by which the dry friction of a joint steps up
+    'load': (0.05, 0.3),  # mass in the hand [kg]
+    'wear': (0.02, 0.06),  # share of its viscous friction that a joint gains a day
+    'unmodelled': (0.1, 0.5),  # spring of a cable at a joint [N m/rad]
 }
 
 
@@ -189,9 +189,8 @@ def costs(folder, workers=2):
                 f'per second and core; busy share {cpu / wall / count:.2f}'
             )
             peak = max(one['peak'] for one in after.values())
-            print(
-                f'  peak of a worker {peak / 1e6:.0f} MB, {moved / done.done / 1e3:.1f} kB a bag moved'
-            )
+            moved_kb = moved / done.done / 1e3
+            print(f'  peak of a worker {peak / 1e6:.0f} MB, {moved_kb:.1f} kB a bag moved')
 
 
 def loop_seconds(bags):

@@ -206,6 +206,7 @@ def _print(outcome: FleetOutcome, out: str, seconds: float, as_json: bool) -> No
 @options.as_json
 def watch(out: str, alpha: float, as_json: bool) -> None:
     """Find changes and wear over time, and draw the overview."""
+    from armid_ros.fleet.pages import write_pages
     from armid_ros.fleet.store import Store
     from armid_ros.fleet.watch import change_rows, write_watch
     from armid_ros.fleet.watch import watch as look
@@ -215,11 +216,12 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
         found = look(store, alpha)
         tick(0.5, 'writing')
         write_watch(store, found)
+        write_pages(store, found)
     rows = [row for arm in found.arms for row in change_rows(arm)[:1]]
     if as_json:
         click.echo(json_text({'schema': 'armid/fleet-watch/1', 'changes': rows}, indent=1))
         return
-    counts = {word: 0 for word in ('changed', 'wearing', 'healthy', 'too few bags')}
+    counts = dict.fromkeys(('changed', 'wearing', 'healthy', 'too few bags'), 0)
     for arm in found.arms:
         counts[arm.health] += 1
     say(', '.join(f'{count} {word}' for word, count in counts.items() if count))
@@ -227,3 +229,4 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
         say(f'{row["arm"]}: {row["text"]}')
     if len(rows) > _SHOWN:
         say(f'... and {len(rows) - _SHOWN} more, in {out}/alarms.jsonl')
+    say(f'{out}: index.html, pages/, watch/ (Parquet), alarms.jsonl')

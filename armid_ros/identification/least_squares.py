@@ -106,7 +106,7 @@ def solve(
         fit, relative = _robust(problem, used, fit)
     values = fit.values if bounds is None else within(fit, bounds)
     residual = _residual(problem, values)
-    weights = relative / fit.scale
+    weights = np.asarray(relative / fit.scale)
     products = noise_products(problem, residual * weights, weights, fit.inverse)
     counts = np.maximum(triangle.counts, 1.0)
     squares = np.sum(residual**2, axis=0, where=used)
@@ -130,7 +130,7 @@ def _robust(
         residual = _residual(problem, fit.values)
         scale = positive(_robust_scale(residual, used))
         size = np.maximum(np.abs(residual) / scale, 1e-12)
-        relative = used * np.sqrt(np.minimum(1.0, _HUBER / size))
+        relative = np.asarray(used * np.sqrt(np.minimum(1.0, _HUBER / size)))
         fit = fit_scaled(Triangle.of(problem, relative), scale)
         if np.allclose(scale, before[0], rtol=1e-6) and np.allclose(relative, before[1]):
             break
