@@ -230,3 +230,59 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
     if len(rows) > _SHOWN:
         say(f'... and {len(rows) - _SHOWN} more, in {out}/alarms.jsonl')
     say(f'{out}: index.html, pages/, watch/ (Parquet), alarms.jsonl')
+
+
+@fleet.command(epilog='Example: armid fleet diagnose --out results')
+@_out
+@_scheduler
+@_workers
+@click.option('--arm', 'arms', multiple=True, help='Which arm; those that `watch` names, if none.')
+@click.option('--all', 'everyone', is_flag=True, help='All arms, whether they changed or not.')
+@click.option(
+    '--alpha',
+    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+    default=0.05,
+    show_default=True,
+    help='Share of healthy arms among those named, in the long run.',
+)
+@options.as_json
+def diagnose(
+    out: str,
+    scheduler: str | None,
+    workers: int | None,
+    arms: tuple[str, ...],
+    everyone: bool,
+    alpha: float,
+    as_json: bool,
+) -> None:
+    """Name what has happened to arms, each with its own past as baseline."""
+    from armid_ros.fleet.diagnose import cases, diagnose_fleet
+    from armid_ros.fleet.pages import write_pages
+    from armid_ros.fleet.store import Store
+    from armid_ros.fleet.watch import watch as look
+    from armid_ros.fleet.watch import write_watch
+
+    store = Store(out)
+    with progress('reading results') as tick:
+        found = look(store, alpha)
+        chosen = cases(found, arms, everyone)
+        rows: list[dict[str, Any]] = []
+        if chosen:
+            with _cluster(scheduler, workers) as client:
+                rows = diagnose_fleet(
+                    client,
+                    store,
+                    chosen,
+                    found,
+                    lambda ended, of: tick(ended / of, f'{ended} of {of} arms'),
+                )
+        write_watch(store, found)
+        write_pages(store, found)
+    if as_json:
+        click.echo(json_text({'schema': 'armid/fleet-diagnoses/1', 'arms': rows}, indent=1))
+        return
+    if not rows:
+        say('no arm is named; --arm or --all diagnose others')
+    for row in rows:
+        say(f'{row["arm"]}: {row["verdict"].replace("_", " ")}: {row["summary"]}')
+    say(f'{out}: index.html, pages/, reports/, watch/diagnoses.parquet')

@@ -10,7 +10,9 @@ Pages load nothing and are linked by relative addresses, so a folder of them can
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 from urllib.parse import quote
 
 from armid_ros.fleet.bags import BagFile, folder_of
@@ -18,7 +20,7 @@ from armid_ros.fleet.changes import Change, Series
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import change_rows, day_text, RESIDUAL, Watch, WatchedArm, wear_rows
 from armid_ros.report.notation import counted, digits, with_interval
-from armid_ros.report.page import Page
+from armid_ros.report.page import Page, Section
 from armid_ros.report.sections.fleet import (
     ArmRow,
     Arms,
@@ -27,6 +29,7 @@ from armid_ros.report.sections.fleet import (
     Curve,
     curve,
     Curves,
+    Headline,
     RefusedBags,
     Row,
     spark,
@@ -43,18 +46,21 @@ _SHOWN = 50
 
 def write_pages(store: Store, found: Watch) -> None:
     """Write index.html and the pages of all arms."""
-    reports = set(store.names('reports/arm=*/**/report.html'))
+    reports = set(store.names('reports/arm=*/*/report.html'))
+    table = store.read_table('watch/diagnoses.parquet')
+    diagnoses = {} if table is None else {row['arm']: row for row in table.to_pylist()}
     for arm in found.arms:
-        store.write(f'pages/{_file(arm.arm)}', arm_page(found, arm, reports))
-    store.write('index.html', overview(found))
+        page = arm_page(found, arm, reports, diagnoses.get(arm.arm))
+        store.write(f'pages/{_file(arm.arm)}', page)
+    store.write('index.html', overview(found, diagnoses))
 
 
-def overview(found: Watch) -> str:
-    """Return the page with all arms."""
+def overview(found: Watch, diagnoses: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the page with all arms, and what the diagnosis says of some."""
     columns = _columns(found)
-    sections = [
+    sections: list[Section] = [
         _verdict(found),
-        Arms([_title(*one) for one in columns], [_row(arm, columns) for arm in found.arms]),
+        Arms([_title(*one) for one in columns], _rows(found, columns, diagnoses)),
     ]
     refused = [row for arm in found.arms for row in arm.refused]
     if refused:
@@ -70,8 +76,13 @@ def overview(found: Watch) -> str:
     return Page('A fleet over time', subtitle, sections, charts=False).html()
 
 
-def arm_page(found: Watch, arm: WatchedArm, reports: set[str]) -> str:
-    """Return the page of an arm."""
+def arm_page(
+    found: Watch,
+    arm: WatchedArm,
+    reports: set[str],
+    diagnosis: Mapping[str, Any] | None = None,
+) -> str:
+    """Return the page of an arm; reports are the files that bags and diagnosis have."""
     texts = [row['text'] for row in change_rows(arm)]
     tone = {'changed': 'bad', 'wearing': 'fair', 'healthy': 'good'}.get(arm.health, 'fair')
     said = texts[:1] or ['No parameter has changed more than noise and other bags explain.']
@@ -83,12 +94,17 @@ def arm_page(found: Watch, arm: WatchedArm, reports: set[str]) -> str:
             f'{arm.unlike[0]} is {abs(arm.unlike[1]):.1f} deviations of the fleet '
             f'{"above" if arm.unlike[1] > 0 else "below"} that of its siblings'
         )
-    sections = [
+    sections: list[Section] = [
         Verdict(arm.health, tone, [f'{said[0][0].upper()}{said[0][1:]}'], beware),
         Curves([_curve(arm, one) for one in _ordered(arm)]),
         _wear(found, arm),
         _bags(arm, reports),
     ]
+    if diagnosis is not None:
+        link = f'../{quote(diagnosis["report"])}' if diagnosis['report'] else ''
+        verdict = diagnosis['verdict'].replace('_', ' ')
+        cells = [Cell(verdict, link), Cell(diagnosis['summary'])]
+        sections.insert(1, Headline(('Verdict', 'Summary'), [Row(cells)]))
     if arm.refused:
         rows = [_refused_row(row) for row in arm.refused]
         sections.append(RefusedBags(('Arm', 'Bag', 'Why'), rows))
@@ -123,6 +139,20 @@ def _columns(found: Watch) -> list[tuple[str, str]]:
     for arm in found.arms[:1]:
         order += [one.parameter for one in arm.series if one.name in found.wearing]
     return list(dict.fromkeys(order))[:_COLUMNS]
+
+
+def _rows(
+    found: Watch,
+    columns: Sequence[tuple[str, str]],
+    diagnoses: Mapping[str, Mapping[str, Any]],
+) -> list[ArmRow]:
+    rows = []
+    for arm in found.arms:
+        row, diagnosis = _row(arm, columns), diagnoses.get(arm.arm)
+        if diagnosis is not None and diagnosis['verdict'] != 'failed':
+            row = replace(row, diagnosis=diagnosis['summary'], diagnosis_link=diagnosis['report'])
+        rows.append(row)
+    return rows
 
 
 def _row(arm: WatchedArm, columns: Sequence[tuple[str, str]]) -> ArmRow:

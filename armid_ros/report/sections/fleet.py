@@ -38,6 +38,8 @@ class ArmRow:
         Curve of what it is named for; empty for none.
     sparks : sequence of Markup
         Curves of the columns.
+    diagnosis, diagnosis_link : str
+        What the diagnosis says, and its report; empty for none.
 
     """
 
@@ -51,6 +53,8 @@ class ArmRow:
     error: str
     spark: Markup
     sparks: Sequence[Markup]
+    diagnosis: str = ''
+    diagnosis_link: str = ''
 
 
 @dataclass(frozen=True)
@@ -130,6 +134,12 @@ class _Table(Section):
     rows: Sequence[Row]
     numbers: Sequence[int] = ()
     hint: str = ''
+
+
+class Headline(_Table):
+    """What the diagnosis says of an arm."""
+
+    title: ClassVar[str] = 'Diagnosis'
 
 
 class Bags(_Table):
