@@ -60,7 +60,7 @@ def _embedded(workers: int | None) -> Iterator[Client]:
                 n_workers=workers or len(os.sched_getaffinity(0)),
                 threads_per_worker=1,
                 memory_limit=WORKER_MEMORY,
-                dashboard_address=None,
+                dashboard_address='127.0.0.1:0',
                 local_directory=folder,
                 silence_logs=logging.CRITICAL,
             ) as cluster,
