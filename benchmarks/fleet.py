@@ -44,6 +44,8 @@ HARMONICS = ((0.1, 0.5), (0.25, 0.3), (0.55, 0.12))
 #: Noise of the torque sensors [N m].
 NOISE = np.array([0.05, 0.05, 0.02])
 VISCOUS, COULOMB = np.array([0.6, 0.6, 0.3]), np.array([0.5, 0.5, 0.25])
+#: Speed at which joints slide; below, dry friction is less, which the model does not know [rad/s].
+SLIDING = 0.02
 #: How much the temperature of a day changes viscous friction, as a share.
 TEMPERATURE = 0.01
 #: What happens to arms: effect of the catalogue, and the range its size is drawn from.
@@ -100,7 +102,10 @@ def moved(arm, seconds, rng):
         dq += size * w * np.cos(angle)
         ddq -= size * w * w * np.sin(angle)
     motion = Motion(arm.robot.joints, t, q, dq, ddq)
-    return motion.with_torque(arm.torque(motion) + NOISE * rng.normal(size=q.shape))
+    rigid = len(arm.robot.rigid_parameters)
+    coulomb = arm.theta[rigid + 3 : rigid + 6]
+    soft = coulomb * (np.tanh(dq / SLIDING) - np.sign(dq))
+    return motion.with_torque(arm.torque(motion) + soft + NOISE * rng.normal(size=q.shape))
 
 
 def generate(folder, arms, bags, changed, damaged, seconds=60.0, seed=0):

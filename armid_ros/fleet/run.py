@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools
+import time
 from typing import Any
 
 from armid_ros.errors import ArmidError, FleetError
@@ -41,7 +42,9 @@ RETRIES = 3
 _UNDER_WAY, _MORE = 32, 8
 #: Times that a scheduler may be lost.
 _LOST = 5
-#: What the finished futures of a run that goes on are called.
+#: How often is looked whether it is back [s].
+_LOOK_EVERY = 0.1
+#: What tasks are called whose scheduler is gone.
 _BROKEN = ('cancelled', 'lost')
 
 
@@ -110,6 +113,7 @@ class _UnderWay:
 
     arm: str
     bags: list[BagFile]
+    refused: tuple[Refused, ...]
     prepared: dict[BagFile, Future]
     fit: Future
     noise: dict[BagFile, Future]
@@ -199,54 +203,72 @@ def _worked_off(
     job_of: Mapping[str, Job],
     tally: Tally,
 ) -> list[ArmOutcome]:
-    """Keep so many arms under way that no worker waits, and no more."""
+    """Work on all arms; begin again with those under way where the scheduler was lost."""
+    outcomes: list[ArmOutcome] = []
+    for _ in range(_LOST):
+        under_way: dict[Any, _UnderWay] = {}
+        if _ended(client, waiting, under_way, job_of, tally, outcomes):
+            return outcomes
+        waiting.extendleft((one.arm, one.bags, one.refused) for one in under_way.values())
+        while client.status == 'connecting':
+            time.sleep(_LOOK_EVERY)
+        if client.status != 'running':
+            break
+    raise FleetError(
+        'the scheduler was lost, and with it the tasks; what is done is kept: run the same '
+        'command again with --resume'
+    )
+
+
+def _ended(
+    client: Client,
+    waiting: deque[tuple[str, list[BagFile], tuple[Refused, ...]]],
+    under_way: dict[Any, _UnderWay],
+    job_of: Mapping[str, Job],
+    tally: Tally,
+    outcomes: list[ArmOutcome],
+) -> bool:
+    """Keep so many arms under way that no worker waits; return False when all were lost."""
     limit = _UNDER_WAY + _MORE * sum(client.nthreads().values())
     jobs: dict[str, Future] = {}
-    under_way: dict[str, tuple[_UnderWay, tuple[Refused, ...]]] = {}
     ended = as_completed(raise_errors=False)
-    outcomes: list[ArmOutcome] = []
-    lost = 0
     while waiting or under_way:
-        while waiting and sum(len(one.bags) for one, _ in under_way.values()) < limit:
+        while waiting and sum(len(one.bags) for one in under_way.values()) < limit:
             arm, bags, refused = waiting.popleft()
             job = job_of[arm]
             if job.digest not in jobs:
                 jobs[job.digest] = client.submit(same, job, pure=False)
-            tasks = _submitted(client, arm, bags, jobs[job.digest], tally)
-            under_way[tasks.last.key] = tasks, refused
+            tasks = _submitted(client, arm, bags, refused, jobs[job.digest], tally)
+            under_way[tasks.last.key] = tasks
             ended.add(tasks.last)
         future = next(ended)
-        tasks, refused = under_way.pop(future.key)
+        if future.status in _BROKEN:
+            return False
+        tasks = under_way.pop(future.key)
         if future.status == 'finished':
             outcome: ArmOutcome = future.result()
-            outcomes.append(replace(outcome, refused=(*refused, *outcome.refused)))
-        elif future.status in _BROKEN:
-            lost += 1
-            jobs.clear()
-            if lost > _LOST + len(under_way):
-                raise FleetError(
-                    'the scheduler was lost, and with it the tasks; what is done is kept: '
-                    'run the same command again with --resume'
-                )
-            waiting.append((tasks.arm, tasks.bags, refused))
+            outcomes.append(replace(outcome, refused=(*tasks.refused, *outcome.refused)))
+            continue
+        failed = _failed(tasks)
+        for one in failed:
+            write_refused(Store(job_of[tasks.arm].out), one, job_of[tasks.arm])
+        refused, out = (*tasks.refused, *failed), {one.bag for one in failed}
+        rest = [bag for bag in tasks.bags if bag not in out]
+        if failed and rest:
+            waiting.appendleft((tasks.arm, rest, refused))
         else:
-            failed = _failed(tasks)
-            for one in failed:
-                write_refused(Store(job_of[tasks.arm].out), one, job_of[tasks.arm])
-            out = {one.bag for one in failed}
-            rest = [bag for bag in tasks.bags if bag not in out]
-            if failed and rest:
-                waiting.appendleft((tasks.arm, rest, (*refused, *failed)))
-            else:
-                problem = 'no bag of it can be used' if failed else _said(future.exception())
-                outcomes.append(
-                    ArmOutcome(tasks.arm, refused=(*refused, *failed), problem=problem)
-                )
-    return outcomes
+            problem = 'no bag of it can be used' if failed else _said(future.exception())
+            outcomes.append(ArmOutcome(tasks.arm, refused=refused, problem=problem))
+    return True
 
 
 def _submitted(
-    client: Client, arm: str, bags: list[BagFile], job: Future, tally: Tally
+    client: Client,
+    arm: str,
+    bags: list[BagFile],
+    refused: tuple[Refused, ...],
+    job: Future,
+    tally: Tally,
 ) -> _UnderWay:
     """Submit the tasks of an arm: bags, their tree, the fit, its noise, the end."""
 
@@ -264,7 +286,7 @@ def _submitted(
     }
     products = _tree(submit, summed, list(noise.values()))
     last = submit(finish, arm, whole, fit, products, job, retries=RETRIES)
-    return _UnderWay(arm, bags, prepared, fit, noise, last)
+    return _UnderWay(arm, bags, refused, prepared, fit, noise, last)
 
 
 def _tree(submit: Callable[..., Future], join: Callable[..., Any], leaves: list[Future]) -> Future:

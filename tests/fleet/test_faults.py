@@ -177,9 +177,7 @@ def arm_the_trap():
 def test_a_bag_that_ends_its_workers_is_given_up_and_the_others_are_used(bags, tmp_path):
     with connected(None, 2) as client:
         client.register_worker_callbacks(arm_the_trap)
-        outcome = identify_fleet(
-            client, find_bags([f'{bags}/*/*']), URDF, str(tmp_path), FIXED
-        )
+        outcome = identify_fleet(client, find_bags([f'{bags}/*/*']), URDF, str(tmp_path), FIXED)
     (refused,) = outcome.refused
     assert (outcome.done, refused.failed) == (8, True)
     assert refused.bag.url.endswith('arm_0001/2026-01-02')
@@ -231,10 +229,11 @@ def elsewhere(tmp_path):
 
 
 def test_a_scheduler_that_is_lost_leaves_what_is_done_for_the_next_run(
-    bags, expected, elsewhere, tmp_path
+    bags, expected, elsewhere, tmp_path, monkeypatch
 ):
     everything = find_bags([f'{bags}/*/*'])
     out = str(tmp_path / 'results')
+    monkeypatch.setattr('armid_ros.fleet.cluster.PATIENCE', 2.0)
 
     def lose(ended, of):
         if ended >= 4:
@@ -252,6 +251,21 @@ def test_a_scheduler_that_is_lost_leaves_what_is_done_for_the_next_run(
     assert outcome.found == sum(name.startswith('bags') for name in before)
     after = stamps(out)
     assert all(after[name] == before[name] for name in before if name.startswith('bags'))
+    assert digits(Store(out)) == expected
+
+
+def test_a_scheduler_that_comes_back_is_given_the_rest(bags, expected, elsewhere, tmp_path):
+    out, lost = str(tmp_path / 'results'), []
+
+    def lose_once(ended, of):
+        if ended >= 4 and not lost:
+            lost.append(ended)
+            elsewhere.stop()
+            elsewhere.start()
+
+    with connected(elsewhere.address) as client:
+        outcome = identify_fleet(client, find_bags([f'{bags}/*/*']), URDF, out, FIXED, lose_once)
+    assert lost and (outcome.done, outcome.refused) == (9, ())
     assert digits(Store(out)) == expected
 
 

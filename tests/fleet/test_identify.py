@@ -11,7 +11,7 @@ from armid_ros.fleet.bags import find_bags
 from armid_ros.fleet.identify import identify_fleet
 from armid_ros.fleet.kinds import Entry
 from armid_ros.fleet.store import Store
-from armid_ros.identification import identify, IdentificationSettings, Score, SignalSettings
+from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
 from armid_ros.recording import read_recording
 import duckdb
 import numpy as np
@@ -117,8 +117,9 @@ def test_resume_does_what_is_left_and_nothing_twice(bags, cluster, tmp_path):
     after = stamps(tmp_path)
     assert (first.done, second.done, second.found) == (7, 9, 7)
     assert all(after[name] == before[name] for name in before if name.startswith('bags'))
-    assert before['arms/arm=arm_0000/estimate.parquet'] == (
-        after['arms/arm=arm_0000/estimate.parquet']
+    assert (
+        before['arms/arm=arm_0000/estimate.parquet']
+        == (after['arms/arm=arm_0000/estimate.parquet'])
     )
 
 
@@ -161,7 +162,7 @@ def test_each_arm_may_have_a_robot_of_its_own(bags, cluster, tmp_path):
 
 def test_an_effect_that_cannot_be_merged_is_refused_before_anything_is_read(bags, tmp_path):
     settings = replace(SETTINGS, effects='viscous_friction,load_dependent_friction')
-    with pytest.raises(FleetError, match='load_dependent_friction.*not linear'):
+    with pytest.raises(FleetError, match=r'load_dependent_friction.*not linear'):
         identify_fleet(None, find_bags([f'{bags}/*/*']), URDF, str(tmp_path), settings)
 
 

@@ -4,7 +4,7 @@
 
 import pickle
 
-from armid_ros.identification import identify, IdentificationSettings, SignalSettings
+from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 from armid_ros.identification.least_squares import solve
 from armid_ros.identification.recursive import RecursiveLeastSquares
 from armid_ros.identification.regression import regressions
