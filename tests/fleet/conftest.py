@@ -3,13 +3,18 @@
 """A small fleet in bags, and a cluster of two processes to work on it."""
 
 from armid_ros.fleet.cluster import connected
-from armid_ros.fleet.identify import FleetSettings
+from armid_ros.fleet.identify import FleetSettings, identify_fleet, plan_fleet
 import pytest
 
 from benchmarks.fleet import EFFECTS, generate, ROBOT
 
 SETTINGS = FleetSettings(EFFECTS)
 URDF = str(ROBOT)
+
+
+def identified(client, bags, robots, out, settings, *tell):
+    """Plan and run; return the outcome."""
+    return identify_fleet(client, bags, plan_fleet(bags, robots, out, settings), *tell)
 
 
 @pytest.fixture(scope='session')

@@ -14,7 +14,6 @@ import sys
 from armid_ros.errors import FleetError
 from armid_ros.fleet.bags import find_bags
 from armid_ros.fleet.cluster import connected
-from armid_ros.fleet.identify import identify_fleet
 from armid_ros.fleet.store import Store
 from armid_ros.identification import SignalSettings
 from distributed import get_worker
@@ -23,7 +22,7 @@ from fsspec import AbstractFileSystem
 from fsspec.implementations.local import LocalFileSystem
 import pytest
 
-from .conftest import SETTINGS, URDF
+from .conftest import identified, SETTINGS, URDF
 from .test_identify import digits, stamps
 
 FIXED = replace(SETTINGS, signals=SignalSettings(20.0, 8))
@@ -75,7 +74,7 @@ def copied(bags, tmp_path):
 def expected(bags, cluster, tmp_path_factory):
     """Return every number of a run in which nothing happens."""
     out = str(tmp_path_factory.mktemp('expected'))
-    identify_fleet(cluster, find_bags([f'{bags}/*/*']), URDF, out, FIXED)
+    identified(cluster, find_bags([f'{bags}/*/*']), URDF, out, FIXED)
     return digits(Store(out))
 
 
@@ -84,7 +83,7 @@ def test_a_damaged_bag_is_refused_with_its_reason_and_the_others_are_used(
 ):
     (file,) = (copied / 'arm_0001' / '2026-01-02').glob('*.mcap')
     file.write_bytes(b'\0' * 5000)
-    outcome = identify_fleet(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), FIXED)
+    outcome = identified(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), FIXED)
     (refused,) = outcome.refused
     assert (outcome.done, refused.bag.arm, refused.failed) == (8, 'arm_0001', False)
     assert 'MCAP' in refused.reason
@@ -95,7 +94,7 @@ def test_a_damaged_bag_is_refused_with_its_reason_and_the_others_are_used(
 def test_an_arm_without_a_usable_bag_is_said(copied, cluster, tmp_path):
     for file in (copied / 'arm_0002').rglob('*.mcap'):
         file.write_bytes(b'')
-    outcome = identify_fleet(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), FIXED)
+    outcome = identified(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), FIXED)
     assert {arm.arm: arm.problem for arm in outcome.arms if arm.problem} == {
         'arm_0002': 'no bag of it can be used'
     }
@@ -105,10 +104,10 @@ def test_a_bag_that_is_mended_is_used_and_no_longer_refused(bags, copied, cluste
     (file,) = (copied / 'arm_0001' / '2026-01-02').glob('*.mcap')
     whole = file.read_bytes()
     file.write_bytes(b'\0' * 5000)
-    identify_fleet(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), FIXED)
+    identified(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), FIXED)
     file.write_bytes(whole)
     resumed = replace(FIXED, resume=True)
-    outcome = identify_fleet(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), resumed)
+    outcome = identified(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), resumed)
     assert (outcome.done, outcome.found, outcome.refused) == (9, 8, ())
     assert Store(str(tmp_path)).data_set('refused') is None or not len(
         Store(str(tmp_path)).data_set('refused')
@@ -119,7 +118,7 @@ def test_a_store_that_times_out_is_asked_again(copied, cluster, tmp_path):
     register()
     cluster.run(register)
     (copied / 'failures_arm_0001').write_text('2')
-    outcome = identify_fleet(cluster, find_bags([flaky(copied)]), URDF, str(tmp_path), FIXED)
+    outcome = identified(cluster, find_bags([flaky(copied)]), URDF, str(tmp_path), FIXED)
     assert (outcome.done, outcome.refused) == (9, ())
     assert (copied / 'failures_arm_0001').read_text() == '0'
 
@@ -128,13 +127,13 @@ def test_a_store_that_never_answers_costs_its_bags_and_no_others(copied, cluster
     register()
     cluster.run(register)
     (copied / 'failures_arm_0001').write_text('1000')
-    outcome = identify_fleet(cluster, find_bags([flaky(copied)]), URDF, str(tmp_path), FIXED)
+    outcome = identified(cluster, find_bags([flaky(copied)]), URDF, str(tmp_path), FIXED)
     assert outcome.done == 6
     assert {one.bag.arm for one in outcome.refused} == {'arm_0001'}
     assert all(one.failed and 'does not answer' in one.reason for one in outcome.refused)
     (copied / 'failures_arm_0001').unlink()
     resumed = replace(FIXED, resume=True)
-    again = identify_fleet(cluster, find_bags([flaky(copied)]), URDF, str(tmp_path), resumed)
+    again = identified(cluster, find_bags([flaky(copied)]), URDF, str(tmp_path), resumed)
     assert (again.done, again.found) == (9, 6)
 
 
@@ -149,7 +148,7 @@ def test_killing_a_worker_changes_no_digit(bags, expected, tmp_path):
                 killed.append(processes[0])
                 os.kill(processes[0], signal.SIGKILL)
 
-        outcome = identify_fleet(client, everything, URDF, str(tmp_path), FIXED, kill_once)
+        outcome = identified(client, everything, URDF, str(tmp_path), FIXED, kill_once)
     assert killed and (outcome.done, outcome.refused) == (9, ())
     assert digits(Store(str(tmp_path))) == expected
 
@@ -177,7 +176,7 @@ def arm_the_trap():
 def test_a_bag_that_ends_its_workers_is_given_up_and_the_others_are_used(bags, tmp_path):
     with connected(None, 2) as client:
         client.register_worker_callbacks(arm_the_trap)
-        outcome = identify_fleet(client, find_bags([f'{bags}/*/*']), URDF, str(tmp_path), FIXED)
+        outcome = identified(client, find_bags([f'{bags}/*/*']), URDF, str(tmp_path), FIXED)
     (refused,) = outcome.refused
     assert (outcome.done, refused.failed) == (8, True)
     assert refused.bag.url.endswith('arm_0001/2026-01-02')
@@ -241,12 +240,12 @@ def test_a_scheduler_that_is_lost_leaves_what_is_done_for_the_next_run(
 
     with pytest.raises(FleetError, match='--resume'):
         with connected(elsewhere.address) as client:
-            identify_fleet(client, everything, URDF, out, FIXED, lose)
+            identified(client, everything, URDF, out, FIXED, lose)
     before = stamps(out)
     assert any(name.startswith('bags') for name in before)
     elsewhere.start()
     with connected(elsewhere.address) as client:
-        outcome = identify_fleet(client, everything, URDF, out, replace(FIXED, resume=True))
+        outcome = identified(client, everything, URDF, out, replace(FIXED, resume=True))
     assert (outcome.done, outcome.refused) == (9, ())
     assert outcome.found == sum(name.startswith('bags') for name in before)
     after = stamps(out)
@@ -264,7 +263,7 @@ def test_a_scheduler_that_comes_back_is_given_the_rest(bags, expected, elsewhere
             elsewhere.start()
 
     with connected(elsewhere.address) as client:
-        outcome = identify_fleet(client, find_bags([f'{bags}/*/*']), URDF, out, FIXED, lose_once)
+        outcome = identified(client, find_bags([f'{bags}/*/*']), URDF, out, FIXED, lose_once)
     assert lost and (outcome.done, outcome.refused) == (9, ())
     assert digits(Store(out)) == expected
 

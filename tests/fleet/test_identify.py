@@ -8,7 +8,6 @@ from pathlib import Path
 from armid_ros.arm import ArmModel
 from armid_ros.errors import FleetError
 from armid_ros.fleet.bags import find_bags
-from armid_ros.fleet.identify import identify_fleet
 from armid_ros.fleet.kinds import Entry
 from armid_ros.fleet.store import Store
 from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
@@ -21,7 +20,7 @@ import pytest
 
 from benchmarks.fleet import EFFECTS
 
-from .conftest import SETTINGS, URDF
+from .conftest import identified, SETTINGS, URDF
 
 
 @pytest.fixture(scope='module')
@@ -29,7 +28,7 @@ def done(bags, cluster, tmp_path_factory):
     """Return the outcome of a run over the small fleet, and where its results are."""
     out = tmp_path_factory.mktemp('results')
     told = []
-    outcome = identify_fleet(
+    outcome = identified(
         cluster, find_bags([f'{bags}/*/*']), URDF, str(out), SETTINGS, lambda *n: told.append(n)
     )
     assert told[-1] == (9, 9)
@@ -94,10 +93,10 @@ def test_results_are_read_by_duckdb_pandas_and_polars(done):
 
 def test_a_run_replaces_its_own_part_and_no_other(bags, cluster, tmp_path):
     everything = find_bags([f'{bags}/*/*'])
-    identify_fleet(cluster, everything, URDF, str(tmp_path), SETTINGS)
+    identified(cluster, everything, URDF, str(tmp_path), SETTINGS)
     before = stamps(tmp_path)
     again = [bag for bag in everything if bag.day == '2026-01-02' and bag.arm == 'arm_0002']
-    identify_fleet(cluster, again, URDF, str(tmp_path), SETTINGS)
+    identified(cluster, again, URDF, str(tmp_path), SETTINGS)
     after = stamps(tmp_path)
     assert set(after) == set(before)
     changed = {name for name in after if after[name] != before[name]}
@@ -110,10 +109,10 @@ def test_a_run_replaces_its_own_part_and_no_other(bags, cluster, tmp_path):
 def test_resume_does_what_is_left_and_nothing_twice(bags, cluster, tmp_path):
     everything = find_bags([f'{bags}/*/*'])
     some = [bag for bag in everything if (bag.arm, bag.day) != ('arm_0001', '2026-01-03')][:7]
-    first = identify_fleet(cluster, some, URDF, str(tmp_path), SETTINGS)
+    first = identified(cluster, some, URDF, str(tmp_path), SETTINGS)
     before = stamps(tmp_path)
     resumed = replace(SETTINGS, resume=True)
-    second = identify_fleet(cluster, everything, URDF, str(tmp_path), resumed)
+    second = identified(cluster, everything, URDF, str(tmp_path), resumed)
     after = stamps(tmp_path)
     assert (first.done, second.done, second.found) == (7, 9, 7)
     assert all(after[name] == before[name] for name in before if name.startswith('bags'))
@@ -126,25 +125,25 @@ def test_resume_does_what_is_left_and_nothing_twice(bags, cluster, tmp_path):
 def test_what_was_resumed_is_what_one_run_gives(bags, cluster, tmp_path):
     everything = find_bags([f'{bags}/*/*'])
     fixed = replace(SETTINGS, signals=SignalSettings(20.0, 8))
-    identify_fleet(cluster, everything, URDF, f'{tmp_path}/at_once', fixed)
-    identify_fleet(cluster, everything[:5], URDF, f'{tmp_path}/resumed', fixed)
+    identified(cluster, everything, URDF, f'{tmp_path}/at_once', fixed)
+    identified(cluster, everything[:5], URDF, f'{tmp_path}/resumed', fixed)
     resumed = replace(fixed, resume=True)
-    identify_fleet(cluster, everything, URDF, f'{tmp_path}/resumed', resumed)
+    identified(cluster, everything, URDF, f'{tmp_path}/resumed', resumed)
     assert digits(Store(f'{tmp_path}/resumed')) == digits(Store(f'{tmp_path}/at_once'))
 
 
 def test_a_later_run_takes_the_filters_of_the_first(bags, cluster, tmp_path):
     everything = find_bags([f'{bags}/*/*'])
-    first = identify_fleet(cluster, everything[:1], URDF, str(tmp_path), SETTINGS)
-    later = identify_fleet(cluster, everything[4:6], URDF, str(tmp_path), SETTINGS)
+    first = identified(cluster, everything[:1], URDF, str(tmp_path), SETTINGS)
+    later = identified(cluster, everything[4:6], URDF, str(tmp_path), SETTINGS)
     assert later.filters == first.filters
 
 
 def test_one_more_effect_is_another_kind_and_nothing_of_it_is_found(bags, cluster, tmp_path):
     everything = find_bags([f'{bags}/arm_0000/*'], r'(arm_\d+)')
-    identify_fleet(cluster, everything, URDF, str(tmp_path), SETTINGS)
+    identified(cluster, everything, URDF, str(tmp_path), SETTINGS)
     other = replace(SETTINGS, effects=f'{EFFECTS},rotor_inertia', resume=True)
-    assert identify_fleet(cluster, everything, URDF, str(tmp_path), other).found == 0
+    assert identified(cluster, everything, URDF, str(tmp_path), other).found == 0
 
 
 def test_each_arm_may_have_a_robot_of_its_own(bags, cluster, tmp_path):
@@ -154,7 +153,7 @@ def test_each_arm_may_have_a_robot_of_its_own(bags, cluster, tmp_path):
         'arm_0001': Entry(URDF, effects='viscous_friction'),
         'arm_0002': Entry(URDF, gravity='moon'),
     }
-    identify_fleet(cluster, everything, table, str(tmp_path), SETTINGS)
+    identified(cluster, everything, table, str(tmp_path), SETTINGS)
     arms = Store(str(tmp_path)).data_set('arms')
     assert len(by_arm(arms, 'arm_0001')) == len(by_arm(arms, 'arm_0000')) - 6
     assert by_arm(arms, 'arm_0002')['relative_error_percent'].iloc[0] > 5.0
@@ -163,7 +162,7 @@ def test_each_arm_may_have_a_robot_of_its_own(bags, cluster, tmp_path):
 def test_an_effect_that_cannot_be_merged_is_refused_before_anything_is_read(bags, tmp_path):
     settings = replace(SETTINGS, effects='viscous_friction,load_dependent_friction')
     with pytest.raises(FleetError, match=r'load_dependent_friction.*not linear'):
-        identify_fleet(None, find_bags([f'{bags}/*/*']), URDF, str(tmp_path), settings)
+        identified(None, find_bags([f'{bags}/*/*']), URDF, str(tmp_path), settings)
 
 
 def stamps(folder):

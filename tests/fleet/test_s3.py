@@ -4,14 +4,13 @@
 
 from armid_ros.fleet.bags import find_bags
 from armid_ros.fleet.cluster import connected
-from armid_ros.fleet.identify import identify_fleet
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import watch, write_watch
 import fsspec
 from moto.server import ThreadedMotoServer
 import pytest
 
-from .conftest import URDF
+from .conftest import identified, URDF
 from .test_faults import FIXED
 from .test_identify import digits
 
@@ -50,9 +49,9 @@ def test_an_object_store_gives_the_digits_of_a_folder(bags, bucket, tmp_path):
     with connected(None, 1) as client:
         found = find_bags([f'{bucket}/bags/*/*'])
         assert [(bag.arm, bag.day) for bag in found[:1]] == [('arm_0000', '2026-01-01')]
-        outcome = identify_fleet(client, found, URDF, f'{bucket}/results', FIXED)
+        outcome = identified(client, found, URDF, f'{bucket}/results', FIXED)
         local = find_bags([f'{bags}/arm_000[01]/*'])
-        identify_fleet(client, local, URDF, str(tmp_path), FIXED)
+        identified(client, local, URDF, str(tmp_path), FIXED)
     assert (outcome.done, outcome.refused) == (6, ())
     there, here = digits(Store(f'{bucket}/results')), digits(Store(str(tmp_path)))
     assert there == here
@@ -61,7 +60,7 @@ def test_an_object_store_gives_the_digits_of_a_folder(bags, bucket, tmp_path):
 def test_results_in_an_object_store_are_watched_there(bucket):
     store = Store(f'{bucket}/results')
     with connected(None, 1) as client:
-        identify_fleet(client, find_bags([f'{bucket}/bags/*/*']), URDF, store.url, FIXED)
+        identified(client, find_bags([f'{bucket}/bags/*/*']), URDF, store.url, FIXED)
     write_watch(store, watch(store))
     assert store.read('alarms.jsonl') == b''
     assert len(store.read_table('watch/arms.parquet')) == 2

@@ -8,7 +8,6 @@ import re
 from armid_ros.errors import FleetError
 from armid_ros.fleet.bags import find_bags
 from armid_ros.fleet.diagnose import cases, diagnose_fleet
-from armid_ros.fleet.identify import identify_fleet
 from armid_ros.fleet.pages import write_pages
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import watch, write_watch
@@ -16,7 +15,7 @@ import pytest
 
 from benchmarks.fleet import generate
 
-from .conftest import SETTINGS, URDF
+from .conftest import identified, SETTINGS, URDF
 
 
 @pytest.fixture(scope='module')
@@ -26,7 +25,7 @@ def lived(cluster, tmp_path_factory):
     generate(folder / 'bags', arms=10, bags=8, changed=4, damaged=1, seconds=15.0, seed=2)
     store = Store(str(folder / 'results'))
     bags = find_bags([f'{folder}/bags/*/*'])
-    identify_fleet(cluster, bags, URDF, store.url, SETTINGS)
+    identified(cluster, bags, URDF, store.url, SETTINGS)
     found = watch(store)
     write_watch(store, found)
     truth = json.loads((folder / 'bags' / 'truth.json').read_text())
