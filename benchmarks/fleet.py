@@ -108,38 +108,47 @@ def moved(arm, seconds, rng):
     return motion.with_torque(arm.torque(motion) + soft + NOISE * rng.normal(size=q.shape))
 
 
-def generate(folder, arms, bags, changed, damaged, seconds=60.0, seed=0):
-    """Write a fleet and its truth."""
+def draw(arms, bags, changed, damaged, seed=0):
+    """Return every arm with what happens to it, and which bags are damaged."""
     root = np.random.default_rng(seed)
     sick = set(root.choice(arms, changed, replace=False).tolist())
     broken = set(root.choice(arms * bags, damaged, replace=False).tolist())
-    kinds = list(CHANGES)
-    truth = {'arms': {}, 'damaged': [], 'days': bags}
+    kinds, drawn = list(CHANGES), []
     for number in range(arms):
         rng = np.random.default_rng([seed, number])
-        name = f'arm_{number:04d}'
-        arm = healthy(rng)
-        event = None
+        arm, event = healthy(rng), None
         if number in sick:
-            what = kinds[len(truth['arms']) % len(kinds)]
+            what = kinds[sum(one[2] is not None for one in drawn) % len(kinds)]
             event = {
                 'what': what,
                 'joint': int(rng.integers(3)),
                 'day': int(rng.integers(bags // 3, max(bags // 3 + 1, 2 * bags // 3))),
                 'size': float(rng.uniform(*CHANGES[what])),
             }
-            truth['arms'][name] = event
-        for day in range(bags):
-            start = FIRST_DAY + datetime.timedelta(days=day)
+        damage = {day for day in range(bags) if number * bags + day in broken}
+        drawn.append((f'arm_{number:04d}', arm, event, damage, rng))
+    return drawn
+
+
+def generate(folder, arms, bags, changed, damaged, seconds=60.0, seed=0):
+    """Write a fleet, its truth first."""
+    drawn = draw(arms, bags, changed, damaged, seed)
+    days = [FIRST_DAY + datetime.timedelta(days=day) for day in range(bags)]
+    truth = {
+        'arms': {name: event for name, _, event, _, _ in drawn if event},
+        'damaged': [f'{name}/{days[day].date()}' for name, *_, bad, _ in drawn for day in bad],
+    }
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    Path(folder, 'truth.json').write_text(json.dumps(truth, indent=1))
+    for name, arm, event, damage, rng in drawn:
+        for day, start in enumerate(days):
             bag = Path(folder, name, start.date().isoformat())
+            bag.parent.mkdir(exist_ok=True)
             measured = moved(lived(arm, event, day, rng), seconds, rng)
-            bag.parent.mkdir(parents=True, exist_ok=True)
             write_recording(bag, measured, start_ns=round(start.timestamp() * 1e9))
-            if number * bags + day in broken:
+            if day in damage:
                 (file,) = bag.glob('*.mcap')
                 file.write_bytes(b'\0' * 4096)
-                truth['damaged'].append(str(bag))
-    Path(folder, 'truth.json').write_text(json.dumps(truth, indent=1))
 
 
 def score(folder, results):

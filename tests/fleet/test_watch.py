@@ -72,7 +72,7 @@ def test_wear_of_every_joint_has_an_interval(lived):
 
 
 def test_pages_lead_from_the_fleet_to_the_arm_to_the_bag(lived):
-    store, found, truth = lived
+    store, found, _ = lived
     write_pages(store, found)
     index = store.read('index.html').decode()
     for arm in found.arms:
@@ -83,8 +83,8 @@ def test_pages_lead_from_the_fleet_to_the_arm_to_the_bag(lived):
         assert len(arm.bags) == sum(f'id="2026-01-{day:02d}-' in page for day in range(1, 9))
     for where in re.findall(r'href="pages/([^"#]+)#([^"]+)"', index):
         assert f'id="{where[1]}"' in store.read(f'pages/{where[0]}').decode()
-    for page in (index, page):
-        assert '://' not in page
+    for text in (index, page):
+        assert '://' not in text
 
 
 def test_the_overview_shows_those_first_that_need_a_person(lived):
