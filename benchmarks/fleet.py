@@ -179,35 +179,50 @@ def score(folder, results):
 
 
 def costs(folder, workers=2):
-    """Print what a run costs beside identify in a loop."""
+    """Print what runs cost beside identify in a loop: few bags and all, one worker and more."""
     from armid_ros.fleet.bags import find_bags
+
+    bags = find_bags([f'{folder}/*/*'])
+    sample = bags[:: max(1, len(bags) // 30)]
+    for number, count in dict.fromkeys(
+        [(min(10, len(bags)), workers), (len(bags), workers), (len(bags), 1)]
+    ):
+        before = loop_seconds(sample)
+        cost = run_cost(bags[:number], count)
+        looped = 0.5 * (before + loop_seconds(sample))  # a busy machine is slow now and then
+        print(
+            f'{count} workers, {number} bags: {1e3 * cost["cpu"]:.0f} ms of processor a bag '
+            f'({1e3 * cost["client"]:.1f} ms of it scheduler and client), identify in a loop '
+            f'{1e3 * looped:.0f} ms, ratio {cost["cpu"] / looped:.2f}; '
+            f'{60.0 / cost["cpu"]:.0f} bag seconds per second and core; {cost["wall"]:.1f} s, '
+            f'workers busy {cost["busy"]:.2f}; peak of a worker {cost["peak"] / 1e6:.0f} MB; '
+            f'{cost["moved"] / 1e3:.1f} kB a bag moved between workers'
+        )
+
+
+def run_cost(bags, workers):
+    """Identify a fleet; return processor seconds a bag, wall time, memory and bytes."""
     from armid_ros.fleet.cluster import connected
     from armid_ros.fleet.identify import FleetSettings, identify_fleet, plan_fleet
 
-    bags = find_bags([f'{folder}/*/*'])
-    looped = loop_seconds(bags[:: max(1, len(bags) // 40)])
-    for count in dict.fromkeys((1, workers)):
-        with tempfile.TemporaryDirectory() as out, connected(None, count) as client:
-            settings = FleetSettings(EFFECTS)
-            jobs = plan_fleet(bags, str(ROBOT), f'{out}/warm', settings)
-            identify_fleet(client, bags[:4], jobs)
-            jobs = plan_fleet(bags, str(ROBOT), f'{out}/run', settings)
-            before = client.run(_used)
-            start = time.perf_counter()
-            done = identify_fleet(client, bags, jobs)
-            wall = time.perf_counter() - start
-            after = client.run(_used)
-            cpu = sum(after[w]['cpu'] - before[w]['cpu'] for w in after)
-            moved = sum(after[w]['moved'] - before[w]['moved'] for w in after)
-            print(
-                f'{count} workers, {done.done} bags: {wall:.1f} s, processors busy {cpu:.1f} s: '
-                f'{1e3 * cpu / done.done:.0f} ms a bag, identify in a loop {1e3 * looped:.0f} ms: '
-                f'ratio {cpu / done.done / looped:.2f}; {60.0 * done.done / cpu:.0f} bag seconds '
-                f'per second and core; busy share {cpu / wall / count:.2f}'
-            )
-            peak = max(one['peak'] for one in after.values())
-            moved_kb = moved / done.done / 1e3
-            print(f'  peak of a worker {peak / 1e6:.0f} MB, {moved_kb:.1f} kB a bag moved')
+    with tempfile.TemporaryDirectory() as out, connected(None, workers) as client:
+        settings = FleetSettings(EFFECTS)
+        identify_fleet(client, bags[:4], plan_fleet(bags, str(ROBOT), f'{out}/warm', settings))
+        jobs = plan_fleet(bags, str(ROBOT), f'{out}/run', settings)
+        before = client.run(_used)
+        start, own = time.perf_counter(), time.process_time()
+        done = identify_fleet(client, bags, jobs).done
+        wall, own = time.perf_counter() - start, time.process_time() - own
+        after = client.run(_used)
+    busy = sum(after[w]['cpu'] - before[w]['cpu'] for w in after)
+    return {
+        'cpu': (busy + own) / done,
+        'client': own / done,
+        'wall': wall,
+        'busy': busy / wall / workers,
+        'peak': max(one['peak'] for one in after.values()),
+        'moved': sum(after[w]['moved'] - before[w]['moved'] for w in after) / done,
+    }
 
 
 def loop_seconds(bags):

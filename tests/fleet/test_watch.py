@@ -96,7 +96,7 @@ def test_the_overview_shows_those_first_that_need_a_person(lived):
 
 def test_the_diagnosis_names_what_happened_with_the_arms_own_past_as_baseline(lived, cluster):
     store, found, truth = lived
-    arm, event = next(one for one in truth['arms'].items() if one[1]['what'] == 'load')
+    arm = next(arm for arm, event in truth['arms'].items() if event['what'] == 'load')
     (case,) = cases(found, [arm])
     assert max(case.before) < min(case.after)
     (row,) = diagnose_fleet(cluster, store, [case], found)
