@@ -6,7 +6,9 @@ Steps and trends in series of estimates, and how many arms of a fleet may be nam
 A value of a series is theta + e with the variance s^2 + t^2: s is the deviation that its bag
 states, t how much bags differ beyond that, by temperature, motion or what the model lacks. t is
 one number a parameter for all arms of a kind, from the median of squared differences of
-neighbours, which a step or a slow trend does not change. Of every series the largest step and the
+neighbours, which a step or a slow trend does not change. A bag that differs from its neighbours and those from
+it by more than noise does is an odd bag, not a change, and bounded to the edge of the noise (Hampel
+identifier; Pearson 2002); what lasts has neighbours that agree. Of every series the largest step and the
 trend are tested, of every arm all its series, with Bonferroni's factor for as many as were tried.
 Over arms the false discovery rate is controlled (Benjamini and Hochberg 1995): of the arms that
 are named, no more than a share alpha is healthy in the long run.
@@ -31,6 +33,10 @@ MONTH = 365.25 / 12.0
 FEWEST = 4
 #: Median of a squared standard normal variable.
 _MEDIAN = float(stats.chi2.ppf(0.5, 1))
+#: Bags to either side that a bag is compared with, and how many deviations make it an odd one.
+_NEIGHBOURS, _ODD = 2, 3.0
+#: No probability is less: that of larger scores is no number any more.
+_SMALLEST = 1e-300
 #: Degrees of freedom of a variance from the median of n squares, over n.
 _EFFICIENCY = 0.37
 
@@ -175,7 +181,7 @@ def judge(
             found.append(largest_change(one, spread[one.parameter]))
     arms = []
     for arm, changes in by_arm.items():
-        changes.sort(key=lambda change: change.p)
+        changes.sort(key=lambda change: (change.p, -abs(change.size) / change.std))
         p = min(1.0, len(changes) * changes[0].p) if changes else 1.0
         arms.append((arm, tuple(changes), p))
     adjusted = stats.false_discovery_control([p for _, _, p in arms]) if arms else []
@@ -193,9 +199,9 @@ def named(judged: Judged, alpha: float) -> tuple[Change, ...]:
 
 def largest_change(series: Series, spread: Spread) -> Change:
     """Return the largest step of a series, or its trend if that explains it as well."""
-    variance = series.std**2 + spread.std**2
-    weights = 1.0 / np.maximum(variance, 1e-300)
-    x, count = series.values, len(series.values)
+    variance = np.maximum(series.std**2 + spread.std**2, 1e-300)
+    weights = 1.0 / variance
+    x, count = _bounded(series.values, np.sqrt(variance)), len(series.values)
     before, after = np.cumsum(weights)[:-1], np.cumsum(weights[::-1])[::-1][1:]
     low = np.cumsum(weights * x)[:-1] / before
     high = np.cumsum((weights * x)[::-1])[::-1][1:] / after
@@ -259,6 +265,14 @@ def _spread(group: Sequence[Series]) -> Spread:
     return Spread(float(np.sqrt(extra)), freedom)
 
 
+def _bounded(x: FloatArray, std: FloatArray) -> FloatArray:
+    """Return a series with odd values moved to the edge of the noise about their neighbours."""
+    padded = np.pad(x, _NEIGHBOURS, constant_values=np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEIGHBOURS + 1)
+    middle = np.nanmedian(windows, axis=1)
+    return np.asarray(np.clip(x, middle - _ODD * std, middle + _ODD * std))
+
+
 def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
     """Return slope, its standard deviation, and the value at the beginning."""
     total = weights.sum()
@@ -272,4 +286,4 @@ def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, 
 
 
 def _p(score: float, freedom: float, tried: int) -> float:
-    return min(1.0, 2.0 * tried * float(stats.t.sf(score, freedom)))
+    return min(1.0, 2.0 * tried * max(float(stats.t.sf(score, freedom)), _SMALLEST))

@@ -33,8 +33,8 @@ def names(series, alpha=0.05):
 
 
 def test_a_thousand_healthy_arms_are_rarely_accused():
-    accused = [len(names(fleet(np.random.default_rng(seed), 1000))) > 0 for seed in range(20)]
-    assert np.mean(accused) <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / 20)
+    accused = [len(names(fleet(np.random.default_rng(seed), 1000))) > 0 for seed in range(6)]
+    assert np.mean(accused) <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / 6)
 
 
 def test_a_step_is_found_with_its_arm_parameter_place_and_size():
@@ -66,7 +66,7 @@ def test_the_interval_of_wear_holds_the_truth_as_often_as_it_says():
 def test_of_the_arms_named_few_are_healthy():
     rng = np.random.default_rng(4)
     false, true = 0, 0
-    for _ in range(10):
+    for _ in range(4):
         series = fleet(rng, 200)
         for arm in range(40):
             k = 8 * arm + int(rng.integers(8))
@@ -76,7 +76,7 @@ def test_of_the_arms_named_few_are_healthy():
         sick = {f'arm_{arm}' for arm in range(40)}
         false, true = false + len(found - sick), true + len(found & sick)
     assert false <= 0.05 * (false + true) + 2 * np.sqrt(0.05 * (false + true))
-    assert true > 200
+    assert true > 80
 
 
 def test_what_bags_differ_by_beyond_their_deviations_is_learned_from_all_arms():
@@ -97,3 +97,27 @@ def test_a_level_series_has_no_p_below_one_in_a_thousand():
     days = np.arange(10.0)
     flat = Series('a', 'x', 'j', '', days, np.ones(10), np.full(10, 0.1))
     assert largest_change(flat, spreads([flat])[flat.parameter]).p == 1.0
+
+
+def test_a_step_beyond_all_probability_is_named_before_smaller_ones():
+    series = fleet(np.random.default_rng(7), 100, bags=20)
+    late = np.arange(20) >= 9
+    series[1] = changed(series[1], np.where(late, 30.0, 0.0))
+    series[2] = changed(series[2], np.where(late, 60.0, 0.0))
+    (first, *_) = judge(series)
+    assert [change.series.joint for change in named(first, 0.05)[:2]] == ['joint_2', 'joint_1']
+
+
+@pytest.mark.parametrize('at', [0, 1, 5, 9])
+def test_one_odd_bag_is_no_change(at):
+    series = fleet(np.random.default_rng(8), 50)
+    for k in range(0, len(series), 16):
+        series[k] = changed(series[k], np.where(np.arange(10) == at, 0.5, 0.0))
+    assert names(series) == set()
+
+
+@pytest.mark.parametrize('lasting', [2, 3, 8])
+def test_what_lasts_two_bags_is_a_change(lasting):
+    series = fleet(np.random.default_rng(9), 50)
+    series[16] = changed(series[16], np.where(np.arange(10) >= 10 - lasting, 0.5, 0.0))
+    assert names(series) == {'arm_2'}
