@@ -246,7 +246,7 @@ def _used(dask_worker):
     return {
         'cpu': usage.ru_utime + usage.ru_stime,
         'peak': usage.ru_maxrss * 1024,
-        'moved': dask_worker.transfer_incoming_bytes_total,
+        'moved': sum(one['total'] for one in dask_worker.transfer_incoming_log),
     }
 
 

@@ -6,12 +6,14 @@ Steps and trends in series of estimates, and how many arms of a fleet may be nam
 A value of a series is theta + e with the variance s^2 + t^2: s is the deviation that its bag
 states, t how much bags differ beyond that, by temperature, motion or what the model lacks. t is
 one number a parameter for all arms of a kind, from the median of squared differences of
-neighbours, which a step or a slow trend does not change. A bag that differs from its neighbours and those from
-it by more than noise does is an odd bag, not a change, and bounded to the edge of the noise (Hampel
-identifier; Pearson 2002); what lasts has neighbours that agree. Of every series the largest step and the
-trend are tested, of every arm all its series, with Bonferroni's factor for as many as were tried.
-Over arms the false discovery rate is controlled (Benjamini and Hochberg 1995): of the arms that
-are named, no more than a share alpha is healthy in the long run.
+neighbours, which a step or a slow trend does not change. A bag further from the median of its
+neighbours than noise is an odd bag, not a change, and moved to the edge of the noise (the
+identifier of Hampel 1974); what lasts has neighbours that agree with it.
+
+Of every series the largest step and the trend are tested, of every arm all its series, with
+Bonferroni's factor for as many as were tried. Over arms the false discovery rate is controlled
+(Benjamini and Hochberg 1995): of the arms that are named, no more than a share alpha is healthy
+in the long run.
 
 """
 
@@ -33,8 +35,8 @@ MONTH = 365.25 / 12.0
 FEWEST = 4
 #: Median of a squared standard normal variable.
 _MEDIAN = float(stats.chi2.ppf(0.5, 1))
-#: Bags to either side that a bag is compared with, and how many deviations make it an odd one.
-_NEIGHBOURS, _ODD = 2, 3.0
+#: Bags that one is compared with, itself among them, and how many deviations make it an odd one.
+_WINDOW, _ODD = 5, 3.0
 #: No probability is less: that of larger scores is no number any more.
 _SMALLEST = 1e-300
 #: Degrees of freedom of a variance from the median of n squares, over n.
@@ -267,9 +269,9 @@ def _spread(group: Sequence[Series]) -> Spread:
 
 def _bounded(x: FloatArray, std: FloatArray) -> FloatArray:
     """Return a series with odd values moved to the edge of the noise about their neighbours."""
-    padded = np.pad(x, _NEIGHBOURS, constant_values=np.nan)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEIGHBOURS + 1)
-    middle = np.nanmedian(windows, axis=1)
+    windows = np.lib.stride_tricks.sliding_window_view(x, min(_WINDOW, len(x)))
+    nearest = np.clip(np.arange(len(x)) - _WINDOW // 2, 0, len(windows) - 1)
+    middle = np.median(windows, axis=1)[nearest]
     return np.asarray(np.clip(x, middle - _ODD * std, middle + _ODD * std))
 
 

@@ -116,8 +116,8 @@ def test_one_odd_bag_is_no_change(at):
     assert names(series) == set()
 
 
-@pytest.mark.parametrize('lasting', [2, 3, 8])
-def test_what_lasts_two_bags_is_a_change(lasting):
+@pytest.mark.parametrize('lasting', [3, 4, 7])
+def test_what_lasts_three_bags_is_a_change(lasting):
     series = fleet(np.random.default_rng(9), 50)
     series[16] = changed(series[16], np.where(np.arange(10) >= 10 - lasting, 0.5, 0.0))
     assert names(series) == {'arm_2'}
