@@ -201,14 +201,15 @@ def _jobs(
     for entry in dict.fromkeys(entries.values()):
         model = _model(entry, settings)
         own = [bag for bag in bags if entries[bag.arm] == entry]
+        theory = model.base_parameters(np.random.default_rng(settings.seed))
         key = _kind(model)
         asked = settings.signals
         filters = known_kinds.get(key)
         if filters is None or asked != SignalSettings():
-            filters = choose_filters(model, own, asked, settings.topic, settings.reading)
+            filters = choose_filters(model, theory, own, asked, settings.topic, settings.reading)
         by_entry[entry] = Job(
             model,
-            model.base_parameters(np.random.default_rng(settings.seed)),
+            theory,
             filters,
             store.url,
             run,

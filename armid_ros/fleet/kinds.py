@@ -16,7 +16,10 @@ from armid_ros.files import load_json, reading
 from armid_ros.fleet.bags import BagFile
 from armid_ros.fleet.job import Filters
 from armid_ros.fleet.store import fetched, opened, Store, StoreError
+from armid_ros.identification.cutoff import cutoff_of_torques
+from armid_ros.identification.damage import without_damage
 from armid_ros.identification.signals import conditioning, SignalSettings
+from armid_ros.model import BaseParameters
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.pieces import read_pieces
 
@@ -84,6 +87,7 @@ def read_table(url: str) -> dict[str, Entry]:
 
 def choose_filters(
     arm: ArmModel,
+    theory: BaseParameters,
     bags: Sequence[BagFile],
     asked: SignalSettings,
     topic: str | None,
@@ -124,6 +128,9 @@ def choose_filters(
     if not recordings:
         raise FleetError(f'no bag of {arm.robot.name} can be read: {problem}')
     used = conditioning(recordings, asked)
+    if asked.cutoff_hz is None:
+        repaired, _ = without_damage(recordings, SignalSettings(used.cutoff_hz, used.decimation))
+        used = cutoff_of_torques(arm, theory.independent, repaired, used)
     return Filters(used.cutoff_hz, used.decimation, used.rate_hz)
 
 
