@@ -12,6 +12,7 @@ import tempfile
 
 from armid_ros import __version__
 from armid_ros.errors import FleetError
+import dask
 from distributed import Client, LocalCluster
 
 #: What a worker of this machine may take before Dask moves results to the disk [bytes].
@@ -20,6 +21,14 @@ WORKER_MEMORY = 1_200_000_000
 ANSWER = 30.0
 #: How long one that was lost may take to come back [s].
 PATIENCE = 120.0
+
+
+#: What Dask does beside the work all the time, for pages that nobody looks at here.
+_QUIET = {
+    'distributed.worker.profile.enabled': False,
+    'distributed.admin.tick.interval': '1s',
+    'distributed.admin.system-monitor.interval': '2s',
+}
 
 
 @contextmanager
@@ -59,6 +68,7 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
 def _embedded(workers: int | None) -> Iterator[Client]:
     with tempfile.TemporaryDirectory(prefix='armid-fleet-') as folder:
         with (
+            dask.config.set(_QUIET),
             LocalCluster(
                 n_workers=workers or len(os.sched_getaffinity(0)),
                 threads_per_worker=1,
