@@ -70,6 +70,7 @@ setup(
         'convert': requirements('convert'),
         'view': requirements('view'),
         'notebook': requirements('notebook'),
+        'fleet': requirements('fleet'),
         'test': requirements('test'),
         'bench': requirements('bench'),
     },

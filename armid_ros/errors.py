@@ -61,3 +61,7 @@ class RecordingEnded(RecordingError):
 
 class OutputError(ArmidError):
     """A result cannot be written, or would take the place of another one."""
+
+
+class FleetError(ArmidError):
+    """A run over a fleet cannot begin, or cannot go on."""

@@ -27,6 +27,7 @@ COMMANDS = {
     'elastic': 'elastic',
     'exo': 'exo',
     'compare': 'compare',
+    'fleet': 'fleet',
     'recover': 'record',
     'view': 'view',
     'layout': 'layout',

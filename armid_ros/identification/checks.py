@@ -28,10 +28,19 @@ SILENT = 'the torque of every joint is constant; is effort filled in?'
 
 
 def check_motion(
-    robot: Robot, recordings: Sequence[Recording], used: Conditioning
+    robot: Robot, recordings: Sequence[Recording], used: Conditioning | None = None
 ) -> tuple[str, ...]:
     """
     Refuse recordings without usable motion.
+
+    Parameters
+    ----------
+    robot : Robot
+        Whose they are.
+    recordings : sequence of Recording
+        What was recorded.
+    used : Conditioning, optional
+        Filters behind which something has to be left, where ``check_length`` does not see to it.
 
     Returns
     -------
@@ -44,23 +53,44 @@ def check_motion(
         Naming the recording, the joint and the remedy.
 
     """
+    for recording in recordings:
+        check_positions(robot, recording.source, recording.q.min(axis=0), recording.q.max(axis=0))
+        if recording.duration < SHORTEST or not _outlasts(recording, used):
+            raise _too_short(recording)
     ranges = np.max([np.ptp(recording.q, axis=0) for recording in recordings], axis=0)
-    resting = [name for name, size in zip(robot.joints, ranges, strict=True) if size < REST_RANGE]
-    if len(resting) == robot.n_joints:
+    return resting(robot, recordings[0].source, ranges)
+
+
+def check_length(recordings: Sequence[Recording], problem: Sequence[Regression]) -> None:
+    """Refuse recordings of which nothing is left behind the filters."""
+    left = {part.source for part in problem}
+    for recording in recordings:
+        if recording.source not in left:
+            raise _too_short(recording)
+
+
+def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
+    """Say which joints are at rest, given how far each moved, (n,); refuse it of all of them."""
+    names = [name for name, size in zip(robot.joints, ranges, strict=True) if size < REST_RANGE]
+    if len(names) == robot.n_joints:
         raise IdentificationError(
-            f'{recordings[0].source}: no motion, every joint stays within {REST_RANGE} rad; '
+            f'{source}: no motion, every joint stays within {REST_RANGE} rad; '
             'record the arm while it follows an excitation'
         )
-    for recording in recordings:
-        if recording.duration < SHORTEST or not any(True for _ in segments(recording, used)):
-            raise IdentificationError(
-                f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
-                f'too short; record a movement of several seconds'
-            )
-        _check_positions(robot, recording)
-    if resting:
-        return (f'at rest throughout: {", ".join(resting)}; nothing of their own is identified',)
+    if names:
+        return (f'at rest throughout: {", ".join(names)}; nothing of their own is identified',)
     return ()
+
+
+def _outlasts(recording: Recording, used: Conditioning | None) -> bool:
+    return used is None or any(True for _ in segments(recording, used))
+
+
+def _too_short(recording: Recording) -> IdentificationError:
+    return IdentificationError(
+        f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
+        f'too short; record a movement of several seconds'
+    )
 
 
 def check_torque(
@@ -138,10 +168,11 @@ def _gives_out_energy(problem: Sequence[Regression]) -> bool:
     return True
 
 
-def _check_positions(robot: Robot, recording: Recording) -> None:
-    problem = position_problem(robot, recording.q.min(axis=0), recording.q.max(axis=0))
+def check_positions(robot: Robot, source: str, lowest: FloatArray, highest: FloatArray) -> None:
+    """Refuse a recording whose joints, from lowest to highest (n,), are far out of limits."""
+    problem = position_problem(robot, lowest, highest)
     if problem:
-        raise IdentificationError(f'{recording.source}: {problem}')
+        raise IdentificationError(f'{source}: {problem}')
 
 
 def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> str:

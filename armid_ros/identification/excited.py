@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.least_squares import joint_triangles
 from armid_ros.identification.regression import Regression
+from armid_ros.identification.triangle import Triangle
 from armid_ros.model import BaseParameters, group_columns, regroup
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -39,13 +39,34 @@ def excited(
         The columns of that.
 
     """
-    w = joint_triangles(problem)[:, :, :-1].reshape(-1, theory.rank)
+    base, kept = told_apart(theory, Triangle.of(problem))
+    return base, tuple(part.restrict(kept) for part in problem)
+
+
+def told_apart(theory: BaseParameters, triangle: Triangle) -> tuple[BaseParameters, list[int]]:
+    """
+    Group further what the rows of a triangle do not tell apart.
+
+    Parameters
+    ----------
+    theory : BaseParameters
+        What any motion can tell apart.
+    triangle : Triangle
+        Rows in the columns that theory keeps.
+
+    Returns
+    -------
+    base : BaseParameters
+        What these rows tell apart.
+    kept : list of int
+        Which of the columns it keeps.
+
+    """
     names = tuple(theory.standard[column] for column in theory.independent)
-    data = group_columns(w, names, tolerance=EXCITATION_TOLERANCE)
+    data = group_columns(triangle.stacked, names, tolerance=EXCITATION_TOLERANCE)
     base = theory if data.rank == theory.rank else regroup(theory, data)
     order = {int(column): position for position, column in enumerate(theory.independent)}
-    kept = [order[int(column)] for column in base.independent]
-    return base, tuple(part.restrict(kept) for part in problem)
+    return base, [order[int(column)] for column in base.independent]
 
 
 def bounds(arm: ArmModel, base: BaseParameters) -> tuple[FloatArray, FloatArray]:

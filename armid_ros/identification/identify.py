@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.checks import check_motion, check_torque
+from armid_ros.identification.checks import check_length, check_motion, check_torque
 from armid_ros.identification.cutoff import cutoff_of_torques
 from armid_ros.identification.damage import without_damage
 from armid_ros.identification.excited import excited
@@ -240,7 +240,7 @@ def identify(
     settings = settings or IdentificationSettings()
     recordings, damage = without_damage(recordings, settings.signals)
     used = conditioning(list(recordings), settings.signals)
-    notes = tuple(map(str, damage)) + check_motion(arm.robot, recordings, used)
+    notes = tuple(map(str, damage)) + check_motion(arm.robot, recordings)
     theory = arm.base_parameters(rng)
     # inertia of a motion that is taken as slow: as described, unless bodies are fitted to weight
     described = arm.quasi_static and settings.physical is None
@@ -248,6 +248,7 @@ def identify(
     if settings.signals.cutoff_hz is None:
         used = cutoff_of_torques(whole, theory.independent, recordings, used)
     columns = regressions(whole, theory.independent, recordings, used, progress)
+    check_length(recordings, columns)
     samples = sum(len(part.motion) for part in columns)
     if samples * arm.robot.n_joints < 2 * theory.rank:
         raise IdentificationError(

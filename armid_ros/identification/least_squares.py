@@ -16,18 +16,25 @@ from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.identification.regression import Regression
+from armid_ros.identification.triangle import (
+    fit_scaled,
+    fit_triangle,
+    freedom_factor,
+    positive,
+    ROUNDS,
+    Triangle,
+    TriangleFit,
+    within,
+)
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
-import scipy.optimize
 
 Method = Literal['ols', 'wls', 'irls']
 
 #: Residuals beyond this many robust standard deviations lose weight (Huber 1981: 95 % efficiency).
 _HUBER = 1.345
-#: Rounds of reweighting; the weights of both schemes settle in three to ten.
-_ROUNDS = 20
 #: Order of the autoregression that whitens residuals: the slopes of drift, and one resonance.
 AR_ORDER = 3
 #: Least share of the noise that a residual is taken to have kept in a band.
@@ -68,6 +75,7 @@ def solve(
     problem: Sequence[Regression],
     method: Method = 'wls',
     bounds: tuple[FloatArray, FloatArray] | None = None,
+    triangle: Triangle | None = None,
 ) -> Solution:
     """
     Fit parameters to one or more stretches of motion.
@@ -81,6 +89,8 @@ def solve(
         (Huber's function).
     bounds : tuple of two ndarray, each of shape (r,), optional
         What is physically possible, lower and upper. The covariance is that without bounds.
+    triangle : Triangle, optional
+        That of the problem, where it is known.
 
     Returns
     -------
@@ -88,73 +98,43 @@ def solve(
         Parameters with covariance.
 
     """
+    triangle = Triangle.of(problem) if triangle is None else triangle
     used = np.concatenate([part.informative for part in problem])
-    counts = np.maximum(used.sum(axis=0), 1)
-    rank = problem[0].columns.shape[2]
-    freedom = counts.sum() / max(1.0, counts.sum() - rank)
-    relative, scale = used.astype(float), np.ones(used.shape[1])
-    triangles = joint_triangles(problem, relative)
-    values, triangle = _fit(triangles, scale)
-    for _ in range(0 if method == 'ols' else _ROUNDS):
-        before = (scale, relative)
-        if method == 'wls':
-            scale = _positive(np.sqrt(freedom * _squares(triangles, values) / counts))
-        else:
-            residual = _residual(problem, values)
-            scale = _positive(_robust_scale(residual, used))
-            size = np.maximum(np.abs(residual) / scale, 1e-12)
-            relative = used * np.sqrt(np.minimum(1.0, _HUBER / size))
-            triangles = joint_triangles(problem, relative)
-        values, triangle = _fit(triangles, scale)
-        if np.allclose(scale, before[0], rtol=1e-6) and np.allclose(relative, before[1]):
-            break
-    if bounds is not None:
-        values = _within(values, triangle, bounds)
+    fit = fit_triangle(triangle, weighted=method == 'wls')
+    relative: FloatArray = used.astype(float)
+    if method == 'irls':
+        fit, relative = _robust(problem, used, fit)
+    values = fit.values if bounds is None else within(fit, bounds)
     residual = _residual(problem, values)
-    weights = relative / scale
+    weights = np.asarray(relative / fit.scale)
+    products = noise_products(problem, residual * weights, weights, fit.inverse)
+    counts = np.maximum(triangle.counts, 1.0)
+    squares = np.sum(residual**2, axis=0, where=used)
     return Solution(
         values=values,
-        covariance=_covariance(problem, residual * weights, weights, triangle),
-        joint_std=np.sqrt(freedom * np.sum(residual**2, axis=0, where=used) / counts),
-        condition_number=float(np.linalg.cond(triangle)),
+        covariance=fit.covariance(products),
+        joint_std=np.sqrt(freedom_factor(triangle) * squares / counts),
+        condition_number=fit.condition_number,
         outliers=int(np.sum(used & (relative**2 < 0.5))),
         weights=weights,
     )
 
 
-def joint_triangles(
-    problem: Sequence[Regression], weights: npt.NDArray[np.floating] | None = None
-) -> FloatArray:
-    """
-    Compress every joint's rows [columns, torque] to a triangle with the same products.
-
-    Parameters
-    ----------
-    problem : sequence of Regression
-        N rows of each of n joints in r columns, in one or more stretches.
-    weights : ndarray, shape (N, n), optional
-        What the rows are multiplied by; by default those that say nothing are left out.
-
-    Returns
-    -------
-    ndarray, shape (n, r + 1, r + 1)
-        T_j with T_j' T_j = [W_j, y_j]' [W_j, y_j]; not triangular where columns are zero.
-
-    """
-    if weights is None:
-        weights = np.concatenate([part.informative for part in problem]).astype(float)
-    n_joints, rank = problem[0].columns.shape[1:]
-    triangles = np.zeros((n_joints, rank + 1, rank + 1))
-    for joint in range(n_joints):
-        rows = np.concatenate(
-            [np.column_stack([part.columns[:, joint], part.target[:, joint]]) for part in problem]
-        )
-        active = np.flatnonzero(rows.any(axis=0))
-        stacked = rows[:, active] * weights[:, joint, np.newaxis]
-        (factor,) = scipy.linalg.qr(stacked, mode='r', overwrite_a=True, check_finite=False)
-        factor = factor[: len(active)]
-        triangles[joint, : len(factor), active] = factor.T
-    return triangles
+def _robust(
+    problem: Sequence[Regression], used: npt.NDArray[np.bool_], fit: TriangleFit
+) -> tuple[TriangleFit, FloatArray]:
+    """Weight outliers down; return the fit, and what its rows were multiplied by, (N, n)."""
+    relative: FloatArray = used.astype(float)
+    for _ in range(ROUNDS):
+        before = (fit.scale, relative)
+        residual = _residual(problem, fit.values)
+        scale = positive(_robust_scale(residual, used))
+        size = np.maximum(np.abs(residual) / scale, 1e-12)
+        relative = np.asarray(used * np.sqrt(np.minimum(1.0, _HUBER / size)))
+        fit = fit_scaled(Triangle.of(problem, relative), scale)
+        if np.allclose(scale, before[0], rtol=1e-6) and np.allclose(relative, before[1]):
+            break
+    return fit, relative
 
 
 def _residual(problem: Sequence[Regression], values: FloatArray) -> FloatArray:
@@ -162,58 +142,11 @@ def _residual(problem: Sequence[Regression], values: FloatArray) -> FloatArray:
     return np.concatenate(parts)
 
 
-def _squares(triangles: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the sum of squared residuals of every joint, shape (n,)."""
-    rest: FloatArray = triangles @ np.append(values, -1.0)
-    return np.asarray(np.sum(rest**2, axis=1))
-
-
-def _within(
-    values: FloatArray, triangle: FloatArray, bounds: tuple[FloatArray, FloatArray]
-) -> FloatArray:
-    """Return the best fit within bounds: the one whose predictions differ least from the free."""
-    if np.all((values >= bounds[0]) & (values <= bounds[1])):
-        return values
-    scale = np.linalg.norm(triangle, axis=0)
-    solution = scipy.optimize.lsq_linear(
-        triangle / scale, triangle @ values, (bounds[0] * scale, bounds[1] * scale), method='bvls'
-    )
-    return np.asarray(np.clip(solution.x / scale, *bounds))
-
-
 def _robust_scale(residual: FloatArray, used: npt.NDArray[np.bool_]) -> FloatArray:
     """Return the standard deviation that the middle half of each joint's residual suggests."""
     masked = np.where(used, residual, np.nan)
     spread = np.nanmedian(np.abs(masked - np.nanmedian(masked, axis=0)), axis=0)
     return np.asarray(1.4826 * np.nan_to_num(spread))
-
-
-def _positive(scale: FloatArray) -> FloatArray:
-    """Keep a joint that is fitted exactly from taking all the weight."""
-    floor = max(1e-9 * float(np.max(scale)), 1e-100)
-    return np.maximum(scale, floor)
-
-
-def _fit(triangles: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Solve by QR with scaled columns; return the values and the triangular factor."""
-    stacked = (triangles / scale[:, np.newaxis, np.newaxis]).reshape(-1, triangles.shape[2])
-    size = np.linalg.norm(stacked, axis=0)
-    size[size == 0.0] = 1.0
-    (factor,) = scipy.linalg.qr(stacked / size, mode='r', check_finite=False)
-    rank = len(size) - 1
-    triangle = factor[:rank, :rank]
-    values = scipy.linalg.solve_triangular(triangle, factor[:rank, rank]) * size[rank]
-    return values / size[:rank], triangle * size[:rank]
-
-
-def _covariance(
-    problem: Sequence[Regression], residual: FloatArray, weights: FloatArray, triangle: FloatArray
-) -> FloatArray:
-    """Propagate coloured residuals through the fit: H^-1 (sum over f of W^H Phi W) H^-1."""
-    inverse = scipy.linalg.solve_triangular(triangle, np.eye(len(triangle)))
-    meat = noise_products(problem, residual, weights, inverse)
-    bread = inverse @ inverse.T
-    return np.asarray(bread @ meat @ bread)
 
 
 def noise_products(

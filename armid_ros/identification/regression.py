@@ -76,7 +76,9 @@ class Regression:
         return np.asarray(linear if self.constant is None else linear + self.constant)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> Regression:
-        """Return the problem in some of its columns."""
+        """Return the problem in some of its columns; itself if that is all of them in order."""
+        if np.array_equal(columns, np.arange(self.columns.shape[2])):
+            return self
         return replace(self, columns=self.columns[:, :, columns])
 
 
@@ -251,6 +253,7 @@ def filtered_columns(
                 result[first : first + count, :, source.outer] = decimate(block, used)
         first += count
         tick(samples.stop - samples.start)
+    result.setflags(write=False)  # so that nobody who freezes it has to copy it
     return result
 
 

@@ -23,6 +23,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 import math
 from typing import NamedTuple
 
@@ -191,9 +192,7 @@ class SpikeGate:
         noise = np.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)
         growth = np.maximum(noise, 0.5 * dt[1:] * (dt[1:] + dt[:-1]) / period**2)
         error = np.abs(moves[1:] - ratio[:, np.newaxis] * moves[:-1]) / growth[:, np.newaxis]
-        windows = np.array_split(error, max(1, len(error) // WINDOW))
-        usual = np.max([_usual_size(window, _USUAL) for window in windows], axis=0)
-        limit = np.maximum(self._quantile_of(period) * usual, floor)
+        limit = np.maximum(self._quantile_of(period) * _loudest(error), floor)
         off = np.zeros(x.shape)
         off[2:] = error / np.maximum(limit, _TINY)
         return off
@@ -368,7 +367,24 @@ class SpikeGate:
         return np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
 
 
+def _loudest(errors: FloatArray) -> FloatArray:
+    """Return the largest usual size of all windows of errors (N, m), shape (m,)."""
+    windows = max(1, len(errors) // WINDOW)
+    size, longer = divmod(len(errors), windows)
+    signals, cut = errors.shape[1], longer * (size + 1)
+    first = errors[:cut].reshape(longer, size + 1, signals)
+    rest = errors[cut:].reshape(windows - longer, size, signals)
+    usual = [_usual_size(part.swapaxes(0, 1), _USUAL) for part in (first, rest) if len(part)]
+    return np.asarray(np.max(np.concatenate(usual), axis=0))
+
+
 def _usual_size(missed: Sequence[FloatArray] | FloatArray, share: float) -> FloatArray:
     """Return the standard deviation of which a normal variable exceeds so few of the errors."""
     size = np.quantile(np.array(missed), share, axis=0)
-    return np.asarray(size / stats.norm.ppf(0.5 + share / 2.0))
+    return np.asarray(size / _normal_quantile(share))
+
+
+@cache
+def _normal_quantile(share: float) -> float:
+    """Return what so few normal variables exceed in size; scipy takes longer than the rest."""
+    return float(stats.norm.ppf(0.5 + share / 2.0))

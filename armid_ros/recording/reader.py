@@ -75,15 +75,15 @@ def read_recording(
     if not joints or len(set(joints)) != len(joints):
         raise RecordingError(f'{path}: joints wanted must differ and not be none, got {joints}')
     with Bag(path, settings) as bag:
-        chosen = _choose_topic(bag, joints, topic)
+        chosen = choose_topic(bag, joints, topic)
         decoder = JointStateDecoder(joints)
         where = f'{path}: {chosen.name}'
         with reading(path, RecordingError):
             pieces = list(_within(settings, where, _decoded(bag, chosen, decoder)))
         damage = bag.damage
-    _check_joints(where, decoder, joints)
+    check_joints(where, decoder, joints)
     with reading(where, RecordingError):
-        return _assemble(str(path), chosen.name, joints, pieces, decoder, damage)
+        return assemble(str(path), chosen.name, joints, pieces, decoder, damage)
 
 
 def _decoded(bag: Bag, topic: Topic, decoder: JointStateDecoder) -> Iterator[JointStates]:
@@ -103,7 +103,7 @@ def _within(
         yield piece
 
 
-def _assemble(
+def assemble(
     path: str,
     topic: str,
     joints: tuple[str, ...],
@@ -166,7 +166,7 @@ def _recording(
     )
 
 
-def _choose_topic(bag: Bag, joints: Sequence[str], wanted: str | None) -> Topic:
+def choose_topic(bag: Bag, joints: Sequence[str], wanted: str | None) -> Topic:
     """Return the topic to read."""
     topics = bag.topics()
     candidates = [topic for topic in topics if topic.type_name == JOINT_STATE]
@@ -229,7 +229,7 @@ def _named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
     return decoder.names_seen
 
 
-def _check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) -> None:
+def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) -> None:
     """Refuse a topic that does not name all joints, or nothing at all."""
     if not decoder.messages:
         raise RecordingError(f'{where} has no messages')

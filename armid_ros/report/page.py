@@ -62,12 +62,15 @@ class Page:
         Robot, data, day; in a line.
     sections : sequence of Section
         Parts in order; the first is the verdict.
+    charts : bool
+        Whether there are interactive charts, which need a library.
 
     """
 
     title: str
     subtitle: str
     sections: Sequence[Section]
+    charts: bool = True
 
     def html(self) -> str:
         """Return the whole file, scripts and styles included."""

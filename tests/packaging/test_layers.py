@@ -13,6 +13,7 @@ import pytest
 
 LAYERS = (
     ('cli',),
+    ('fleet',),
     ('api', 'nodes'),
     ('report', 'view'),
     ('diagnosis', 'inspection'),

@@ -1,0 +1,288 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Many arms and many bags: identified on a cluster, watched over time, diagnosed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+import time
+from typing import Any, TYPE_CHECKING
+
+from armid_ros.cli import options
+from armid_ros.cli.terminal import print_rows, progress, say
+from armid_ros.errors import FleetError
+from armid_ros.files import json_text
+from armid_ros.identification import SignalSettings
+import click
+
+if TYPE_CHECKING:
+    from armid_ros.fleet.identify import FleetOutcome
+    from distributed import Client
+
+#: Refused bags that are shown; all are in the table `refused`.
+_SHOWN = 20
+
+_out = click.option(
+    '--out', required=True, metavar='URL', help='Folder of the results: a path, or s3://...'
+)
+_scheduler = click.option(
+    '--scheduler',
+    metavar='ADDRESS',
+    help='Of a Dask cluster, as tcp://host:8786; processes of this machine by default.',
+)
+_workers = click.option(
+    '--workers',
+    type=click.IntRange(min=1),
+    help='Processes of this machine; one a core by default.',
+)
+
+
+class _Fleet(click.Group):
+    """Says which packages are missing before anything is asked of them."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command of the group."""
+        missing = [n for n in ('dask', 'distributed', 'fsspec', 'pyarrow') if not find_spec(n)]
+        if missing:
+            raise FleetError(
+                f'armid fleet needs {", ".join(missing)}: pip install "armid_ros[fleet]"'
+            )
+        return super().invoke(ctx)
+
+
+@click.group(cls=_Fleet)
+def fleet() -> None:
+    """Identify, watch and diagnose many arms with many bags."""
+
+
+@fleet.command(
+    epilog='Example: armid fleet identify "bags/*/*" --robot arm.urdf --out results; '
+    'what the first wildcard stands for is the arm.'
+)
+@click.argument('globs', nargs=-1, required=True, metavar='GLOB...')
+@click.option('--robot', 'robot_source', metavar='R', help='Of all arms: shipped name or path.')
+@click.option(
+    '--robots',
+    'table',
+    metavar='CSV',
+    help='Of each arm: columns arm and robot, if wanted gravity, joints and effects.',
+)
+@_out
+@_scheduler
+@_workers
+@click.option('--arm', metavar='REGEX', help='Its first group is the arm, in the URL of a bag.')
+@options.effects
+@click.option(
+    '--method',
+    type=click.Choice(['ols', 'wls']),
+    default='wls',
+    show_default=True,
+    help='All joints alike, or weighted by their noise.',
+)
+@click.option('--cutoff', type=float, help='Of the position filter [Hz]; from a few bags, once.')
+@click.option('--decimation', type=int, help='Keep one sample of this many.')
+@click.option('--topic', help='JointState topic, where a bag has several.')
+@options.gravity
+@options.joints
+@options.seed
+@click.option('--resume', is_flag=True, help='Leave out what earlier runs have done.')
+@options.reading
+@options.as_json
+def identify(
+    globs: tuple[str, ...],
+    robot_source: str | None,
+    table: str | None,
+    out: str,
+    scheduler: str | None,
+    workers: int | None,
+    arm: str | None,
+    effects: str,
+    method: str,
+    cutoff: float | None,
+    decimation: int | None,
+    topic: str | None,
+    gravity: str,
+    joints: str | None,
+    seed: int,
+    resume: bool,
+    as_json: bool,
+) -> None:
+    """Identify every arm of a fleet from its bags."""
+    from armid_ros.fleet.bags import find_bags
+    from armid_ros.fleet.identify import FleetSettings, identify_fleet, plan_fleet
+    from armid_ros.fleet.kinds import read_table
+
+    if (robot_source is None) == (table is None):
+        raise FleetError('name the robot of all arms with --robot, or a table with --robots')
+    settings = FleetSettings(
+        effects=effects,
+        gravity=gravity,
+        joints=joints or '',
+        weighted=method == 'wls',
+        signals=SignalSettings(cutoff, decimation),
+        topic=topic,
+        resume=resume,
+        seed=seed,
+        reading=options.read_settings(),
+    )
+    robots = read_table(table) if table is not None else str(robot_source)
+    start = time.monotonic()
+    with progress('listing bags') as tick:
+        bags = find_bags(globs, arm)
+        jobs = plan_fleet(bags, robots, out, settings)
+        tick(0.0, 'starting workers')
+        with _cluster(scheduler, workers) as client:
+            outcome = identify_fleet(
+                client,
+                bags,
+                jobs,
+                lambda ended, of: tick(ended / of, f'{ended} of {of} bags'),
+            )
+    _print(outcome, out, time.monotonic() - start, as_json)
+
+
+@contextmanager
+def _cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
+    from armid_ros.fleet.cluster import connected
+
+    with connected(scheduler, workers) as client:
+        yield client
+
+
+def _print(outcome: FleetOutcome, out: str, seconds: float, as_json: bool) -> None:
+    refused = [
+        {
+            'arm': one.bag.arm,
+            'bag': one.bag.url,
+            'what': 'failed' if one.failed else 'refused',
+            'reason': one.reason,
+        }
+        for one in outcome.refused
+    ]
+    if as_json:
+        document = {
+            'schema': 'armid/fleet-run/1',
+            'out': out,
+            'arms': len(outcome.arms),
+            'bags': outcome.done + len(refused),
+            'done': outcome.done,
+            'found': outcome.found,
+            'refused': refused,
+            'without_estimate': {arm.arm: arm.problem for arm in outcome.arms if arm.problem},
+        }
+        click.echo(json_text(document, indent=1))
+        return
+    found = f', {outcome.found} of them by earlier runs' if outcome.found else ''
+    say(
+        f'{len(outcome.arms)} arms: {outcome.done} bags done{found}, {len(refused)} refused, '
+        f'in {seconds:.0f} s'
+    )
+    for robot, filters in outcome.filters.items():
+        say(
+            f'{robot}: as `armid identify --cutoff {filters.cutoff_hz:.6g} '
+            f'--decimation {filters.decimation}`'
+        )
+    for arm in outcome.arms:
+        if arm.problem:
+            say(f'{arm.arm}: no estimate: {arm.problem}')
+    if refused:
+        print_rows(refused[:_SHOWN], as_json=False)
+        if len(refused) > _SHOWN:
+            say(f'... and {len(refused) - _SHOWN} more, in {out}/refused')
+    say(f'{out}: bags, parameters, arms, refused (Parquet), fleet.json')
+
+
+@fleet.command(epilog='Example: armid fleet watch --out results')
+@_out
+@click.option(
+    '--alpha',
+    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+    default=0.05,
+    show_default=True,
+    help='Share of healthy arms among those named, in the long run.',
+)
+@options.as_json
+def watch(out: str, alpha: float, as_json: bool) -> None:
+    """Find changes and wear over time, and draw the overview."""
+    from armid_ros.fleet.pages import write_pages
+    from armid_ros.fleet.store import Store
+    from armid_ros.fleet.watch import change_rows, write_watch
+    from armid_ros.fleet.watch import watch as look
+
+    store = Store(out)
+    with progress('reading results') as tick:
+        found = look(store, alpha)
+        tick(0.5, 'writing')
+        write_watch(store, found)
+        write_pages(store, found)
+    rows = [row for arm in found.arms for row in change_rows(arm)[:1]]
+    if as_json:
+        click.echo(json_text({'schema': 'armid/fleet-watch/1', 'changes': rows}, indent=1))
+        return
+    counts = dict.fromkeys(('changed', 'wearing', 'healthy', 'too few bags'), 0)
+    for arm in found.arms:
+        counts[arm.health] += 1
+    say(', '.join(f'{count} {word}' for word, count in counts.items() if count))
+    for row in rows[:_SHOWN]:
+        say(f'{row["arm"]}: {row["text"]}')
+    if len(rows) > _SHOWN:
+        say(f'... and {len(rows) - _SHOWN} more, in {out}/alarms.jsonl')
+    say(f'{out}: index.html, pages/, watch/ (Parquet), alarms.jsonl')
+
+
+@fleet.command(epilog='Example: armid fleet diagnose --out results')
+@_out
+@_scheduler
+@_workers
+@click.option('--arm', 'arms', multiple=True, help='Which arm; those that `watch` names, if none.')
+@click.option('--all', 'everyone', is_flag=True, help='All arms, whether they changed or not.')
+@click.option(
+    '--alpha',
+    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+    default=0.05,
+    show_default=True,
+    help='Share of healthy arms among those named, in the long run.',
+)
+@options.as_json
+def diagnose(
+    out: str,
+    scheduler: str | None,
+    workers: int | None,
+    arms: tuple[str, ...],
+    everyone: bool,
+    alpha: float,
+    as_json: bool,
+) -> None:
+    """Name what has happened to arms, each with its own past as baseline."""
+    from armid_ros.fleet.diagnose import cases, diagnose_fleet
+    from armid_ros.fleet.pages import write_pages
+    from armid_ros.fleet.store import Store
+    from armid_ros.fleet.watch import watch as look
+    from armid_ros.fleet.watch import write_watch
+
+    store = Store(out)
+    with progress('reading results') as tick:
+        found = look(store, alpha)
+        chosen = cases(found, arms, everyone)
+        rows: list[dict[str, Any]] = []
+        if chosen:
+            with _cluster(scheduler, workers) as client:
+                rows = diagnose_fleet(
+                    client,
+                    store,
+                    chosen,
+                    found,
+                    lambda ended, of: tick(ended / of, f'{ended} of {of} arms'),
+                )
+        write_watch(store, found)
+        write_pages(store, found)
+    if as_json:
+        click.echo(json_text({'schema': 'armid/fleet-diagnoses/1', 'arms': rows}, indent=1))
+        return
+    if not rows:
+        say('no arm is named; --arm or --all diagnose others')
+    for row in rows:
+        say(f'{row["arm"]}: {row["verdict"].replace("_", " ")}: {row["summary"]}')
+    say(f'{out}: index.html, pages/, reports/, watch/diagnoses.parquet')

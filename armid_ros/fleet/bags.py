@@ -1,0 +1,184 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which bags there are, and which arm and day each belongs to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+import datetime
+import hashlib
+import re
+from typing import Any
+from urllib.parse import quote
+
+from armid_ros.errors import FleetError
+from armid_ros.fleet.store import opened
+
+#: Endings of files that are bags, or parts of one.
+SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
+#: A date in a path: 2026-01-31, 2026_01_31 or 20260131.
+_DATE = re.compile(r'(?<!\d)(20\d\d)([-_]?)(\d\d)\2(\d\d)(?!\d)')
+_WILD = re.compile(r'[*?\[]')
+#: What stores call the version of a file, the surest first.
+_VERSIONS = ('ETag', 'etag', 'md5Hash', 'mtime', 'LastModified', 'updated', 'created')
+
+
+@dataclass(frozen=True, order=True)
+class BagFile:
+    """
+    A bag of a fleet.
+
+    Attributes
+    ----------
+    arm : str
+        Whose it is.
+    url : str
+        Where it is.
+    day : str
+        As 2026-01-31, of its path; empty where the path has none.
+    size : int
+        Bytes.
+    version : str
+        Changes when its content does.
+
+    """
+
+    arm: str
+    url: str
+    day: str = ''
+    size: int = 0
+    version: str = ''
+
+    @property
+    def name(self) -> str:
+        """Name of its files among the results: that of the bag, and a digest of where it is."""
+        last = self.url.rstrip('/').rsplit('/', 1)[-1]
+        digest = hashlib.sha256(self.url.encode()).hexdigest()[:10]
+        return f'{re.sub(r"[^A-Za-z0-9_.-]", "_", last)}-{digest}'
+
+
+def part_of(data_set: str, bag: BagFile, day: str) -> str:
+    """Return the file of a bag in a data set that is partitioned by arm and day."""
+    return f'{data_set}/{folder_of(bag.arm)}/day={day}/{bag.name}.parquet'
+
+
+def folder_of(arm: str) -> str:
+    """Return the partition of an arm."""
+    return f'arm={quote(arm, safe="")}'
+
+
+def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[BagFile]:
+    """
+    List the bags that URLs with wildcards stand for.
+
+    The arm of a bag is what the first wildcard stands for, unless that is the bag itself: then it
+    is the folder that the bag lies in.
+
+    Parameters
+    ----------
+    patterns : sequence of str
+        URLs or paths with wildcards; they name .mcap and .db3 files or rosbag2 directories.
+    arm_pattern : str, optional
+        A regular expression whose first group is the arm, searched for in the URL.
+
+    Raises
+    ------
+    FleetError
+        There is no bag, or a bag has no arm.
+
+    """
+    regular = None if arm_pattern is None else _compiled(arm_pattern)
+    found: dict[str, BagFile] = {}
+    for pattern in patterns:
+        filesystem, path = opened(pattern)
+        listed = _listed(filesystem, path, pattern)
+        bags = list(_bags(filesystem, listed))
+        if not bags:
+            raise FleetError(
+                f'{pattern}: no bag there; name .mcap or .db3 files or rosbag2 directories, as in '
+                f'"{pattern.rstrip("/")}/*/*"'
+            )
+        for at, size, version in bags:
+            url = filesystem.unstrip_protocol(at)
+            arm = _arm(path, at) if regular is None else _searched(regular, url)
+            plain = at if url.startswith('file://') else url
+            found[plain] = BagFile(arm, plain, _day(at), size, version)
+    return sorted(found.values())
+
+
+def _listed(filesystem: Any, path: str, pattern: str) -> Mapping[str, Mapping[str, Any]]:
+    try:
+        listed: Mapping[str, Mapping[str, Any]] = filesystem.glob(path, detail=True)
+    except Exception as error:  # every store has errors of its own
+        raise FleetError(f'{pattern}: cannot be listed: {error}') from error
+    return listed
+
+
+def _bags(
+    filesystem: Any, listed: Mapping[str, Mapping[str, Any]]
+) -> Iterator[tuple[str, int, str]]:
+    """Yield path, size and version of all bags; files of a bag that is there too are parts."""
+    whole: list[str] = []
+    for path, info in sorted(listed.items()):
+        path = path.rstrip('/')
+        if any(path.startswith(f'{folder}/') for folder in whole[-1:]):
+            continue
+        if info.get('type') == 'directory':
+            inside = [one for one in filesystem.ls(path, detail=True) if _is_part(one['name'])]
+            if inside:
+                whole.append(path)
+                versions = [_version(one) for one in sorted(inside, key=lambda one: one['name'])]
+                size = sum(int(one.get('size') or 0) for one in inside)
+                yield path, size, _digest(*versions)
+        elif path.endswith(SUFFIXES):
+            yield path, int(info.get('size') or 0), _digest(_version(info))
+
+
+def _is_part(path: str) -> bool:
+    return path.endswith(SUFFIXES)
+
+
+def _version(info: Mapping[str, Any]) -> str:
+    found = [str(info[name]) for name in _VERSIONS if info.get(name)][:1]
+    return '/'.join([str(info.get('name')), str(info.get('size')), *found])
+
+
+def _digest(*parts: str) -> str:
+    return hashlib.sha256('\n'.join(parts).encode()).hexdigest()[:16]
+
+
+def _arm(pattern: str, path: str) -> str:
+    wild = [k for k, part in enumerate(pattern.split('/')) if _WILD.search(part)]
+    parts = path.rstrip('/').split('/')
+    at = min(wild[0] if wild else len(parts) - 1, len(parts) - 1)
+    if at == len(parts) - 1 and at > 0:
+        at -= 1
+    return parts[at]
+
+
+def _searched(regular: re.Pattern[str], url: str) -> str:
+    match = regular.search(url)
+    if match is None:
+        raise FleetError(f'{url}: --arm {regular.pattern} finds no arm in it')
+    return match.group(1)
+
+
+def _compiled(pattern: str) -> re.Pattern[str]:
+    try:
+        compiled = re.compile(pattern)
+    except re.error as error:
+        raise FleetError(f'--arm {pattern}: {error}') from error
+    if compiled.groups < 1:
+        raise FleetError(f"--arm {pattern}: has no group, as in 'robots/([^/]+)/'")
+    return compiled
+
+
+def _day(path: str) -> str:
+    """Return the last date in a path."""
+    for year, _, month, day in reversed(_DATE.findall(path)):
+        try:
+            return datetime.date(int(year), int(month), int(day)).isoformat()
+        except ValueError:
+            continue
+    return ''

@@ -1,0 +1,101 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where the work is done: processes of this machine, or a Dask cluster by its address."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import logging
+import os
+import tempfile
+
+from armid_ros import __version__
+from armid_ros.errors import FleetError
+import dask
+from distributed import Client, LocalCluster
+
+#: What a worker of this machine may take before Dask moves results to the disk [bytes].
+WORKER_MEMORY = 1_200_000_000
+#: How long a cluster may take to answer [s].
+ANSWER = 30.0
+#: How long one that was lost may take to come back [s].
+PATIENCE = 120.0
+
+
+#: What Dask does beside the work all the time, for pages that nobody looks at here.
+_QUIET = {
+    'distributed.worker.profile.enabled': False,
+    'distributed.admin.tick.interval': '1s',
+    'distributed.admin.system-monitor.interval': '2s',
+}
+
+
+@contextmanager
+def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Client]:
+    """
+    Hold a connection to a cluster.
+
+    Parameters
+    ----------
+    scheduler : str or None
+        Address of a scheduler, as tcp://host:8786; None for processes of this machine.
+    workers : int, optional
+        How many, where they are of this machine; one a core by default.
+
+    Raises
+    ------
+    FleetError
+        No scheduler answers, or its workers have another version of this package or none.
+
+    """
+    logging.getLogger('distributed').setLevel(logging.CRITICAL)
+    if scheduler is None:
+        with _embedded(workers) as client:
+            yield client
+        return
+    try:
+        client = Client(scheduler, timeout=ANSWER)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise FleetError(f'--scheduler {scheduler}: does not answer: {error}') from error
+    with client:
+        client._timeout = PATIENCE  # there is no public name for it
+        _check_versions(client, scheduler)
+        yield client
+
+
+@contextmanager
+def _embedded(workers: int | None) -> Iterator[Client]:
+    with tempfile.TemporaryDirectory(prefix='armid-fleet-') as folder:
+        with (
+            dask.config.set(_QUIET),
+            LocalCluster(
+                n_workers=workers or len(os.sched_getaffinity(0)),
+                threads_per_worker=1,
+                memory_limit=WORKER_MEMORY,
+                dashboard_address='127.0.0.1:0',
+                local_directory=folder,
+                silence_logs=logging.CRITICAL,
+            ) as cluster,
+            Client(cluster) as client,
+        ):
+            yield client
+
+
+def _check_versions(client: Client, scheduler: str) -> None:
+    try:
+        versions = client.run(_version)
+    except ImportError as error:
+        raise FleetError(f'--scheduler {scheduler}: its workers lack {error.name}') from error
+    other = sorted({version for version in versions.values() if version != __version__})
+    if other:
+        raise FleetError(
+            f'--scheduler {scheduler}: its workers have armid_ros {", ".join(other)}, '
+            f'here it is {__version__}; install the same one'
+        )
+
+
+def _version() -> str:
+    from armid_ros import __version__
+
+    return __version__

@@ -1,0 +1,235 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What has happened to the arms that are named: the diagnosis, with the arm's own past as baseline.
+
+The model is what the arm was before its change, identified from its last bags then; the diagnosis
+looks at the first bags after it and is judged by one more that it only predicts. Results:
+
+    watch/diagnoses.parquet              one row an arm: verdict, summary, causes
+    reports/arm=A/diagnosis/             diagnosis.json, model.yaml, report.html
+    reports/arm=A/BAG/                   identification.json, model.yaml, report.html of each bag
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+import tempfile
+from typing import Any
+
+from armid_ros.api.diagnosis import diagnose
+from armid_ros.api.identification import identify
+from armid_ros.arm import ArmModel
+from armid_ros.errors import ArmidError, FleetError
+from armid_ros.fleet.bags import BagFile, folder_of
+from armid_ros.fleet.identify import kind_arm
+from armid_ros.fleet.job import Filters
+from armid_ros.fleet.kinds import document
+from armid_ros.fleet.run import RETRIES
+from armid_ros.fleet.store import fetched, Store
+from armid_ros.fleet.watch import Watch, WatchedArm
+from armid_ros.recording import read_recording, Recording
+from distributed import as_completed, Client
+import pyarrow as pa
+
+#: Bags before a change that say what the arm was, and bags after it that are looked at.
+BEFORE, AFTER = 3, 3
+
+DIAGNOSES = pa.schema(
+    [
+        ('arm', pa.string()),
+        ('verdict', pa.string()),  # of the diagnosis, or failed
+        ('summary', pa.string()),
+        ('effects', pa.list_(pa.string())),  # names of the catalogue, the largest first
+        ('closed', pa.float64()),  # share of the gap on data not used to fit
+        ('baseline', pa.list_(pa.string())),  # bags
+        ('bags', pa.list_(pa.string())),
+        ('report', pa.string()),  # in the results; empty if there is none
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """
+    An arm to be diagnosed.
+
+    Attributes
+    ----------
+    arm : str
+        Its name.
+    before, after : tuple of str
+        URLs of its bags before and after its change; the last one after is only predicted.
+
+    """
+
+    arm: str
+    before: tuple[str, ...]
+    after: tuple[str, ...]
+
+
+def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> list[Case]:
+    """
+    Choose the bags by which arms are diagnosed.
+
+    Parameters
+    ----------
+    found : Watch
+        The fleet over time.
+    arms : sequence of str
+        Which arms; by default those that are named.
+    everyone : bool
+        Whether all arms are.
+
+    Raises
+    ------
+    FleetError
+        An arm is not there.
+
+    """
+    by_name = {arm.arm: arm for arm in found.arms}
+    missing = [arm for arm in arms if arm not in by_name]
+    if missing:
+        raise FleetError(f"there is no arm '{missing[0]}'; there are {', '.join(by_name)}")
+    if arms:
+        chosen = [by_name[arm] for arm in arms]
+    else:
+        chosen = [arm for arm in found.arms if arm.named or everyone]
+    return [_case(arm) for arm in chosen if len(arm.bags) >= 2]
+
+
+def diagnose_fleet(
+    client: Client,
+    store: Store,
+    chosen: Sequence[Case],
+    found: Watch,
+    tell: Callable[[int, int], None] = lambda ended, of: None,
+) -> list[dict[str, Any]]:
+    """
+    Diagnose arms on a cluster; a row of ``watch/diagnoses.parquet`` each.
+
+    Rows of other arms stay.
+
+    """
+    kinds = document(store)['kinds']
+    kind_of = {arm.arm: arm.kind for arm in found.arms}
+    model_of = {key: kind_arm(store, facts, key) for key, facts in kinds.items()}
+    futures = {}
+    for case in chosen:
+        facts = kinds[kind_of[case.arm]]
+        filters = Filters(**facts['filters'])
+        model = model_of[kind_of[case.arm]]
+        future = client.submit(
+            one_arm, case, model, filters, facts['topic'], store.url, retries=RETRIES, pure=False
+        )
+        futures[future] = case
+    rows: list[dict[str, Any]] = []
+    for future in as_completed(list(futures), raise_errors=False):
+        case = futures[future]
+        if future.status == 'finished':
+            rows.append(future.result())
+        else:
+            rows.append(_row(case, 'failed', str(future.exception())))
+        tell(len(rows), len(futures))
+    rows.sort(key=lambda row: str(row['arm']))
+    table = store.read_table('watch/diagnoses.parquet')
+    new = {row['arm'] for row in rows}
+    old = [] if table is None else [row for row in table.to_pylist() if row['arm'] not in new]
+    both = pa.Table.from_pylist([*old, *rows], DIAGNOSES)
+    store.write_table('watch/diagnoses.parquet', both)
+    return rows
+
+
+def one_arm(
+    case: Case, model: ArmModel, filters: Filters, topic: str | None, out: str
+) -> dict[str, Any]:
+    """Task: identify what an arm was, diagnose what it is, and draw the bags beside the change."""
+    store = Store(out)
+    try:
+        with ExitStack() as stack:
+            before, after = (
+                [_read(stack, url, model, topic) for url in urls]
+                for urls in (case.before, case.after)
+            )
+            for url, recording in zip(
+                (*case.before[-1:], *case.after[:1]), (*before[-1:], *after[:1]), strict=True
+            ):
+                one = identify(
+                    model, recording, cutoff=filters.cutoff_hz, decimation=filters.decimation
+                )
+                name = BagFile(case.arm, url).name
+                _keep(store, one.save, f'reports/{folder_of(case.arm)}/{name}')
+            past = identify(model, before, cutoff=filters.cutoff_hz, decimation=filters.decimation)
+            held_out = after[2:] if len(after) > 2 else []
+            result = diagnose(
+                past.arm,
+                after[:2],
+                validate=held_out,
+                baseline=before,
+                cutoff=filters.cutoff_hz,
+                decimation=filters.decimation,
+            )
+            report = f'reports/{folder_of(case.arm)}/diagnosis'
+            _keep(store, result.save, report)
+    except ArmidError as error:
+        return _row(case, 'failed', str(error))
+    gap = result.core.gap
+    return _row(
+        case,
+        result.verdict,
+        result.summary_text,
+        list(dict.fromkeys(result.names)),
+        None if gap is None else float(gap.closed),
+        f'{report}/report.html',
+    )
+
+
+def _case(arm: WatchedArm) -> Case:
+    urls = [str(row['bag']) for row in arm.bags]
+    middle = max(1, len(urls) // 2)
+    if not arm.named:
+        before, after = urls[:middle], urls[middle:]
+    elif arm.named[0].kind == 'trend':
+        before, after = urls[: min(BEFORE, middle)], urls[-min(AFTER, len(urls) - middle) :]
+    else:
+        cut = urls.index(arm.bag_at(arm.named[0])['bag'])
+        before, after = urls[:cut], urls[cut:]
+    return Case(arm.arm, tuple(before[-BEFORE:]), tuple(after[:AFTER]))
+
+
+def _read(stack: ExitStack, url: str, model: ArmModel, topic: str | None) -> Recording:
+    path = stack.enter_context(fetched(url))
+    return read_recording(path, joints=model.robot.joints, topic=topic)
+
+
+def _keep(store: Store, save: Callable[[str], Path], name: str) -> None:
+    """Put the files that a result saves among the results, report.html last."""
+    with tempfile.TemporaryDirectory(prefix='armid-report-') as folder:
+        save(folder)
+        files = sorted(Path(folder).iterdir(), key=lambda file: file.name == 'report.html')
+        for file in files:
+            store.write(f'{name}/{file.name}', file.read_bytes())
+
+
+def _row(
+    case: Case,
+    verdict: str,
+    summary: str,
+    effects: Sequence[str] = (),
+    closed: float | None = None,
+    report: str = '',
+) -> dict[str, Any]:
+    return {
+        'arm': case.arm,
+        'verdict': verdict,
+        'summary': summary,
+        'effects': list(effects),
+        'closed': closed,
+        'baseline': list(case.before),
+        'bags': list(case.after),
+        'report': report,
+    }

@@ -1,0 +1,278 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The tables of results: what is in them, and how a bag or an arm becomes rows.
+
+    bags/arm=A/day=D/BAG.parquet         one row: what was recorded, how well it fits, its triangle
+    parameters/arm=A/day=D/BAG.parquet   one row a parameter: what the bag tells by itself
+    arms/arm=A/estimate.parquet          one row a parameter: what all bags of the arm tell
+    refused/arm=A/BAG.parquet            one row: why a bag is not used
+
+A bag has one file in each, named after it, so a run writes over what it made of the same bag and
+over nothing else. ``bags`` is written last: what is there is complete.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import datetime
+import hashlib
+
+from armid_ros.arm import parameter_table
+from armid_ros.errors import FleetError
+from armid_ros.estimate import ParameterName
+from armid_ros.fleet.bags import BagFile, folder_of, part_of
+from armid_ros.fleet.job import Job
+from armid_ros.fleet.merge import ArmEstimate
+from armid_ros.fleet.store import Store
+from armid_ros.fleet.summary import MotionStatistics, OwnEstimate, Refused, Summary
+from armid_ros.identification.triangle import Triangle
+from armid_ros.motion import FloatArray
+import numpy as np
+import pyarrow as pa
+
+_NUMBERS = pa.list_(pa.float64())
+_STAMP = pa.timestamp('us', tz='UTC')
+
+#: One row a bag.
+BAGS = pa.schema(
+    [
+        ('bag', pa.string()),  # URL
+        ('version', pa.string()),  # changes when the bag does
+        ('settings', pa.string()),  # changes when model or filters do
+        ('run', pa.string()),  # that made it
+        ('start', _STAMP),  # first stamp
+        ('start_ns', pa.int64()),
+        ('seconds', pa.float64()),
+        ('samples', pa.int64()),
+        ('bytes', pa.int64()),
+        ('relative_error_percent', pa.float64()),  # of the bag's own fit
+        ('condition_number', pa.float64()),
+        ('joints', pa.list_(pa.string())),
+        ('residual_std', _NUMBERS),  # of each joint [N m]
+        ('lowest', _NUMBERS),  # positions [rad or m]
+        ('highest', _NUMBERS),
+        ('top_speed', _NUMBERS),  # [rad/s or m/s]
+        ('notes', pa.list_(pa.string())),
+        ('triangle', _NUMBERS),  # as Triangle.packed
+    ]
+)
+_PARAMETER = [
+    ('name', pa.string()),
+    ('joint', pa.string()),
+    ('unit', pa.string()),
+    ('value', pa.float64()),
+    ('std', pa.float64()),  # standard deviation
+]
+#: One row a parameter of a bag.
+PARAMETERS = pa.schema([('bag', pa.string()), ('start', _STAMP), *_PARAMETER])
+#: One row a parameter of an arm.
+ARMS = pa.schema(
+    [
+        ('settings', pa.string()),
+        ('versions', pa.string()),  # changes when a bag does
+        ('bags', pa.int64()),
+        ('seconds', pa.float64()),
+        ('relative_error_percent', pa.float64()),
+        ('condition_number', pa.float64()),
+        *_PARAMETER,
+    ]
+)
+#: One row a bag that is not used.
+REFUSED = pa.schema(
+    [
+        ('bag', pa.string()),
+        ('version', pa.string()),
+        ('settings', pa.string()),
+        ('run', pa.string()),
+        ('failed', pa.bool_()),  # by a store or a worker, not by the bag
+        ('reason', pa.string()),
+    ]
+)
+
+
+def write_summary(store: Store, summary: Summary, job: Job) -> None:
+    """Write what is kept of a bag."""
+    bag, own, motion = summary.bag, summary.own, summary.motion
+    start = datetime.datetime.fromtimestamp(summary.start_ns * 1e-9, datetime.UTC)
+    robot = job.arm.robot
+    rows = [] if own is None else _rows(own.parameters, own.values, own.std)
+    table = pa.Table.from_pylist(
+        [{'bag': bag.url, 'start': start, **row} for row in rows], PARAMETERS
+    )
+    store.write_table(part_of('parameters', bag, summary.day), table)
+    row = {
+        'bag': bag.url,
+        'version': bag.version,
+        'settings': job.digest,
+        'run': job.run,
+        'start': start,
+        'start_ns': summary.start_ns,
+        'seconds': motion.seconds,
+        'samples': motion.samples,
+        'bytes': bag.size,
+        'relative_error_percent': None if own is None else own.relative_error_percent,
+        'condition_number': None if own is None else own.condition_number,
+        'joints': list(robot.joints),
+        'residual_std': None if own is None else own.joint_std,
+        'lowest': motion.lowest,
+        'highest': motion.highest,
+        'top_speed': motion.top_speed,
+        'notes': list(summary.notes),
+        'triangle': summary.triangle.packed(),
+    }
+    store.write_table(part_of('bags', bag, summary.day), pa.Table.from_pylist([row], BAGS))
+    for day in [] if bag.day else _days(store, bag):
+        if day != summary.day:  # the same bag, recorded anew
+            store.remove(part_of('bags', bag, day))
+            store.remove(part_of('parameters', bag, day))
+    store.remove(_refused(bag))
+
+
+def find_summary(store: Store, bag: BagFile, job: Job) -> Summary | Refused | None:
+    """
+    Return what is among the results of a bag, if it is of the same bag and settings.
+
+    That of an earlier run counts where the job resumes.
+
+    """
+    refused = store.read_table(_refused(bag))
+    if refused is not None:
+        row = refused.to_pylist()[0]
+        if _same(row, bag, job) and not row['failed']:
+            return Refused(bag, row['reason'])
+    days = [bag.day] if bag.day else _days(store, bag) if job.resume else []
+    for day in days:
+        table = store.read_table(part_of('bags', bag, day))
+        row = {} if table is None else table.to_pylist()[0]
+        if row and _same(row, bag, job):
+            return _summary(row, bag, day, job)
+    return None
+
+
+def write_refused(store: Store, refused: Refused, job: Job) -> None:
+    """Write why a bag is not used."""
+    row = {
+        'bag': refused.bag.url,
+        'version': refused.bag.version,
+        'settings': job.digest,
+        'run': job.run,
+        'failed': refused.failed,
+        'reason': refused.reason,
+    }
+    store.write_table(_refused(refused.bag), pa.Table.from_pylist([row], REFUSED))
+    for data_set in ('bags', 'parameters'):  # of a version that was whole
+        for day in _days(store, refused.bag, data_set):
+            store.remove(part_of(data_set, refused.bag, day))
+
+
+def write_arm(store: Store, arm: str, estimate: ArmEstimate, job: Job) -> None:
+    """Write what the bags of an arm tell together."""
+    common = {
+        'settings': job.digest,
+        'versions': versions_digest(estimate.versions),
+        'bags': len(estimate.versions),
+        'seconds': estimate.motion.seconds,
+        'relative_error_percent': estimate.relative_error_percent,
+        'condition_number': estimate.condition_number,
+    }
+    rows = _rows(estimate.parameters, estimate.values, estimate.std)
+    table = pa.Table.from_pylist([{**common, **row} for row in rows], ARMS)
+    store.write_table(_estimate(arm), table)
+
+
+def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> list[Refused] | None:
+    """
+    Tell whether the estimate of an arm is of exactly these bags, less those refused.
+
+    Returns
+    -------
+    list of Refused or None
+        Those refused; None if the arm has to be done.
+
+    """
+    table = store.read_table(_estimate(arm))
+    row = {} if table is None or not len(table) else table.slice(0, 1).to_pylist()[0]
+    if not row or row['settings'] != job.digest:
+        return None
+    refused = []
+    listed = set(store.names(f'refused/{folder_of(arm)}/*.parquet'))
+    for bag in bags:
+        if _refused(bag) in listed:
+            known = find_summary(store, bag, job)
+            if not isinstance(known, Refused):
+                return None
+            refused.append(known)
+    out = {one.bag.url for one in refused}
+    used = [(bag.url, bag.version) for bag in bags if bag.url not in out]
+    return refused if row['versions'] == versions_digest(used) else None
+
+
+def versions_digest(versions: Sequence[tuple[str, str]]) -> str:
+    """Return a name for a set of bags as they are now."""
+    lines = sorted('\t'.join(pair) for pair in versions)
+    return hashlib.sha256('\n'.join(lines).encode()).hexdigest()[:16]
+
+
+def table_of(store: Store, data_set: str) -> pa.Table:
+    """
+    Return a data set as one table.
+
+    Raises
+    ------
+    FleetError
+        It is not there.
+
+    """
+    table = store.data_set(data_set)
+    if table is None:
+        raise FleetError(f'{store.url}: holds no {data_set}; run `armid fleet identify` first')
+    return table
+
+
+def _rows(
+    parameters: tuple[ParameterName, ...], values: FloatArray, std: FloatArray
+) -> list[dict[str, object]]:
+    rows: list[dict[str, object]] = parameter_table(parameters, values, list(std))
+    return [
+        {name: row[name] for name in ('name', 'joint', 'unit', 'value', 'std')} for row in rows
+    ]
+
+
+def _same(row: dict[str, object], bag: BagFile, job: Job) -> bool:
+    if row['version'] != bag.version or row['settings'] != job.digest:
+        return False
+    return job.resume or row['run'] == job.run
+
+
+def _summary(row: dict[str, object], bag: BagFile, day: str, job: Job) -> Summary:
+    def array(name: str) -> FloatArray:
+        return np.array(row[name], dtype=float)
+
+    motion = MotionStatistics(
+        int(str(row['samples'])),
+        float(str(row['seconds'])),
+        array('lowest'),
+        array('highest'),
+        array('top_speed'),
+    )
+    own: OwnEstimate | None = None  # is among the parameters already
+    triangle = Triangle.unpacked(array('triangle'))
+    start = int(str(row['start_ns']))
+    computed = row['run'] == job.run
+    return Summary(bag, day, start, triangle, motion, own, computed=computed)
+
+
+def _refused(bag: BagFile) -> str:
+    return f'refused/{folder_of(bag.arm)}/{bag.name}.parquet'
+
+
+def _estimate(arm: str) -> str:
+    return f'arms/{folder_of(arm)}/estimate.parquet'
+
+
+def _days(store: Store, bag: BagFile, data_set: str = 'bags') -> list[str]:
+    """Return the days under which a bag is among the results."""
+    pattern = f'{data_set}/{folder_of(bag.arm)}/day=*/{bag.name}.parquet'
+    return [name.split('/')[2].removeprefix('day=') for name in store.names(pattern)]

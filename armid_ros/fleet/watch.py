@@ -1,0 +1,393 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+A fleet over time: series of its results, what has changed, and who is told.
+
+    watch/arms.parquet      one row an arm: its health, and how sure that is
+    watch/changes.parquet   one row a change that an arm is named for
+    watch/wear.parquet      one row a parameter of friction and the like: its slope in a month
+    alarms.jsonl            one line a change, the same for programs
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+import datetime
+import json
+from typing import Any
+
+from armid_ros.errors import FleetError
+from armid_ros.fleet.changes import (
+    Change,
+    judge,
+    Judged,
+    named,
+    Series,
+    Spread,
+    spreads,
+    unlike_siblings,
+    wear,
+)
+from armid_ros.fleet.identify import kind_arm
+from armid_ros.fleet.kinds import document
+from armid_ros.fleet.results import table_of
+from armid_ros.fleet.store import Store
+from armid_ros.motion import FloatArray
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from scipy import stats
+
+#: Share of healthy arms among those named, in the long run.
+ALPHA = 0.05
+#: Half width of a 95 % interval, in standard deviations.
+_WIDE = 1.96
+#: What the series of residuals is called; it is the logarithm of their deviation.
+RESIDUAL = 'residual'
+_DAY_NS = 86_400 * 1e9
+
+_CHANGE = [
+    ('arm', pa.string()),
+    ('kind', pa.string()),  # step or trend
+    ('name', pa.string()),
+    ('joint', pa.string()),
+    ('unit', pa.string()),
+    ('last_day', pa.string()),  # last bag before a step; first bag of a trend
+    ('first_day', pa.string()),  # first bag after a step; last bag of a trend
+    ('bag', pa.string()),  # that bag
+    ('level', pa.float64()),  # before
+    ('size', pa.float64()),  # of a step, or of a trend in a month
+    ('std', pa.float64()),
+    ('p', pa.float64()),  # of this series
+    ('adjusted_p', pa.float64()),  # of the arm, over all arms
+    ('text', pa.string()),
+]
+CHANGES = pa.schema(_CHANGE)
+WEAR = pa.schema(
+    [
+        ('arm', pa.string()),
+        ('name', pa.string()),
+        ('joint', pa.string()),
+        ('unit', pa.string()),
+        ('per_month', pa.float64()),
+        ('lower', pa.float64()),  # 95 % interval
+        ('upper', pa.float64()),
+    ]
+)
+ARMS = pa.schema(
+    [
+        ('arm', pa.string()),
+        ('health', pa.string()),  # changed, wearing, healthy or too few bags
+        ('bags', pa.int64()),
+        ('refused', pa.int64()),
+        ('adjusted_p', pa.float64()),
+        ('relative_error_percent', pa.float64()),  # median of its bags
+        ('unlike', pa.string()),  # the parameter furthest from that of its siblings
+        ('unlike_by', pa.float64()),  # in robust standard deviations of the arms
+    ]
+)
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedArm:
+    """
+    An arm over time.
+
+    Attributes
+    ----------
+    arm : str
+        Its name.
+    kind : str
+        That of its robot.
+    series : tuple of Series
+        Its parameters, and the logarithm of its residuals.
+    bags : tuple of dict
+        A row of the table ``bags`` each, in order of time, without triangles.
+    judged : Judged
+        What the tests say.
+    named : tuple of Change
+        What it is named for.
+    unlike : tuple of str and float
+        Parameter furthest from that of its siblings, and by how much.
+    refused : tuple of dict
+        Rows of the table ``refused``.
+
+    """
+
+    arm: str
+    kind: str
+    series: tuple[Series, ...]
+    bags: tuple[dict[str, Any], ...]
+    judged: Judged
+    named: tuple[Change, ...]
+    unlike: tuple[str, float]
+    refused: tuple[dict[str, Any], ...]
+
+    @property
+    def health(self) -> str:
+        """One word or two."""
+        if self.named:
+            return 'changed' if self.named[0].kind == 'step' else 'wearing'
+        return 'healthy' if self.judged.changes else 'too few bags'
+
+    def bag_at(self, change: Change, offset: int = 0) -> dict[str, Any]:
+        """Return the row of the bag at a change: the first one after it, or so many from it."""
+        at = change.index if change.kind == 'step' else len(change.series.days) - 1
+        day = change.series.days[min(max(0, at + offset), len(change.series.days) - 1)]
+        return min(self.bags, key=lambda row: abs(row['start_ns'] / _DAY_NS - day))
+
+
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """
+    A fleet over time.
+
+    Attributes
+    ----------
+    arms : tuple of WatchedArm
+        Those named first.
+    spread : dict
+        Spread of bags by kind of arm and parameter.
+    wearing : frozenset of str
+        Names of the parameters that wear is looked for in: those of the effects.
+    alpha : float
+        False discovery rate.
+
+    """
+
+    arms: tuple[WatchedArm, ...]
+    spread: Mapping[str, Mapping[tuple[str, str], Spread]]
+    wearing: frozenset[str]
+    alpha: float
+
+
+def watch(store: Store, alpha: float = ALPHA) -> Watch:
+    """
+    Look at the results of a fleet over time.
+
+    Raises
+    ------
+    FleetError
+        There are no results.
+
+    """
+    kind_of: Mapping[str, str] = document(store).get('arms', {})
+    if not kind_of:
+        raise FleetError(f'{store.url}: holds no fleet; run `armid fleet identify` first')
+    bags = _bags(store)
+    series = _series(table_of(store, 'parameters'), bags)
+    refused: dict[str, list[dict[str, Any]]] = {}
+    table = store.data_set('refused')
+    for row in [] if table is None else table.to_pylist():
+        refused.setdefault(str(row['arm']), []).append(row)
+    by_kind: dict[str, list[Series]] = {}
+    for one in series:
+        by_kind.setdefault(kind_of.get(one.arm, ''), []).append(one)
+    spread = {kind: spreads(group) for kind, group in by_kind.items()}
+    judged = _judged(by_kind, spread)
+    unlike = {kind: unlike_siblings(group) for kind, group in by_kind.items()}
+    own: dict[str, list[Series]] = {}
+    for one in series:
+        own.setdefault(one.arm, []).append(one)
+    arms = [
+        WatchedArm(
+            one.arm,
+            kind_of.get(one.arm, ''),
+            tuple(own[one.arm]),
+            tuple(bags.get(one.arm, ())),
+            one,
+            named(one, alpha),
+            _furthest(unlike[kind_of.get(one.arm, '')], own[one.arm]),
+            tuple(refused.get(one.arm, ())),
+        )
+        for one in judged
+    ]
+    return Watch(tuple(arms), spread, _beside_the_body(store), alpha)
+
+
+def write_watch(store: Store, found: Watch) -> None:
+    """Write tables and alarms."""
+    changes = [row for arm in found.arms for row in change_rows(arm)]
+    tables = {
+        'changes': pa.Table.from_pylist(changes, CHANGES),
+        'wear': pa.Table.from_pylist(list(wear_rows(found)), WEAR),
+        'arms': pa.Table.from_pylist([_arm_row(arm) for arm in found.arms], ARMS),
+    }
+    for name, table in tables.items():
+        store.write_table(f'watch/{name}.parquet', table)
+    store.write('alarms.jsonl', ''.join(json.dumps(row) + '\n' for row in changes))
+
+
+def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
+    """Return the changes that an arm is named for, the least probable first."""
+    rows = []
+    for change in arm.named:
+        series = change.series
+        last, first = (change.index - 1, change.index) if change.kind == 'step' else (0, -1)
+        rows.append(
+            {
+                'arm': arm.arm,
+                'kind': change.kind,
+                'name': series.name,
+                'joint': series.joint,
+                'unit': series.unit,
+                'last_day': day_text(float(series.days[last])),
+                'first_day': day_text(float(series.days[first])),
+                'bag': arm.bag_at(change)['bag'],
+                'level': change.level,
+                'size': change.size,
+                'std': change.std,
+                'p': change.p,
+                'adjusted_p': arm.judged.adjusted,
+                'text': sentence(change),
+            }
+        )
+    return rows
+
+
+def wear_rows(found: Watch) -> Iterator[dict[str, Any]]:
+    """Yield the slope of every parameter that is none of a rigid body, of every arm."""
+    for arm in found.arms:
+        for series in arm.series:
+            if series.name not in found.wearing or len(series.values) < 2:
+                continue
+            slope, std = wear(series, found.spread[arm.kind][series.parameter])
+            if np.isfinite(std):
+                yield {
+                    'arm': arm.arm,
+                    'name': series.name,
+                    'joint': series.joint,
+                    'unit': series.unit,
+                    'per_month': slope,
+                    'lower': slope - _WIDE * std,
+                    'upper': slope + _WIDE * std,
+                }
+
+
+def sentence(change: Change) -> str:
+    """Say what has changed, when, and by how much with a 95 % interval."""
+    series = change.series
+    what = _what(series)
+    if series.name == RESIDUAL:
+        lower, upper = (
+            100.0 * np.expm1(change.size + sign * _WIDE * change.std) for sign in (-1.0, 1.0)
+        )
+        by = f'by {100.0 * np.expm1(change.size):+.0f} % ({lower:+.0f} to {upper:+.0f} %)'
+    else:
+        by = f'by {change.size:+.3g} ± {_WIDE * change.std:.2g} {series.unit}'.rstrip()
+    if change.kind == 'trend':
+        return f'{what} drifts {by} a month since {day_text(float(series.days[0]))}'
+    last, first = (day_text(float(series.days[k])) for k in (change.index - 1, change.index))
+    when = f'on {first}' if last == first else f'between {last} and {first}'
+    return f'{what} changed {by} {when}'
+
+
+def day_text(days: float) -> str:
+    """Return days of the epoch as a date."""
+    moment = datetime.datetime.fromtimestamp(86_400.0 * days, datetime.UTC)
+    return moment.date().isoformat()
+
+
+def _what(series: Series) -> str:
+    if series.name == RESIDUAL:
+        return f'residual torque of {series.joint}'
+    if series.name.isidentifier() and '_' in series.name:
+        return f'{series.name.replace("_", " ")} of {series.joint}'
+    return f'inertial parameter {series.name}'
+
+
+def _beside_the_body(store: Store) -> frozenset[str]:
+    """Return the names of the parameters that effects have."""
+    names: set[str] = set()
+    for key, facts in document(store)['kinds'].items():
+        arm = kind_arm(store, facts, key)
+        rigid = len(arm.robot.rigid_parameters)
+        names.update(parameter.name for parameter in arm.parameters[rigid:])
+    return frozenset(names)
+
+
+def _judged(
+    by_kind: Mapping[str, Sequence[Series]],
+    spread: Mapping[str, Mapping[tuple[str, str], Spread]],
+) -> list[Judged]:
+    """Judge all arms together, each by the spread of its own kind."""
+    judged = [one for kind, group in by_kind.items() for one in judge(group, spread[kind])]
+    adjusted = stats.false_discovery_control([one.p for one in judged]) if judged else []
+    both = [replace(one, adjusted=float(q)) for one, q in zip(judged, adjusted, strict=True)]
+    return sorted(both, key=lambda one: (one.adjusted, one.p, one.arm))
+
+
+def _bags(store: Store) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows of all bags, by arm and in order of time."""
+    table = table_of(store, 'bags').drop_columns(['triangle'])
+    bags: dict[str, list[dict[str, Any]]] = {}
+    for row in table.to_pylist():
+        bags.setdefault(str(row['arm']), []).append(row)
+    for rows in bags.values():
+        rows.sort(key=lambda row: (row['start_ns'], row['bag']))
+    return bags
+
+
+def _series(parameters: pa.Table, bags: Mapping[str, list[dict[str, Any]]]) -> list[Series]:
+    """Return every parameter of every arm over time, and the logarithm of its residuals."""
+    found = []
+    for arm, rows in sorted(bags.items()):
+        days = np.array([row['start_ns'] / _DAY_NS for row in rows])
+        place = {row['bag']: k for k, row in enumerate(rows)}
+        found += _residuals(arm, days, rows)
+        own = parameters.filter(pc.equal(pc.cast(parameters['arm'], pa.string()), arm))
+        at = np.array([place.get(bag, -1) for bag in own['bag'].to_pylist()], dtype=np.intp)
+        keys = list(
+            zip(*(own[name].to_pylist() for name in ('name', 'joint', 'unit')), strict=True)
+        )
+        numbers: dict[str, FloatArray] = {
+            name: own[name].to_numpy(zero_copy_only=False) for name in ('value', 'std')
+        }
+        groups: dict[tuple[str, str, str], list[int]] = {}
+        for row, key in enumerate(keys):
+            if at[row] >= 0:
+                groups.setdefault(key, []).append(row)
+        for key, members in groups.items():
+            order = np.array(sorted(members, key=lambda row: int(at[row])))
+            found.append(
+                Series(arm, *key, days[at[order]], numbers['value'][order], numbers['std'][order])
+            )
+    return found
+
+
+def _residuals(arm: str, days: FloatArray, rows: Sequence[dict[str, Any]]) -> list[Series]:
+    fitted = [k for k, row in enumerate(rows) if row['residual_std']]
+    if not fitted:
+        return []
+    logs = np.log(np.maximum([rows[k]['residual_std'] for k in fitted], 1e-300))
+    joints = rows[fitted[0]]['joints']
+    return [
+        Series(arm, RESIDUAL, joint, '', days[fitted], logs[:, j], np.zeros(len(fitted)))
+        for j, joint in enumerate(joints)
+    ]
+
+
+def _furthest(
+    unlike: Mapping[tuple[str, str, str], float], series: Sequence[Series]
+) -> tuple[str, float]:
+    distances = {one: unlike[one.arm, *one.parameter] for one in series if one.name != RESIDUAL}
+    if not distances:
+        return '', 0.0
+    furthest = max(distances, key=lambda one: abs(distances[one]))
+    return _what(furthest), distances[furthest]
+
+
+def _arm_row(arm: WatchedArm) -> dict[str, Any]:
+    errors = [row['relative_error_percent'] for row in arm.bags if row['relative_error_percent']]
+    return {
+        'arm': arm.arm,
+        'health': arm.health,
+        'bags': len(arm.bags),
+        'refused': len(arm.refused),
+        'adjusted_p': arm.judged.adjusted,
+        'relative_error_percent': float(np.median(errors)) if errors else None,
+        'unlike': arm.unlike[0],
+        'unlike_by': arm.unlike[1],
+    }

@@ -1,0 +1,113 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A bag that may be larger than the memory, as recordings of a part of its time each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from armid_ros.errors import RecordingError
+from armid_ros.files import reading
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state_decoder import JointStateDecoder, JointStates
+from armid_ros.recording.reader import assemble, check_joints, choose_topic
+from armid_ros.recording.recording import Recording
+from armid_ros.recording.settings import DEFAULT, ReadSettings
+import numpy as np
+import numpy.typing as npt
+
+#: Returns the stamp [ns] from which on samples of a piece are to be in the next one as well.
+Keep = Callable[[Recording], int]
+
+
+def read_pieces(
+    path: str | Path,
+    *,
+    joints: Sequence[str],
+    topic: str | None = None,
+    samples: int,
+    keep: Keep,
+    settings: ReadSettings = DEFAULT,
+) -> Iterator[tuple[Recording, bool]]:
+    """
+    Yield the measurements of some joints piece by piece, in the order of storage.
+
+    Parameters
+    ----------
+    path, joints, topic, settings
+        As of ``read_recording``.
+    samples : int
+        Messages that a piece takes at most, beside those that the piece before left it.
+    keep : callable
+        Asked of every piece but the last; what lies before the stamp that it returns is let go.
+
+    Yields
+    ------
+    piece : Recording
+        With times from its own first sample on.
+    last : bool
+        Whether it is the last one.
+
+    Raises
+    ------
+    RecordingError
+        As ``read_recording``.
+
+    """
+    joints = tuple(joints)
+    with Bag(path, settings) as bag:
+        chosen = choose_topic(bag, joints, topic)
+        decoder = JointStateDecoder(joints)
+        where = f'{path}: {chosen.name}'
+        held: list[JointStates] = []
+        new = 0
+
+        def made(damage: str = '') -> Recording:
+            check_joints(where, decoder, joints)
+            with reading(where, RecordingError):
+                return assemble(str(path), chosen.name, joints, list(held), decoder, damage)
+
+        for part in _parts(bag, chosen.name, decoder, samples):
+            if new and new + len(part) > samples:
+                piece = made()
+                yield piece, False
+                held, new = list(_from(held, keep(piece), piece.clock)), 0
+            held.append(part)
+            new += len(part)
+        yield made(bag.damage), True
+
+
+def _parts(bag: Bag, topic: str, decoder: JointStateDecoder, most: int) -> Iterator[JointStates]:
+    """Yield the messages of a topic, so many at a time at most."""
+    with reading(bag.path, RecordingError):
+        for block in bag.blocks(topic):
+            for states in decoder.decode(block):
+                for start in range(0, len(states), most):
+                    yield _part(states, slice(start, start + most))
+
+
+def _from(held: Sequence[JointStates], stamp: int, clock: str) -> Iterator[JointStates]:
+    """Yield what messages have from a stamp on."""
+    for states in held:
+        late = (states.header if clock == 'header' else states.receive) >= stamp
+        if late.any():
+            yield _part(states, np.flatnonzero(late))
+
+
+def _part(states: JointStates, which: slice | npt.NDArray[np.intp]) -> JointStates:
+    """Return some of the messages."""
+    q, dq, tau = (
+        None if values is None else values[which]
+        for values in (states.position, states.velocity, states.effort)
+    )
+    return replace(
+        states,
+        number=states.number[which],
+        header=states.header[which],
+        receive=states.receive[which],
+        position=q,
+        velocity=dq,
+        effort=tau,
+    )

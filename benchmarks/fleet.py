@@ -1,0 +1,317 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+A fleet whose truth is known: what `armid fleet` finds of it, and what that costs.
+
+Arms of one kind differ in mass and friction, and move another way in every bag, a bag a day.
+Friction goes with the temperature of the day. Some arms change: friction steps up, a load stays in
+the hand, a joint wears, or something acts that the model does not have. Some bags are damaged.
+
+    python -m benchmarks.fleet generate DIR [--arms N] [--bags M] [--changed K] [--damaged D]
+    python -m benchmarks.fleet score DIR RESULTS     after `armid fleet identify` and `watch`
+    python -m benchmarks.fleet costs [DIR]           processor time, memory, bytes, efficiency
+    python -m benchmarks.fleet merge                 10,000 triangles of 84 parameters
+
+Without a word: a small fleet, all of it.
+
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+from pathlib import Path
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.motion import Motion
+from armid_ros.recording import read_recording, write_recording
+from armid_ros.robots import load_robot
+import numpy as np
+
+ROBOT = Path(__file__).parents[1] / 'examples' / 'arm.urdf'
+EFFECTS = 'viscous_friction,coulomb_friction,torque_offset'
+RATE = 200.0
+FIRST_DAY = datetime.datetime(2026, 1, 1, 8, tzinfo=datetime.UTC)
+#: Frequencies of the motion [Hz] and their sizes [rad].
+HARMONICS = ((0.1, 0.5), (0.25, 0.3), (0.55, 0.12))
+#: Noise of the torque sensors [N m].
+NOISE = np.array([0.05, 0.05, 0.02])
+VISCOUS, COULOMB = np.array([0.6, 0.6, 0.3]), np.array([0.5, 0.5, 0.25])
+#: Speed at which joints slide; below, dry friction is less, which the model does not know [rad/s].
+SLIDING = 0.02
+#: How much the temperature of a day changes viscous friction, as a share.
+TEMPERATURE = 0.01
+#: What happens to arms: effect of the catalogue, and the range its size is drawn from.
+CHANGES = {
+    'friction': (0.08, 0.3),  # share by which the dry friction of a joint steps up
+    'load': (0.05, 0.3),  # mass in the hand [kg]
+    'wear': (0.02, 0.06),  # share of its viscous friction that a joint gains a day
+    'unmodelled': (0.1, 0.5),  # spring of a cable at a joint [N m/rad]
+}
+
+
+def healthy(rng):
+    """Draw an arm: the description with other masses, and its own friction."""
+    robot = load_robot(str(ROBOT))
+    arm = ArmModel.of(robot, effects=EFFECTS)
+    bodies = robot.rigid_parameters.reshape(-1, 10) * rng.normal(1.0, 0.03, (robot.n_joints, 1))
+    viscous, coulomb = (base * rng.uniform(0.8, 1.25, 3) for base in (VISCOUS, COULOMB))
+    return arm.with_theta(
+        np.concatenate([bodies.ravel(), viscous, coulomb, rng.normal(0, 0.1, 3)])
+    )
+
+
+def lived(arm, truth, day, rng):
+    """Return an arm as it is on a day."""
+    theta = arm.theta.copy()
+    rigid = len(arm.robot.rigid_parameters)
+    theta[rigid : rigid + 3] *= 1.0 + TEMPERATURE * rng.normal()
+    if not truth or day < truth['day']:
+        return arm.with_theta(theta)
+    joint, size = truth['joint'], truth['size']
+    if truth['what'] == 'friction':
+        theta[rigid + 3 + joint] *= 1.0 + size
+    elif truth['what'] == 'wear':
+        theta[rigid + joint] *= 1.0 + size * (day - truth['day'] + 1)
+    changed = arm.with_theta(theta)
+    if truth['what'] == 'load':
+        return changed.with_effect(
+            make_effect('payload', arm.robot), [size, 0.0, 0.0, 0.3 * size, 0, 0, 0, 0, 0, 0]
+        )
+    if truth['what'] == 'unmodelled':
+        name = arm.robot.joints[joint]
+        return changed.with_effect(make_effect(f'joint_spring@{name}', arm.robot), [size, 0.0])
+    return changed
+
+
+def moved(arm, seconds, rng):
+    """Return what is recorded of a motion in closed form."""
+    t = np.arange(round(seconds * RATE)) / RATE
+    q, dq, ddq = np.zeros((3, len(t), arm.robot.n_joints))
+    for hz, size in HARMONICS:
+        w = 2 * np.pi * hz
+        angle = w * t[:, None] + rng.uniform(0, 2 * np.pi, arm.robot.n_joints)
+        q += size * np.sin(angle)
+        dq += size * w * np.cos(angle)
+        ddq -= size * w * w * np.sin(angle)
+    motion = Motion(arm.robot.joints, t, q, dq, ddq)
+    rigid = len(arm.robot.rigid_parameters)
+    coulomb = arm.theta[rigid + 3 : rigid + 6]
+    soft = coulomb * (np.tanh(dq / SLIDING) - np.sign(dq))
+    return motion.with_torque(arm.torque(motion) + soft + NOISE * rng.normal(size=q.shape))
+
+
+def draw(arms, bags, changed, damaged, seed=0):
+    """Return every arm with what happens to it, and which bags are damaged."""
+    root = np.random.default_rng(seed)
+    sick = set(root.choice(arms, changed, replace=False).tolist())
+    broken = set(root.choice(arms * bags, damaged, replace=False).tolist())
+    kinds, drawn = list(CHANGES), []
+    for number in range(arms):
+        rng = np.random.default_rng([seed, number])
+        arm, event = healthy(rng), None
+        if number in sick:
+            what = kinds[sum(one[2] is not None for one in drawn) % len(kinds)]
+            event = {
+                'what': what,
+                'joint': int(rng.integers(3)),
+                'day': int(rng.integers(bags // 3, max(bags // 3 + 1, 2 * bags // 3))),
+                'size': float(rng.uniform(*CHANGES[what])),
+            }
+        damage = {day for day in range(bags) if number * bags + day in broken}
+        drawn.append((f'arm_{number:04d}', arm, event, damage, rng))
+    return drawn
+
+
+def generate(folder, arms, bags, changed, damaged, seconds=60.0, seed=0):
+    """Write a fleet, its truth first."""
+    drawn = draw(arms, bags, changed, damaged, seed)
+    days = [FIRST_DAY + datetime.timedelta(days=day) for day in range(bags)]
+    truth = {
+        'arms': {name: event for name, _, event, _, _ in drawn if event},
+        'damaged': [f'{name}/{days[day].date()}' for name, *_, bad, _ in drawn for day in bad],
+    }
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    Path(folder, 'truth.json').write_text(json.dumps(truth, indent=1))
+    for name, arm, event, damage, rng in drawn:
+        for day, start in enumerate(days):
+            bag = Path(folder, name, start.date().isoformat())
+            bag.parent.mkdir(exist_ok=True)
+            measured = moved(lived(arm, event, day, rng), seconds, rng)
+            write_recording(bag, measured, start_ns=round(start.timestamp() * 1e9))
+            if day in damage:
+                (file,) = bag.glob('*.mcap')
+                file.write_bytes(b'\0' * 4096)
+
+
+def score(folder, results):
+    """Compare what was named with the truth."""
+    from pyarrow import parquet
+
+    truth = json.loads(Path(folder, 'truth.json').read_text())
+    changes = parquet.read_table(f'{results}/watch/changes.parquet').to_pylist()
+    arms = parquet.read_table(f'{results}/watch/arms.parquet').to_pylist()
+    found = {row['arm'] for row in changes}
+    sick = set(truth['arms'])
+    print(f'{len(found & sick)} of {len(sick)} changed arms named, {len(found - sick)} others')
+    for arm in sorted(sick - found):
+        print(f'  not named: {arm} {truth["arms"][arm]}')
+    for arm in sorted(found - sick):
+        print(f'  healthy: {arm} {next(r["text"] for r in changes if r["arm"] == arm)}')
+    late = []
+    for arm in sorted(found & sick):
+        row, event = next(r for r in changes if r['arm'] == arm), truth['arms'][arm]
+        day = FIRST_DAY + datetime.timedelta(days=event['day'])
+        if row['kind'] == 'step':
+            late.append(abs((datetime.date.fromisoformat(row['first_day']) - day.date()).days))
+        print(f'  {arm} {event["what"]} {event["size"]:.2f} from {day.date()}: {row["text"]}')
+    print(f'day of steps off by {np.mean(late) if late else 0:.2f} days in the mean')
+    refused = sum(row['refused'] for row in arms)
+    print(f'{refused} of {len(truth["damaged"])} damaged bags refused')
+    return len(found & sick), len(found - sick)
+
+
+def costs(folder, workers=2):
+    """Print what runs cost beside identify in a loop: few bags and all, one worker and more."""
+    from armid_ros.fleet.bags import find_bags
+
+    bags = find_bags([f'{folder}/*/*'])
+    sample = bags[:: max(1, len(bags) // 30)]
+    for number, count in dict.fromkeys(
+        [(min(10, len(bags)), workers), (len(bags), workers), (len(bags), 1)]
+    ):
+        before = loop_seconds(sample)
+        cost = run_cost(bags[:number], count)
+        looped = 0.5 * (before + loop_seconds(sample))  # a busy machine is slow now and then
+        print(
+            f'{count} workers, {number} bags: {1e3 * cost["cpu"]:.0f} ms of processor a bag '
+            f'({1e3 * cost["client"]:.1f} ms of it scheduler and client), identify in a loop '
+            f'{1e3 * looped:.0f} ms, ratio {cost["cpu"] / looped:.2f}; '
+            f'{60.0 / cost["cpu"]:.0f} bag seconds per second and core; {cost["wall"]:.1f} s, '
+            f'workers busy {cost["busy"]:.2f}; peak of a worker {cost["peak"] / 1e6:.0f} MB; '
+            f'{cost["moved"] / 1e3:.1f} kB a bag moved between workers'
+        )
+
+
+def run_cost(bags, workers):
+    """Identify a fleet; return processor seconds a bag, wall time, memory and bytes."""
+    from armid_ros.fleet.cluster import connected
+    from armid_ros.fleet.identify import FleetSettings, identify_fleet, plan_fleet
+
+    with tempfile.TemporaryDirectory() as out, connected(None, workers) as client:
+        settings = FleetSettings(EFFECTS)
+        identify_fleet(client, bags[:4], plan_fleet(bags, str(ROBOT), f'{out}/warm', settings))
+        jobs = plan_fleet(bags, str(ROBOT), f'{out}/run', settings)
+        before = client.run(_used)
+        start, own = time.perf_counter(), time.process_time()
+        done = identify_fleet(client, bags, jobs).done
+        wall, own = time.perf_counter() - start, time.process_time() - own
+        after = client.run(_used)
+    busy = sum(after[w]['cpu'] - before[w]['cpu'] for w in after)
+    return {
+        'cpu': (busy + own) / done,
+        'client': own / done,
+        'wall': wall,
+        'busy': busy / wall / workers,
+        'peak': max(one['peak'] for one in after.values()),
+        'moved': sum(after[w]['moved'] - before[w]['moved'] for w in after) / done,
+    }
+
+
+def loop_seconds(bags):
+    """Return processor seconds of identify for a bag, in one process."""
+    from armid_ros.identification import identify
+
+    arm = ArmModel.of(str(ROBOT), effects=EFFECTS)
+    done, start = 0, time.process_time()
+    for bag in bags:
+        try:
+            recording = read_recording(bag.url, joints=arm.robot.joints)
+        except Exception:
+            continue
+        identify(arm, [recording], rng=np.random.default_rng(0))
+        done += 1
+    return (time.process_time() - start) / done
+
+
+def _used(dask_worker):
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return {
+        'cpu': usage.ru_utime + usage.ru_stime,
+        'peak': usage.ru_maxrss * 1024,
+        'moved': sum(one['total'] for one in dask_worker.transfer_incoming_log),
+    }
+
+
+def merge(count=10_000, joints=7, rigid=63):
+    """Time the merge of triangles of seven joints with 84 parameters, as in a tree."""
+    from armid_ros.fleet.merge import FAN_IN
+    from armid_ros.identification.triangle import Triangle
+
+    rng = np.random.default_rng(0)
+    rank = rigid + 3 * joints
+    factors = np.zeros((joints, rank + 1, rank + 1))
+    for joint in range(joints):
+        active = [*range(9 * joint, rigid), *(rigid + joint + joints * k for k in range(3)), rank]
+        factor = np.triu(rng.normal(size=(len(active), len(active))))
+        factors[joint][: len(active), active] = factor
+    one = Triangle(factors, np.full(joints, 1000.0))
+    level, start = [one] * count, time.process_time()
+    while len(level) > 1:
+        level = [Triangle.merged(level[k : k + FAN_IN]) for k in range(0, len(level), FAN_IN)]
+    seconds = time.process_time() - start
+    expected = np.sqrt(count) * np.linalg.norm(one.factors)
+    error = abs(np.linalg.norm(level[0].factors) / expected - 1.0)
+    print(
+        f'{count} triangles of {rank} parameters merged in {seconds:.1f} s, '
+        f'{8 * len(one.packed()) / 1e3:.0f} kB each; norm off by {error:.1e}'
+    )
+
+
+def main():
+    """Run one of the parts, or a small fleet through all of them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('part', nargs='?', choices=['generate', 'score', 'costs', 'merge'])
+    parser.add_argument('folders', nargs='*', type=Path)
+    parser.add_argument('--arms', type=int, default=200)
+    parser.add_argument('--bags', type=int, default=10)
+    parser.add_argument('--changed', type=int, default=20)
+    parser.add_argument('--damaged', type=int, default=5)
+    parser.add_argument('--seconds', type=float, default=60.0)
+    parser.add_argument('--seed', type=int, default=0)
+    parser.add_argument('--workers', type=int, default=2)
+    asked = parser.parse_args()
+    if asked.part == 'merge':
+        merge()
+        return
+    sizes = asked.arms, asked.bags, asked.changed, asked.damaged, asked.seconds, asked.seed
+    if asked.part == 'generate':
+        generate(asked.folders[0], *sizes)
+    elif asked.part == 'score':
+        score(*asked.folders)
+    elif asked.part == 'costs' and asked.folders:
+        costs(asked.folders[0], asked.workers)
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            generate(f'{folder}/bags', 20, 10, 4, 2, asked.seconds, asked.seed)
+            costs(f'{folder}/bags', asked.workers)
+            if asked.part is None:
+                for command in (
+                    ['identify', f'{folder}/bags/*/*', '--robot', str(ROBOT)],
+                    ['watch'],
+                ):
+                    told = [sys.executable, '-m', 'armid_ros.cli', 'fleet', *command]
+                    subprocess.run([*told, '--out', f'{folder}/results'], check=True)
+                score(f'{folder}/bags', f'{folder}/results')
+                merge()
+
+
+if __name__ == '__main__':
+    main()

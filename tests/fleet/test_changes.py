@@ -1,0 +1,123 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Changes of arms over time: found where there are, and rarely where there are none."""
+
+from armid_ros.fleet.changes import judge, largest_change, MONTH, named, Series, spreads, wear
+import numpy as np
+import pytest
+
+PARAMETERS = [('viscous_coefficient', f'joint_{k}') for k in range(8)]
+
+
+def fleet(rng, arms, bags=10, beyond=0.5):
+    """Return series of healthy arms: noise as stated, and some beyond it."""
+    days = np.arange(bags, dtype=float)
+    found = []
+    for arm in range(arms):
+        for name, joint in PARAMETERS:
+            std = 0.01 * rng.uniform(0.5, 2.0, bags)
+            noise = std * rng.normal(size=bags) + beyond * 0.01 * rng.normal(size=bags)
+            values = rng.normal(1.0, 0.2) + noise
+            found.append(Series(f'arm_{arm}', name, joint, 'N m s/rad', days, values, std))
+    return found
+
+
+def changed(series, shift):
+    """Return the series with something added."""
+    return Series(**{**vars(series), 'values': series.values + shift})
+
+
+def names(series, alpha=0.05):
+    """Return the arms that are named."""
+    return {one.arm for one in judge(series) if named(one, alpha)}
+
+
+def test_a_thousand_healthy_arms_are_rarely_accused():
+    accused = [len(names(fleet(np.random.default_rng(seed), 1000))) > 0 for seed in range(6)]
+    assert np.mean(accused) <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / 6)
+
+
+def test_a_step_is_found_with_its_arm_parameter_place_and_size():
+    series = fleet(np.random.default_rng(1), 50)
+    series[8 * 7 + 3] = changed(series[8 * 7 + 3], np.where(np.arange(10) >= 6, 0.1, 0.0))
+    (first, *_) = judge(series)
+    change = named(first, 0.05)[0]
+    assert (first.arm, change.series.parameter) == ('arm_7', PARAMETERS[3])
+    assert (change.kind, change.index) == ('step', 6)
+    assert abs(change.size - 0.1) < 3 * change.std
+
+
+def test_wear_is_a_trend_with_its_slope():
+    series = fleet(np.random.default_rng(2), 50)
+    series[0] = changed(series[0], 0.02 * np.arange(10.0))
+    change = next(one for one in judge(series) if one.arm == 'arm_0').changes[0]
+    assert change.kind == 'trend'
+    assert abs(change.size - 0.02 * MONTH) < 3 * change.std
+
+
+def test_the_interval_of_wear_holds_the_truth_as_often_as_it_says():
+    series = fleet(np.random.default_rng(3), 250, beyond=1.0)
+    spread = spreads(series)
+    slopes = np.array([wear(one, spread[one.parameter]) for one in series])
+    inside = np.mean(np.abs(slopes[:, 0]) < 1.96 * slopes[:, 1])
+    assert inside == pytest.approx(0.95, abs=0.02)
+
+
+def test_of_the_arms_named_few_are_healthy():
+    rng = np.random.default_rng(4)
+    false, true = 0, 0
+    for _ in range(4):
+        series = fleet(rng, 200)
+        for arm in range(40):
+            k = 8 * arm + int(rng.integers(8))
+            step = rng.choice([0.03, 0.06, 0.12])
+            series[k] = changed(series[k], np.where(np.arange(10) >= 5, step, 0.0))
+        found = names(series)
+        sick = {f'arm_{arm}' for arm in range(40)}
+        false, true = false + len(found - sick), true + len(found & sick)
+    assert false <= 0.05 * (false + true) + 2 * np.sqrt(0.05 * (false + true))
+    assert true > 80
+
+
+def test_what_bags_differ_by_beyond_their_deviations_is_learned_from_all_arms():
+    series = fleet(np.random.default_rng(5), 100, beyond=2.0)
+    for spread in spreads(series).values():
+        assert spread.std == pytest.approx(0.02, rel=0.15)
+
+
+def test_a_step_of_one_arm_does_not_hide_itself_in_the_spread():
+    series = fleet(np.random.default_rng(6), 1, bags=40)
+    stepped = [changed(one, np.where(np.arange(40) >= 20, 1.0, 0.0)) for one in series]
+    before, after = spreads(series), spreads(stepped)
+    for parameter in before:
+        assert after[parameter].std < before[parameter].std + 0.01
+
+
+def test_a_level_series_has_no_p_below_one_in_a_thousand():
+    days = np.arange(10.0)
+    flat = Series('a', 'x', 'j', '', days, np.ones(10), np.full(10, 0.1))
+    assert largest_change(flat, spreads([flat])[flat.parameter]).p == 1.0
+
+
+def test_a_step_beyond_all_probability_is_named_before_smaller_ones():
+    series = fleet(np.random.default_rng(7), 100, bags=20)
+    late = np.arange(20) >= 9
+    series[1] = changed(series[1], np.where(late, 30.0, 0.0))
+    series[2] = changed(series[2], np.where(late, 60.0, 0.0))
+    (first, *_) = judge(series)
+    assert [change.series.joint for change in named(first, 0.05)[:2]] == ['joint_2', 'joint_1']
+
+
+@pytest.mark.parametrize('at', [0, 1, 5, 9])
+def test_one_odd_bag_is_no_change(at):
+    series = fleet(np.random.default_rng(8), 50)
+    for k in range(0, len(series), 16):
+        series[k] = changed(series[k], np.where(np.arange(10) == at, 0.5, 0.0))
+    assert names(series) == set()
+
+
+@pytest.mark.parametrize('lasting', [3, 4, 7])
+def test_what_lasts_three_bags_is_a_change(lasting):
+    series = fleet(np.random.default_rng(9), 50)
+    series[16] = changed(series[16], np.where(np.arange(10) >= 10 - lasting, 0.5, 0.0))
+    assert names(series) == {'arm_2'}

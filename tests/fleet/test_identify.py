@@ -1,0 +1,186 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A fleet identified on two processes is what each arm identified alone is."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import FleetError
+from armid_ros.fleet.bags import find_bags
+from armid_ros.fleet.kinds import Entry
+from armid_ros.fleet.store import Store
+from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
+from armid_ros.recording import read_recording
+import duckdb
+import numpy as np
+import pandas
+import polars
+import pytest
+
+from benchmarks.fleet import EFFECTS
+
+from .conftest import identified, SETTINGS, URDF
+
+
+@pytest.fixture(scope='module')
+def done(bags, cluster, tmp_path_factory):
+    """Return the outcome of a run over the small fleet, and where its results are."""
+    out = tmp_path_factory.mktemp('results')
+    told = []
+    outcome = identified(
+        cluster, find_bags([f'{bags}/*/*']), URDF, str(out), SETTINGS, lambda *n: told.append(n)
+    )
+    assert told[-1] == (9, 9)
+    return outcome, Store(str(out))
+
+
+def by_arm(table, arm):
+    """Return the parameters of an arm, in the order of the table."""
+    frame = table.to_pandas()
+    return frame[frame['arm'].astype(str) == arm]
+
+
+@pytest.mark.parametrize('number', [0, 1, 2])
+def test_an_arm_is_what_one_identification_of_its_bags_is(bags, done, number):
+    outcome, store = done
+    (filters,) = outcome.filters.values()
+    arm = ArmModel.of(URDF, effects=EFFECTS)
+    name = f'arm_{number:04d}'
+    recordings = [
+        read_recording(path, joints=arm.robot.joints) for path in sorted((bags / name).iterdir())
+    ]
+    settings = IdentificationSettings('wls', SignalSettings(filters.cutoff_hz, filters.decimation))
+    one = identify(arm, recordings, settings, rng=np.random.default_rng(0))
+    rows = by_arm(store.data_set('arms'), name)
+    assert list(rows['name']) == [parameter.name for parameter in one.estimate.parameters]
+    np.testing.assert_allclose(rows['value'], one.estimate.values, rtol=1e-9, atol=1e-13)
+    np.testing.assert_allclose(rows['std'], one.estimate.std, rtol=1e-9)
+    expected = Score.of(one.training).relative_error_percent
+    assert rows['relative_error_percent'].iloc[0] == pytest.approx(expected, rel=1e-9)
+    assert rows['condition_number'].iloc[0] == pytest.approx(one.condition_number, rel=1e-9)
+
+
+def test_a_bag_is_what_its_own_identification_is(bags, done):
+    outcome, store = done
+    (filters,) = outcome.filters.values()
+    arm = ArmModel.of(URDF, effects=EFFECTS)
+    path = bags / 'arm_0001' / '2026-01-02'
+    settings = IdentificationSettings('wls', SignalSettings(filters.cutoff_hz, filters.decimation))
+    one = identify(
+        arm,
+        [read_recording(path, joints=arm.robot.joints)],
+        settings,
+        rng=np.random.default_rng(0),
+    )
+    frame = store.data_set('parameters').to_pandas()
+    rows = frame[frame['bag'] == str(path)]
+    np.testing.assert_allclose(rows['value'], one.estimate.values, rtol=1e-9, atol=1e-13)
+    np.testing.assert_allclose(rows['std'], one.estimate.std, rtol=1e-9)
+
+
+def test_results_are_read_by_duckdb_pandas_and_polars(done):
+    _, store = done
+    folder = store.url
+    count = len(pandas.read_parquet(f'{folder}/parameters'))
+    pattern = f'{folder}/parameters/**/*.parquet'
+    query = f"select arm, day from read_parquet('{pattern}', hive_partitioning=true)"
+    rows = duckdb.sql(query).fetchall()
+    assert len(rows) == count and {arm for arm, _ in rows} == {f'arm_000{k}' for k in range(3)}
+    assert len(polars.read_parquet(pattern, hive_partitioning=True)) == count
+    assert count == 9 * 24
+
+
+def test_a_run_replaces_its_own_part_and_no_other(bags, cluster, tmp_path):
+    everything = find_bags([f'{bags}/*/*'])
+    identified(cluster, everything, URDF, str(tmp_path), SETTINGS)
+    before = stamps(tmp_path)
+    again = [bag for bag in everything if bag.day == '2026-01-02' and bag.arm == 'arm_0002']
+    identified(cluster, again, URDF, str(tmp_path), SETTINGS)
+    after = stamps(tmp_path)
+    assert set(after) == set(before)
+    changed = {name for name in after if after[name] != before[name]}
+    folder = 'arm=arm_0002/day=2026-01-02'
+    assert {name for name in changed if name.startswith(('bags', 'parameters'))} == {
+        f'{kind}/{folder}/{again[0].name}.parquet' for kind in ('bags', 'parameters')
+    }
+
+
+def test_resume_does_what_is_left_and_nothing_twice(bags, cluster, tmp_path):
+    everything = find_bags([f'{bags}/*/*'])
+    some = [bag for bag in everything if (bag.arm, bag.day) != ('arm_0001', '2026-01-03')][:7]
+    first = identified(cluster, some, URDF, str(tmp_path), SETTINGS)
+    before = stamps(tmp_path)
+    resumed = replace(SETTINGS, resume=True)
+    second = identified(cluster, everything, URDF, str(tmp_path), resumed)
+    after = stamps(tmp_path)
+    assert (first.done, second.done, second.found) == (7, 9, 7)
+    assert all(after[name] == before[name] for name in before if name.startswith('bags'))
+    assert (
+        before['arms/arm=arm_0000/estimate.parquet']
+        == (after['arms/arm=arm_0000/estimate.parquet'])
+    )
+
+
+def test_what_was_resumed_is_what_one_run_gives(bags, cluster, tmp_path):
+    everything = find_bags([f'{bags}/*/*'])
+    fixed = replace(SETTINGS, signals=SignalSettings(20.0, 8))
+    identified(cluster, everything, URDF, f'{tmp_path}/at_once', fixed)
+    identified(cluster, everything[:5], URDF, f'{tmp_path}/resumed', fixed)
+    resumed = replace(fixed, resume=True)
+    identified(cluster, everything, URDF, f'{tmp_path}/resumed', resumed)
+    assert digits(Store(f'{tmp_path}/resumed')) == digits(Store(f'{tmp_path}/at_once'))
+
+
+def test_a_later_run_takes_the_filters_of_the_first(bags, cluster, tmp_path):
+    everything = find_bags([f'{bags}/*/*'])
+    first = identified(cluster, everything[:1], URDF, str(tmp_path), SETTINGS)
+    later = identified(cluster, everything[4:6], URDF, str(tmp_path), SETTINGS)
+    assert later.filters == first.filters
+
+
+def test_one_more_effect_is_another_kind_and_nothing_of_it_is_found(bags, cluster, tmp_path):
+    everything = find_bags([f'{bags}/arm_0000/*'], r'(arm_\d+)')
+    identified(cluster, everything, URDF, str(tmp_path), SETTINGS)
+    other = replace(SETTINGS, effects=f'{EFFECTS},rotor_inertia', resume=True)
+    assert identified(cluster, everything, URDF, str(tmp_path), other).found == 0
+
+
+def test_each_arm_may_have_a_robot_of_its_own(bags, cluster, tmp_path):
+    everything = find_bags([f'{bags}/*/*'])
+    table = {
+        'arm_0000': Entry(URDF),
+        'arm_0001': Entry(URDF, effects='viscous_friction'),
+        'arm_0002': Entry(URDF, gravity='moon'),
+    }
+    identified(cluster, everything, table, str(tmp_path), SETTINGS)
+    arms = Store(str(tmp_path)).data_set('arms')
+    assert len(by_arm(arms, 'arm_0001')) == len(by_arm(arms, 'arm_0000')) - 6
+    assert by_arm(arms, 'arm_0002')['relative_error_percent'].iloc[0] > 5.0
+
+
+def test_an_effect_that_cannot_be_merged_is_refused_before_anything_is_read(bags, tmp_path):
+    settings = replace(SETTINGS, effects='viscous_friction,load_dependent_friction')
+    with pytest.raises(FleetError, match=r'load_dependent_friction.*not linear'):
+        identified(None, find_bags([f'{bags}/*/*']), URDF, str(tmp_path), settings)
+
+
+def stamps(folder):
+    """Return when every table was written, by its name."""
+    return {
+        str(path.relative_to(folder)): path.stat().st_mtime_ns
+        for path in Path(folder).rglob('*.parquet')
+    }
+
+
+def digits(store):
+    """Return every number of the estimates of arms and bags."""
+    frames = [store.data_set(name).to_pandas() for name in ('arms', 'parameters')]
+    return [
+        sorted(
+            frame[['arm', 'name', 'joint', 'value', 'std']]
+            .astype({'arm': str})
+            .itertuples(index=False, name=None)
+        )
+        for frame in frames
+    ]
