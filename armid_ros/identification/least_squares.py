@@ -109,7 +109,7 @@ def solve(
         if np.allclose(scale, before[0], rtol=1e-6) and np.allclose(relative, before[1]):
             break
     if bounds is not None:
-        values = _within(values, triangle, bounds)
+        values = within(values, triangle, bounds)
     residual = _residual(problem, values)
     weights = relative / scale
     return Solution(
@@ -168,10 +168,22 @@ def _squares(triangles: FloatArray, values: FloatArray) -> FloatArray:
     return np.asarray(np.sum(rest**2, axis=1))
 
 
-def _within(
+def within(
     values: FloatArray, triangle: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
-    """Return the best fit within bounds: the one whose predictions differ least from the free."""
+    """
+    Return the best fit within bounds: the one whose predictions differ least from the free.
+
+    Parameters
+    ----------
+    values : ndarray, shape (r,)
+        The free fit.
+    triangle : ndarray, shape (r, r)
+        Triangular factor of the weighted columns.
+    bounds : tuple of two ndarray, each of shape (r,)
+        Lower and upper.
+
+    """
     if np.all((values >= bounds[0]) & (values <= bounds[1])):
         return values
     scale = np.linalg.norm(triangle, axis=0)

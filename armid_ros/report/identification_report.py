@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.identification import Fit, Grade, Identification, Verification
 from armid_ros.identification import grade as graded
+from armid_ros.identification.estimators.names import IN_WORDS
 from armid_ros.recording import Recording
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted
@@ -150,11 +151,6 @@ def _noise(result: Identification, verification: Verification | None) -> list[Se
 def _asked(
     result: Identification, robot: str, training: Sequence[str], validation: Sequence[str]
 ) -> list[tuple[str, str]]:
-    methods = {
-        'ols': 'ordinary least squares',
-        'wls': 'least squares weighted by the noise of each joint',
-        'irls': 'least squares weighted by the noise of each joint, outliers weighted down',
-    }
     gravity = ', '.join(f'{g:.4g}' for g in result.arm.robot.gravity)
     used = result.used
     kept = used.rate_hz / used.decimation
@@ -163,7 +159,7 @@ def _asked(
         ('Joints', ', '.join(result.arm.robot.joints)),
         ('Gravity', f'({gravity}) m/s²'),
         ('Effects', ', '.join(effect.name for effect in result.arm.effects) or 'none'),
-        ('Method', methods[result.settings.method]),
+        ('Method', IN_WORDS[result.settings.method]),
         (
             'Filter',
             f'positions below {used.cutoff_hz:.3g} Hz of {used.rate_hz:.4g} Hz; torque and model '
