@@ -10,6 +10,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification import Fit, Grade, Identification, Verification
 from armid_ros.identification import grade as graded
 from armid_ros.identification.estimators.names import IN_WORDS
+from armid_ros.identification.estimators.side_by_side import MethodScore
 from armid_ros.recording import Recording
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted
@@ -22,6 +23,7 @@ from armid_ros.report.sections.excitation import Excitation
 from armid_ros.report.sections.facts import Asked
 from armid_ros.report.sections.fit import FitSection
 from armid_ros.report.sections.forward import Forward
+from armid_ros.report.sections.methods import Methods
 from armid_ros.report.sections.next_steps import NextSteps
 from armid_ros.report.sections.origin import Origin
 from armid_ros.report.sections.parameters import Parameters
@@ -44,6 +46,7 @@ def identification_report(
     validation_recordings: Sequence[Recording] = (),
     verification: Verification | None = None,
     grade: Grade | None = None,
+    methods: Sequence[MethodScore] = (),
     exports: Mapping[str, Sequence[str]] | None = None,
     provenance: Provenance | None = None,
 ) -> str:
@@ -68,6 +71,8 @@ def identification_report(
         What the identification was put to.
     grade : Grade, optional
         What it is good for; found out where it is not given.
+    methods : sequence of MethodScore
+        Estimators that were compared on the same data.
     exports : mapping of str to sequence of str, optional
         Files for other programs, and what each has no place for.
     provenance : Provenance, optional
@@ -115,6 +120,7 @@ def identification_report(
         ),
         WhitenessSection(arm.robot, shown, role),
         *_noise(result, verification),
+        *([Methods(methods)] if methods else []),
         NextSteps(judgement.next_steps),
         Origin(provenance or Provenance()),
     ]

@@ -33,9 +33,11 @@ import scipy.linalg
 #: The reference keeps this share of the band of the regressor, which is ten times the motion's.
 REFERENCE_SHARE = 0.2
 #: Simulations; a linear arm settles after two.
-_MOST_ROUNDS = 6
+_MOST_ROUNDS = 4
 #: A change of less than this share of a standard deviation is the last.
 _SETTLED = 0.02
+#: An arm under computed torque that is off by more than this share of its motion is no arm.
+_ASTRAY = 0.05
 
 
 @dataclass(frozen=True)
@@ -85,14 +87,13 @@ def fit_by_instruments(
 
     """
     notes: tuple[str, ...] = ()
-    base, now, arm = fit.base, fit, fit.arm
-    limits = bounds(arm, base)
-    found = Instrumented(fit.values, fit.solution.covariance)
+    base, now, simulated = fit.base, fit, True
+    limits = bounds(fit.arm, base)
     for _ in range(_MOST_ROUNDS):
         try:
-            columns = _simulated_columns(arm, now, recordings, used)
+            columns = _simulated_columns(now, recordings, used)
         except ArmidError as error:
-            columns = _smooth_columns(arm, now, recordings, used)
+            simulated, columns = False, _smooth_columns(now, recordings, used)
             notes = (
                 f'instruments are of the smoothed motion: the arm is not simulated ({error})',
             )
@@ -100,7 +101,7 @@ def fit_by_instruments(
         step = np.abs(found.values - now.values) / np.sqrt(np.diag(found.covariance))
         arm = moved(now.arm, base, found.values, free)
         now = _at(now, arm, found.values, recordings, used)
-        if np.max(step, initial=0.0) < _SETTLED:
+        if np.max(step, initial=0.0) < _SETTLED or not simulated:
             break
     solution = replace(fit.solution, values=found.values, covariance=found.covariance)
     return replace(now, solution=solution), notes
@@ -182,27 +183,31 @@ def at_times(simulated: Motion, motion: Motion) -> Motion:
 
 
 def _simulated_columns(
-    arm: ArmModel, fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
+    fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
 ) -> list[FloatArray]:
     """Return the columns of the arm along its own motion, simulated on the smoothed one."""
-    found = []
+    arm, found = fit.arm, []
     for motion in _motions(recordings, used):
         reference = smooth_reference(motion, REFERENCE_SHARE * used.cutoff_hz)
         plant = Plant(unlimited(arm.along(reference)), hard_stops=False)
         run = simulate(
             plant, reference, rng=np.random.default_rng(0), controller=ComputedTorque(plant.arm)
         )
-        motion = at_times(run.truth, motion)
-        found.append(filtered_columns(arm, fit.base.independent, motion, used))
+        along = at_times(run.truth, motion)
+        off = np.std(along.q - reference.q, axis=0) / np.maximum(np.std(reference.q, axis=0), 1e-9)
+        if np.max(off) > _ASTRAY:
+            joint = motion.joints[int(np.argmax(off))]
+            raise IdentificationError(f'simulated, {joint} does not follow its reference')
+        found.append(filtered_columns(arm, fit.base.independent, along, used))
     return found
 
 
 def _smooth_columns(
-    arm: ArmModel, fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
+    fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
 ) -> list[FloatArray]:
     return [
         filtered_columns(
-            arm,
+            fit.arm,
             fit.base.independent,
             replace(smooth_reference(motion, REFERENCE_SHARE * used.cutoff_hz), t=motion.t),
             used,

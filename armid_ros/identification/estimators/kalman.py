@@ -34,8 +34,11 @@ _BAND = 0.4
 _STEP = 1e-6
 #: What a parameter may be off by before any data: this share of its value ...
 _PRIOR_SHARE = 0.3
-#: ... or what makes this share of the torque that is recorded, whichever is more.
-_PRIOR_TORQUE = 0.1
+#: ... or what makes this share of the torque that is recorded, whichever is more: of effects, of
+#: which a description says nothing, and of the body.
+_PRIOR_TORQUE = 0.1, 0.01
+#: A filter that leaves so many times the torque of least squares has not converged.
+_CONVERGED = 1.5
 #: Least position noise [rad or m]: below it rounding of the integration counts.
 _LEAST_NOISE = 1e-7
 
@@ -90,7 +93,18 @@ def fit_by_kalman_filter(
         solution=replace(fit.solution, values=values, covariance=covariance),
         predicted=torques(arm, recordings, used),
     )
-    return found, ()
+    ratio = _left(found) / max(_left(fit), 1e-300)
+    if ratio < _CONVERGED:
+        return found, ()
+    return found, (
+        f'ekf leaves {ratio:.2g} times the torque that wls leaves: it has not converged',
+    )
+
+
+def _left(fit: FittedValues) -> float:
+    """Return the size of what a fit leaves of the torque."""
+    left = [p.tau - torque for p, torque in zip(fit.problem, fit.predicted, strict=True)]
+    return float(np.linalg.norm(np.concatenate(left)))
 
 
 def _prior(fit: FittedValues, values: FloatArray) -> FloatArray:
@@ -98,7 +112,9 @@ def _prior(fit: FittedValues, values: FloatArray) -> FloatArray:
     size = np.sqrt(np.mean(np.concatenate([part.tau for part in fit.problem]) ** 2, axis=0))
     columns = np.concatenate([part.columns for part in fit.problem])
     reach = np.max(np.sqrt(np.mean(columns**2, axis=0)) / size[:, np.newaxis], axis=0)
-    return np.asarray(np.maximum(_PRIOR_SHARE * np.abs(values), _PRIOR_TORQUE / reach))
+    body = [parameter.rigid for parameter in fit.base.parameters]
+    least = np.where(body, _PRIOR_TORQUE[1], _PRIOR_TORQUE[0])
+    return np.asarray(np.maximum(_PRIOR_SHARE * np.abs(values), least / reach))
 
 
 def _raw(used: Conditioning) -> Conditioning:
@@ -165,6 +181,7 @@ class _Filter:
     ) -> None:
         self._arm, self._columns, self._motion = arm, fit.base.independent, motion
         self._dt = float(motion.t[1] - motion.t[0])
+        self._start = fit.base.values(arm.theta)
         self._slow = REST_SPEED * np.max(np.abs(motion.dq), axis=0)
         self._noise = np.maximum(_position_noise(motion), _LEAST_NOISE) ** 2
         # the residual of the least squares is white at its own rate; the same spectrum here
@@ -253,7 +270,10 @@ class _Filter:
         by_dq = (columns[n : 2 * n] - columns[2 * n : 3 * n]) / (2.0 * reach)[:, None, None]
         along = np.tensordot(np.where(slow, dq, 0.0), by_dq, 1)
         torque = columns @ theta
-        inertia = (torque[3 * n : 4 * n] - torque[-1]).T
+        heavier = columns[3 * n : 4 * n] - columns[-1]
+        inertia = (heavier @ theta).T
+        if np.linalg.eigvalsh(0.5 * (inertia + inertia.T))[0] <= 0.0:
+            inertia = (heavier @ self._start).T  # until the parameters are those of bodies again
         return _Slopes(
             torque[-2] + along @ theta,
             ((torque[:n] - torque[-1]) / _STEP).T,

@@ -130,6 +130,8 @@ def compare_methods(
         If weighted least squares, which all are held against, cannot identify anything.
 
     """
+    if not methods:
+        return ()
     plain = _fit(arm, recordings, 'wls', signals, seed)
     nominal = _simulated(arm, recordings, plain, signals, seed)
     pairs = _twins(plain, recordings, twins, seed)
