@@ -24,6 +24,7 @@ COMMANDS = {
     'diagnose': 'diagnose',
     'elastic': 'elastic',
     'exo': 'exo',
+    'lunar': 'lunar',
     'compare': 'compare',
     'recover': 'record',
     'layout': 'layout',
