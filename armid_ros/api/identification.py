@@ -38,7 +38,7 @@ from armid_ros.identification import (
     write_document,
 )
 from armid_ros.identification import identify as run
-from armid_ros.identification.least_squares import Method
+from armid_ros.identification.estimators.names import Estimator
 from armid_ros.recording import Recording
 
 if TYPE_CHECKING:
@@ -238,7 +238,7 @@ def identify(
     *,
     validate: RecordingLike | Sequence[RecordingLike] = (),
     effects: str = USUAL,
-    method: Method = 'wls',
+    method: Estimator = 'wls',
     cutoff: float | None = None,
     decimation: int | None = None,
     physical: bool | PhysicalSettings = False,
@@ -257,8 +257,9 @@ def identify(
         To be predicted and not to be fitted.
     effects : str
         Catalogue names with commas, for a robot without a model.
-    method : {'ols', 'wls', 'irls'}
-        All joints alike, weighted by their noise, or robust as well.
+    method : {'ols', 'wls', 'irls', 'iv', 'cloe', 'ekf'}
+        Least squares with all joints alike, weighted by their noise, or robust as well;
+        instrumental variables, closed-loop output error, extended Kalman filter.
     cutoff : float, optional
         Of the position filter [Hz]; from the noise by default.
     decimation : int, optional

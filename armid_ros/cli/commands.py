@@ -26,6 +26,7 @@ COMMANDS = {
     'diagnose': 'diagnose',
     'elastic': 'elastic',
     'exo': 'exo',
+    'lunar': 'lunar',
     'compare': 'compare',
     'fleet': 'fleet',
     'recover': 'record',

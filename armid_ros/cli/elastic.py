@@ -21,6 +21,7 @@ from armid_ros.identification.two_inertia import (
     write_runs,
 )
 from armid_ros.identification.two_inertia.output import elastic_document, SCHEMA
+from armid_ros.identification.two_inertia.story import TuningStory
 from armid_ros.motion import FloatArray
 from armid_ros.report.elastic_report import elastic_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
@@ -68,8 +69,9 @@ STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_ac
 )
 @click.option(
     '--start',
-    type=click.Choice(['before', 'after']),
-    help='Printed set to begin the tuning with, in place of what was found by then.',
+    type=click.Choice(['found', 'before', 'after']),
+    help='What the tuning begins with: what was found by then, or a printed set. By default '
+    "the former, with --demo the set 'before', as in the source.",
 )
 @click.option('--accelerometers', metavar='R1,R2', help='Distances from their joints [m].')
 @click.option('--gear', metavar='N1,N2', help='Turns of the motors per turn of the joints.')
@@ -105,6 +107,8 @@ def elastic(
     are found joint by joint.
 
     """
+    begin = start or ('before' if demo else 'found')
+    printed = None if begin == 'found' else two_link_set(begin).parameters
     robot = load_robot(robot_source)
     if not planar_pair(robot):
         if demo or steps:
@@ -140,11 +144,11 @@ def elastic(
             drives,
             steps=responses,
             loop=loop,
-            start=None if start is None else two_link_set(start).parameters,
+            start=printed,
             progress=tick,
         )
         tick(1.0, 'drawing')
-        known, table = _known(robot, shipped, start)
+        known, table = _known(robot, shipped, begin)
         files = _draw(result, known, out)
         page = elastic_report(
             result,
@@ -154,17 +158,23 @@ def elastic(
             provenance=Provenance(
                 files=hash_files([*bags, *steps]),
                 versions=versions(),
-                settings={'start of the tuning': start or 'what step 3a found'},
+                settings={'start of the tuning': begin},
                 seed=seed if demo else None,
             ),
         )
         write_file(out / 'report.html', page)
     document = elastic_document(result, robot_source)
+    story = None
+    if demo and result.tuning is not None:
+        story = TuningStory.of(result.tuning, printed or result.untuned, shipped.parameters)
+        document['story'] = story.document()
     write_file(out / 'elastic.json', json_text(document, indent=1))
     if as_json:
         click.echo(json_text(document))
         return
     _tell(document)
+    if story is not None:
+        say(story.sentence())
     say(f'{out}: {", ".join(["elastic.json", "report.html", *files])}')
 
 
@@ -209,14 +219,12 @@ def _simulate(
     return (out / 'resonances',), (out / 'steps',)
 
 
-def _known(
-    robot: Robot, shipped: TwoLinkSet, start: str | None
-) -> tuple[TwoLinkParameters | None, str]:
+def _known(robot: Robot, shipped: TwoLinkSet, begin: str) -> tuple[TwoLinkParameters | None, str]:
     """Return what the parameters are compared with, and where it comes from."""
     if robot.name == ROBOT:
         return shipped.parameters, 'Table 1 of the source, after tuning'
-    if start is not None:
-        return two_link_set(start).parameters, f"the set '{start}', which the tuning began with"
+    if begin != 'found':
+        return two_link_set(begin).parameters, f"the set '{begin}', which the tuning began with"
     return None, ''
 
 

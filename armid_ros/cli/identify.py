@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+import time
 from typing import Any
 
 from armid_ros.arm import ArmModel, Misfit, save_model
@@ -33,6 +34,8 @@ from armid_ros.identification import (
 from armid_ros.identification import (
     identify as run,
 )
+from armid_ros.identification.estimators.names import ESTIMATORS, estimators_of
+from armid_ros.identification.estimators.side_by_side import compare_methods
 from armid_ros.identification.output import SCHEMA
 from armid_ros.recording import Recording
 from armid_ros.report import identification_report
@@ -64,10 +67,16 @@ OUTPUTS = (
 @options.effects
 @click.option(
     '--method',
-    type=click.Choice(['ols', 'wls', 'irls']),
+    type=click.Choice(ESTIMATORS),
     default='wls',
     show_default=True,
-    help='All joints alike, weighted by their noise, or robust against outliers as well.',
+    help='Least squares: all joints alike, weighted by their noise, or robust as well. Against '
+    'encoder noise: instruments, closed-loop output error, or a Kalman filter.',
+)
+@click.option(
+    '--methods',
+    metavar='M,...',
+    help='Compare these methods, or all, side by side on the same data; takes a minute.',
 )
 @click.option(
     '--cutoff', type=float, help='Of the position filter [Hz]; from the data by default.'
@@ -110,6 +119,7 @@ def identify(
     validate: tuple[Path, ...],
     effects: str,
     method: Any,
+    methods: str | None,
     cutoff: float | None,
     decimation: int | None,
     quasi_static: bool,
@@ -137,6 +147,7 @@ def identify(
     settings = IdentificationSettings(
         method, SignalSettings(cutoff, decimation), known if physical else None
     )
+    compared = () if methods is None else estimators_of(methods)
     rng = np.random.default_rng(seed)
     with progress('reading') as tick:
         recordings = options.read(bags, robot, topic)
@@ -149,7 +160,19 @@ def identify(
         verification = (
             verify(result, arm, recordings, held_out, rng=rng, progress=tick) if verifies else None
         )
+        scores = compare_methods(
+            arm,
+            recordings,
+            held_out,
+            compared,
+            settings.signals,
+            seed=seed,
+            clock=time.process_time,
+            progress=tick,
+        )
     document = identification_document(result, robot_source, validation, verification, graded)
+    if scores:
+        document['methods'] = [score.document() for score in scores]
     source = options.kept_source(robot_source, robot, out)
     held_out_fits = [fit for part in validation.values() for fit in part]
     misfit = _misfit(result, held_out_fits)
@@ -164,6 +187,7 @@ def identify(
         validation_recordings=held_out,
         verification=verification,
         grade=graded,
+        methods=scores,
         exports=exports,
         provenance=provenance([*bags, *validate], document['settings'], seed),
     )
@@ -196,6 +220,8 @@ def _print(
     for recording in recordings:
         say(f'{recording.source}: {recording.report.describe()}')
     _tell(result, verification, result.arm.robot.notes, exports)
+    if 'methods' in document:
+        _print_methods(document['methods'])
     fitted = document['training']['relative_error_percent']
     say(f'relative error {fitted:.2f} % on the data it was fitted to')
     for entry in document['validation']:
@@ -231,6 +257,28 @@ def _print_certificate(certificate: PhysicalCertificate) -> None:
         for link in certificate.links
     ]
     print_rows(rows, as_json=False, right=('mass [kg]',))
+
+
+def _print_methods(scores: Sequence[dict[str, Any]]) -> None:
+    heads = {
+        'fitted [%]': 'training_error_percent',
+        'held out [%]': 'held_out_error_percent',
+        'position [mrad]': 'closed_loop_position_error_milli',
+        'bias [%]': 'bias_percent',
+        'scatter [%]': 'scatter_percent',
+        'time [s]': 'seconds',
+    }
+    rows = [
+        {
+            'method': score['method'],
+            **{h: '-' if score[k] is None else f'{score[k]:.3g}' for h, k in heads.items()},
+        }
+        for score in scores
+    ]
+    print_rows(rows, as_json=False, right=tuple(heads))
+    for score in scores:
+        if score['note']:
+            say(f'{score["method"]}: {score["note"]}')
 
 
 def _tell(

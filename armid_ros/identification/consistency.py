@@ -156,13 +156,15 @@ def check_noise(
     tick = _steps(repeats + 2, progress)
     problem = _about(result, recordings)
     tick()
-    solution = solve(problem, result.settings.method)
-    calm = [_calm(recording, INSTRUMENT_SHARE * used.cutoff_hz) for recording in recordings]
+    solution = solve(problem, result.settings.least_squares)
+    calm = [
+        calm_recording(recording, INSTRUMENT_SHARE * used.cutoff_hz) for recording in recordings
+    ]
     instruments = _about(result, calm)
     tick()
     statistic, freedom, values, covariance = _hausman(problem, instruments, solution.weights)
 
-    noise = np.sqrt(np.mean([_position_noise(r) ** 2 for r in recordings], axis=0))
+    noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
     bias, bias_std = _simulated_bias(
         result, calm, instruments, solution.weights, noise, rng, repeats, tick
     )
@@ -191,7 +193,7 @@ def _steps(count: int, progress: Callable[[float], None] | None) -> Callable[[],
     return tick
 
 
-def _calm(recording: Recording, cutoff_hz: float) -> Recording:
+def calm_recording(recording: Recording, cutoff_hz: float) -> Recording:
     """Return a recording with positions smoothed below a frequency."""
     sections = signal.butter(4, cutoff_hz * recording.period * 2.0, output='sos')
     return replace(recording, q=signal.sosfiltfilt(sections, recording.q, axis=0), dq=None)
@@ -241,8 +243,8 @@ def _hausman(
     return statistic, max(freedom, 1.0), other / scale, covariance / np.outer(scale, scale)
 
 
-def _position_noise(recording: Recording) -> FloatArray:
-    """Return the standard deviation of white position noise, from the top of the spectrum."""
+def position_noise(recording: Recording) -> FloatArray:
+    """Return the standard deviation of white position noise, from the top of the spectrum (n,)."""
     rate = 1.0 / recording.period
     length = min(len(recording), int(8.0 * rate))
     frequency, power = signal.welch(

@@ -22,7 +22,7 @@ from armid_ros.identification.signals import Conditioning, decimate, segments
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
-from armid_ros.simulation import Controller, Plant, simulate
+from armid_ros.simulation import Controller, Plant, simulate, SimulatedRun
 import numpy as np
 import pinocchio as pin
 
@@ -170,16 +170,7 @@ def forward_validation(
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
     motion = motion.select(motion.t <= motion.t[0] + duration)
     reference = replace(motion, t=motion.t - motion.t[0])
-    arm, believed = arm.along(reference), nominal or arm
-    added = believed.action().inertia
-    n = motion.n_joints
-    controller = RecordedTorque(
-        reference, believed.body, bandwidth, np.zeros(n) if added is None else np.diag(added)
-    )
-    far, free = np.full(n, _FAR), np.full(n, np.inf)
-    robot = replace(arm.robot, lower=-far, upper=far, velocity_limit=free, torque_limit=free)
-    plant = Plant(replace(arm, robot=robot), hard_stops=False)
-    run = simulate(plant, reference, rng=np.random.default_rng(0), controller=controller)
+    run, controller = driven(arm.along(reference), reference, nominal or arm, bandwidth)
     t = run.truth.t
     recorded = np.column_stack([np.interp(t, reference.t, column) for column in reference.q.T])
     given = controller.feedforward(run.truth)
@@ -195,3 +186,39 @@ def forward_validation(
         motion=motion,
         simulated=np.column_stack([np.interp(reference.t, t, q) for q in run.truth.q.T]),
     )
+
+
+def driven(
+    arm: ArmModel, reference: Motion, nominal: ArmModel, bandwidth: float = BANDWIDTH
+) -> tuple[SimulatedRun, RecordedTorque]:
+    """
+    Simulate an arm under the recorded torques of a motion and the feedback that holds it to it.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        What is simulated.
+    reference : Motion
+        Recorded motion with torque, from time zero on.
+    nominal : ArmModel
+        Gives the inertia matrix of the feedback.
+    bandwidth : float
+        Natural frequency of the feedback [rad/s].
+
+    """
+    added = nominal.action().inertia
+    n = reference.n_joints
+    controller = RecordedTorque(
+        reference, nominal.body, bandwidth, np.zeros(n) if added is None else np.diag(added)
+    )
+    plant = Plant(unlimited(arm), hard_stops=False)
+    run = simulate(plant, reference, rng=np.random.default_rng(0), controller=controller)
+    return run, controller
+
+
+def unlimited(arm: ArmModel) -> ArmModel:
+    """Return an arm whose joints have no limits that a simulation could run into."""
+    n = arm.robot.n_joints
+    far, free = np.full(n, _FAR), np.full(n, np.inf)
+    robot = replace(arm.robot, lower=-far, upper=far, velocity_limit=free, torque_limit=free)
+    return replace(arm, robot=robot)

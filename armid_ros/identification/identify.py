@@ -13,6 +13,8 @@ from armid_ros.estimate import Estimate
 from armid_ros.identification.checks import check_length, check_motion, check_torque
 from armid_ros.identification.cutoff import cutoff_of_torques
 from armid_ros.identification.damage import without_damage
+from armid_ros.identification.estimators.names import Estimator, least_squares_of
+from armid_ros.identification.estimators.refine import refined
 from armid_ros.identification.excited import excited
 from armid_ros.identification.halves import halves_error
 from armid_ros.identification.identifiability import Unidentified, unidentified
@@ -38,8 +40,9 @@ class IdentificationSettings:
 
     Attributes
     ----------
-    method : {'ols', 'wls', 'irls'}
-        Ordinary least squares, weighted by the noise of each joint, or robust as well.
+    method : {'ols', 'wls', 'irls', 'iv', 'cloe', 'ekf'}
+        Least squares: ordinary, weighted by the noise of each joint, or robust as well;
+        instrumental variables, closed-loop output error, extended Kalman filter.
     signals : SignalSettings
         Filtering and decimation.
     physical : PhysicalSettings or None
@@ -47,9 +50,21 @@ class IdentificationSettings:
 
     """
 
-    method: Method = 'wls'
+    method: Estimator = 'wls'
     signals: SignalSettings = field(default_factory=SignalSettings)
     physical: PhysicalSettings | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse bodies where the estimator knows no constraints."""
+        if self.physical is not None and self.method != self.least_squares:
+            raise IdentificationError(
+                f'{self.method} is not fitted among bodies: take ols, wls or irls for that'
+            )
+
+    @property
+    def least_squares(self) -> Method:
+        """The least squares that the method is, or starts from."""
+        return least_squares_of(self.method)
 
 
 @dataclass(frozen=True)
@@ -261,13 +276,17 @@ def identify(
     if described:
         problem = through(problem, torques(whole, recordings, used), base.values(whole.theta))
         free = free_directions(whole, rng)
-        fit = fit_values(whole, base, problem, recordings, used, settings.method, free)
+        fit = fit_values(whole, base, problem, recordings, used, settings.least_squares, free)
         fit, said = with_uncertain_inertia(whole, fit, recordings, used)
         notes += said
     else:
-        fit = fit_values(arm, base, problem, recordings, used, settings.method)
+        fit = fit_values(arm, base, problem, recordings, used, settings.least_squares)
     if not described and _hidden(arm, theory):
-        theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings.method, rng)
+        theory, fit = _with_what_shows_now(
+            theory, fit, recordings, used, settings.least_squares, rng
+        )
+    fit, said = refined(settings.method, arm, fit, recordings, used, rng)
+    notes += said
     if fit.base.rank < theory.rank:
         notes += (
             f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
@@ -278,7 +297,7 @@ def identify(
     certificate = None
     if settings.physical is not None:
         fit, certificate = fit_to_bodies(
-            arm, fit, recordings, used, settings.method, settings.physical, rng
+            arm, fit, recordings, used, settings.least_squares, settings.physical, rng
         )
         notes += certificate.sentences()
     if not fit.settled:

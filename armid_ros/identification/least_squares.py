@@ -104,7 +104,7 @@ def solve(
     relative: FloatArray = used.astype(float)
     if method == 'irls':
         fit, relative = _robust(problem, used, fit)
-    values = fit.values if bounds is None else within(fit, bounds)
+    values = fit.values if bounds is None else within(fit.values, fit.factor, bounds)
     residual = _residual(problem, values)
     weights = np.asarray(relative / fit.scale)
     products = noise_products(problem, residual * weights, weights, fit.inverse)

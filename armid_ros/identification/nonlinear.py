@@ -121,7 +121,7 @@ def fit_values(
     """
     solution = solve(problem, method, bounds(arm, base))
     motions = [part.motion for part in problem]
-    chosen = _ungrouped(arm, base) if free is None else free
+    chosen = ungrouped(arm, base) if free is None else free
     reached = moved(arm, base, solution.values, chosen)
     bare = arm.with_theta(np.where(np.arange(len(arm.theta)) < _rigid(arm), arm.theta, 0.0))
     if curved(bare, arm, motions):
@@ -361,7 +361,7 @@ def _lifted(
     return found if same else reached
 
 
-def _ungrouped(arm: ArmModel, base: BaseParameters) -> FloatArray:
+def ungrouped(arm: ArmModel, base: BaseParameters) -> FloatArray:
     """Return directions of the rigid parameters that change no base parameter, (10 n, k)."""
     return np.asarray(scipy.linalg.null_space(base.grouping[:, : _rigid(arm)]))
 

@@ -234,7 +234,7 @@ def fit_triangle(
         if np.allclose(fit.scale, before, rtol=1e-6):
             break
     if bounds is not None:
-        return TriangleFit(within(fit, bounds), fit.scale, fit.factor)
+        return TriangleFit(within(fit.values, fit.factor, bounds), fit.scale, fit.factor)
     return fit
 
 
@@ -251,9 +251,22 @@ def fit_scaled(triangle: Triangle, scale: FloatArray) -> TriangleFit:
     return TriangleFit(values / size[:rank], scale, upper * size[:rank])
 
 
-def within(fit: TriangleFit, bounds: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """Return the best fit within bounds: the one whose predictions differ least from the free."""
-    values, triangle = fit.values, fit.factor
+def within(
+    values: FloatArray, triangle: FloatArray, bounds: tuple[FloatArray, FloatArray]
+) -> FloatArray:
+    """
+    Return the best fit within bounds: the one whose predictions differ least from the free.
+
+    Parameters
+    ----------
+    values : ndarray, shape (r,)
+        The free fit.
+    triangle : ndarray, shape (r, r)
+        Triangular factor of the weighted columns.
+    bounds : tuple of two ndarray, each of shape (r,)
+        Lower and upper.
+
+    """
     if np.all((values >= bounds[0]) & (values <= bounds[1])):
         return values
     scale = np.linalg.norm(triangle, axis=0)

@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.identification import Fit, Grade, Identification, Verification
 from armid_ros.identification import grade as graded
+from armid_ros.identification.estimators.names import IN_WORDS
+from armid_ros.identification.estimators.side_by_side import MethodScore
 from armid_ros.recording import Recording
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, robot_label
@@ -21,6 +23,7 @@ from armid_ros.report.sections.excitation import Excitation
 from armid_ros.report.sections.facts import Asked
 from armid_ros.report.sections.fit import FitSection
 from armid_ros.report.sections.forward import Forward
+from armid_ros.report.sections.methods import Methods
 from armid_ros.report.sections.next_steps import NextSteps
 from armid_ros.report.sections.origin import Origin
 from armid_ros.report.sections.parameters import Parameters
@@ -44,6 +47,7 @@ def identification_report(
     validation_recordings: Sequence[Recording] = (),
     verification: Verification | None = None,
     grade: Grade | None = None,
+    methods: Sequence[MethodScore] = (),
     exports: Mapping[str, Sequence[str]] | None = None,
     provenance: Provenance | None = None,
 ) -> str:
@@ -68,6 +72,8 @@ def identification_report(
         What the identification was put to.
     grade : Grade, optional
         What it is good for; found out where it is not given.
+    methods : sequence of MethodScore
+        Estimators that were compared on the same data.
     exports : mapping of str to sequence of str, optional
         Files for other programs, and what each has no place for.
     provenance : Provenance, optional
@@ -115,6 +121,7 @@ def identification_report(
         ),
         WhitenessSection(arm.robot, shown, role),
         *_noise(result, verification),
+        *([Methods(methods)] if methods else []),
         NextSteps(judgement.next_steps),
         Origin(provenance or Provenance()),
     ]
@@ -151,11 +158,6 @@ def _noise(result: Identification, verification: Verification | None) -> list[Se
 def _asked(
     result: Identification, robot: str, training: Sequence[str], validation: Sequence[str]
 ) -> list[tuple[str, str]]:
-    methods = {
-        'ols': 'ordinary least squares',
-        'wls': 'least squares weighted by the noise of each joint',
-        'irls': 'least squares weighted by the noise of each joint, outliers weighted down',
-    }
     gravity = ', '.join(f'{g:.4g}' for g in result.arm.robot.gravity)
     used = result.used
     kept = used.rate_hz / used.decimation
@@ -164,7 +166,7 @@ def _asked(
         ('Joints', ', '.join(result.arm.robot.joints)),
         ('Gravity', f'({gravity}) m/s²'),
         ('Effects', ', '.join(effect.name for effect in result.arm.effects) or 'none'),
-        ('Method', methods[result.settings.method]),
+        ('Method', IN_WORDS[result.settings.method]),
         (
             'Filter',
             f'positions below {used.cutoff_hz:.3g} Hz of {used.rate_hz:.4g} Hz; torque and model '

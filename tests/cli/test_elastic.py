@@ -50,6 +50,14 @@ def test_demo_finds_the_springs(folder) -> None:
     assert 'The springs have' in (folder / 'report.html').read_text(encoding='utf-8')
 
 
+def test_demo_tells_the_story_of_the_tuning(folder) -> None:
+    """From the printed set before tuning to that after it, of which the arm is made."""
+    story = json.loads((folder / 'elastic.json').read_text())['story']
+    assert story['main_parameters_percent_before'] > 50.0
+    assert story['main_parameters_percent_after'] < 0.5
+    assert story['factor'] > 150.0
+
+
 def test_bags_give_the_same_again_and_no_steps_leave_out_the_tuning(folder, tmp_path) -> None:
     arguments = [str(folder / 'resonances'), '--out', str(tmp_path / 'again')]
     result = CliRunner().invoke(elastic, arguments, catch_exceptions=False)

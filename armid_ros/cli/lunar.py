@@ -1,0 +1,66 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The paper on the humanoid arm for the moon, repeated by one command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from armid_ros.cli import options
+from armid_ros.cli.origin import provenance
+from armid_ros.cli.terminal import print_rows, progress, say
+from armid_ros.files import json_text, write_file
+from armid_ros.identification import write_document
+from armid_ros.identification.lunar.output import lunar_document, SCHEMA
+from armid_ros.identification.lunar.reproduction import reproduce
+from armid_ros.report.lunar_report import lunar_report, sentences
+import click
+
+OUTPUTS = ('lunar.json', 'report.html')
+
+
+@click.command(epilog='Example: armid lunar --out result')
+@options.folder
+@options.seed
+@options.as_json
+def lunar(out: Path, seed: int, as_json: bool) -> None:
+    """Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures."""
+    options.hold(out, SCHEMA)
+    options.require_own(out, OUTPUTS, 'lunar')
+    with progress('designing the trajectory') as tick:
+        found = reproduce(seed=seed, progress=tick)
+    document = lunar_document(found)
+    write_document(out / 'lunar.json', document)
+    page = lunar_report(found, provenance=provenance([], {'robot': 'humanoid_arm'}, seed))
+    write_file(out / 'report.html', page)
+    if as_json:
+        click.echo(json_text(document))
+        return
+    for table in document['tables']:
+        say(f'Table {table["number"]}, {table["title"]}')
+        print_rows(_rows(table), as_json=False, right=tuple(_HEADS))
+    for sentence in sentences(found):
+        say(sentence)
+    say(f'{out}: {", ".join(OUTPUTS)}')
+
+
+#: Columns of the table in the terminal, and the keys of the document.
+_HEADS = {
+    'paper': 'paper',
+    'against noise': 'against_noise',
+    'weight': 'weight_alone',
+    'whole': 'whole_dynamics',
+}
+
+
+def _rows(table: dict[str, Any]) -> list[dict[str, str]]:
+    unit = 'of noise' if table['measure'] == 'mae_over_noise' else '% of peak'
+    return [
+        {
+            'joint': joint,
+            **{head: f'{table[key][joint]:.3g}' for head, key in _HEADS.items()},
+            'unit': unit,
+        }
+        for joint in table['paper']
+    ]

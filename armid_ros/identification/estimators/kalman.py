@@ -1,0 +1,297 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+An extended Kalman filter of positions, velocities and parameters.
+
+State x = (q, dq, theta), input the recorded torque, output the recorded position; theta is
+constant. The arm is integrated from sample to sample with the parameters as believed so far, and
+each position corrects all three. Nothing is filtered or differentiated beforehand.
+Source: Gautier and Poignet 2001; Jazwinski 1970, section 8.3.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.excited import bounds
+from armid_ros.identification.nonlinear import FittedValues, moved, torques
+from armid_ros.identification.regression import REST_SPEED
+from armid_ros.identification.signals import Conditioning, decimate, segments
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, LinAlgError
+
+#: Samples per second that are enough to integrate an arm between them [Hz].
+_RATE = 500.0
+#: Share of the sampling rate below which positions are taken as they are.
+_BAND = 0.4
+#: Steps of differences of position [rad or m] and velocity.
+_STEP = 1e-6
+#: What a parameter may be off by before any data: this share of its value ...
+_PRIOR_SHARE = 0.3
+#: ... or what makes this share of the torque that is recorded, whichever is more: of effects, of
+#: which a description says nothing, and of the body.
+_PRIOR_TORQUE = 0.1, 0.01
+#: A filter that leaves so many times the torque of least squares has not converged.
+_CONVERGED = 1.5
+#: Least position noise [rad or m]: below it rounding of the integration counts.
+_LEAST_NOISE = 1e-7
+
+
+def fit_by_kalman_filter(
+    start: ArmModel,
+    fit: FittedValues,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    free: FloatArray,
+) -> tuple[FittedValues, tuple[str, ...]]:
+    """
+    Fit by an extended Kalman filter.
+
+    Parameters
+    ----------
+    start : ArmModel
+        Where it begins: the description, or an arm that can be simulated.
+    fit : FittedValues
+        Weighted least squares: which parameters, and how large the torque noise is.
+    recordings : sequence of Recording
+        Training data.
+    used : Conditioning
+        Filters of the least squares; the Kalman filter has none but that before decimation.
+    free : ndarray, shape (10 n, k)
+        Directions of the rigid parameters that change no torque.
+
+    Raises
+    ------
+    IdentificationError
+        If an effect has a memory or is not linear in its parameters, or the filter diverges.
+
+    """
+    if fit.passes > 1 or not all(effect.instantaneous for effect in start.effects):
+        named = ', '.join(effect.name for effect in start.effects)
+        raise IdentificationError(
+            'ekf takes effects without a memory whose torque is linear in their parameters; '
+            f'among {named} is one that is not so: use wls'
+        )
+    limits = bounds(start, fit.base)
+    values = fit.base.values(start.theta)
+    covariance = np.diag(_prior(fit, values) ** 2)
+    for recording in recordings:
+        for motion in segments(recording, _raw(used)):
+            kalman = _Filter(start, fit, _thinned(motion, used), used)
+            values, covariance = kalman.run(values, covariance, limits)
+    arm = moved(fit.arm, fit.base, values, free)
+    found = replace(
+        fit,
+        arm=arm,
+        values=values,
+        solution=replace(fit.solution, values=values, covariance=covariance),
+        predicted=torques(arm, recordings, used),
+    )
+    ratio = _left(found) / max(_left(fit), 1e-300)
+    if ratio < _CONVERGED:
+        return found, ()
+    return found, (
+        f'ekf leaves {ratio:.2g} times the torque that wls leaves: it has not converged',
+    )
+
+
+def _left(fit: FittedValues) -> float:
+    """Return the size of what a fit leaves of the torque."""
+    left = [p.tau - torque for p, torque in zip(fit.problem, fit.predicted, strict=True)]
+    return float(np.linalg.norm(np.concatenate(left)))
+
+
+def _prior(fit: FittedValues, values: FloatArray) -> FloatArray:
+    """Return the standard deviations of the parameters before any data, shape (r,)."""
+    size = np.sqrt(np.mean(np.concatenate([part.tau for part in fit.problem]) ** 2, axis=0))
+    columns = np.concatenate([part.columns for part in fit.problem])
+    reach = np.max(np.sqrt(np.mean(columns**2, axis=0)) / size[:, np.newaxis], axis=0)
+    body = [parameter.rigid for parameter in fit.base.parameters]
+    least = np.where(body, _PRIOR_TORQUE[1], _PRIOR_TORQUE[0])
+    return np.asarray(np.maximum(_PRIOR_SHARE * np.abs(values), least / reach))
+
+
+def _raw(used: Conditioning) -> Conditioning:
+    factor = max(1, round(used.rate_hz / _RATE))
+    return Conditioning(used.rate_hz, _BAND * used.rate_hz, factor)
+
+
+def _thinned(motion: Motion, used: Conditioning) -> Motion:
+    """Return positions and torques at the rate of the Kalman filter."""
+    raw = _raw(used)
+    assert motion.tau is not None
+    q, tau = decimate(motion.q, raw), decimate(motion.tau, raw)
+    t = raw.decimation / raw.rate_hz * np.arange(len(q), dtype=float)
+    dq = np.gradient(q, t, axis=0)
+    return Motion(motion.joints, t, q, dq, np.zeros_like(q), tau)
+
+
+@dataclass(frozen=True)
+class _Slopes:
+    """
+    The torque of an arm at one state, and its derivatives.
+
+    Attributes
+    ----------
+    torque : ndarray, shape (n,)
+        Without acceleration.
+    by_q, by_dq, inertia : ndarray, shape (n, n)
+        Derivatives by position, velocity and acceleration.
+    columns : ndarray, shape (n, r)
+        Derivatives by the parameters, at the acceleration that was asked for.
+    step : ndarray, shape (n,)
+        Half the torque between slow motion forwards and backwards, which friction may hold, of
+        joints that are slow; of others none.
+
+    """
+
+    torque: FloatArray
+    by_q: FloatArray
+    by_dq: FloatArray
+    inertia: FloatArray
+    columns: FloatArray
+    step: FloatArray
+
+
+class _Filter:
+    """
+    The filter along one stretch.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Structure.
+    fit : FittedValues
+        Parameters and torque noise.
+    motion : Motion
+        Positions and torques.
+    used : Conditioning
+        Filters of the least squares, whose residual is the torque noise.
+
+    """
+
+    def __init__(
+        self, arm: ArmModel, fit: FittedValues, motion: Motion, used: Conditioning
+    ) -> None:
+        self._arm, self._columns, self._motion = arm, fit.base.independent, motion
+        self._dt = float(motion.t[1] - motion.t[0])
+        self._start = fit.base.values(arm.theta)
+        self._slow = REST_SPEED * np.max(np.abs(motion.dq), axis=0)
+        self._noise = np.maximum(_position_noise(motion), _LEAST_NOISE) ** 2
+        # the residual of the least squares is white at its own rate; the same spectrum here
+        rows = used.rate_hz / used.decimation
+        self._torque_noise = fit.solution.joint_std**2 * max(1.0, 1.0 / (self._dt * rows))
+
+    def run(
+        self, values: FloatArray, covariance: FloatArray, limits: tuple[FloatArray, FloatArray]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Filter the stretch; return parameters and their covariance."""
+        n, r = self._motion.n_joints, len(values)
+        assert self._motion.tau is not None
+        x = np.concatenate([self._motion.q[0], self._motion.dq[0], values])
+        p = np.zeros((2 * n + r, 2 * n + r))
+        p[:n, :n] = np.diag(self._noise)
+        p[n : 2 * n, n : 2 * n] = np.diag(2.0 * self._noise / self._dt**2)
+        p[2 * n :, 2 * n :] = covariance
+        ddq = np.zeros(n)
+        for k in range(1, len(self._motion)):
+            tau = 0.5 * (self._motion.tau[k - 1] + self._motion.tau[k])
+            x, p, ddq = self._predict(x, p, ddq, tau)
+            x, p = self._correct(x, p, self._motion.q[k])
+            x[2 * n :] = np.clip(x[2 * n :], *limits)
+            if not np.all(np.isfinite(x)):
+                raise IdentificationError(_diverged(self._motion.t[k]))
+        return x[2 * n :], p[2 * n :, 2 * n :]
+
+    def _predict(
+        self, x: FloatArray, p: FloatArray, ddq: FloatArray, tau: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        n, dt = self._motion.n_joints, self._dt
+        q, dq, theta = x[:n], x[n : 2 * n], x[2 * n :]
+        here = self._slopes(q + 0.5 * dt * dq, dq, ddq, theta)
+        try:
+            factor = cho_factor(here.inertia)
+        except (LinAlgError, ValueError):
+            raise IdentificationError(_diverged(self._motion.t[-1])) from None
+        implicit = here.inertia + dt * here.by_dq  # stiff friction damps, and does not ring
+        ddq = np.asarray(np.linalg.solve(implicit, tau - here.torque), dtype=np.float64)
+        after = np.concatenate([q + dt * dq + 0.5 * dt**2 * ddq, dq + dt * ddq, theta])
+        slopes = -np.linalg.solve(implicit, np.hstack([here.by_q, here.by_dq, here.columns]))
+        moves = np.eye(len(x))
+        moves[:n, n : 2 * n] += dt * np.eye(n)
+        moves[n : 2 * n] += dt * slopes
+        moves[:n] += 0.5 * dt**2 * slopes
+        p = moves @ p @ moves.T
+        gain = cho_solve(factor, np.diag(np.sqrt(self._torque_noise + here.step**2)))
+        noise = np.vstack([0.5 * dt**2 * gain, dt * gain])
+        p[: 2 * n, : 2 * n] += noise @ noise.T
+        return after, p, ddq
+
+    def _correct(
+        self, x: FloatArray, p: FloatArray, q: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        n = self._motion.n_joints
+        innovation = p[:n, :n] + np.diag(self._noise)
+        gain = np.linalg.solve(innovation, p[:n]).T
+        x = x + gain @ (q - x[:n])
+        left = np.eye(len(x))
+        left[:, :n] -= gain
+        return x, left @ p @ left.T + (gain * self._noise) @ gain.T  # Joseph's form
+
+    def _slopes(
+        self, q: FloatArray, dq: FloatArray, ddq: FloatArray, theta: FloatArray
+    ) -> _Slopes:
+        """
+        Differentiate the torque by everything, from one call of the columns.
+
+        Between slow motion backwards and forwards it is taken as straight, as friction may be
+        anything there.
+
+        """
+        n, slow = len(q), np.abs(dq) < self._slow
+        middle = np.where(slow, 0.0, dq)
+        reach = np.where(slow, self._slow, _STEP)
+        states = np.empty((4 * n + 2, 3, n))
+        states[:, 0], states[:, 1], states[:, 2] = q, middle, ddq
+        states[:n, 0] += _STEP * np.eye(n)
+        states[n : 2 * n, 1] += np.diag(reach)
+        states[2 * n : 3 * n, 1] -= np.diag(reach)
+        states[3 * n : 4 * n, 2] += np.eye(n)
+        states[-2, 2] = 0.0
+        t = self._dt * np.arange(len(states), dtype=float)
+        motion = Motion(self._motion.joints, t, states[:, 0], states[:, 1], states[:, 2])
+        columns = self._arm.columns(motion)[:, :, self._columns]
+        by_dq = (columns[n : 2 * n] - columns[2 * n : 3 * n]) / (2.0 * reach)[:, None, None]
+        along = np.tensordot(np.where(slow, dq, 0.0), by_dq, 1)
+        torque = columns @ theta
+        heavier = columns[3 * n : 4 * n] - columns[-1]
+        inertia = (heavier @ theta).T
+        if np.linalg.eigvalsh(0.5 * (inertia + inertia.T))[0] <= 0.0:
+            inertia = (heavier @ self._start).T  # until the parameters are those of bodies again
+        return _Slopes(
+            torque[-2] + along @ theta,
+            ((torque[:n] - torque[-1]) / _STEP).T,
+            (by_dq @ theta).T,
+            0.5 * (inertia + inertia.T),
+            columns[-1] + along,
+            np.where(slow, reach * np.abs(np.einsum('jjp,p->j', by_dq, theta)), 0.0),
+        )
+
+
+def _position_noise(motion: Motion) -> FloatArray:
+    """Return the standard deviation of white position noise, from differences, shape (n,)."""
+    differences = np.diff(motion.q, n=4, axis=0)  # gain of white noise: sqrt(70)
+    return np.asarray(np.median(np.abs(differences), axis=0) / 0.6745 / np.sqrt(70.0))
+
+
+def _diverged(t: float) -> str:
+    return (
+        f'ekf: the filter diverged within {t:.0f} s: the description is too far off, or the '
+        'sampling too slow; use wls'
+    )

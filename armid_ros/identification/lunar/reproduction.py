@@ -1,0 +1,333 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The paper's experiments, repeated on the simulated arm.
+
+The arm of the paper's Table 2 runs one designed trajectory, slowly, with torque noise as large as
+the paper's errors. It is identified by its weight alone, as in the paper, and with the whole
+dynamics, from a description whose masses are 20 % too small. Errors are against the true torque
+along trajectories that were not used, and, as the paper may have measured them, against the noisy
+torque of the run itself.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.excitation import design, DesignSettings, Excitation, Limits, random_feasible
+from armid_ros.identification.identify import Fit, Identification, identify
+from armid_ros.identification.lunar.paper import PaperTable, TABLES
+from armid_ros.model import gravity_composites, inverse_dynamics
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+from armid_ros.robots import collision_model, load_robot, Robot
+from armid_ros.simulation import Sensors, simulate
+import numpy as np
+import scipy.optimize
+
+#: The description is this much of the arm.
+_BELIEVED = 0.8
+#: Samples per second that are recorded [Hz].
+_RATE = 100.0
+#: Period of the trajectory [s], two of which are run: slow, as in the paper.
+_PERIOD = 60.0
+#: Trajectories that the errors are taken along, and their period [s].
+HELD_OUT, _TEST = 5, 60.0
+#: Encoder of 18 bits.
+_RESOLUTION = 2 * np.pi / 2**18
+#: Poses among which the largest torques of an arm are looked for.
+_POSES = 5000
+#: Poses of each joint, those of the largest torques, from which it is searched further.
+_STARTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class MethodErrors:
+    """
+    Errors of one way to identify the arm.
+
+    Attributes
+    ----------
+    name : str
+        'weight alone' or 'whole dynamics'.
+    result : Identification
+        What it found.
+    held_out : ndarray, shape (6,)
+        Error against the true torque along trajectories not used [N m]; RMSE, or for Table 6 the
+        mean absolute error.
+    noisy : ndarray, shape (6,)
+        The same against the noisy torque of the run [N m].
+
+    """
+
+    name: str
+    result: Identification
+    held_out: FloatArray
+    noisy: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """
+    One table, repeated.
+
+    Attributes
+    ----------
+    table : PaperTable
+        What the paper has.
+    joints : tuple of str
+        Joints, shoulder first.
+    peak : ndarray, shape (6,)
+        Largest torque that gravity can ask of each joint [N m].
+    peak_run : ndarray, shape (6,)
+        Largest torque along the trajectories of the errors [N m].
+    methods : tuple of MethodErrors
+        By the weight alone, and with the whole dynamics.
+    test : Fit
+        The first trajectory of the errors: true torque, and that of the weight alone.
+
+    """
+
+    table: PaperTable
+    joints: tuple[str, ...]
+    peak: FloatArray
+    peak_run: FloatArray
+    methods: tuple[MethodErrors, ...]
+    test: Fit
+
+    def ratio(self, errors: FloatArray) -> FloatArray:
+        """Return errors as the paper has them: of the peak, or of the noise, shape (6,)."""
+        return errors / (self.table.noise if self.table.uniform else self.peak_run)
+
+
+@dataclass(frozen=True)
+class Composite:
+    """
+    One of the minimal gravity parameters.
+
+    Attributes
+    ----------
+    name : str
+        Its masses and moments, times gravity.
+    joint : str
+        The joint that it belongs to.
+    truth, value, std : float
+        On the moon without load [N mm].
+    loaded_truth, loaded, loaded_std : float
+        With the load [N mm].
+
+    """
+
+    name: str
+    joint: str
+    truth: float
+    value: float
+    std: float
+    loaded_truth: float
+    loaded: float
+    loaded_std: float
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """
+    The whole paper.
+
+    Attributes
+    ----------
+    repeated : tuple of Repeated
+        Tables 3, 4 and 6.
+    composites : tuple of Composite
+        The minimal gravity parameters.
+    load, load_std : float
+        Mass that the two runs on the moon differ by [kg].
+
+    """
+
+    repeated: tuple[Repeated, ...]
+    composites: tuple[Composite, ...]
+    load: float
+    load_std: float
+
+
+def reproduce(
+    *, seed: int, progress: Callable[[float, str], None] = lambda share, what: None
+) -> Reproduction:
+    """
+    Repeat the paper.
+
+    Parameters
+    ----------
+    seed : int
+        Of every random number.
+    progress : callable, optional
+        Told the share that is done, 0 to 1, and what is being done.
+
+    """
+    rng = np.random.default_rng(seed)
+    nominal = load_robot('humanoid_arm', gravity='moon')
+    progress(0.0, 'designing the trajectory')
+    collision = collision_model(nominal)
+    settings = DesignSettings(
+        period=_PERIOD,
+        speed='slow',
+        starts=2,
+        candidates=20,
+        iterations=60,
+        noise=TABLES[0].noise,
+        target='gravity',
+        processes=1,
+    )
+    run = design(ArmModel(nominal), settings, rng, collision=collision).excitation
+    limits = Limits.of(nominal, speed='slow')
+    tests = [
+        Excitation(
+            random_feasible(
+                ArmModel(nominal), limits, _TEST, 3, rng, collision=collision, margin=0.01
+            )
+        ).motion(_RATE)
+        for _ in range(HELD_OUT)
+    ]
+    repeated = []
+    for index, table in enumerate(TABLES):
+        progress(0.5 + index / 6.0, f'table {table.number}')
+        repeated.append(_repeat(table, run, tests, np.random.default_rng([seed, table.number])))
+    return Reproduction(tuple(repeated), *_compared(repeated[0], repeated[1], rng))
+
+
+def attainable(robot: Robot, rng: np.random.Generator) -> FloatArray:
+    """Return the largest torque that gravity can ask of every joint, shape (n,) [N m]."""
+    n = robot.n_joints
+
+    def torque(q: FloatArray) -> FloatArray:
+        rest = np.zeros_like(q)
+        return inverse_dynamics(
+            robot, Motion(robot.joints, np.arange(1.0 * len(q)), q, rest, rest)
+        )
+
+    poses = rng.uniform(-np.pi, np.pi, (_POSES, n))
+    sizes = np.abs(torque(poses))
+    best = np.zeros(n)
+    for joint in range(n):
+        for pose in poses[np.argsort(sizes[:, joint])[-_STARTS:]]:
+            found = scipy.optimize.minimize(
+                lambda q, joint=joint: -abs(float(torque(q[np.newaxis])[0, joint])), pose
+            )
+            best[joint] = max(best[joint], -found.fun)
+    return best
+
+
+def _repeat(
+    table: PaperTable, run: Excitation, tests: Sequence[Motion], rng: np.random.Generator
+) -> Repeated:
+    robot = load_robot(table.robot, gravity=table.gravity)
+    truth = ArmModel(robot)
+    recording, moved = _recorded(truth, table, run, rng)
+    assert recording.tau is not None
+    believed = load_robot('humanoid_arm', gravity=table.gravity)
+    believed = believed.with_inertias(_BELIEVED * believed.rigid_parameters)
+    torques = [truth.torque(motion) for motion in tests]
+    methods = []
+    for name, slow in (('weight alone', True), ('whole dynamics', False)):
+        described = ArmModel(believed, quasi_static=slow)
+        result = identify(described, [recording], rng=np.random.default_rng(0))
+        arm = replace(result.arm, quasi_static=slow)
+        found = [arm.torque(motion) for motion in tests]
+        off = np.concatenate([f - t for f, t in zip(found, torques, strict=True)])
+        left = recording.tau - arm.torque(moved)
+        methods.append(MethodErrors(name, result, _size(off, table), _size(left, table)))
+        if slow:
+            shown = found[0]
+    return Repeated(
+        table,
+        robot.joints,
+        attainable(robot, rng),
+        np.abs(np.concatenate(torques)).max(axis=0),
+        tuple(methods),
+        Fit(
+            'held out',
+            tests[0].with_torque(torques[0]),
+            shown,
+            np.ones(torques[0].shape, dtype=bool),
+        ),
+    )
+
+
+def _recorded(
+    truth: ArmModel, table: PaperTable, run: Excitation, rng: np.random.Generator
+) -> tuple[Recording, Motion]:
+    """Run the arm; return what is recorded, with the noise of the table, and how it moved."""
+    made = simulate(
+        truth, run.motion(1000.0), rng=rng, sensors=Sensors(resolution=_RESOLUTION), rate=_RATE
+    )
+    if table.uniform:
+        noise = 2.0 * table.noise * rng.uniform(-1.0, 1.0, made.tau.shape)
+    else:
+        noise = table.noise * rng.normal(size=made.tau.shape)
+    recording = Recording(
+        joints=made.joints,
+        t=made.t,
+        q=made.q,
+        tau=made.tau + noise,
+        source=f'the run of table {table.number}',
+    )
+    return recording, made.truth
+
+
+def _size(errors: FloatArray, table: PaperTable) -> FloatArray:
+    """Return errors as the table has them: their mean size, or their root mean square."""
+    if table.uniform:
+        return np.asarray(np.mean(np.abs(errors), axis=0))
+    return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))
+
+
+def _compared(
+    bare: Repeated, loaded: Repeated, rng: np.random.Generator
+) -> tuple[tuple[Composite, ...], float, float]:
+    """Return the composites of two runs, and the load that they differ by with its deviation."""
+    robots = [load_robot(r.table.robot, gravity='moon') for r in (bare, loaded)]
+    theory = gravity_composites(robots[0], rng)
+    gravity = 1e3 * float(np.linalg.norm(robots[0].gravity))
+    static = [j for j in range(len(robots[0].rigid_parameters)) if j % 10 < 4]
+    found = [r.methods[0].result for r in (bare, loaded)]
+    truth = [gravity * theory.values(robot.rigid_parameters[static]) for robot in robots]
+    values = [gravity * theory.values(one.arm.robot.rigid_parameters[static]) for one in found]
+    places = [
+        [
+            next(k for k, p in enumerate(one.estimate.parameters) if _leads(p.name, name.name))
+            for name in theory.parameters
+        ]
+        for one in found
+    ]
+    stds = [gravity * one.estimate.std[rows] for one, rows in zip(found, places, strict=True)]
+    composites = tuple(
+        Composite(name.name, name.joint, *map(float, numbers))
+        for name, *numbers in zip(
+            theory.parameters,
+            truth[0],
+            values[0],
+            stds[0],
+            truth[1],
+            values[1],
+            stds[1],
+            strict=True,
+        )
+    )
+    change = (values[1] - values[0]) / gravity
+    last = [j for j, name in enumerate(theory.standard) if name.joint == robots[0].joints[-1]]
+    columns = theory.grouping[:, last]  # m, mx, my, mz of the hand
+    covariance = sum(
+        one.estimate.covariance[np.ix_(rows, rows)]
+        for one, rows in zip(found, places, strict=True)
+    )
+    weighted = np.linalg.solve(covariance, columns)
+    spread = np.linalg.inv(weighted.T @ columns)
+    load = spread @ (weighted.T @ change)
+    return composites, float(load[0]), float(np.sqrt(spread[0, 0]))
+
+
+def _leads(name: str, leader: str) -> bool:
+    return name.split(' ')[0] == leader.split(' ')[0]

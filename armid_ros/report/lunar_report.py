@@ -1,0 +1,89 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report of the lunar paper, repeated."""
+
+from __future__ import annotations
+
+from armid_ros.identification.identifiability import HALF_WIDTH
+from armid_ros.identification.lunar.paper import LOAD, STATED_ERROR
+from armid_ros.identification.lunar.reproduction import Repeated, Reproduction
+from armid_ros.report.notation import digits, measured
+from armid_ros.report.page import Page, Section
+from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.lunar import GravityParameters, PaperTables, TorqueCurves
+from armid_ros.report.sections.origin import Origin
+from armid_ros.report.sections.verdict import Verdict
+import numpy as np
+
+#: Wanted of Tables 3 and 4 [% of the peak], and of Table 6 [of the noise].
+_WANTED = 1.0, 0.15
+
+
+def lunar_report(found: Reproduction, *, provenance: Provenance | None = None) -> str:
+    """
+    Return report.html of the repeat.
+
+    Parameters
+    ----------
+    found : Reproduction
+        Tables and gravity parameters.
+    provenance : Provenance, optional
+        Files, versions, settings, seed.
+
+    """
+    sections: list[Section] = [
+        Verdict(*_grade(found), sentences(found)),
+        PaperTables(found.repeated),
+        TorqueCurves(found.repeated),
+        GravityParameters(found.composites, _load(found)),
+        Origin(provenance or Provenance()),
+    ]
+    subtitle = 'gravity and dynamics of a 6-DOF humanoid arm · the paper beside its repeat'
+    return Page('The lunar paper', subtitle, sections).html()
+
+
+def sentences(found: Reproduction) -> tuple[str, ...]:
+    """Say in words what was found."""
+    lines = []
+    for one in found.repeated:
+        slow, whole = (one.ratio(method.held_out) for method in one.methods)
+        if one.table.uniform:
+            low, high = (digits(float(end)) for end in np.sort(one.table.ratio)[[0, -1]])
+            lines.append(
+                f'Table {one.table.number}, {one.table.title}: mean absolute error over noise '
+                f'{digits(float(slow.max()))} at most by the weight alone, '
+                f'{digits(float(whole.max()))} with the whole dynamics; the paper: '
+                f'{low} to {high}.'
+            )
+            continue
+        noisy = one.ratio(one.methods[0].noisy)
+        paper = 100.0 * float(np.mean(one.table.ratio))
+        lines.append(
+            f'Table {one.table.number}, {one.table.title}: error of the peak torque '
+            f'{digits(100.0 * float(slow.mean()))} % by the weight alone, '
+            f'{digits(100.0 * float(whole.mean()))} % with the whole dynamics, on average; '
+            f'{digits(100.0 * float(noisy.mean()))} % against the noisy torque. The paper: '
+            f'{paper:.2f} %'
+            + (f' ({STATED_ERROR:g} % in its abstract).' if one.table.number == 3 else '.')
+        )
+    lines.append(
+        f'{len(found.composites)} gravity parameters; a load of {_load(found)} is found where '
+        f'{LOAD:g} kg is.'
+    )
+    return tuple(lines)
+
+
+def _grade(found: Reproduction) -> tuple[str, str]:
+    held = all(_as_wanted(one) for one in found.repeated)
+    return ('reproduced', 'good') if held else ('in part', 'fair')
+
+
+def _as_wanted(one: Repeated) -> bool:
+    ratio = one.ratio(one.methods[0].held_out)
+    if one.table.uniform:
+        return bool(np.max(ratio) <= _WANTED[1])
+    return bool(100.0 * np.mean(ratio) <= _WANTED[0])
+
+
+def _load(found: Reproduction) -> str:
+    return ' ± '.join(measured(found.load, HALF_WIDTH * found.load_std)) + ' kg'

@@ -1,0 +1,122 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every estimator finds the arm; those against encoder noise are biased less by it."""
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import IdentificationError
+from armid_ros.identification import (
+    IdentificationSettings,
+    identify,
+    PhysicalSettings,
+    SignalSettings,
+)
+from armid_ros.identification.estimators.names import ESTIMATORS, estimators_of
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+from ..conftest import multisine, recorded
+
+SIGNALS = SignalSettings(20.0, 4)
+VALUES = {
+    'viscous_friction': 0.08,
+    'coulomb_friction': 0.05,
+    'torque_offset': 0.02,
+    'rotor_inertia': 0.02,
+}
+
+
+@pytest.fixture(scope='module')
+def arm():
+    """Return the humanoid arm with friction and rotors, which can always be simulated."""
+    model = ArmModel(load_robot('humanoid_arm'))
+    for name, value in VALUES.items():
+        model = model.with_effect(make_effect(name, model.robot), np.full(6, value))
+    return model
+
+
+@pytest.fixture(scope='module')
+def motion(arm):
+    return multisine(arm.robot.joints, 10.0, 200.0, seed=1)
+
+
+def torque_error(arm, motion, method, torque_noise, position_noise, signals=SIGNALS, seed=0):
+    """Return the error of the torque along a motion that was not used, as a share of it."""
+    recording = recorded(arm, motion, seed, torque_noise, position_noise)
+    found = identify(
+        ArmModel(arm.robot, arm.effects),
+        [recording],
+        IdentificationSettings(method, signals),
+        rng=np.random.default_rng(0),
+    )
+    other = multisine(arm.robot.joints, 5.0, 200.0, seed=2)
+    tau = arm.torque(other)
+    return np.linalg.norm(found.arm.torque(other) - tau) / np.linalg.norm(tau)
+
+
+@pytest.mark.parametrize('method', ESTIMATORS)
+def test_every_estimator_predicts_torques_that_it_has_not_seen(arm, motion, method):
+    limit = 0.05 if method == 'ekf' else 0.02
+    assert torque_error(arm, motion, method, 0.05, 1e-5, SignalSettings()) < limit
+
+
+def test_instruments_take_the_bias_of_encoder_noise_away(arm, motion):
+    plain, instruments = (
+        torque_error(arm, motion, method, 0.05, 3e-4) for method in ('wls', 'iv')
+    )
+    assert plain > 0.02
+    assert instruments < 0.3 * plain
+
+
+def test_output_error_is_biased_less_by_encoder_noise_than_least_squares(arm, motion):
+    plain, simulated = (
+        torque_error(arm, motion, method, 0.05, 3e-4) for method in ('wls', 'cloe')
+    )
+    assert simulated < 0.8 * plain
+
+
+def test_intervals_of_instruments_hold_the_truth(arm, motion):
+    inside = []
+    for seed in range(3):
+        recording = recorded(arm, motion, seed, 0.05, 3e-4)
+        found = identify(
+            ArmModel(arm.robot, arm.effects),
+            [recording],
+            IdentificationSettings('iv', SIGNALS),
+            rng=np.random.default_rng(0),
+        )
+        error = found.estimate.values - found.base.values(arm.theta)
+        inside.append(np.abs(error) < 1.96 * found.estimate.std)
+    assert 0.85 < np.mean(inside) <= 1.0
+
+
+def test_a_slow_model_has_no_inertia_to_simulate(arm, motion):
+    slow = replace(ArmModel(arm.robot, arm.effects), quasi_static=True)
+    recording = recorded(arm, motion, 0, 0.05)
+    for method in ('iv', 'cloe', 'ekf'):
+        with pytest.raises(IdentificationError, match=f'{method} simulates the arm'):
+            identify(
+                slow, [recording], IdentificationSettings(method), rng=np.random.default_rng(0)
+            )
+
+
+def test_a_filter_has_no_memory_of_torques(arm, motion):
+    late = ArmModel(arm.robot, arm.effects).with_effect(make_effect('time_delay', arm.robot))
+    recording = recorded(arm, motion, 0, 0.05)
+    with pytest.raises(IdentificationError, match='ekf takes effects without a memory'):
+        identify(late, [recording], IdentificationSettings('ekf'), rng=np.random.default_rng(0))
+
+
+def test_what_is_not_fitted_among_bodies_says_so():
+    with pytest.raises(IdentificationError, match='iv is not fitted among bodies'):
+        IdentificationSettings('iv', physical=PhysicalSettings())
+
+
+def test_names_are_read_in_order_and_unknown_ones_refused():
+    assert estimators_of('all') == ESTIMATORS
+    assert estimators_of('ekf, ols') == ('ols', 'ekf')
+    with pytest.raises(IdentificationError, match=r"no method 'kalman'; there are ols, wls"):
+        estimators_of('kalman')
