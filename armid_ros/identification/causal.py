@@ -15,7 +15,7 @@ of that of one filter in front of the regressor.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math
@@ -37,6 +37,8 @@ MOTION_FILTER_RATIO = 4.0
 ROW_RATE_RATIO = 40.0
 #: Time constants until the start of G at rest is forgotten, to 1e-6.
 _SETTLED = 20.0
+#: Periods between two samples beyond which some are missing.
+_GAP = 1.5
 #: No arm has positions or torques beyond this [SI units]; their squares would drown all others.
 LARGEST = 1e6
 #: Intervals whose median is taken as the sampling period.
@@ -216,6 +218,11 @@ class CausalFilter:
         self._restarts.clear()
         self._restart()
 
+    def restart(self, reason: str) -> None:
+        """Begin a new stretch, as what comes does not continue what was before."""
+        self._restarts[reason] += 1
+        self._restart()
+
     @property
     def rejected(self) -> Mapping[str, int]:
         """Samples left out: wrong_length, not_finite, impossible, out_of_order, no_velocity."""
@@ -223,7 +230,7 @@ class CausalFilter:
 
     @property
     def restarts(self) -> Mapping[str, int]:
-        """Restarts of the filter, by reason: dropout, jump_back."""
+        """Restarts of the filter, by reason: dropout, jump_back, and those asked for."""
         return MappingProxyType(self._restarts)
 
     @property
@@ -287,7 +294,11 @@ class CausalFilter:
             return None
         if self._start is None:
             self._start = t
-        stages = self._lag.update(dt, self._unwrapped(signal))
+        signal = self._unwrapped(signal)
+        missing = self._missing(t, dt, signal)
+        for value in (*missing, signal):
+            stages = self._lag.update(dt / (len(missing) + 1), value)
+        self._recent.append((t, signal))
         if t - self._start < _SETTLED / self._lag.pole:
             return None
         return self._motion(t, stages)
@@ -303,9 +314,30 @@ class CausalFilter:
         if dt == 0.0 or (self._period and -longest <= dt < 0.0):
             self._rejected['out_of_order'] += 1
             return False
-        self._restarts['dropout' if dt > 0.0 else 'jump_back'] += 1
-        self._restart()
+        self.restart('dropout' if dt > 0.0 else 'jump_back')
         return True
+
+    def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
+        """
+        Return what stands for the samples missing before one.
+
+        A straight line would have no acceleration, so the rows would lack that of the whole gap.
+        They are on the cubic through the sample behind the gap and three before it, which are as
+        far apart as the gap is long, for then it has hardly more noise than they.
+
+        """
+        assert self._period is not None
+        count = round(dt / self._period) if dt > _GAP * self._period else 1
+        if count < 2 or not self._recent:
+            return []
+        last = t - dt
+        nearest = (min(self._recent, key=lambda s: abs(s[0] - (last - k * dt))) for k in range(3))
+        nodes = [n for k, n in enumerate(nearest) if abs(n[0] - (last - k * dt)) < 0.5 * dt]
+        place = np.array([(node_t - last) / dt for node_t, _ in nodes] + [1.0])
+        values = np.stack([value for _, value in nodes] + [signal])
+        inside = np.arange(1, count) / count
+        factors = np.linalg.solve(np.vander(place), values)
+        return list(np.vander(inside, len(place)) @ factors)
 
     def _unwrapped(self, signal: FloatArray) -> FloatArray:
         """Undo the jump by a full turn with which some drivers keep a joint within +-pi."""
@@ -323,6 +355,7 @@ class CausalFilter:
         self._start = None
         self._last = None
         self._position = None
+        self._recent: deque[tuple[float, FloatArray]] = deque(maxlen=3 * self._max_gap)
         if self._period is not None:
             self._make_filter(self._period)
 

@@ -362,8 +362,9 @@ class _Reader:
         number = self.number(element, name, where, default)
         if abs(number) > LARGEST:
             wrong = 'not finite' if math.isinf(number) else f'beyond {LARGEST:g}'
+            text = element.get(name)
             raise RobotError(
-                f"{self.source}: {where}: {name}='{element.get(name)}' of <{element.tag}> is {wrong}"
+                f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is {wrong}"
             )
         return number
 

@@ -52,7 +52,7 @@ def test_a_number_is_finite(value):
 
 @pytest.mark.parametrize('value', [1e101, -1e308, '1.48e200', 10**150])
 def test_a_number_has_a_size_that_arithmetic_bears(value):
-    with pytest.raises(ValueError, match='mass is .* beyond 1e\\+100'):
+    with pytest.raises(ValueError, match=r'mass is .* beyond'):
         finite(value, 'mass')
 
 
