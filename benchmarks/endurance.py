@@ -132,7 +132,7 @@ def prepared(folder: Path) -> dict[str, list[str]]:
         'identify': ['identify', str(run), *robot, '--validate', str(other), '--out', '{out}'],
         'simulate': ['simulate', *robot, '--rate', '250', '--out', '{out}'],
         'recover': ['recover', str(crashed), '--out', '{out}'],
-        'excite': ['excite', *robot, '--duration', '8', '--time-budget', '2', '--out', '{out}'],
+        'excite': ['excite', *robot, '--kind', 'multisine', '--duration', '8', '--out', '{out}'],
         'inspect': ['inspect', str(run), *robot, '--out', '{out}'],
         'compare': ['compare', str(folder / 'result'), str(folder / 'result'), '--out', '{out}'],
     }

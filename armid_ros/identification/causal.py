@@ -121,6 +121,23 @@ def pole_of(cutoff: float) -> float:
     return 2.0 * np.pi * cutoff / _CUTOFF_OF_POLE
 
 
+def _gain_of_curvature(pole: float) -> float:
+    """
+    Return what a triple lag makes of a constant second derivative that is 1.
+
+    Between samples the signal is a straight line, so all its curvature is at the samples, and the
+    filter sees sum(h(k)) in place of the integral of its impulse response p^3 t^2 / 2 exp(-p t).
+
+    Parameters
+    ----------
+    pole : float
+        p over the sampling rate [-].
+
+    """
+    decay = math.exp(-pole)
+    return 0.5 * pole**3 * decay * (1.0 + decay) / (1.0 - decay) ** 3
+
+
 @dataclass(frozen=True)
 class CausalMotion:
     """
@@ -205,6 +222,7 @@ class CausalFilter:
         self._restarts: Counter[str] = Counter()
         self._revolute = np.ones(n_joints) if prismatic is None else 1.0 - np.asarray(prismatic)
         self._lag: TripleLag | None = None
+        self._gain = 1.0
         self._intervals: list[float] = []
         self._start: float | None = None
         self._last: float | None = None
@@ -369,6 +387,7 @@ class CausalFilter:
     def _make_filter(self, period: float) -> None:
         fastest = _FASTEST_POLE / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
         self._lag = TripleLag(min(MOTION_FILTER_RATIO * self._cutoff, fastest))
+        self._gain = _gain_of_curvature(self._lag.pole * period)
 
     def _motion(self, t: float, stages: FloatArray) -> CausalMotion:
         n = self._n_joints
@@ -379,6 +398,6 @@ class CausalFilter:
         if self._measured_velocity:
             q, dq, ddq = three[:n], three[n : 2 * n], slope[n : 2 * n]
         else:
-            curvature = pole * pole * (one[:n] - 2.0 * two[:n] + three[:n])
+            curvature = pole * pole * (one[:n] - 2.0 * two[:n] + three[:n]) / self._gain
             q, dq, ddq = three[:n], slope[:n], curvature
         return CausalMotion(t, q, dq, ddq, three[-n:])
