@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import open_regular
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.settings import DEFAULT, ReadSettings
@@ -74,6 +75,8 @@ def convert_ros1(path: Path, out: Path, rename: Sequence[tuple[str, str]] = ()) 
         It is no such bag, or nothing in it has a type that ROS 2 has.
 
     """
+    with open_regular(path, RecordingError):  # a FIFO would be waited for
+        pass
     try:
         with Reader(path) as reader:
             return _copy_ros1(path, reader, out, rename)
