@@ -193,10 +193,10 @@ def is_whole(path: Path) -> bool:
         return described and path.read_bytes()[-8:] == b'\x89MCAP0\r\n'
     text = path.read_text()
     if path.suffix == '.json':
-        json.loads(text)
-    elif path.suffix == '.yaml':
+        return bool(json.loads(text))
+    if path.suffix == '.yaml':
         return bool(load_yaml(text)) and text.endswith('\n')
-    elif path.suffix == '.html':
+    if path.suffix == '.html':
         return text.rstrip().endswith('</html>')
     return text.endswith('\n')
 
