@@ -31,7 +31,7 @@ TREE := $(shell find armid_ros scripts launch config resource -name __pycache__ 
 MESSAGES := $(shell find msg_schemas -name __pycache__ -prune -o -type f -print)
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test docs fuzz chaos coverage lint bench benchmark lock clean help check
+.PHONY: all demo test docs fuzz chaos coverage lint bench endurance benchmark lock clean help check
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
 
@@ -64,6 +64,9 @@ lint: $(STAMPS)/armid_ros $(STAMPS)/test  ## format, lint, layers, types
 
 bench: $(STAMPS)/armid_ros $(STAMPS)/bench  ## speed and accuracy, side by side with the peers
 	$(BIN)/python -m benchmarks $(BENCH)
+
+endurance: $(STAMPS)/armid_ros $(STAMPS)/test $(STAMPS)/bench  ## kill recorders and armid at random, play and record for 30 min; about an hour
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.endurance
 
 benchmark: $(STAMPS)/armid_ros $(STAMPS)/test  ## name the effects hidden in the locked set, about 30 min
 	$(BIN)/python -m benchmarks.hidden_effects locked --out benchmark

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Run benchmarks by name, or all of them: ``python -m benchmarks [NAME ...]``."""
+"""Run benchmarks by name, or all but the longest: ``python -m benchmarks [NAME ...]``."""
 
 from pathlib import Path
 import subprocess
@@ -20,6 +20,8 @@ LIBRARY = {
     'real_recordings',
     'two_days',
 }
+#: Runs only when it is asked for: it takes an hour.
+LONG = {'endurance'}
 
 
 def main() -> int:
@@ -27,7 +29,7 @@ def main() -> int:
     known = sorted(
         path.stem for path in Path(__file__).parent.glob('*.py') if path.stem not in LIBRARY
     )
-    names = sys.argv[1:] or known
+    names = sys.argv[1:] or [name for name in known if name not in LONG]
     unknown = [name for name in names if name not in known]
     if unknown:
         print(f"benchmarks: no '{unknown[0]}'; there are {', '.join(known)}", file=sys.stderr)

@@ -11,6 +11,7 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.table import Shown, Summary
+from armid_ros.files import write_file
 from armid_ros.identification.comparison import compare as run
 from armid_ros.identification.comparison import Comparison
 from armid_ros.identification.parameters_file import Parameters, parameters_of, read_parameters
@@ -65,7 +66,7 @@ class ComparisonResult(Shown):
         """Write the page; return where it is."""
         from armid_ros.report.compare_report import compare_report
 
-        Path(path).write_text(compare_report(self.core), encoding='utf-8')
+        write_file(Path(path), compare_report(self.core))
         return Path(path)
 
     def save(self, folder: str | Path) -> Path:
@@ -73,7 +74,7 @@ class ComparisonResult(Shown):
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
         text = json.dumps(self.document(), indent=1)
-        (out / 'comparison.json').write_text(text, encoding='utf-8')
+        write_file(out / 'comparison.json', text)
         self.report(out / 'report.html')
         return out
 

@@ -26,6 +26,7 @@ from armid_ros.arm.export import arm_urdf
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
 from armid_ros.effects import CATALOGUE
+from armid_ros.files import write_file
 from armid_ros.identification import SignalSettings
 from armid_ros.recording import Recording
 from armid_ros.report.notation import with_interval
@@ -117,7 +118,7 @@ class DiagnosisResult(Shown):
             recordings=self.recordings,
             validation=self.held_out,
         )
-        Path(path).write_text(page, encoding='utf-8')
+        write_file(Path(path), page)
         return Path(path)
 
     def save(self, folder: str | Path) -> Path:
@@ -125,7 +126,7 @@ class DiagnosisResult(Shown):
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
         text = json.dumps(self.document(), indent=1)
-        (out / 'diagnosis.json').write_text(text, encoding='utf-8')
+        write_file(out / 'diagnosis.json', text)
         save_model(out / 'model.yaml', self.arm, self._robot)
         self.report(out / 'report.html')
         return out

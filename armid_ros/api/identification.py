@@ -25,6 +25,7 @@ from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.estimate import Estimate
+from armid_ros.files import write_file
 from armid_ros.identification import (
     Fit,
     Grade,
@@ -139,7 +140,7 @@ class IdentificationResult(Shown):
         """Return the description with the identified values; write it where a path is given."""
         text = arm_urdf(self.arm).text
         if path is not None:
-            Path(path).write_text(text, encoding='utf-8')
+            write_file(Path(path), text)
         return text
 
     def report(self, path: str | Path = 'report.html') -> Path:
@@ -154,7 +155,7 @@ class IdentificationResult(Shown):
             validation=self.validation,
             validation_recordings=self.held_out,
         )
-        Path(path).write_text(page, encoding='utf-8')
+        write_file(Path(path), page)
         return Path(path)
 
     def save(self, folder: str | Path) -> Path:
@@ -167,7 +168,7 @@ class IdentificationResult(Shown):
         if self.core.physical is not None:
             self.urdf(out / 'identified.urdf')
             text = arm_mjcf(self.arm).text
-            (out / 'identified.mjcf.xml').write_text(text, encoding='utf-8')
+            write_file(out / 'identified.mjcf.xml', text)
         return out
 
     def summary(self) -> Summary:

@@ -17,7 +17,7 @@ from armid_ros.api.arguments import (
     RobotLike,
 )
 from armid_ros.api.table import Shown, Summary
-from armid_ros.files import json_text
+from armid_ros.files import json_text, write_file
 from armid_ros.inspection import inspect as look
 from armid_ros.inspection import Inspection, inspection_document
 from armid_ros.recording import Recording
@@ -75,14 +75,14 @@ class InspectionResult(Shown):
         """Write the page with all curves; return where it is."""
         from armid_ros.report.inspection_report import inspection_report
 
-        Path(path).write_text(inspection_report(self.core), encoding='utf-8')
+        write_file(Path(path), inspection_report(self.core))
         return Path(path)
 
     def save(self, folder: str | Path) -> Path:
         """Write inspection.json and inspection.html."""
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
-        (out / 'inspection.json').write_text(json_text(self.document(), indent=1), 'utf-8')
+        write_file(out / 'inspection.json', json_text(self.document(), indent=1))
         self.report(out / 'inspection.html')
         return out
 

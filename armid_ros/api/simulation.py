@@ -21,6 +21,7 @@ from armid_ros.excitation import (
     used_shares,
     whole_period,
 )
+from armid_ros.files import write_file
 from armid_ros.motion import Motion
 from armid_ros.recording import read_waypoints, ReadReport, Recording, write_joint_trajectory
 from armid_ros.robots import collision_model
@@ -95,7 +96,7 @@ class ExcitationResult(Shown):
         page = excitation_report(
             self.core, self.arm, robot=robot.name, collision=collision_model(robot)
         )
-        Path(path).write_text(page, encoding='utf-8')
+        write_file(Path(path), page)
         return Path(path)
 
     def save(self, folder: str | Path) -> Path:

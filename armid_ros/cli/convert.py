@@ -31,6 +31,7 @@ import click
 @click.option('--out', type=click.Path(path_type=Path), help='Bag to write; must not exist.')
 @click.option('--dry-run', is_flag=True, help='Show what would be read from where; write nothing.')
 @columns.options
+@options.reading
 @options.joints
 def convert(
     files: tuple[Path, ...],
@@ -94,7 +95,11 @@ def _bag(path: Path, out: Path | None) -> None:
         raise RecordingError(
             f'{path}: nothing to do: a bag of ROS 2 stays as it is without --rename'
         )
-    copied = convert_ros1(path, out, rename) if is_ros1(path) else copy_renamed(path, out, rename)
+    copied = (
+        convert_ros1(path, out, rename)
+        if is_ros1(path)
+        else copy_renamed(path, out, rename, options.read_settings())
+    )
     _tell(copied)
     say(f'{out}: {sum(count for _, _, count in copied.topics)} messages')
 
@@ -104,5 +109,7 @@ def _tell(copied: Copied) -> None:
         say(f'  {topic} ({kind}): {count} messages')
     for text in copied.left_out:
         say(f'  left out: {text}')
+    if copied.damage:
+        say(f'  {copied.damage}')
     if copied.renamed:
         say('  renamed: ' + ', '.join(f'{old} to {new}' for old, new in copied.renamed))

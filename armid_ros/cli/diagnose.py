@@ -134,9 +134,14 @@ def diagnose(
         recordings, held_out, before = (
             options.read(paths, robot, topic) for paths in (bags, validate, baseline)
         )
+        options.tell_damage(*recordings, *held_out, *before)
         if beside is not None:
-            recordings = partner_options.read_together(bags, recordings, beside, partner_topic)
-            held_out = partner_options.read_together(validate, held_out, beside, partner_topic)
+            recordings, held_out = (
+                partner_options.read_together(
+                    named, some, beside, partner_topic, options.read_settings()
+                )
+                for named, some in ((bags, recordings), (validate, held_out))
+            )
         result = run(
             arm,
             recordings,

@@ -81,6 +81,7 @@ STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_ac
     '--model', type=click.Path(path_type=Path), help='A model.yaml with inertias, of other arms.'
 )
 @options.folder
+@options.reading
 @options.seed
 @options.as_json
 def elastic(
@@ -137,8 +138,9 @@ def elastic(
             bags, steps = _simulate(shipped, robot, sensors, out, experiments, seed, tick)
         elif not bags:
             raise RecordingError('no bag is named; give one, or --demo to simulate one')
-        runs = [run for path in bags for run in read_runs(path, robot, sensors)]
-        responses = [run for path in steps for run in read_runs(path, robot, sensors)]
+        how = options.read_settings(), options.tell_damage
+        runs = [run for path in bags for run in read_runs(path, robot, sensors, *how)]
+        responses = [run for path in steps for run in read_runs(path, robot, sensors, *how)]
         result = identify_two_inertia(
             runs,
             drives,

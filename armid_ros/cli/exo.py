@@ -96,10 +96,11 @@ def exo(
             noise = torque_noise, np.radians(angle_noise)
             _record(bag, names, pair, gait, duration, noise, np.random.default_rng(seed))
         settings = options.read_settings()
-        machine, wearer = (
+        machine, wearer = both = tuple(
             read_recording(bag, joints=one.joints, topic=name, settings=settings)
             for one, name in zip((pair.robot, pair.other), names, strict=True)
         )
+        options.tell_damage(*both)
         found = _identify(pair, machine, wearer, inertias, tick)
         tick(0.6, 'driving joints by torque')
         checks = _checks(pair, gait) if simulated else None

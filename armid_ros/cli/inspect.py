@@ -11,7 +11,7 @@ from armid_ros.cli import columns, options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.errors import RecordingError
-from armid_ros.files import json_text
+from armid_ros.files import json_text, write_file
 from armid_ros.inspection import inspect as look
 from armid_ros.inspection import Inspection, inspection_document
 from armid_ros.recording import Recording
@@ -48,6 +48,7 @@ _SIGNS = {'bad': 'x', 'doubt': '!', 'note': '-'}
 @options.gravity
 @options.joints
 @options.seed
+@options.reading
 @options.as_json
 def inspect(
     bag: Path,
@@ -69,12 +70,12 @@ def inspect(
     robot = None
     if robot_source is not None:
         robot = options.open_robot(robot_source, gravity, joints, [bag])
-    topics = () if is_table(bag) or is_ros1(bag) else bag_contents(bag)
+    topics = () if is_table(bag) or is_ros1(bag) else bag_contents(bag, options.read_settings())
     with progress('reading') as tick:
         if robot is None:
             recording = _without_robot(bag, topics, topic, joints)
         else:
-            (recording,) = columns.read([bag], robot, topic)
+            (recording,) = columns.read([bag], robot, topic, options.read_settings())
         tick(0.5, 'trying to identify' if robot else 'looking')
         found = look(recording, robot, topics=topics, rng=np.random.default_rng(seed))
     if out is not None:
@@ -82,7 +83,7 @@ def inspect(
         page = inspection_report(
             found, robot=robot_source or '', provenance=provenance([bag], seed=seed)
         )
-        (out / 'inspection.html').write_text(page, encoding='utf-8')
+        write_file(out / 'inspection.html', page)
     if as_json:
         click.echo(json_text(inspection_document(found)))
         return
@@ -107,7 +108,9 @@ def _without_robot(
     if wanted is None:
         chosen = _topic(bag, topics, topic)
         topic, wanted = chosen.name, list(chosen.joints)
-    return read_anything(bag, joints=wanted, topic=topic, columns=said)
+    return read_anything(
+        bag, joints=wanted, topic=topic, columns=said, settings=options.read_settings()
+    )
 
 
 def _topic(bag: Path, topics: tuple[TopicContent, ...], wanted: str | None) -> TopicContent:

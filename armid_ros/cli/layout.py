@@ -8,6 +8,7 @@ from pathlib import Path
 
 from armid_ros.cli import options
 from armid_ros.cli.terminal import say
+from armid_ros.files import write_file
 from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout
 import click
 
@@ -26,5 +27,5 @@ def layout(robot_source: str, out: Path, namespace: str, joints: str | None) -> 
         'foxglove.json': foxglove_layout(robot.joints, namespace),
     }
     for name, text in files.items():
-        (out / name).write_text(text, encoding='utf-8')
+        write_file(out / name, text)
     say(f'{out}: {", ".join(files)}')

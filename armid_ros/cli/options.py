@@ -111,6 +111,14 @@ def read_settings() -> ReadSettings:
     return ReadSettings(check_crc=bool(meta.get(_CRC, True)), memory_limit=size)
 
 
+def tell_damage(*recordings: Recording) -> None:
+    """Say on stderr what is wrong with the files of recordings; the same is said once."""
+    for text in dict.fromkeys(
+        f'{r.source}: {r.report.damage}' for r in recordings if r.report.damage
+    ):
+        click.echo(visible(text), err=True)
+
+
 def open_robot(
     source: str,
     gravity: str,

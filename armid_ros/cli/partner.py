@@ -9,10 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from armid_ros.cli.options import tell_damage
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import ModelError
 from armid_ros.model.spring_ties import centroid_ties, Tie
-from armid_ros.recording import read_recording, recorded_together, Recording
+from armid_ros.recording import read_recording, ReadSettings, recorded_together, Recording
 from armid_ros.robots import load_robot, Robot
 from armid_ros.simulation.leg_pair import leg_ties
 import click
@@ -69,17 +70,19 @@ def open_partner(
 
 
 def read_together(
-    bags: Sequence[Path], recordings: Sequence[Recording], partner: Partner, topic: str | None
+    bags: Sequence[Path],
+    recordings: Sequence[Recording],
+    partner: Partner,
+    topic: str | None,
+    settings: ReadSettings,
 ) -> list[Recording]:
     """Put the partner, as the same bags have it, beside recordings of the arm."""
+    joints = partner.robot.joints
+    others = [read_recording(bag, joints=joints, topic=topic, settings=settings) for bag in bags]
+    tell_damage(*others)
     return [
-        recorded_together(
-            recording,
-            read_recording(bag, joints=partner.robot.joints, topic=topic),
-            partner.robot,
-            partner.ties,
-        )
-        for bag, recording in zip(bags, recordings, strict=True)
+        recorded_together(recording, other, partner.robot, partner.ties)
+        for recording, other in zip(recordings, others, strict=True)
     ]
 
 

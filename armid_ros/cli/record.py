@@ -62,6 +62,7 @@ import numpy as np
 @options.gravity
 @options.joints
 @options.seed
+@options.reading
 def simulate(
     robot_source: str,
     out: Path,
@@ -136,7 +137,7 @@ def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 def _reference(robot: Robot, path: Path | None, rng: np.random.Generator) -> Reference:
     """Return the trajectory in a file or bag of armid excite, or one that is made in a hurry."""
     if path is not None and (path.is_dir() or path.suffix in ('.mcap', '.db3')):
-        read = read_waypoints(path, robot.joints)
+        read = read_waypoints(path, robot.joints, settings=options.read_settings())
         return Reference(read.joints, read.t, read.q, read.dq, read.ddq, read.tau)
     if path is not None:
         return Reference.of(load_excitation(path).motion(1000.0))

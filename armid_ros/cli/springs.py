@@ -40,10 +40,11 @@ def identify_springs(
         raise RecordingError('no bag is named; give one with encoders on both sides of the joints')
     with progress('reading') as tick:
         try:
-            sides = [read_sides(path, robot) for path in bags]
+            sides = [read_sides(path, robot, options.read_settings()) for path in bags]
         except RecordingError as error:
             hint = f'; {WITHOUT}' if LINK in str(error) else ''
             raise RecordingError(f'{error}{hint}') from None
+        options.tell_damage(*(side for both in sides for side in both))
         tick(0.5, 'fitting')
         found = fit_springs(body, sides, np.random.default_rng(seed))
     document = springs_document(found, source)

@@ -24,6 +24,8 @@ import yaml
 
 #: Nesting beyond which a text is no document of this package; theirs have six levels at most.
 MAX_DEPTH = 64
+#: Largest number of a document. No quantity is as large, and products of three are still numbers.
+LARGEST = 1e100
 #: Nodes of a document with its aliases written out; a model of 1,000 joints has 200,000.
 MAX_NODES = 2_000_000
 
@@ -75,13 +77,15 @@ def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
 
 
 def finite(value: Any, what: str) -> float:
-    """Return a number of a document; ValueError when it is none, or not finite."""
+    """Return a number of a document; ValueError when it is none, or beyond all quantities."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
         raise ValueError(f'{what} has to be a finite number, not {str(value)[:40]!r}')
+    if abs(number) > LARGEST:
+        raise ValueError(f'{what} is {number:g}, which is beyond {LARGEST:g}')
     return number
 
 

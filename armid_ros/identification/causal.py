@@ -15,7 +15,7 @@ of that of one filter in front of the regressor.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math
@@ -37,6 +37,8 @@ MOTION_FILTER_RATIO = 4.0
 ROW_RATE_RATIO = 40.0
 #: Time constants until the start of G at rest is forgotten, to 1e-6.
 _SETTLED = 20.0
+#: Periods between two samples beyond which some are missing.
+_GAP = 1.5
 #: No arm has positions or torques beyond this [SI units]; their squares would drown all others.
 LARGEST = 1e6
 #: Intervals whose median is taken as the sampling period.
@@ -117,6 +119,23 @@ class TripleLag:
 def pole_of(cutoff: float) -> float:
     """Return the pole [rad/s] of a triple lag with a cut-off frequency [Hz]."""
     return 2.0 * np.pi * cutoff / _CUTOFF_OF_POLE
+
+
+def _gain_of_curvature(pole: float) -> float:
+    """
+    Return what a triple lag makes of a constant second derivative that is 1.
+
+    Between samples the signal is a straight line, so all its curvature is at the samples, and the
+    filter sees sum(h(k)) in place of the integral of its impulse response p^3 t^2 / 2 exp(-p t).
+
+    Parameters
+    ----------
+    pole : float
+        p over the sampling rate [-].
+
+    """
+    decay = math.exp(-pole)
+    return 0.5 * pole**3 * decay * (1.0 + decay) / (1.0 - decay) ** 3
 
 
 @dataclass(frozen=True)
@@ -203,6 +222,7 @@ class CausalFilter:
         self._restarts: Counter[str] = Counter()
         self._revolute = np.ones(n_joints) if prismatic is None else 1.0 - np.asarray(prismatic)
         self._lag: TripleLag | None = None
+        self._gain = 1.0
         self._intervals: list[float] = []
         self._start: float | None = None
         self._last: float | None = None
@@ -216,6 +236,11 @@ class CausalFilter:
         self._restarts.clear()
         self._restart()
 
+    def restart(self, reason: str) -> None:
+        """Begin a new stretch, as what comes does not continue what was before."""
+        self._restarts[reason] += 1
+        self._restart()
+
     @property
     def rejected(self) -> Mapping[str, int]:
         """Samples left out: wrong_length, not_finite, impossible, out_of_order, no_velocity."""
@@ -223,7 +248,7 @@ class CausalFilter:
 
     @property
     def restarts(self) -> Mapping[str, int]:
-        """Restarts of the filter, by reason: dropout, jump_back."""
+        """Restarts of the filter, by reason: dropout, jump_back, and those asked for."""
         return MappingProxyType(self._restarts)
 
     @property
@@ -287,7 +312,11 @@ class CausalFilter:
             return None
         if self._start is None:
             self._start = t
-        stages = self._lag.update(dt, self._unwrapped(signal))
+        signal = self._unwrapped(signal)
+        missing = self._missing(t, dt, signal)
+        for value in (*missing, signal):
+            stages = self._lag.update(dt / (len(missing) + 1), value)
+        self._recent.append((t, signal))
         if t - self._start < _SETTLED / self._lag.pole:
             return None
         return self._motion(t, stages)
@@ -303,9 +332,30 @@ class CausalFilter:
         if dt == 0.0 or (self._period and -longest <= dt < 0.0):
             self._rejected['out_of_order'] += 1
             return False
-        self._restarts['dropout' if dt > 0.0 else 'jump_back'] += 1
-        self._restart()
+        self.restart('dropout' if dt > 0.0 else 'jump_back')
         return True
+
+    def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
+        """
+        Return what stands for the samples missing before one.
+
+        A straight line would have no acceleration, so the rows would lack that of the whole gap.
+        They are on the cubic through the sample behind the gap and three before it, which are as
+        far apart as the gap is long, for then it has hardly more noise than they.
+
+        """
+        assert self._period is not None
+        count = round(dt / self._period) if dt > _GAP * self._period else 1
+        if count < 2 or not self._recent:
+            return []
+        last = t - dt
+        nearest = (min(self._recent, key=lambda s: abs(s[0] - (last - k * dt))) for k in range(3))
+        nodes = [n for k, n in enumerate(nearest) if abs(n[0] - (last - k * dt)) < 0.5 * dt]
+        place = np.array([(node_t - last) / dt for node_t, _ in nodes] + [1.0])
+        values = np.stack([value for _, value in nodes] + [signal])
+        inside = np.arange(1, count) / count
+        factors = np.linalg.solve(np.vander(place), values)
+        return list(np.vander(inside, len(place)) @ factors)
 
     def _unwrapped(self, signal: FloatArray) -> FloatArray:
         """Undo the jump by a full turn with which some drivers keep a joint within +-pi."""
@@ -323,6 +373,7 @@ class CausalFilter:
         self._start = None
         self._last = None
         self._position = None
+        self._recent: deque[tuple[float, FloatArray]] = deque(maxlen=3 * self._max_gap)
         if self._period is not None:
             self._make_filter(self._period)
 
@@ -336,6 +387,7 @@ class CausalFilter:
     def _make_filter(self, period: float) -> None:
         fastest = _FASTEST_POLE / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
         self._lag = TripleLag(min(MOTION_FILTER_RATIO * self._cutoff, fastest))
+        self._gain = _gain_of_curvature(self._lag.pole * period)
 
     def _motion(self, t: float, stages: FloatArray) -> CausalMotion:
         n = self._n_joints
@@ -346,6 +398,6 @@ class CausalFilter:
         if self._measured_velocity:
             q, dq, ddq = three[:n], three[n : 2 * n], slope[n : 2 * n]
         else:
-            curvature = pole * pole * (one[:n] - 2.0 * two[:n] + three[:n])
+            curvature = pole * pole * (one[:n] - 2.0 * two[:n] + three[:n]) / self._gain
             q, dq, ddq = three[:n], slope[:n], curvature
         return CausalMotion(t, q, dq, ddq, three[-n:])

@@ -275,7 +275,9 @@ def _single_chances(pairs: FloatArray) -> list[float]:
     std = np.hypot(pairs[:, 1], pairs[:, 3])
     size = np.abs(pairs[:, 2] - pairs[:, 0])
     safe = np.where(std > 0.0, std, 1.0)
-    chances = np.where(std > 0.0, erfc(size / safe / np.sqrt(2.0)), (size == 0.0).astype(float))
+    with np.errstate(over='ignore'):  # infinitely many deviations have no chance
+        missed = size / safe / np.sqrt(2.0)
+    chances = np.where(std > 0.0, erfc(missed), (size == 0.0).astype(float))
     return [float(chance) for chance in chances]
 
 
@@ -286,8 +288,10 @@ def _group_chance(difference: FloatArray, covariance: FloatArray) -> float:
         return 1.0
     sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
     kept = sizes > _ROUNDING * sizes[-1]
-    along = axes[:, kept].T @ (difference / std)
-    return float(chi2.sf(np.sum(along**2 / sizes[kept]), int(kept.sum())))
+    with np.errstate(over='ignore'):
+        along = axes[:, kept].T @ (difference / std)
+        squares = float(np.sum(along**2 / sizes[kept]))
+    return float(chi2.sf(squares, int(kept.sum())))
 
 
 def _beyond_chance(chances: Sequence[float], allowed: float) -> list[bool]:

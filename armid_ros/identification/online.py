@@ -21,6 +21,7 @@ from armid_ros.identification.recursive import RecursiveLeastSquares
 from armid_ros.identification.row_noise import Misfit, RowNoise, sensor_noise
 from armid_ros.identification.score_variance import ScoreVariance
 from armid_ros.identification.spikes import SpikeGate
+from armid_ros.identification.straight_line import StreamSample
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -205,8 +206,14 @@ class OnlineIdentifier:
             self.latest = self._take(t, signal)
         else:
             good = self._gate.take(t, signal, self._without_consequence)
-            self.latest = tuple(one for sample in good for one in self._take(sample.t, sample.x))
+            self.latest = tuple(one for sample in good for one in self._take_good(sample))
         return self.latest[-1] if self.latest else None
+
+    def _take_good(self, sample: StreamSample) -> tuple[OnlineSample, ...]:
+        """Learn from a sample of the gate, which says where a stretch begins."""
+        if sample.begins:
+            self._filter.restart('position_step')
+        return self._take(sample.t, sample.x)
 
     def _take(self, t: float, signal: FloatArray) -> tuple[OnlineSample, ...]:
         """Learn from a good sample; return what it brought, if anything."""
@@ -373,13 +380,16 @@ def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
     if settings.longest_damage < 1:
         return None
     signals = 3 if settings.measured_velocity else 2
-    turning = np.zeros((signals, arm.robot.n_joints), dtype=bool)
+    turning, position, torque = np.zeros((3, signals, arm.robot.n_joints), dtype=bool)
+    position[0], torque[-1] = True, True
     turning[0] = ~np.asarray(arm.robot.prismatic, dtype=bool)
     changes = settings.changes or ChangeSettings()
     return SpikeGate(
         turning.ravel(),
         max_gap=settings.longest_damage,
         false_alarm_time=changes.false_alarm_time,
+        continuous=position.ravel(),
+        pulsing=torque.ravel(),
     )
 
 

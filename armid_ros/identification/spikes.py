@@ -9,12 +9,19 @@ too far from the prediction waits for those after it. When they return to where 
 do not go on from it, it was damaged and is left out; otherwise the arm has changed, and all are
 used. So damage costs the samples that are damaged, and no change is lost, however large.
 
+Positions are continuous. One that steps and goes on from there is of a clock that was set or of an
+encoder that was zeroed, and what follows is a new stretch (``StreamSample.begins``). A torque may
+jump and come back, as where free play is crossed; such pulses are told from damage by what the
+torque reaches otherwise.
+
 Three things say how far is too far; the largest of them counts. The noise: what predictions
 usually miss by, as much as in the loudest part of the last minute, since an arm at rest must not
 forget what it is like in motion, times the quantile of a normal distribution at the chance of one
 false alarm in `false_alarm_time`. The resolution, times the same: the smallest step that a signal
 makes. The consequence (``floor``): what one sample has to be off by to move what is estimated from
-it by as much as noise does.
+it by as much as noise does. Across a gap the line misses by more: an acceleration takes the signal
+off it with the square of time, noise hardly. Which of them a signal has is seen in its errors:
+successive ones of white noise have the correlation -2/3, those of an acceleration 1.
 
 """
 
@@ -22,12 +29,18 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import replace
 import math
-from typing import NamedTuple
 
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.straight_line import (
+    Missed,
+    missed_by,
+    share_of_noise,
+    StreamSample,
+    unwrapped,
+    usual_size,
+)
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -51,41 +64,6 @@ _NEARER = 0.5
 _TINY = 1e-300
 
 
-@dataclass(frozen=True, eq=False)
-class StreamSample:
-    """
-    One sample of a stream.
-
-    Attributes
-    ----------
-    t : float
-        Stamp [s].
-    x : ndarray, shape (m,)
-        What was measured.
-
-    """
-
-    t: float
-    x: FloatArray
-
-
-class _Missed(NamedTuple):
-    """
-    What a prediction missed a sample by.
-
-    Attributes
-    ----------
-    error : ndarray, shape (m,)
-        Absolute values.
-    growth : float
-        How much more a prediction over this time misses usually than one over a period.
-
-    """
-
-    error: FloatArray
-    growth: float
-
-
 class SpikeGate:
     """
     Pass on the samples of a stream without those that are damaged.
@@ -98,19 +76,29 @@ class SpikeGate:
         Successive samples that may be damaged; what lasts longer is real.
     false_alarm_time : float
         Mean time between two good samples that are left out, in normal noise [s].
+    continuous : array_like of bool, shape (m,), optional
+        Signals that never step, as positions; none by default.
+    pulsing : array_like of bool, shape (m,), optional
+        Signals that may jump and come back, as torques; none by default.
 
     Attributes
     ----------
     spikes : Counter of int
-        Samples left out, by the signal that was furthest off.
+        Samples left out as damaged, by the signal that was furthest off.
     rejected : Counter of str
-        Samples left out, by reason: spike; stamp, which alone was off; erratic, which followed
-        neither what was before nor each other; out_of_order.
+        Samples left out, by reason: spike; pulse, which the arm may have made; stamp, which alone
+        was off; erratic, which followed neither what was before nor each other; out_of_order.
 
     """
 
     def __init__(
-        self, turning: npt.ArrayLike, *, max_gap: int = 10, false_alarm_time: float = 360000.0
+        self,
+        turning: npt.ArrayLike,
+        *,
+        max_gap: int = 10,
+        false_alarm_time: float = 360000.0,
+        continuous: npt.ArrayLike = False,
+        pulsing: npt.ArrayLike = False,
     ) -> None:
         if not (max_gap >= 1 and false_alarm_time > 0.0):
             raise IdentificationError(
@@ -118,6 +106,8 @@ class SpikeGate:
                 f'{false_alarm_time} s: both have to be above 0'
             )
         self._turn = np.where(np.asarray(turning, dtype=bool), 2.0 * np.pi, 0.0)
+        self._continuous = np.broadcast_to(np.asarray(continuous, dtype=bool), self._turn.shape)
+        self._pulsing = np.broadcast_to(np.asarray(pulsing, dtype=bool), self._turn.shape)
         self._max_gap = max_gap
         self._false_alarm_time = false_alarm_time
         self.reset()
@@ -128,10 +118,11 @@ class SpikeGate:
         self.rejected: Counter[str] = Counter()
         count = len(self._turn)
         self._steps = np.full((_SEEN, count), np.inf)
-        self._usual: deque[FloatArray] = deque(maxlen=_REMEMBERED)
+        self._usual: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=_REMEMBERED)
+        self._lowest, self._highest = np.full(count, np.inf), np.full(count, -np.inf)
         self._errors: list[FloatArray] = []
         self._moves: list[FloatArray] = []
-        self._scale = np.zeros(count)
+        self._scale, self._noisy = np.zeros(count), np.zeros(count)
         self._restart([])
 
     def take(self, t: float, x: FloatArray, floor: FloatArray | float = 0.0) -> list[StreamSample]:
@@ -148,7 +139,7 @@ class SpikeGate:
             What a sample may be off by without consequence.
 
         """
-        sample = StreamSample(t, self._unwrapped(x))
+        sample = StreamSample(t, unwrapped(x, self._known[1].x, self._turn) if self._known else x)
         if not self._in_time(sample):
             return []
         if self._first is None:
@@ -191,8 +182,10 @@ class SpikeGate:
         ratio, period = dt[1:] / dt[:-1], float(np.median(dt))
         noise = np.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)
         growth = np.maximum(noise, 0.5 * dt[1:] * (dt[1:] + dt[:-1]) / period**2)
-        error = np.abs(moves[1:] - ratio[:, np.newaxis] * moves[:-1]) / growth[:, np.newaxis]
-        limit = np.maximum(self._quantile_of(period) * _loudest(error), floor)
+        error = np.abs(moves[1:] - ratio[:, np.newaxis] * moves[:-1])
+        usual = _loudest(error / growth[:, np.newaxis])
+        # by the growth of noise, which is the least: what is damage is judged by `take`
+        limit = np.maximum(self._quantile_of(period) * usual * noise[:, np.newaxis], floor)
         off = np.zeros(x.shape)
         off[2:] = error / np.maximum(limit, _TINY)
         return off
@@ -213,13 +206,12 @@ class SpikeGate:
         self._period = np.inf
         self._quantile = 0.0
 
-    def _unwrapped(self, x: FloatArray) -> FloatArray:
-        """Undo the jump by a full turn with which some drivers keep a joint within +-pi."""
-        tail = self._tail
-        if tail is None:
-            return x
-        turns = np.rint(np.divide(x - tail.x, self._turn, where=self._turn > 0.0, out=0.0 * x))
-        return np.asarray(x - turns * self._turn)
+    def _unwrapped(self, samples: Sequence[StreamSample]) -> list[StreamSample]:
+        """Return samples without the jumps by full turns between them."""
+        found = [samples[0]]
+        for sample in samples[1:]:
+            found.append(replace(sample, x=unwrapped(sample.x, found[-1].x, self._turn)))
+        return found
 
     @property
     def _tail(self) -> StreamSample | None:
@@ -249,24 +241,28 @@ class SpikeGate:
 
     def _begin(self, floor: FloatArray | float) -> list[StreamSample]:
         """Learn from the first samples, and judge them."""
-        first, self._first = self._first or [], None
+        raw, self._first = self._first or [], None
+        first = self._unwrapped(raw)
         self._period = float(np.median(np.diff([s.t for s in first])))
         self._quantile = self._quantile_of(self._period)
-        missed = [self._missed(first[k : k + 2], first[k + 2]) for k in range(FIRST - 2)]
+        missed = [
+            missed_by(first[k : k + 2], first[k + 2], self._period) for k in range(FIRST - 2)
+        ]
         self._see_steps(np.abs(np.diff([s.x for s in first], axis=0)))
         if not self._usual:
-            errors = [m.error / m.growth for m in missed]
-            self._scale = np.maximum(_usual_size(errors, _USUAL_FIRST), self._resolution)
-        limit = self._limit(floor)
-        straight = [bool(np.all(m.error <= m.growth * limit)) for m in missed]
+            errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
+            self._scale = np.maximum(usual_size(errors, _USUAL_FIRST), self._resolution)
+            self._noisy = share_of_noise(errors, self._scale)
+        straight = [bool(np.all(self._off_by(m, floor) <= 1.0)) for m in missed]
         if not any(straight):  # or the noise is not what it was: it is learned anew
             self.rejected['erratic'] += len(first)
             self._usual.clear()
             self._restart([])
             return []
         start = straight.index(True)
+        first = first[:start] + self._unwrapped(raw[start:])  # not from what is damaged
         self._known = first[start], first[start + 1]
-        self._leave_out(first[:start], missed[0].error / np.maximum(limit, _TINY))
+        self._leave_out(first[:start], self._off_by(missed[0], floor))
         good = list(self._known)
         for sample in first[start + 2 :]:
             good += self._judge(sample, floor)
@@ -277,16 +273,16 @@ class SpikeGate:
         if self._first is not None:  # what came before it was erratic
             self._first.append(sample)
             return []
-        missed = self._missed(self._known, sample)
-        off = missed.error / np.maximum(self._limit(floor), _TINY)
+        missed = missed_by(self._known, sample, self._period)
+        off = self._off_by(missed, floor)
         if not self._held:
-            if float(np.max(off)) <= missed.growth:
+            if float(np.max(off)) <= 1.0:
                 return self._accept([sample], missed)
             self._held, self._went_on, self._off = [sample], 0, off
-            self._suspect = np.flatnonzero(off > missed.growth)
+            self._suspect = np.flatnonzero(off > 1.0)
             return []
         goes_on = self._goes_on(sample, off, floor)
-        if not goes_on and float(np.max(off[self._suspect])) <= missed.growth:
+        if not goes_on and float(np.max(off[self._suspect])) <= 1.0:
             self._leave_out(self._held, self._off)
             self._held = []
             return self._judge(sample, floor)
@@ -295,6 +291,8 @@ class SpikeGate:
         if len(self._held) <= self._max_gap:
             return []
         if 2 * self._went_on > self._max_gap:
+            if self._stepped(floor):
+                self._held[0] = replace(self._held[0], begins=True)
             return self._accept(self._held)
         self.rejected['erratic'] += len(self._held)
         self._restart([])
@@ -307,54 +305,78 @@ class SpikeGate:
         first, second = self._known
         slope = (second.x - first.x) / (second.t - first.t)
         as_before = StreamSample(before.t, last.x - slope * (last.t - before.t))
-        limit = np.maximum(self._limit(floor), _TINY)[self._suspect]
         far_enough = max(1.0, _NEARER * float(np.max(off[self._suspect])))
         for one in (as_before, before):
-            rest = self._missed((one, last), sample)
-            if float(np.max(rest.error[self._suspect] / limit)) < rest.growth * far_enough:
+            rest = self._off_by(missed_by((one, last), sample, self._period), floor)
+            if float(np.max(rest[self._suspect])) < far_enough:
                 return True
         return False
 
-    def _missed(self, known: Sequence[StreamSample], sample: StreamSample) -> _Missed:
-        """Return what a straight line through two samples misses another one by."""
-        before, last = known
-        step, ahead = last.t - before.t, sample.t - last.t
-        ratio = ahead / step
-        noise = math.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)
-        curvature = 0.5 * ahead * (ahead + step) / self._period**2
-        error = np.abs(sample.x - last.x - ratio * (last.x - before.x))
-        return _Missed(error, max(noise, curvature))
+    def _stepped(self, floor: FloatArray | float) -> bool:
+        """
+        Return whether a signal that never steps has stepped between what is known and held.
+
+        The lines before and behind a step do not meet in between; those of a turn, as in a
+        collision, do.
+
+        """
+        if len(self._held) < 2:
+            return False
+        ahead = missed_by(self._known, self._held[0], self._period)
+        back = missed_by((self._held[1], self._held[0]), self._known[1], self._period)
+        apart = self._continuous & (ahead.error * back.error < 0.0)
+        far = np.minimum(self._off_by(ahead, floor), self._off_by(back, floor))
+        return bool(np.any(far[apart] > 1.0))
+
+    def _growth(self, missed: Missed) -> FloatArray:
+        """Return how much more the signals usually miss over this time, shape (m,)."""
+        bend = missed.bend**2
+        return np.asarray(np.sqrt(bend + self._noisy * (missed.noise**2 - bend)))
+
+    def _off_by(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
+        """Return how far off its prediction a sample is, over the limit, shape (m,)."""
+        limit = np.maximum(self._quantile * self._scale * self._growth(missed), floor)
+        return np.asarray(np.abs(missed.error) / np.maximum(limit, _TINY))
 
     def _accept(
-        self, samples: list[StreamSample], missed: _Missed | None = None
+        self, samples: list[StreamSample], missed: Missed | None = None
     ) -> list[StreamSample]:
         """Pass samples on, and learn from them."""
         self._held = []
         for sample in samples:
-            one = missed or self._missed(self._known, sample)
-            self._errors.append(one.error / one.growth)
+            one = missed or missed_by(self._known, sample, self._period)
+            self._errors.append(one.error / self._growth(one))
             self._moves.append(sample.x - self._known[1].x)
+            np.minimum(self._lowest, sample.x, out=self._lowest)
+            np.maximum(self._highest, sample.x, out=self._highest)
             self._known = self._known[1], sample
         if len(self._errors) >= WINDOW:
             self._learn()
         return samples
 
     def _leave_out(self, samples: Sequence[StreamSample], off: FloatArray) -> None:
-        if samples:
+        if not samples:
+            return
+        values = np.stack([sample.x for sample in samples])
+        inside = np.all((self._lowest <= values) & (values <= self._highest), axis=0)
+        if np.all((self._pulsing & inside)[off > 1.0]):
+            self.rejected['pulse'] += len(samples)
+        else:
             self.rejected['spike'] += len(samples)
             self.spikes[int(np.argmax(off))] += len(samples)
-            signals = [self._known[1].x, *(sample.x for sample in samples)]
-            self._see_steps(np.abs(np.diff(signals, axis=0)))
-
-    def _limit(self, floor: FloatArray | float) -> FloatArray:
-        return np.maximum(self._quantile * self._scale, floor)
+        self._see_steps(np.abs(np.diff(values, axis=0, prepend=self._known[1].x[np.newaxis])))
 
     def _learn(self) -> None:
         """Learn what is usual from a window of errors."""
-        self._usual.append(_usual_size(self._errors, _USUAL))
+        errors = np.array(self._errors)
+        size = usual_size(errors, _USUAL)
+        self._usual.append((size, share_of_noise(errors, size)))
         self._see_steps(np.abs(self._moves))
         self._errors, self._moves = [], []
-        self._scale = np.maximum(np.max(self._usual, axis=0), self._resolution)
+        sizes, shares = (np.array(part) for part in zip(*self._usual, strict=True))
+        loudest = np.argmax(sizes, axis=0)[np.newaxis]
+        self._scale = np.maximum(np.take_along_axis(sizes, loudest, 0)[0], self._resolution)
+        self._noisy = np.take_along_axis(shares, loudest, 0)[0]
 
     def _see_steps(self, steps: FloatArray) -> None:
         """Learn the resolution from steps of shape (k, m)."""
@@ -374,17 +396,5 @@ def _loudest(errors: FloatArray) -> FloatArray:
     signals, cut = errors.shape[1], longer * (size + 1)
     first = errors[:cut].reshape(longer, size + 1, signals)
     rest = errors[cut:].reshape(windows - longer, size, signals)
-    usual = [_usual_size(part.swapaxes(0, 1), _USUAL) for part in (first, rest) if len(part)]
+    usual = [usual_size(part.swapaxes(0, 1), _USUAL) for part in (first, rest) if len(part)]
     return np.asarray(np.max(np.concatenate(usual), axis=0))
-
-
-def _usual_size(missed: Sequence[FloatArray] | FloatArray, share: float) -> FloatArray:
-    """Return the standard deviation of which a normal variable exceeds so few of the errors."""
-    size = np.quantile(np.array(missed), share, axis=0)
-    return np.asarray(size / _normal_quantile(share))
-
-
-@cache
-def _normal_quantile(share: float) -> float:
-    """Return what so few normal variables exceed in size; scipy takes longer than the rest."""
-    return float(stats.norm.ppf(0.5 + share / 2.0))

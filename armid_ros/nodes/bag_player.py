@@ -257,6 +257,8 @@ class BagPlayerNode(ArmidNode):
 
     def _advance(self) -> None:
         self._next = next(self._messages, None)
+        if self._next is None and self._bag.damage:
+            self.complaints.say('damage', f'{self.value("bag")}: {self._bag.damage}')
         if self._next is None and self.value('loop'):
             self._messages = self._from_start()
             self._next = next(self._messages, None)

@@ -14,7 +14,8 @@ from armid_ros.identification.causal import LARGEST
 from armid_ros.identification.interaction import Interaction
 from armid_ros.identification.interaction_online import InteractionSettings, OnlineInteraction
 from armid_ros.identification.joint_order import JointOrder
-from armid_ros.identification.spikes import SpikeGate, StreamSample
+from armid_ros.identification.spikes import SpikeGate
+from armid_ros.identification.straight_line import StreamSample
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.parameters import NodeParameter

@@ -49,6 +49,8 @@ _DISTURBANCES = {
     'nodes publish them?',
     'no_velocity': 'joint states without velocity are left out: measured_velocity asks for it',
     'jump_back': 'joint states jump back in time: the filters begin anew',
+    'position_step': 'positions step, as when a clock is set or an encoder is zeroed: the filters '
+    'begin anew',
     'dropout': 'joint states are missing for longer than max_gap: the filters begin anew',
 }
 

@@ -76,7 +76,7 @@ class RecorderNode(ArmidNode):
             upper=1e6,
         ),
         NodeParameter(
-            'chunk_age', 0.2, 'Age at which a chunk is written out.', 's', lower=0.01, upper=60.0
+            'chunk_age', 0.1, 'Age at which a chunk is written out.', 's', lower=0.01, upper=60.0
         ),
     )
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state_decoder import JointStateDecoder
 from armid_ros.recording.message_types import JOINT_STATE
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 
 #: This many messages tell which joints a topic names.
 _PEEK = 1000
@@ -37,7 +38,7 @@ class TopicContent:
     joints: tuple[str, ...] = ()
 
 
-def bag_contents(path: str | Path) -> tuple[TopicContent, ...]:
+def bag_contents(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[TopicContent, ...]:
     """
     Return the topics of a bag, with the joints that those of JointState name.
 
@@ -47,7 +48,7 @@ def bag_contents(path: str | Path) -> tuple[TopicContent, ...]:
         There is no bag that can be read.
 
     """
-    with Bag(path) as bag:
+    with Bag(path, settings) as bag:
         return tuple(
             TopicContent(
                 topic.name,

@@ -13,12 +13,12 @@ Specification: https://mcap.dev/spec
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 import os
 from pathlib import Path
 import struct
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 import zlib
 
@@ -62,14 +62,9 @@ class _Committed(NamedTuple):
     position: int = 0
     chunks: int = 0
     metadata: int = 0
-
-
-@dataclass(frozen=True)
-class _Written:
-    """A chunk in the file."""
-
-    index: ChunkIndex
-    counts: Counter[int]
+    index_size: int = 0
+    counts: Mapping[int, int] = MappingProxyType({})
+    time_range: tuple[int, int] = (0, 0)
 
 
 class McapWriter:
@@ -94,7 +89,8 @@ class McapWriter:
         self._compress = _COMPRESSORS[compression]
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunks: list[_Written] = []
+        # As bytes, for a recorder that runs for days has millions of chunks.
+        self._index = bytearray()
         self._metadata: list[MetadataIndex] = []
         self._done = _Committed()
         try:
@@ -131,15 +127,12 @@ class McapWriter:
     @property
     def counts(self) -> Counter[int]:
         """Number of messages of each channel in the file."""
-        return sum((chunk.counts for chunk in self._chunks[: self._done.chunks]), Counter())
+        return Counter(self._done.counts)
 
     @property
     def time_range(self) -> tuple[int, int]:
         """Log time of the first and the last message [ns], zeros when there is none."""
-        chunks = [c.index for c in self._chunks[: self._done.chunks] if c.counts]
-        if not chunks:
-            return 0, 0
-        return min(c.message_start_time for c in chunks), max(c.message_end_time for c in chunks)
+        return self._done.time_range
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> tuple[int, bytes]:
         """Return the number of a new schema, and the record that must be in the next chunk."""
@@ -217,10 +210,18 @@ class McapWriter:
             compressed_size=len(stored),
             uncompressed_size=len(content),
         )
-        del self._chunks[self._done.chunks :]
-        self._chunks.append(_Written(index, counts))
+        done = self._done
+        del self._index[done.index_size :]
+        self._index += _record(index)
         end_position = self._append(b''.join(parts))
-        self._done = _Committed(end_position, len(self._chunks), self._done.metadata)
+        first, last = done.time_range if done.counts else (start, end)
+        self._done = done._replace(
+            position=end_position,
+            chunks=done.chunks + 1,
+            index_size=len(self._index),
+            counts=MappingProxyType(counts + Counter(done.counts)),
+            time_range=(min(first, start), max(last, end)) if counts else done.time_range,
+        )
 
     def write_metadata(self, name: str, values: dict[str, str]) -> None:
         """Write a metadata record."""
@@ -228,22 +229,21 @@ class McapWriter:
         del self._metadata[self._done.metadata :]
         self._metadata.append(MetadataIndex(self._done.position, len(record), name))
         end = self._append(record)
-        self._done = _Committed(end, self._done.chunks, len(self._metadata))
+        self._done = self._done._replace(position=end, metadata=len(self._metadata))
 
     def finish(self) -> None:
         """Write the summary and close the file; may be called again if it was interrupted."""
         data_end = _record(DataEnd(0))
         begin = self._done.position + len(data_end)
-        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
-            (Opcode.SCHEMA, self._schemas),
-            (Opcode.CHANNEL, self._channels),
-            (Opcode.STATISTICS, [self._statistics()]),
-            (Opcode.CHUNK_INDEX, [chunk.index for chunk in self._chunks[: self._done.chunks]]),
-            (Opcode.METADATA_INDEX, self._metadata[: self._done.metadata]),
+        groups: list[tuple[Opcode, bytes]] = [
+            (Opcode.SCHEMA, _records(self._schemas)),
+            (Opcode.CHANNEL, _records(self._channels)),
+            (Opcode.STATISTICS, _record(self._statistics())),
+            (Opcode.CHUNK_INDEX, bytes(self._index[: self._done.index_size])),
+            (Opcode.METADATA_INDEX, _records(self._metadata[: self._done.metadata])),
         ]
         summary, offsets = b'', b''
-        for opcode, records in groups:
-            group = b''.join(_record(record) for record in records)
+        for opcode, group in groups:
             if group:
                 offsets += _record(SummaryOffset(opcode, begin + len(summary), len(group)))
             summary += group
@@ -304,6 +304,10 @@ def message_record(
         publish_time,
     )
     return b''.join((head, cdr))
+
+
+def _records(records: Sequence[McapRecord]) -> bytes:
+    return b''.join(_record(record) for record in records)
 
 
 def _record(record: McapRecord) -> bytes:

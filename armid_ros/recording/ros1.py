@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import open_regular
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.message_types import JOINT_STATE
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.tables.settings import renamed
 from armid_ros.recording.writer import BagWriter
 from rosbags.convert.converter import is_same_wireformat, migrate_bytes
@@ -38,12 +40,15 @@ class Copied:
         Topics that ROS 2 has no type for, and why.
     renamed : tuple of (str, str)
         Joints that got another name.
+    damage : str
+        What is wrong with the bag; empty for a whole one.
 
     """
 
     topics: tuple[tuple[str, str, int], ...]
     left_out: tuple[str, ...] = ()
     renamed: tuple[tuple[str, str], ...] = ()
+    damage: str = ''
 
 
 def is_ros1(path: Path) -> bool:
@@ -70,6 +75,8 @@ def convert_ros1(path: Path, out: Path, rename: Sequence[tuple[str, str]] = ()) 
         It is no such bag, or nothing in it has a type that ROS 2 has.
 
     """
+    with open_regular(path, RecordingError):  # a FIFO would be waited for
+        pass
     try:
         with Reader(path) as reader:
             return _copy_ros1(path, reader, out, rename)
@@ -77,7 +84,12 @@ def convert_ros1(path: Path, out: Path, rename: Sequence[tuple[str, str]] = ()) 
         raise RecordingError(f'{path}: cannot be read as a bag of ROS 1: {error}') from error
 
 
-def copy_renamed(path: Path, out: Path, rename: Sequence[tuple[str, str]]) -> Copied:
+def copy_renamed(
+    path: Path,
+    out: Path,
+    rename: Sequence[tuple[str, str]],
+    settings: ReadSettings = DEFAULT,
+) -> Copied:
     """
     Copy a bag, giving the joints of its JointState messages other names.
 
@@ -87,7 +99,7 @@ def copy_renamed(path: Path, out: Path, rename: Sequence[tuple[str, str]]) -> Co
     store = get_typestore(Stores.ROS2_JAZZY)
     names: dict[str, str] = {}
     counts: dict[str, int] = {}
-    with Bag(path) as bag, BagWriter(out) as writer:
+    with Bag(path, settings) as bag, BagWriter(out) as writer:
         topics = {topic.name: topic for topic in bag.topics()}
         for topic in topics.values():
             described = topic.message_type
@@ -106,9 +118,11 @@ def copy_renamed(path: Path, out: Path, rename: Sequence[tuple[str, str]]) -> Co
                 cdr = _with_names(store, store.deserialize_cdr(cdr, JOINT_STATE), rename, names)
             writer.write(name, cdr, message.log_time_ns, message.publish_time_ns)
             counts[name] = counts.get(name, 0) + 1
+        damage = bag.damage
     return Copied(
         tuple((name, topic.type_name, counts.get(name, 0)) for name, topic in topics.items()),
         renamed=_changed(names),
+        damage=damage,
     )
 
 

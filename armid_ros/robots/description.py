@@ -11,6 +11,7 @@ import math
 from xml.etree import ElementTree
 
 from armid_ros.errors import RobotError
+from armid_ros.files.documents import LARGEST
 from armid_ros.files.regular import TEXT_LIMIT
 import numpy as np
 
@@ -325,8 +326,6 @@ class _Reader:
         axis = element.find('axis')
         x, y, z = (1.0, 0.0, 0.0) if axis is None else self.vector(axis, 'xyz', where)
         length = math.hypot(x, y, z)
-        if not length < math.inf:
-            raise RobotError(f'{self.source}: the axis of {where} is longer than a number can be')
         if length < SHORTEST_AXIS:
             if element.get('type') in MOVABLE:
                 raise RobotError(f'{self.source}: the axis of {where} has no direction')
@@ -350,17 +349,22 @@ class _Reader:
                 f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is not three finite "
                 'numbers'
             )
+        if max(abs(x), abs(y), abs(z)) > LARGEST:
+            raise RobotError(
+                f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is beyond {LARGEST:g}"
+            )
         return x, y, z
 
     def finite(
         self, element: ElementTree.Element, name: str, where: str, default: float | None = None
     ) -> float:
-        """Return a number; only limits may be infinite."""
+        """Return a number that arithmetic bears; only limits may be infinite."""
         number = self.number(element, name, where, default)
-        if math.isinf(number):
+        if abs(number) > LARGEST:
+            wrong = 'not finite' if math.isinf(number) else f'beyond {LARGEST:g}'
+            text = element.get(name)
             raise RobotError(
-                f"{self.source}: {where}: {name}='{element.get(name)}' of <{element.tag}> is not "
-                'finite'
+                f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is {wrong}"
             )
         return number
 

@@ -50,6 +50,12 @@ def test_a_number_is_finite(value):
         finite(value, 'mass')
 
 
+@pytest.mark.parametrize('value', [1e101, -1e308, '1.48e200', 10**150])
+def test_a_number_has_a_size_that_arithmetic_bears(value):
+    with pytest.raises(ValueError, match=r'mass is .* beyond'):
+        finite(value, 'mass')
+
+
 def test_an_escape_sequence_in_a_name_is_spelled_out():
     assert visible('elbow\x1b[2J\u202e') == 'elbow\\x1b[2J\\u202e'
     assert str(ModelError("joint '\x1b]0;x\x07'")) == "joint '\\x1b]0;x\\x07'"

@@ -164,7 +164,8 @@ TREE_EDIT = st.tuples(
 def edited_tree(tree, edits):
     """Return a document of maps, lists and scalars with some of its nodes edited."""
     tree = deepcopy(tree)
-    for path, operation, value in deepcopy(edits):
+    for path, operation, value in edits:
+        value = deepcopy(value)  # hypothesis draws one object several times
         holder, key, node = None, None, tree
         for place in path:
             keys = list(node) if isinstance(node, dict) else []

@@ -1,5 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
 import json
 
 from armid_ros.errors import ModelError
@@ -34,6 +35,23 @@ def test_a_real_change_is_found_and_sized():
     (change,) = compare(before, after).changed
     assert change.parameter.joint == 'joint_2'
     assert change.deviations == pytest.approx(0.2 / np.hypot(0.01, 0.02))
+
+
+def test_a_difference_beyond_all_numbers_of_deviations_is_a_change():
+    before = parameters([1.0, 2.0], [1e-320, 1e-320])
+    after = parameters([1e100, 2.0], [1e-320, 1e-320])
+    covariance = np.diag([1e-318, 1e-318])
+    for one, other in (
+        (before, after),
+        (drawn_as(before, covariance), drawn_as(after, covariance)),
+    ):
+        (change,) = compare(one, other).changed
+        assert change.parameter.joint == 'joint_1'
+
+
+def drawn_as(parameters, covariance):
+    """Return parameters with a covariance."""
+    return replace(parameters, covariance=covariance)
 
 
 def test_what_only_one_has_is_listed():

@@ -80,6 +80,49 @@ def test_a_collision_passes_whole():
     assert not gate.rejected
 
 
+@pytest.mark.parametrize('late', [2, 4, 9])
+def test_a_clock_that_is_set_a_little_begins_a_new_stretch(late):
+    """Set forth, positions stand still for some samples; set back, they jump."""
+    t, x = stream(np.random.default_rng(13))
+    back = np.concatenate([t[:DAMAGED], t[DAMAGED:] - late / RATE])
+    forth = np.concatenate([t[:DAMAGED], t[DAMAGED:] + late / RATE])
+    for stamps, first in ((back, DAMAGED + late), (forth, DAMAGED)):
+        gate = SpikeGate([True, False], continuous=[True, False])
+        good = [s for a, b in zip(stamps, x, strict=True) for s in gate.take(float(a), b)]
+        assert [s.t for s in good if s.begins] == [stamps[first]]
+        assert len(good) >= COUNT - late - 1
+
+
+def test_a_step_of_a_torque_and_a_collision_begin_no_new_stretch():
+    t, x = stream(np.random.default_rng(14))
+    x[DAMAGED:, 1] += 30.0
+    x[:, 0] += 2.0 * np.minimum(t, 2.0 * (t[DAMAGED // 2] + 0.3 / RATE) - t)
+    gate = SpikeGate([True, False], continuous=[True, False])
+    good = [s for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
+    assert len(good) == COUNT and not any(s.begins for s in good)
+
+
+@pytest.mark.parametrize(('height', 'reason'), [(-1.7, 'pulse'), (-20.0, 'spike')])
+def test_a_torque_that_jumps_to_where_it_often_is_may_be_of_the_arm(height, reason):
+    t, x = stream(np.random.default_rng(15))
+    x[400:1900:100, 1] += height * np.sign(x[400:1900:100, 1])
+    gate = SpikeGate([True, False], pulsing=[False, True])
+    good = [s for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
+    assert len(good) == COUNT - 15
+    assert gate.rejected == {reason: 15}
+    assert sum(gate.spikes.values()) == 15 * (reason == 'spike')
+
+
+@pytest.mark.parametrize('lost', [1, 2, 5])
+def test_noise_after_lost_samples_is_judged_as_noise(lost):
+    """What a glitch may be does not grow with the square of the time that nothing came."""
+    t, x = stream(np.random.default_rng(16))
+    x[DAMAGED, 1] += 1.5
+    kept = np.delete(np.arange(COUNT), slice(DAMAGED - lost, DAMAGED))
+    _, good = passed(t[kept], x[kept])
+    assert t[DAMAGED] not in good and len(good) == len(kept) - 1
+
+
 def test_full_turns_are_no_damage():
     t, x = stream(np.random.default_rng(5))
     x[:, 0] = 4.0 * t
@@ -87,6 +130,18 @@ def test_full_turns_are_no_damage():
     gate, good = passed(t, x)
     np.testing.assert_array_equal(good, t)
     assert not gate.rejected
+
+
+@pytest.mark.parametrize('where', [0, 1, 5, DAMAGED])
+@pytest.mark.parametrize('angle', [3.3, 9.7, 16.0, 1e5])
+def test_a_damaged_angle_turns_nothing_after_it(where, angle):
+    t, x = stream(np.random.default_rng(17))
+    spoiled = x.copy()
+    spoiled[where, 0] += angle
+    gate = SpikeGate([True, False])
+    good = [s for a, b in zip(t, spoiled, strict=True) for s in gate.take(float(a), b)]
+    assert all(np.array_equal(s.x, x[round(s.t * RATE)]) for s in good)
+    assert len(good) >= COUNT - 3
 
 
 def test_an_arm_that_rested_may_begin_to_move():
@@ -97,13 +152,15 @@ def test_an_arm_that_rested_may_begin_to_move():
     np.testing.assert_array_equal(good, t)
 
 
-def test_of_two_senders_that_contradict_each_other_one_is_followed():
+@pytest.mark.parametrize('apart', [1.0, 3.0, 20.0])
+def test_of_two_senders_that_contradict_each_other_one_is_followed(apart):
     t, x = stream(np.random.default_rng(7))
-    other = x + np.array([0.3, 2.0])
-    x[DAMAGED::2] = other[DAMAGED::2]
-    gate, good = passed(t, x)
-    assert gate.rejected['spike'] >= 0.9 * (COUNT - DAMAGED) / 2
-    kept = np.isin(t, good)
+    other = x + np.array([0.3, apart])
+    end = DAMAGED + 300  # before friction steps as well
+    x[DAMAGED:end:2] = other[DAMAGED:end:2]
+    gate, good = passed(t[:end], x[:end])
+    assert gate.rejected['spike'] >= 0.9 * (end - DAMAGED) / 2
+    kept = np.isin(t[:end], good)
     assert np.count_nonzero(kept[DAMAGED + 100 :: 2]) in (0, len(kept[DAMAGED + 100 :: 2]))
 
 

@@ -8,6 +8,7 @@ import resource
 import signal
 import subprocess
 import sys
+import tracemalloc
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording import (
@@ -357,6 +358,25 @@ def test_a_kill_loses_less_than_0_3_s_at_3_khz(tmp_path):
     np.testing.assert_allclose(recording.t, np.arange(len(recording)) / 3000, atol=1e-8)
     assert 'without its index, as after a crash' in recording.report.damage
     assert 'The file ends without its index' in recording.report.describe()
+
+
+def test_a_chunk_leaves_but_its_index_in_memory(tmp_path):
+    """A recorder writes ten chunks a second, for days."""
+    with BagWriter(tmp_path / 'bag', clock=lambda: 0.0) as writer:
+        writer.add_topic('/joint_states', JOINT_STATE)
+        cdr = joint_state_cdr(['a'], [10**18], [[0.0]], [[0.0]], [[0.0]])[0]
+
+        def chunks(count):
+            for _ in range(count):
+                writer.write('/joint_states', cdr, 10**18)
+                writer.flush()
+
+        chunks(100)
+        tracemalloc.start()
+        chunks(2000)
+        kept = tracemalloc.get_traced_memory()[0]
+        tracemalloc.stop()
+    assert kept < 200 * 2000
 
 
 def test_flush_writes_out_what_is_waiting(swinging, stamps, messages_of, tmp_path):

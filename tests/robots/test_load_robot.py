@@ -428,13 +428,18 @@ class TestSizes:
             '<axis xyz="nan 0 1"/><child',
             "joint 'j1': xyz='nan 0 1' of <axis> is not three",
         ),
-        ('<child', '<axis xyz="1.7e308 1.7e308 0"/><child', "axis of joint 'j1' is longer"),
+        (
+            '<child',
+            '<axis xyz="1.7e308 1.7e308 0"/><child',
+            "'j1': xyz='1.7e308 1.7e308 0' of <axis>",
+        ),
+        ('ixx="1"', 'ixx="1e101"', "link 'l0': ixx='1e101' of <inertia> is beyond 1e+100"),
         ('<child', '<origin xyz="0 1e999 0"/><child', "joint 'j1': xyz='0 1e999 0' of <origin>"),
         ('<child', '<dynamics damping="inf"/><child', "damping='inf' of <dynamics> is not finite"),
         (
             '<mass value="1"/>',
             '<origin xyz="1e200 0 0"/><mass value="1e200"/>',
-            'beyond all numbers',
+            "xyz='1e200 0 0' of <origin> is beyond 1e+100",
         ),
     ],
 )

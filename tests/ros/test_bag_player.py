@@ -10,6 +10,7 @@ from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.recording import write_joint_trajectory, write_recording
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.mcap_records import map_file
 from armid_ros.recording.writer import BagWriter
 import numpy as np
 import pytest
@@ -32,6 +33,17 @@ def bag(tmp_path):
         tmp_path / 'bag', motion, start_ns=7 * SECOND, robot_description='<robot name="r"/>'
     )
     return str(tmp_path / 'bag')
+
+
+def test_damage_of_the_bag_is_said(bench, bag, tmp_path):
+    path = next((tmp_path / 'bag').glob('*.mcap'))
+    content = bytearray(path.read_bytes())
+    chunk = map_file(bytes(content), path).chunks[0]
+    content[(chunk.begin + chunk.end) // 2] ^= 4
+    path.write_bytes(content)
+    player = bench.add(BagPlayerNode, bag=bag, rate=1000.0)
+    bench.spin_until(lambda: player.finished)
+    assert 'chunk' in player.complaints.latest
 
 
 def stamps(messages):

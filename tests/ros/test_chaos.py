@@ -29,9 +29,8 @@ from sensor_msgs.msg import JointState
 from tests.ros.test_online_identifier import EFFECT, message, PENDULUM, RATE, spoil
 
 SCHEDULES = int(os.environ.get('ARMID_CHAOS', 4))
-#: Whether deviations have to hold as well, which they do not yet where the clock is set back while
-#: messages are damaged; and what no parameter of the arm is off by.
-EXACT, FAR = 'ARMID_CHAOS' in os.environ, 1.0
+#: Deviations and SI units by which the estimate may be off in the end.
+DEVIATIONS, BIAS = 5.0, 5e-3
 NUMBER = 6
 #: Samples that are learned after an event, and in the end.
 CHUNK, LAST = 50, 1000
@@ -168,6 +167,6 @@ def test_it_works_on_whatever_happens(bench, tmp_path, seed):
     for node in world.identifiers:
         estimate = node.identifier.estimate()
         error = np.abs(estimate.values - truth)
-        assert np.all(np.isfinite(error)) and np.all(error < FAR), happened
-        if EXACT:
-            assert np.all(error < 5.0 * estimate.std + 2e-2), (happened, error, estimate.std)
+        assert np.all(np.isfinite(error)), happened
+        wide = DEVIATIONS * estimate.std + BIAS
+        assert np.all(error < wide), (happened, error, estimate.std)

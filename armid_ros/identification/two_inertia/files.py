@@ -13,7 +13,7 @@ ends it, and so does a pause in the stamps.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
@@ -32,6 +32,7 @@ from armid_ros.recording import (
 from armid_ros.recording.elastic_topics import imu_topic, LINK, MOTOR, REFERENCE
 from armid_ros.recording.imu import read_accelerations, write_accelerations
 from armid_ros.recording.message_types import STRING
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.robots import Robot
 from armid_ros.simulation.accelerometers import LinkAccelerometers
 from armid_ros.simulation.elastic_run import ElasticRun
@@ -124,9 +125,17 @@ def write_runs(
             start = int(stamps[-1]) + _PAUSE_NS
 
 
-def read_runs(path: str | Path, robot: Robot, sensors: Accelerometers) -> list[ElasticRun]:
+def read_runs(
+    path: str | Path,
+    robot: Robot,
+    sensors: Accelerometers,
+    settings: ReadSettings = DEFAULT,
+    read: Callable[..., None] | None = None,
+) -> list[ElasticRun]:
     """
     Read the experiments of a bag.
+
+    `read` is given the recordings of joint states, which know how they were read.
 
     Raises
     ------
@@ -135,10 +144,15 @@ def read_runs(path: str | Path, robot: Robot, sensors: Accelerometers) -> list[E
         loops are never asked to move.
 
     """
-    motors = _motor_topic(path)
+    motors = _motor_topic(path, settings)
     names = (motors, LINK, REFERENCE)
-    recordings = [read_recording(path, joints=robot.joints, topic=topic) for topic in names]
-    felt = [read_accelerations(path, imu_topic(name)) for name in robot.links]
+    recordings = [
+        read_recording(path, joints=robot.joints, topic=topic, settings=settings)
+        for topic in names
+    ]
+    felt = [read_accelerations(path, imu_topic(name), settings) for name in robot.links]
+    if read is not None:
+        read(*recordings)
     if recordings[0].tau is None or any(recording.dq is None for recording in recordings):
         raise RecordingError(
             f'{path}: velocities of {motors}, {LINK} and {REFERENCE}, and torques of {motors}, '
@@ -180,7 +194,9 @@ def read_runs(path: str | Path, robot: Robot, sensors: Accelerometers) -> list[E
     return runs
 
 
-def read_sides(path: str | Path, robot: Robot) -> tuple[Recording, Recording]:
+def read_sides(
+    path: str | Path, robot: Robot, settings: ReadSettings = DEFAULT
+) -> tuple[Recording, Recording]:
     """
     Read motors and links of any arm from a bag.
 
@@ -190,15 +206,17 @@ def read_sides(path: str | Path, robot: Robot) -> tuple[Recording, Recording]:
         A topic is missing.
 
     """
-    motors = _motor_topic(path)
+    motors = _motor_topic(path, settings)
     motor, link = (
-        read_recording(path, joints=robot.joints, topic=topic) for topic in (motors, LINK)
+        read_recording(path, joints=robot.joints, topic=topic, settings=settings)
+        for topic in (motors, LINK)
     )
     return motor, link
 
 
-def _motor_topic(path: str | Path) -> str:
-    return _OTHER_MOTOR if _OTHER_MOTOR in {topic.name for topic in topics(path)} else MOTOR
+def _motor_topic(path: str | Path, settings: ReadSettings) -> str:
+    names = {topic.name for topic in topics(path, settings)}
+    return _OTHER_MOTOR if _OTHER_MOTOR in names else MOTOR
 
 
 def _experiments(

@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-import gzip
 import io
 from pathlib import Path
 from typing import Any
 import zipfile
 
 from armid_ros.errors import RecordingError
+from armid_ros.recording.tables.content import read_content
 from armid_ros.recording.tables.extra import imported
 from armid_ros.recording.tables.table import Table, table_of_arrays
 import numpy as np
@@ -25,7 +25,7 @@ Arrays = dict[str, npt.NDArray[np.generic]]
 
 def read_numpy(path: Path) -> Table:
     """Read a .npy or .npz file, compressed by gzip or not."""
-    raw = gzip.decompress(path.read_bytes()) if path.suffix == '.gz' else path.read_bytes()
+    raw = read_content(path)
     try:
         loaded = np.load(io.BytesIO(raw), allow_pickle=False)
         arrays = {'': loaded} if isinstance(loaded, np.ndarray) else dict(loaded)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import open_regular
 from armid_ros.recording.tables.arrays import read_hdf5, read_matlab, read_numpy
 from armid_ros.recording.tables.parquet import INFO, read_lerobot, read_parquet
 from armid_ros.recording.tables.table import Column, Table
@@ -57,6 +58,8 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
     if _suffix(path) not in _READERS:
         known = ', '.join(_READERS)
         raise RecordingError(f'{path}: no table; tables are {known} and LeRobot datasets')
+    with open_regular(path, RecordingError):  # a FIFO would be waited for
+        pass
     return _READERS[_suffix(path)](path)
 
 

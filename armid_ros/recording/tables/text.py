@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 import csv
-import gzip
 import io
 from pathlib import Path
 import re
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
+from armid_ros.recording.tables.content import read_content
 from armid_ros.recording.tables.table import Column, Table
 import numpy as np
 
@@ -52,13 +52,11 @@ def read_text(path: Path) -> Table:
 
 
 def _lines(path: Path) -> list[str]:
+    raw = read_content(path)
     try:
-        raw = gzip.decompress(path.read_bytes()) if path.suffix == '.gz' else path.read_bytes()
         text = raw.decode('utf-8-sig')
     except UnicodeDecodeError:
         text = raw.decode('latin-1')
-    except (OSError, EOFError) as error:
-        raise RecordingError(f'{path}: cannot be read: {error}') from error
     return text.rstrip().splitlines()
 
 

@@ -1,0 +1,97 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the straight line through two samples of a stream misses the next one by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+import math
+from typing import NamedTuple
+
+from armid_ros.motion import FloatArray
+import numpy as np
+from scipy import stats
+
+#: Correlation of successive errors of a straight line in white noise.
+_NOISE_CORRELATION = -2.0 / 3.0
+#: Usual errors beyond which one says nothing of the correlation.
+_CLIPPED = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class StreamSample:
+    """
+    One sample of a stream.
+
+    Attributes
+    ----------
+    t : float
+        Stamp [s].
+    x : ndarray, shape (m,)
+        What was measured.
+    begins : bool
+        Whether a position has stepped here, so that this does not continue what was before.
+
+    """
+
+    t: float
+    x: FloatArray
+    begins: bool = False
+
+
+class Missed(NamedTuple):
+    """
+    What a prediction missed a sample by.
+
+    Attributes
+    ----------
+    error : ndarray, shape (m,)
+        Measured minus predicted.
+    noise, bend : float
+        How much more noise, and an acceleration, make a prediction over this time miss than one
+        over a period.
+
+    """
+
+    error: FloatArray
+    noise: float
+    bend: float
+
+
+def missed_by(known: Sequence[StreamSample], sample: StreamSample, period: float) -> Missed:
+    """Return what a straight line through two samples misses another one by."""
+    before, last = known
+    step, ahead = last.t - before.t, sample.t - last.t
+    ratio = ahead / step
+    noise = math.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)
+    bend = 0.5 * ahead * (ahead + step) / period**2
+    return Missed(sample.x - last.x - ratio * (last.x - before.x), noise, bend)
+
+
+def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
+    """Undo the jump by a full turn, where there is one, with which drivers keep within +-pi."""
+    turns = np.rint(np.divide(x - last, turn, where=turn > 0.0, out=np.zeros_like(x)))
+    return np.asarray(x - turns * turn)
+
+
+def usual_size(missed: FloatArray, share: float) -> FloatArray:
+    """Return the standard deviation of which a normal variable exceeds so few of the errors."""
+    size = np.quantile(np.abs(missed), share, axis=0)
+    return np.asarray(size / _normal_quantile(share))
+
+
+def share_of_noise(missed: FloatArray, size: FloatArray) -> FloatArray:
+    """Return the share of white noise in the squares of successive errors of shape (k, m)."""
+    errors = np.clip(missed, -_CLIPPED * size, _CLIPPED * size)
+    squares = np.sum(errors**2, axis=0)
+    products = np.sum(errors[1:] * errors[:-1], axis=0)
+    correlation = np.divide(products, squares, where=squares > 0.0, out=np.ones_like(squares))
+    return np.asarray(np.clip((1.0 - correlation) / (1.0 - _NOISE_CORRELATION), 0.0, 1.0))
+
+
+@cache
+def _normal_quantile(share: float) -> float:
+    """Return what so few normal variables exceed in size; scipy takes longer than the rest."""
+    return float(stats.norm.ppf(0.5 + share / 2.0))

@@ -1,0 +1,36 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The bytes of a table, unpacked where it is a .gz, within bounds."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+import zlib
+
+from armid_ros.errors import RecordingError
+from armid_ros.files import open_regular
+from armid_ros.recording.settings import DEFAULT
+
+
+def read_content(path: Path) -> bytes:
+    """
+    Return the content of a file.
+
+    Raises
+    ------
+    RecordingError
+        It is no regular file, takes too much memory, or is no gzip where its name says so.
+
+    """
+    limit = DEFAULT.memory_limit
+    with open_regular(path, RecordingError) as stream:
+        if path.suffix != '.gz':
+            return stream.read()
+        try:
+            with gzip.GzipFile(fileobj=stream) as packed:
+                content = packed.read(limit + 1)
+        except (OSError, EOFError, zlib.error) as error:
+            raise RecordingError(f'{path}: cannot be unpacked: {error}') from error
+    DEFAULT.require(len(content), f'{path}: what is packed in it')
+    return content

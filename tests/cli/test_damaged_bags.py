@@ -1,0 +1,66 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every command that reads a bag says what is wrong with it, and takes --no-crc."""
+
+from armid_ros.cli import main
+from armid_ros.recording import Recording, write_recording
+from armid_ros.recording.mcap_records import map_file
+from armid_ros.robots import load_robot
+import click
+import numpy as np
+import pytest
+
+from tests.cli.conftest import armid, ROBOT
+
+READERS = ('convert', 'diagnose', 'elastic', 'excite', 'exo', 'identify', 'inspect', 'recover')
+READERS += ('simulate',)
+
+
+@pytest.fixture(scope='module')
+def damaged(tmp_path_factory):
+    """Return a bag with one bit of a chunk turned round, which makes another number of one."""
+    robot = load_robot(ROBOT)
+    t = np.arange(4000) / 250.0
+    wave = np.outer(t, np.linspace(0.5, 2.0, 6))
+    bag = tmp_path_factory.mktemp('rot') / 'bag'
+    q, dq = 0.3 * np.sin(wave), 0.3 * np.cos(wave)
+    recording = Recording(joints=robot.joints, t=t, q=q, dq=dq, tau=q, start_ns=10**18)
+    write_recording(bag, recording, compression='none', chunk_size=20_000)
+    path = next(bag.glob('*.mcap'))
+    content = bytearray(path.read_bytes())
+    chunk = map_file(bytes(content), path).chunks[0]
+    content[content.index(q[600, 3].tobytes(), chunk.begin) + 6] ^= 1  # not of a length or name
+    path.write_bytes(content)
+    return bag
+
+
+@pytest.mark.parametrize('name', READERS)
+def test_checksums_may_be_left_out(name):
+    command = main.get_command(click.Context(main), name)
+    assert any('--no-crc' in option.secondary_opts for option in command.params)
+
+
+def test_what_a_copy_lacks_is_said(damaged, tmp_path):
+    said = armid('convert', damaged, '--rename', 'elbow:knee', '--out', tmp_path / 'copy').output
+    assert 'the checksum of the chunk' in said and 'are left out' in said
+    whole = armid(
+        'convert', damaged, '--rename', 'elbow:knee', '--no-crc', '--out', tmp_path / 'all'
+    )
+    assert 'checksum' not in whole.output and '4000 messages' in whole.output
+
+
+def test_inspect_reads_with_and_without(damaged):
+    assert 'the checksum of the chunk' in armid('inspect', damaged).output
+    assert 'checksum' not in armid('inspect', damaged, '--no-crc').output
+
+
+def test_an_exoskeleton_s_bag_is_not_read_without_a_word(tmp_path):
+    recorded = tmp_path / 'walk'
+    armid('exo', '--duration', '4', '--out', recorded)
+    path = next((recorded / 'recording').glob('*.mcap'))
+    content = bytearray(path.read_bytes())
+    chunk = map_file(bytes(content), path).chunks[-1]
+    content[(chunk.begin + chunk.end) // 2] ^= 4
+    path.write_bytes(content)
+    said = armid('exo', recorded / 'recording', '--out', tmp_path / 'again').output
+    assert 'the checksum of the chunk' in said or 'is damaged' in said

@@ -1,0 +1,43 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Tables are read from files, of which the packed ones have a limit."""
+
+from dataclasses import replace
+import gzip
+import os
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.ros1 import convert_ros1
+from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.tables import content, open_table
+import pytest
+
+
+@pytest.mark.parametrize('suffix', ['csv', 'csv.gz', 'npz', 'mat', 'h5', 'parquet'])
+def test_a_fifo_is_no_table(tmp_path, suffix):
+    path = tmp_path / f'pipe.{suffix}'
+    os.mkfifo(path)
+    with pytest.raises(RecordingError, match='a FIFO, and no file'):
+        open_table(path)
+
+
+def test_a_fifo_is_no_bag_of_ros_1(tmp_path):
+    path = tmp_path / 'pipe.bag'
+    os.mkfifo(path)
+    with pytest.raises(RecordingError, match='a FIFO, and no file'):
+        convert_ros1(path, tmp_path / 'out')
+
+
+def test_what_is_packed_has_a_limit(tmp_path, monkeypatch):
+    monkeypatch.setattr(content, 'DEFAULT', replace(DEFAULT, memory_limit=1_000_000))
+    path = tmp_path / 'bomb.csv.gz'
+    path.write_bytes(gzip.compress(b'0,' * 10_000_000))
+    with pytest.raises(RecordingError, match=r'bomb.csv.gz: what is packed in it takes'):
+        open_table(path)
+
+
+def test_what_is_no_gzip_is_said(tmp_path):
+    path = tmp_path / 'wrong.csv.gz'
+    path.write_bytes(b'a,b\n1,2\n')
+    with pytest.raises(RecordingError, match=r'wrong.csv.gz: cannot be unpacked'):
+        open_table(path)
