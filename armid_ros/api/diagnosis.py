@@ -25,7 +25,6 @@ from armid_ros.arm import ArmModel, save_model
 from armid_ros.arm.export import arm_urdf
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
-from armid_ros.effects import CATALOGUE
 from armid_ros.files import write_file
 from armid_ros.identification import SignalSettings
 from armid_ros.recording import Recording
@@ -230,9 +229,7 @@ def diagnose(
         *(recordings_of(group, model.robot) for group in (recordings, validate, baseline))
     )
     more: dict[str, Any] = {'baseline': before} if before else {}
-    settings = DiagnosisSettings(
-        library=tuple(CATALOGUE), signals=SignalSettings(cutoff, decimation)
-    )
+    settings = DiagnosisSettings(signals=SignalSettings(cutoff, decimation))
     result = run(
         model, looked_at, validate=held_out, settings=settings, rng=generator(rng), **more
     )

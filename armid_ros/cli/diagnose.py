@@ -15,7 +15,6 @@ from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, Finding
 from armid_ros.diagnosis.verdict.document import SCHEMA
-from armid_ros.effects import CATALOGUE
 from armid_ros.files import json_text
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.identifiability import told_from_zero
@@ -123,7 +122,6 @@ def diagnose(
     arm = options.with_effects(arm, effects)
     beside = partner_options.open_partner(partner, ties, robot, gravity)
     settings = DiagnosisSettings(
-        library=tuple(CATALOGUE),
         signals=SignalSettings(cutoff, decimation),
         partner=beside,
         material=material,

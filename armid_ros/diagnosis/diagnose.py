@@ -118,6 +118,10 @@ class Diagnosis:
     notes: tuple[str, ...]
     baseline: str
 
+    def __repr__(self) -> str:
+        """Return the verdict and what was said."""
+        return f'Diagnosis: {self.verdict}. {self.summary}'
+
 
 def diagnose(
     arm: ArmModel,

@@ -93,7 +93,7 @@ class DiagnosisSettings:
 
     """
 
-    library: tuple[str, ...] = tuple(CATALOGUE)
+    library: tuple[str, ...] = field(default_factory=lambda: tuple(CATALOGUE))
     own: tuple[Kind, ...] = ()
     partner: Partner | None = None
     signals: SignalSettings = field(default_factory=SignalSettings)
