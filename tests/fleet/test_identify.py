@@ -8,7 +8,7 @@ from pathlib import Path
 from armid_ros.arm import ArmModel
 from armid_ros.errors import FleetError
 from armid_ros.fleet.bags import find_bags
-from armid_ros.fleet.kinds import Entry
+from armid_ros.fleet.kinds import document, Entry
 from armid_ros.fleet.store import Store
 from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
 from armid_ros.recording import read_recording
@@ -19,6 +19,7 @@ import polars
 import pytest
 
 from benchmarks.fleet import EFFECTS
+from docsite.schemas import faults
 
 from .conftest import identified, SETTINGS, URDF
 
@@ -33,6 +34,10 @@ def done(bags, cluster, tmp_path_factory):
     )
     assert told[-1] == (9, 9)
     return outcome, Store(str(out))
+
+
+def test_the_plan_is_as_its_schema_says(done):
+    assert faults('fleet', document(done[1])) == []
 
 
 def by_arm(table, arm):

@@ -127,6 +127,7 @@ def explain(
         question.arm, (), evidence.data, evidence.sigma, question.base, (), question.told
     )
     named, steps, fitted = _pruned(question, named, steps, values, evidence, settings)
+    fitted = _widened(fitted, steps)
     taken = {own.effect.name for own in named}
     small = tuple(trial for trial in minor if trial.group.effect.name not in taken)
     return Explanation(
@@ -140,6 +141,25 @@ def explain(
         small,
         question.told,
     )
+
+
+def _widened(fitted: Fitted, steps: Sequence[Step]) -> Fitted:
+    """
+    Widen deviations to what the values vary by from part to part of the data (jackknife).
+
+    What a model gets wrong of a motion is no noise: a value follows it, and another motion would
+    give another one.
+
+    """
+    factor, start = np.ones(len(fitted.estimate.values)), 0
+    for own, step in zip(fitted.named, steps, strict=True):
+        held, span = step.trial.held_values, slice(start, start + len(own.kept))
+        if held.shape[1] == len(own.kept):
+            spread = np.sqrt((len(held) - 1) * np.var(held, axis=0))
+            factor[span] = np.maximum(spread / np.maximum(fitted.estimate.std[span], 1e-300), 1.0)
+        start = span.stop + len(own.effect.shape)
+    covariance = fitted.estimate.covariance * np.outer(factor, factor)
+    return replace(fitted, estimate=replace(fitted.estimate, covariance=covariance))
 
 
 _Found = tuple[
