@@ -44,9 +44,13 @@ from tests.hidden.lived.specification import COUNTS, KINDS, specify
 Ask = Callable[..., Answer]
 
 
-def judge(kind: str, index: int, again: bool = True, question: Ask = ask) -> LivedJudged:
-    """Make a case and ask about it; an exception is an answer, too."""
-    case = lived_case(kind, index)
+def judge(kind: str, index: int, again: bool = True, question: Ask = ask) -> LivedJudged | None:
+    """Make a case and ask about it; an exception is an answer, too. None: it cannot be made."""
+    try:
+        case = lived_case(kind, index)
+    except RuntimeError as error:
+        print(f'{kind}/{index} left out: {error}', flush=True)
+        return None
     day_1, day_2 = ([recording_of(run) for run in day] for day in (case.day_1, case.day_2))
     held_out = recording_of(case.held_out)
     described = robot_of(case).gravity
@@ -119,7 +123,7 @@ def run(
     count = len(cases)
     with ProcessPoolExecutor(processes, mp_context=context) as pool:
         jobs = pool.map(judge, [kind] * count, cases, [again] * count, [question] * count)
-        for one in jobs:
+        for one in filter(None, jobs):
             judged.append(one)
             print(_line(one), flush=True)
     return judged

@@ -52,7 +52,11 @@ class _Fleet(click.Group):
         return super().invoke(ctx)
 
 
-@click.group(cls=_Fleet)
+@click.group(
+    cls=_Fleet,
+    epilog='Example: armid fleet identify "bags/*/*" --robot arm.urdf --out results; '
+    'armid fleet watch --out results.',
+)
 def fleet() -> None:
     """Identify, watch and diagnose many arms with many bags."""
 

@@ -26,10 +26,13 @@ import numpy.typing as npt
 
 #: A cut-off is compared with one lower by this factor.
 _STEP = 0.5
-#: Lower than the first by this at the most: five steps.
-_LOWEST = 1.0 / 32.0
+#: A cut-off that loses more of the rows at the ends of stretches is too low for them.
+_KEPT = 0.8
 #: Stretches of the data that are predicted in turn; their losses give the deviation of a mean.
 _STRETCHES = 16
+#: Nor is a cut-off lowered for less than a tenth of the error; jitter and slack cost a third and
+#: more on every machine that was tried.
+_NEAR = 0.1
 #: Rows that are enough to compare cut-offs, some hundred for every parameter of seven joints.
 _ROWS = 6000
 #: Directions of the columns with less than this share of the squares are dependent.
@@ -45,9 +48,9 @@ def cutoff_of_torques(
     """
     Lower the cut-off of positions as far as it makes torques more predictable.
 
-    The highest cut-off is taken whose loss on data that were left out is within one standard
-    deviation of the least (Breiman et al., Classification and Regression Trees, 1984): clean data
-    keep theirs.
+    The highest cut-off is taken whose loss on data that were left out is within a tenth of the
+    least, or one standard deviation (Breiman et al., Classification and Regression Trees, 1984):
+    clean data keep theirs.
 
     Parameters
     ----------
@@ -67,14 +70,16 @@ def cutoff_of_torques(
 
     """
     tried: list[tuple[float, FloatArray]] = []
-    cutoff = used.cutoff_hz
-    while cutoff >= _LOWEST * used.cutoff_hz:
+    cutoff, rows = used.cutoff_hz, 0
+    while True:
         try:
             problem = regressions(arm, columns, recordings, replace(used, cutoff_hz=cutoff))
         except IdentificationError:
             break
-        if not problem:
+        count = sum(len(part.tau) for part in problem)
+        if count < _KEPT * rows or not problem:
             break
+        rows = max(rows, count)
         tried.append((cutoff, _losses(problem)))
         best = min(tried, key=lambda one: float(np.mean(one[1])))
         if not _as_good(tried[-1][1], best[1]):
@@ -90,7 +95,7 @@ def _as_good(losses: FloatArray, best: FloatArray) -> bool:
     """Tell whether stretches are predicted as well as the best way does, to one deviation."""
     worse = losses - best
     deviation = np.std(worse, ddof=1) / np.sqrt(len(worse))
-    return bool(np.mean(worse) <= deviation)
+    return bool(np.mean(worse) <= max(float(deviation), _NEAR * float(np.mean(best))))
 
 
 def _losses(problem: Sequence[Regression]) -> FloatArray:

@@ -147,15 +147,7 @@ def inspect(
 
 def _of_fit(trial: Trial) -> Iterator[Remark]:
     error = trial.relative_error_percent
-    if trial.better is not None:
-        cutoff, left = trial.better
-        yield Remark(
-            'doubt',
-            f'noise of the positions: identify would filter them at {trial.cutoff_hz:.3g} Hz and '
-            f'leave {error:.0f} % of the efforts; with --cutoff {cutoff:.2g} it leaves '
-            f'{left:.0f} %',
-        )
-    elif error is not None and error > POOR:
+    if error is not None and error > POOR:
         yield Remark(
             'doubt',
             f'rigid body and friction leave {error:.0f} % of the efforts; look for axes or zeros '

@@ -10,23 +10,14 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import ArmidError
 from armid_ros.identification import (
-    Conditioning,
-    IdentificationSettings,
     identify,
     Score,
-    SignalSettings,
 )
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
-
-#: A fit that leaves less than this needs no other cut-off [%].
-_GOOD = 3.0
-#: Shares of the cut-off that are tried below it, and what they have to leave of the error.
-_CUTOFFS = (0.5, 0.25, 0.1, 0.05)
-_CLEARLY = 0.75
 
 
 @dataclass(frozen=True)
@@ -52,8 +43,6 @@ class Trial:
         Efforts over what the description takes, joint by joint; NaN where it does not follow.
     notes : tuple of str
         What the identification says.
-    better : (float, float) or None
-        A lower cut-off [Hz] that leaves a clearly smaller relative error, and that error [%].
 
     """
 
@@ -65,7 +54,6 @@ class Trial:
     cutoff_hz: float | None = None
     scale: FloatArray | None = None
     notes: tuple[str, ...] = ()
-    better: tuple[float, float] | None = None
 
 
 def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> Trial:
@@ -99,29 +87,7 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         cutoff_hz=result.used.cutoff_hz,
         scale=_scale(robot, motions),
         notes=result.notes,
-        better=_better_cutoff(arm, recording, result.used, error, rng) if error > _GOOD else None,
     )
-
-
-def _better_cutoff(
-    arm: ArmModel,
-    recording: Recording,
-    used: Conditioning,
-    error: float,
-    rng: np.random.Generator,
-) -> tuple[float, float] | None:
-    """Try lower cut-offs on the same rows of torque, for which errors can be compared."""
-    best = None
-    for share in _CUTOFFS:
-        signals = SignalSettings(used.cutoff_hz * share, used.decimation)
-        try:
-            fits = identify(arm, [recording], IdentificationSettings(signals=signals), rng=rng)
-        except ArmidError:
-            break
-        left = Score.of(fits.training).relative_error_percent
-        if left < _CLEARLY * error and (best is None or left < best[1]):
-            best = signals.cutoff_hz or 0.0, left
-    return best
 
 
 def _scale(robot: Robot, motions: list[Motion]) -> FloatArray:

@@ -115,7 +115,8 @@ class BagPlayerNode(ArmidNode):
         self._topics = self._make_publishers()
         self._guard = self._make_guard()
         self._messages = self._from_start()
-        self._next: RawMessage | None = next(self._messages, None)
+        self._next: RawMessage | None = None
+        self._take()
         self._first = self._next.log_time_ns if self._next else 0
         self._begin = self._first + int(self.value('start_offset') * 1e9)
         self._position = self._begin
@@ -255,10 +256,14 @@ class BagPlayerNode(ArmidNode):
             topic.publish(message.cdr)
             self.published[message.topic] += 1
 
-    def _advance(self) -> None:
+    def _take(self) -> None:
+        """Read the next message; at the end say what was left out, be it all of them."""
         self._next = next(self._messages, None)
         if self._next is None and self._bag.damage:
             self.complaints.say('damage', f'{self.value("bag")}: {self._bag.damage}')
+
+    def _advance(self) -> None:
+        self._take()
         if self._next is None and self.value('loop'):
             self._messages = self._from_start()
             self._next = next(self._messages, None)

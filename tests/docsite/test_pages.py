@@ -70,20 +70,32 @@ def test_the_blocks_of_a_page_run_one_after_the_other(page, at_desk):
 def options():
     """Return all options of all commands."""
     context = click.Context(main)
-    commands = (main.get_command(context, name) for name in main.list_commands(context))
     return {
         option
-        for command in commands
+        for command in commands_of(main, context)
         for parameter in command.get_params(context)
         for option in (*parameter.opts, *parameter.secondary_opts)
     }
+
+
+def commands_of(group, context):
+    """Yield all commands of a group, and those of the groups in it."""
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        yield command
+        if isinstance(command, click.Group):
+            yield from commands_of(command, context)
 
 
 @pytest.mark.parametrize('page', PAGES, ids=name_of)
 def test_every_option_that_a_page_names_exists(page):
     """Those of programs that are not of this package are named with the program alone."""
     text = re.sub(r'^```.*?^```$', '', page.read_text(encoding='utf-8'), flags=re.M | re.S)
-    said = [code for code in re.findall(r'`([^`\n]+)`', text) if not code.startswith('python -m')]
+    said = [
+        code
+        for code in re.findall(r'`([^`\n]+)`', text)
+        if not code.startswith(('python -m', 'pip '))
+    ]
     named = {option for code in said for option in re.findall(r'(?<!\S)--[a-z][\w-]*', code)}
     assert named <= {*options(), '--ros-args', '--slice'}  # of ROS 2, of the benchmark
 

@@ -143,14 +143,11 @@ def test_units_of_efforts_are_seen_against_the_description(factor, said, clean, 
     assert any(said in remark for remark in remarks(wrong, robot))
 
 
-def test_noisy_positions_are_answered_with_a_cutoff_that_helps(clean, robot):
+def test_noisy_positions_are_answered_with_a_lower_cutoff(clean, robot):
     """Coarse encoders make noise of every frequency in what is differentiated."""
     coarse = replace(clean, q=np.round(clean.q / 0.02) * 0.02)
-    found = inspect(coarse, robot, rng=np.random.default_rng(0))
-    cutoff, left = found.trial.better
-    assert cutoff < found.trial.cutoff_hz
-    assert left < 0.75 * found.trial.relative_error_percent
-    assert any('with --cutoff' in remark.text for remark in found.remarks)
+    rough, fine = (inspect(one, robot, rng=np.random.default_rng(0)) for one in (coarse, clean))
+    assert rough.trial.cutoff_hz < 0.5 * fine.trial.cutoff_hz
 
 
 def test_a_fit_that_explains_little_is_doubted(clean, robot):
