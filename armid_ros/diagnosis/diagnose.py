@@ -31,9 +31,10 @@ from armid_ros.diagnosis.search.explain import Explanation
 from armid_ros.diagnosis.search.unharmed import harmed
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.explain_ties import diagnose_ties
-from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
+from armid_ros.diagnosis.verdict.attribution import attribute
 from armid_ros.diagnosis.verdict.finding import Finding, findings, small_print
 from armid_ros.diagnosis.verdict.gap import Gap, measure_gap
+from armid_ros.diagnosis.verdict.headline import headline, shares_of
 from armid_ros.diagnosis.verdict.pattern import find_pattern, Pattern
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left
@@ -51,8 +52,6 @@ _COMMON = (
     'the baseline did not determine the model for these motions: a rigid body and friction common '
     'to both were fitted'
 )
-#: Recordings hardly show what takes less than this share of the share it takes of others.
-_HARDLY = 0.1
 
 
 @dataclass(frozen=True)
@@ -271,11 +270,11 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     unseen = _unseen(validate, explanation, prepared, chosen)
     measured = chosen.floor_in_words in (NOISE, ESTIMATED)
     least = 0.0 if measured else settings.thresholds.headline
-    explanation, shares = _headline(chosen.rest or explanation, unseen, least)
+    explanation, shares = headline(chosen.rest or explanation, unseen, least)
     rest = explanation
     if chosen.rest is not None and explanation.steps:
         as_told = in_model_as_given(explanation)
-        told = _shares(as_told, unseen)[0]
+        told = shares_of(as_told, unseen)[0]
         if told.share(range(len(as_told.steps))) >= least:
             explanation, shares = as_told, told
         else:
@@ -335,36 +334,6 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
     )
-
-
-def _headline(
-    explanation: Explanation, unseen: Evidence | None, least: float
-) -> tuple[Explanation, Attribution]:
-    """
-    Drop names that other data deny, leave small ones to the small print, share out the gap.
-
-    It is shared out on those data, or on the data left out one by one where those hardly show
-    what was named.
-
-    """
-    shares, denied = _shares(explanation, unseen)
-    small = [k for k in range(len(explanation.steps)) if shares.share([k]) < least]
-    gone = denied or sorted(small, key=lambda k: shares.share([k]))
-    if gone:
-        return _headline(explanation.without(gone[0]), unseen, least)
-    return explanation, shares
-
-
-def _shares(explanation: Explanation, unseen: Evidence | None) -> tuple[Attribution, list[int]]:
-    """Share out the gap, and return the names that other data deny, the least first."""
-    left_out = attribute(explanation, None)
-    if unseen is None:
-        return left_out, []
-    names = range(len(explanation.steps))
-    seen = attribute(explanation, unseen)
-    denied = [k for k in reversed(seen.order) if seen.denied(k)]
-    shown = seen.share(names) > _HARDLY * left_out.share(names)
-    return (seen if shown else left_out), denied
 
 
 def _unseen(

@@ -84,12 +84,16 @@ class Baseline:
         )
 
     def told(self, arm: ArmModel, base: BaseParameters) -> Told:
-        """Return what these recordings tell of what is free of an arm."""
+        """
+        Return what these recordings tell of what is free of an arm.
+
+        It is the arm whose misfit was measured, or has more effects that are zero.
+
+        """
         rows = [
             part.reduce(arm.columns(part.motion)[:, :, base.independent]) for part in self.data
         ]
-        left = [part.residual(arm) for part in self.data]
-        return Told(self.data, self._weighted(rows), self._weighted(left))
+        return Told(self.data, self._weighted(rows), self._weighted(self.residual))
 
     def columns(self, arm: ArmModel, effect: Effect, kept: Sequence[int]) -> FloatArray:
         """Return the columns of an effect over the misfit, one row a row and joint, (S, p)."""

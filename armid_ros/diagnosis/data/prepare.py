@@ -80,12 +80,12 @@ def choose_filters(
 
     """
     used = conditioning([*recordings, *baseline], settings.signals)
-    if settings.partner is None and settings.signals.cutoff_hz is None:
+    if settings.partner is not None:
+        return band_of_motion(recordings, used, settings.signals, _NARROW)
+    if settings.signals.cutoff_hz is None:
         beside, _ = with_friction(arm)
         told = beside.base_parameters(rng).independent
         used = cutoff_of_torques(beside, told, baseline or recordings, used)
-    if settings.partner is not None:
-        return band_of_motion(recordings, used, settings.signals, _NARROW)
     if settings.signals.decimation is not None:
         return used
     band = used.rate_hz / (2.5 * MODEL_BANDS * used.decimation)

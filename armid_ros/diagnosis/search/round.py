@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
@@ -12,7 +12,7 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.fit import Told
-from armid_ros.diagnosis.search.held_out import Products, products, Trial
+from armid_ros.diagnosis.search.held_out import Products, Trial
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -112,8 +112,8 @@ class Round:
         Recordings in which nothing was wrong.
     width : float
         Squares that any cause takes of what nothing explains: a lead of less decides nothing.
-    known : dict
-        Products that were made already.
+    known : Products or None
+        Of what is free, which all that is tried in the round stands beside.
 
     """
 
@@ -123,13 +123,7 @@ class Round:
     total: float | None
     before: Before | None = None
     width: float = 0.0
-    known: dict[int, Products] = field(default_factory=dict)
-
-    def of_free(self, problem: Problem, beside: Beside) -> Products:
-        """Return the products of what is free, which a round makes once."""
-        if id(beside) not in self.known:
-            self.known[id(beside)] = products(problem, beside.free, ())
-        return self.known[id(beside)]
+    known: Products | None = None
 
 
 def worth(trial: Trial, here: Round) -> float:

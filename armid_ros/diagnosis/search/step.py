@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from armid_ros.diagnosis.data.rows import Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.held_out import (
-    held_out,
+    products,
     Trial,
     tried_beside,
     with_group,
@@ -109,9 +109,10 @@ def next_step(
 
     """
     thresholds = here.settings.thresholds
-    trials, power = held_out(problem, beside.free, groups, beside.hold, beside.pull)
+    known = products(problem, beside.free, groups)
+    trials, power = tried_beside(known, problem, groups, beside.hold, beside.pull)
     total = float(power.sum()) if here.total is None else here.total
-    here = replace(here, total=total)
+    here = replace(here, total=total, known=known)
     seen = [trial for trial in trials if trial.visible >= thresholds.least_visible]
     ranking = _best_per_key(seen, here)
     survey = _survey(groups, ranking, total, len(seen))
@@ -261,7 +262,8 @@ def _alone(
     """Try a group with weighted columns beside what is free."""
     group = replace(group, columns=slice(0, group.size))
     free, held = beside.rows(problem), beside
-    known = with_group(here.of_free(problem, beside), problem, free, own)
+    assert here.known is not None
+    known = with_group(here.known, problem, free, own)
     if here.before is not None:
         free = np.concatenate([own, free], axis=2)
         known, held = with_own_again(known), here.before.beside(group, here.work.arm, beside)
