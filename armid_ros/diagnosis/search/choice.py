@@ -21,6 +21,7 @@ from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.search.explain import explain, Explanation
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.question import as_given, fitted_anew
+from armid_ros.diagnosis.search.round import cost
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -218,9 +219,28 @@ def _left_by(explanation: Explanation) -> FloatArray:
 
 
 def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings) -> bool:
-    """Return whether causes in the model as given explain as much as a body fitted anew."""
+    """
+    Return whether causes in the model as given explain as much as a body fitted anew.
+
+    They do where they leave no gap, or where the body takes less beside them than its values have
+    to take of the gap.
+
+    """
     evidence = first.evidence
-    left, fitted = first.fitted.residual, anew.fitted.residual
-    limits = evidence.limits(left, settings)
-    same = settings.thresholds.same_fit * evidence.losses(fitted)
-    return bool(np.all(evidence.losses(left) <= np.maximum(limits, same)))
+    left = evidence.losses(first.fitted.residual)
+    if np.all(left <= evidence.limits(first.fitted.residual, settings)):
+        return True
+    before, after = (
+        evidence.losses(one) for one in (first.reference.residual, anew.fitted.residual)
+    )
+    gap = max(float(evidence.count @ before), 1e-300)
+    lead = float(evidence.count @ (left - after)) / gap
+    return lead <= settings.thresholds.price * (
+        _freedom(anew, settings) - _freedom(first, settings)
+    )
+
+
+def _freedom(explanation: Explanation, settings: DiagnosisSettings) -> float:
+    """Return how many values were chosen, those of the rigid body included."""
+    body = 0 if explanation.base is None else explanation.base.rank
+    return body + sum(cost(step.trial, settings) for step in explanation.steps)
