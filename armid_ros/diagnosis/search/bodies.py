@@ -74,7 +74,12 @@ def _triangle(
     data: Sequence[Trajectory],
     sigma: Sequence[FloatArray],
 ) -> tuple[FloatArray, float]:
-    """Return the triangular factor of base columns and what they are to make, and its rows."""
+    """
+    Return the triangular factor of base columns and what they are to make, and its rows.
+
+    What other data tell of the body counts as rows as well.
+
+    """
     fitted, rank = explanation.fitted, len(values)
     blocks = []
     for columns, left in zip(fitted.columns, fitted.residual, strict=True):
@@ -85,5 +90,9 @@ def _triangle(
         scipy.linalg.qr(rows.reshape(-1, rank + 1), mode='r')[0][: rank + 1]
         for rows in weighted_rows(blocks, data, sigma)
     ]
+    told = explanation.told
+    if told is not None:
+        own, left = told.columns, told.left - told.columns @ fitted.change
+        factors.append(np.column_stack([own, left + own @ values]))
     whole = scipy.linalg.qr(np.concatenate(factors), mode='r')[0][: rank + 1]
     return np.asarray(whole), float(sum(part.told.sum() for part in data))

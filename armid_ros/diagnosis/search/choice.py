@@ -222,22 +222,21 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     """
     Return whether causes in the model as given explain as much as a body fitted anew.
 
-    They do where they leave no gap, or where the body takes less beside them than its values have
-    to take of the gap.
+    Where that leaves noise, they have to leave as little. Where it leaves a gap itself, it has to
+    take more beside them than its values cost.
 
     """
     evidence = first.evidence
-    left = evidence.losses(first.fitted.residual)
-    if np.all(left <= evidence.limits(first.fitted.residual, settings)):
+    left, fitted = first.fitted.residual, anew.fitted.residual
+    after, least = evidence.losses(left), evidence.losses(fitted)
+    same = settings.thresholds.same_fit * least
+    if np.all(after <= np.maximum(evidence.limits(left, settings), same)):
         return True
-    before, after = (
-        evidence.losses(one) for one in (first.reference.residual, anew.fitted.residual)
-    )
-    gap = max(float(evidence.count @ before), 1e-300)
-    lead = float(evidence.count @ (left - after)) / gap
-    return lead <= settings.thresholds.price * (
-        _freedom(anew, settings) - _freedom(first, settings)
-    )
+    if _at_floor(anew, settings):
+        return False
+    gap = max(float(evidence.count @ evidence.losses(first.reference.residual)), 1e-300)
+    price = settings.thresholds.price * (_freedom(anew, settings) - _freedom(first, settings))
+    return float(evidence.count @ (after - least)) <= price * gap
 
 
 def _freedom(explanation: Explanation, settings: DiagnosisSettings) -> float:
