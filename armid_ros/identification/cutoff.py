@@ -17,6 +17,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.normal_equations import told_basis
 from armid_ros.identification.regression import Regression, regressions
 from armid_ros.identification.signals import Conditioning
 from armid_ros.motion import FloatArray
@@ -138,8 +139,5 @@ def _fit(
     weights = told * weight
     rows = (x * weights[:, :, np.newaxis]).reshape(-1, x.shape[2])
     own = rows.T @ rows
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-300))
-    values, vectors = np.linalg.eigh(own * np.outer(scale, scale))
-    good = values > _DEPENDENT * max(float(values[-1]), 1e-300)
-    basis = scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good])
+    basis = told_basis(own, _DEPENDENT)
     return np.asarray(basis @ (basis.T @ (rows.T @ (y * weights).ravel())))

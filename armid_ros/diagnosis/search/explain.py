@@ -25,6 +25,7 @@ from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
+from armid_ros.diagnosis.search.resampled import widened
 from armid_ros.diagnosis.search.rivals import undecided
 from armid_ros.diagnosis.search.round import Before, Beside, Round
 from armid_ros.diagnosis.search.step import acceptable, material, next_step, Step, Survey
@@ -127,7 +128,7 @@ def explain(
         question.arm, (), evidence.data, evidence.sigma, question.base, (), question.told
     )
     named, steps, fitted = _pruned(question, named, steps, values, evidence, settings)
-    fitted = _widened(fitted, steps)
+    fitted = widened(fitted, evidence, question.told)
     taken = {own.effect.name for own in named}
     small = tuple(trial for trial in minor if trial.group.effect.name not in taken)
     return Explanation(
@@ -141,25 +142,6 @@ def explain(
         small,
         question.told,
     )
-
-
-def _widened(fitted: Fitted, steps: Sequence[Step]) -> Fitted:
-    """
-    Widen deviations to what the values vary by from part to part of the data (jackknife).
-
-    What a model gets wrong of a motion is no noise: a value follows it, and another motion would
-    give another one.
-
-    """
-    factor, start = np.ones(len(fitted.estimate.values)), 0
-    for own, step in zip(fitted.named, steps, strict=True):
-        held, span = step.trial.held_values, slice(start, start + len(own.kept))
-        if held.shape[1] == len(own.kept):
-            spread = np.sqrt((len(held) - 1) * np.var(held, axis=0))
-            factor[span] = np.maximum(spread / np.maximum(fitted.estimate.std[span], 1e-300), 1.0)
-        start = span.stop + len(own.effect.shape)
-    covariance = fitted.estimate.covariance * np.outer(factor, factor)
-    return replace(fitted, estimate=replace(fitted.estimate, covariance=covariance))
 
 
 _Found = tuple[

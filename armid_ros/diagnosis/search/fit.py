@@ -10,7 +10,7 @@ the first order only. Values stay within what is physically possible.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,6 +22,7 @@ from armid_ros.effects.load import described_spread
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.least_squares import solve
+from armid_ros.identification.normal_equations import told_basis
 from armid_ros.identification.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
@@ -32,6 +33,8 @@ _EXCITED = 1e-4
 _MOST_ROUNDS = 4
 #: Squares of a column that are this share of those of the largest one are rounding.
 _ROUNDING = 1e-20
+#: Directions of scaled columns with less than this share of the largest are not told.
+_UNTOLD = 1e-10
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,13 @@ class Told:
     def aim(self) -> FloatArray:
         """Products of the columns with what is left, shape (r,)."""
         return np.asarray(self.columns.T @ self.left)
+
+    def recordings(self, change: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Yield the columns of each recording, (S, r), and what a change leaves of it, (S,)."""
+        for fold in sorted({part.fold for part in self.data}):
+            own = [k for k, part in enumerate(self.data) if part.fold == fold]
+            rows = np.concatenate([self.rows[k].reshape(-1, len(change)) for k in own])
+            yield rows, np.concatenate([self.rest[k].ravel() for k in own]) - rows @ change
 
     def regressions(self, change: FloatArray, named: int) -> list[Regression]:
         """Return the data as a problem in which so many more columns do not act."""
@@ -289,13 +299,11 @@ def _step(
     known = len(pull)
     own[:known, :known] += hold
     aim[:known] += pull
-    diagonal = np.diag(own)
-    seen = diagonal > _ROUNDING * diagonal.max(initial=1e-300)
-    scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, diagonal, 1.0)), 0.0)
-    values, vectors = np.linalg.eigh(own * np.outer(scale, scale))
-    good = values > 1e-10 * max(float(values[-1]), 1e-300) if size else values > 0.0
-    basis = scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good])
-    return np.asarray(basis @ (basis.T @ aim))
+    seen = np.diag(own) > _ROUNDING * np.diag(own).max(initial=1e-300)
+    basis = told_basis(own[np.ix_(seen, seen)], _UNTOLD)
+    step = np.zeros(size)
+    step[seen] = basis @ (basis.T @ aim[seen])
+    return step
 
 
 def _covariance(

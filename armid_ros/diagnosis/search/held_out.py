@@ -21,6 +21,7 @@ from functools import cached_property
 
 from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.candidates import Group
+from armid_ros.identification.normal_equations import told_basis
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -268,10 +269,7 @@ class _Base:
         cls, known: Products, train: npt.NDArray[np.bool_], hold: FloatArray, pull: FloatArray
     ) -> _Base:
         own = known.free[train].sum(axis=0) + hold
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-300))
-        values, vectors = np.linalg.eigh(own * np.outer(scale, scale))
-        good = values > _UNSEEN * max(float(values.max(initial=0.0)), 1e-300)
-        basis = scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good])
+        basis = told_basis(own, _UNSEEN)
         inverse = basis @ basis.T
         border = known.border[train].sum(axis=0)
         return cls(

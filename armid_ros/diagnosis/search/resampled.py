@@ -1,0 +1,80 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+How sure values are where a model gets motions wrong: what they vary by from part to part of data.
+
+What a model gets wrong of a motion is no noise. A value follows it, and another motion would give
+another value, whichever of the two days it is from.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.rows import fold_rows, make_problem
+from armid_ros.diagnosis.search.fit import Fitted, Told
+from armid_ros.identification.normal_equations import told_basis
+from armid_ros.motion import FloatArray
+import numpy as np
+from scipy import stats
+
+_LEVEL = 0.975
+#: Directions of scaled columns with less than this share of the largest are not told.
+_UNTOLD = 1e-10
+
+
+def widened(fitted: Fitted, evidence: Evidence, told: Told | None) -> Fitted:
+    """
+    Widen deviations to what the values vary by when parts of the data are left out (jackknife).
+
+    Few parts tell a spread badly: deviations are such that twice them has 95 % of Student's
+    distribution.
+
+    """
+    size = len(fitted.estimate.values)
+    if not size:
+        return fitted
+    variance, freedom = np.zeros(size), 0
+    for changes in _left_out(fitted, evidence, told):
+        variance += (len(changes) - 1) * np.var(changes, axis=0)
+        freedom += len(changes) - 1
+    few = float(stats.t.ppf(_LEVEL, freedom) / stats.norm.ppf(_LEVEL))
+    spread = few * np.sqrt(variance)
+    factor = np.maximum(spread / np.maximum(fitted.estimate.std, 1e-300), 1.0)
+    covariance = fitted.estimate.covariance * np.outer(factor, factor)
+    return replace(fitted, estimate=replace(fitted.estimate, covariance=covariance))
+
+
+def _left_out(fitted: Fitted, evidence: Evidence, told: Told | None) -> Iterator[FloatArray]:
+    """Yield by what the values change without each part of each day, (K, p)."""
+    size = len(fitted.estimate.values)
+    problem = make_problem(evidence.data, evidence.sigma, fitted.residual, list(fitted.columns))
+    fold = fold_rows(evidence.data)
+    width = problem.x.shape[2]
+    own, aim = [], []
+    for k in range(int(fold.max()) + 1):
+        x, y = problem.x[fold == k].reshape(-1, width), problem.y[fold == k].ravel()
+        own.append(x.T @ x)
+        aim.append(x.T @ y)
+    all_own, all_aim = sum(own) + fitted.hold, sum(aim) + fitted.pull
+    pairs = zip(own, aim, strict=True)
+    yield np.array([_solved(all_own - n, all_aim - b)[-size:] for n, b in pairs])
+    if told is None:
+        return
+    before = []
+    for x, y in told.recordings(fitted.change):
+        rank = x.shape[1]
+        less_own, less_aim = all_own.copy(), all_aim.copy()
+        less_own[:rank, :rank] -= x.T @ x
+        less_aim[:rank] -= x.T @ y
+        before.append(_solved(less_own, less_aim)[-size:])
+    if len(before) > 1:
+        yield np.array(before)
+
+
+def _solved(products: FloatArray, aim: FloatArray) -> FloatArray:
+    basis = told_basis(products, _UNTOLD)
+    return np.asarray(basis @ (basis.T @ aim))

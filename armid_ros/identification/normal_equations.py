@@ -1,0 +1,32 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Normal equations of which data do not tell every direction."""
+
+from __future__ import annotations
+
+from armid_ros.motion import FloatArray
+import numpy as np
+
+
+def told_basis(products: FloatArray, tolerance: float) -> FloatArray:
+    """
+    Return directions that data tell.
+
+    Parameters
+    ----------
+    products : ndarray, shape (p, p)
+        Products of columns with each other; positive semi-definite.
+    tolerance : float
+        Share of the largest eigenvalue, of columns scaled to one length, below which a direction
+        is not told.
+
+    Returns
+    -------
+    ndarray, shape (p, k)
+        B of the pseudo-inverse B B'.
+
+    """
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(products), 1e-300))
+    values, vectors = np.linalg.eigh(products * np.outer(scale, scale))
+    good = values > tolerance * max(float(values.max(initial=0.0)), 1e-300)
+    return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
