@@ -10,12 +10,14 @@ torques with those of the model, joint by joint, with friction and offset taken 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.search.candidates import effect_rows
+from armid_ros.effects.load import Payload
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -65,33 +67,54 @@ class Gate:
 
 def check_data(arm: ArmModel, recordings: Sequence[Recording], data: Sequence[Trajectory]) -> Gate:
     """Look for faults of the data."""
-    slopes, correlation = _compare(_under_its_gravity(arm, data), data)
+    slopes, correlation = _compare(_as_it_may_be(arm, data), data)
     faults = [*_time_base(recordings, _band(data)), *_torques(arm, slopes, correlation)]
     return Gate(tuple(faults), tuple(_clipped(recordings)), slopes, correlation)
 
 
-def _under_its_gravity(arm: ArmModel, data: Sequence[Trajectory]) -> ArmModel:
+def _as_it_may_be(arm: ArmModel, data: Sequence[Trajectory]) -> ArmModel:
     """
-    Return an arm under the gravity that explains the torques, if no simple fault does so better.
+    Return an arm under the gravity, or with the load, that explains torques better than a fault.
 
-    An arm that hangs takes the opposite torques of one that stands, but for its inertia. Other
-    units or exchanged joints make torques that some gravity explains in part.
+    An arm that hangs takes the opposite torques of one that stands, but for its inertia, and one
+    that carries a load takes many times the torque in a wrist. Other units or exchanged joints
+    make torques that some gravity or some load explains in part.
 
     """
     bare = ArmModel(arm.robot, quasi_static=arm.quasi_static)
-    columns = np.concatenate([part.reduce(bare.gravity_columns(part.motion)) for part in data])
     left = np.concatenate([part.residual(bare) for part in data])
     torque = left + np.concatenate([part.reduce(bare.torque(part.motion)) for part in data])
     scale = np.maximum(np.sqrt(np.mean(torque**2, axis=0)), 1e-12)
-    flat = (columns / scale[:, np.newaxis]).reshape(-1, 3)
-    change = np.linalg.lstsq(flat, (left / scale).ravel(), rcond=None)[0]
-    after = np.sum(((left - columns @ change) / scale) ** 2)
-    if after >= min(
-        _repaired(torque / scale, (torque - left) / scale, scale),
-        0.5 * np.sum((left / scale) ** 2),
-    ):
-        return arm
-    return ArmModel(arm.robot.with_gravity(arm.robot.gravity + change), arm.effects, arm.values)
+    repaired = _repaired(torque / scale, (torque - left) / scale, scale)
+    least, best = min(repaired, 0.5 * float(np.sum((left / scale) ** 2))), bare
+    for columns, changed in _changes(bare, data):
+        flat = (columns / scale[:, np.newaxis]).reshape(-1, columns.shape[2])
+        values = np.linalg.lstsq(flat, (left / scale).ravel(), rcond=1e-6)[0]
+        after = float(np.sum(((left - columns @ values) / scale) ** 2))
+        other = changed(values)
+        if after < least and other is not None:
+            least, best = after, other
+    return best
+
+
+_Change = Callable[[FloatArray], ArmModel | None]
+
+
+def _changes(bare: ArmModel, data: Sequence[Trajectory]) -> Iterator[tuple[FloatArray, _Change]]:
+    """Yield columns, and the arm that values of them make; None where no arm is like that."""
+    load = Payload.on(bare.robot)
+
+    def falling(change: FloatArray) -> ArmModel:
+        return ArmModel(
+            bare.robot.with_gravity(bare.robot.gravity + change), quasi_static=bare.quasi_static
+        )
+
+    def loaded(values: FloatArray) -> ArmModel | None:
+        possible = load.plausible(values, np.zeros_like(values), bare)
+        return bare.with_effect(load, values) if possible else None
+
+    yield np.concatenate([p.reduce(bare.gravity_columns(p.motion)) for p in data]), falling
+    yield np.concatenate([effect_rows(bare, load, part) for part in data]), loaded
 
 
 def _repaired(torque: FloatArray, model: FloatArray, scale: FloatArray) -> float:
@@ -182,9 +205,8 @@ def _compare(arm: ArmModel, data: Sequence[Trajectory]) -> tuple[FloatArray, Flo
     """Regress torques on the model's, with constant, velocity and its sign taken out."""
     n = arm.robot.n_joints
     slopes, correlation = np.zeros((2, n, n))
-    bare = ArmModel(arm.robot, quasi_static=arm.quasi_static)
-    measured = np.concatenate([part.residual(bare) for part in data])
-    load = np.concatenate([part.reduce(bare.torque(part.motion)) for part in data])
+    measured = np.concatenate([part.residual(arm) for part in data])
+    load = np.concatenate([part.reduce(arm.torque(part.motion)) for part in data])
     measured = measured + load
     dq = np.concatenate([part.motion.dq[part.rows] for part in data])
     for i in range(n):

@@ -83,7 +83,7 @@ def choose_filters(
     if settings.partner is not None:
         return band_of_motion(recordings, used, settings.signals, _NARROW)
     if settings.signals.cutoff_hz is None:
-        beside, _ = with_friction(arm)
+        beside, _ = with_friction(arm, settings.library)
         told = beside.base_parameters(rng).independent
         used = cutoff_of_torques(beside, told, baseline or recordings, used)
     if settings.signals.decimation is not None:

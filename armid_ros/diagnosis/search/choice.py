@@ -95,7 +95,7 @@ def explained(
     if written is not None:
         return _beside(arm, prepared, written, settings, rng, tell)
     few, many = settings.thresholds.few_causes, settings.thresholds.many_causes
-    given = as_given(arm, prepared.data, few)
+    given = as_given(arm, prepared.data, few, settings.library)
     told = Evidence(prepared.data, prepared.as_told, prepared.as_told)
     tell(0.2, 'the model as given')
     first = explain(given, told, settings)
@@ -104,7 +104,7 @@ def explained(
         return Chosen(first, nothing, NOISE)
     tell(0.4, 'the model fitted anew')
     noise = Evidence(prepared.data, tuple(prepared.sigma), tuple(prepared.sigma))
-    anew = explain(fitted_anew(arm, prepared.data, many, rng), noise, settings)
+    anew = explain(fitted_anew(arm, prepared.data, many, settings.library, rng), noise, settings)
     misfit = _left_by(anew)
     if _at_floor(anew, settings):
         misfit, words = nothing, NOISE
@@ -136,13 +136,15 @@ def _beside(
     tell(0.2, 'what has changed')
     noise = prepared.as_told
     evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
-    given = as_given(arm, prepared.data, 2 * settings.thresholds.few_causes)
+    given = as_given(arm, prepared.data, 2 * settings.thresholds.few_causes, settings.library)
     found = explain(given, evidence, settings)
     if _at_floor(found, settings):
         return Chosen(found, misfit, WRITTEN_MISFIT)
     tell(0.6, 'the model fitted anew')
     sigma = tuple(np.maximum(one, misfit) for one in prepared.sigma)
-    question = fitted_anew(arm, prepared.data, settings.thresholds.many_causes, rng)
+    question = fitted_anew(
+        arm, prepared.data, settings.thresholds.many_causes, settings.library, rng
+    )
     anew = explain(question, Evidence(prepared.data, sigma, tuple(prepared.sigma)), settings)
     return Chosen(found if _as_good(found, anew, settings) else anew, misfit, WRITTEN_MISFIT)
 
@@ -162,7 +164,7 @@ def _since(
     sigma = tuple(np.maximum(one, misfit) for one in noise)
     evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
     most = 2 * settings.thresholds.few_causes
-    free = fitted_anew(arm, [*prepared.data, *baseline.data], most, rng)
+    free = fitted_anew(arm, [*prepared.data, *baseline.data], most, settings.library, rng)
     assert free.base is not None and free.beside_base is not None
     told = baseline.told(free.arm, free.base)
     beside = told if free.beside is arm else baseline.told(free.beside, free.beside_base)

@@ -52,19 +52,25 @@ class Question:
     beside_told: Told | None = None
 
 
-def as_given(arm: ArmModel, data: Sequence[Trajectory], most: int) -> Question:
+def as_given(
+    arm: ArmModel, data: Sequence[Trajectory], most: int, library: Sequence[str]
+) -> Question:
     """Ask what a model lacks whose values are right, as far as it has any."""
-    beside, unknown = with_friction(arm)
+    beside, unknown = with_friction(arm, library)
     return Question(
         arm, _without_values(arm, data), beside, _without_values(beside, data), unknown, most
     )
 
 
 def fitted_anew(
-    arm: ArmModel, data: Sequence[Trajectory], most: int, rng: np.random.Generator
+    arm: ArmModel,
+    data: Sequence[Trajectory],
+    most: int,
+    library: Sequence[str],
+    rng: np.random.Generator,
 ) -> Question:
     """Ask what a model lacks of which only the structure counts."""
-    beside, unknown = with_friction(arm)
+    beside, unknown = with_friction(arm, library)
     return Question(
         arm,
         excited(arm, arm.base_parameters(rng), data)[0],
@@ -75,14 +81,14 @@ def fitted_anew(
     )
 
 
-def with_friction(arm: ArmModel) -> tuple[ArmModel, tuple[Effect, ...]]:
+def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
     """Return an arm with what every joint may be taken to have, and what was added."""
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     added: list[Effect] = []
     beside = arm
     for kind in CATALOGUE.values():
         joints = tuple(j for j in arm.robot.joints if (kind.name, j) not in there)
-        if kind.everywhere and joints:
+        if kind.everywhere and kind.name in library and joints:
             beside = beside.with_effect(kind.on(arm.robot, joints))
             added += [kind.on(arm.robot, (joint,)) for joint in joints]
     return beside, tuple(added)
