@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A payload on an arm that is described exactly."""
 
+from dataclasses import replace
+
 from armid_ros.diagnosis import diagnose
 from armid_ros.model import inverse_dynamics
 import numpy as np
@@ -28,3 +30,33 @@ def test_a_payload_is_named_with_its_mass(request, arm, friction):
     assert payload.values[0] == pytest.approx(MASS, rel=0.05)
     others = {finding.name for finding in found.findings} - {'payload'}
     assert others <= {'viscous_friction', 'coulomb_friction'}
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+@pytest.mark.parametrize('mass', [3.0, 8.0])
+def test_a_heavy_load_is_no_fault_of_the_data(bench, mass, side):
+    light = bench.robot.rigid_parameters.copy()
+    light[-10:] *= 0.02
+    robot = bench.robot.with_inertias(light)
+    first = mass * np.array([0.12 * side, 0.0, 0.2])
+    reach = (first / mass) @ (first / mass)
+    spread = mass * reach * np.eye(3) - np.outer(first, first) / mass + 0.01 * np.eye(3)
+    body = [mass, *first, spread[0, 0], 0.0, spread[1, 1], spread[0, 2], 0.0, spread[2, 2]]
+    load = light.copy()
+    load[-10:] += body
+    true = robot.with_inertias(load)
+    recordings = bench.recordings(
+        lambda m, tau: inverse_dynamics(true, m) - inverse_dynamics(bench.robot, m)
+    )
+    arm = replace(bench.arm, robot=robot)
+    found = diagnose(arm, recordings, rng=np.random.default_rng(0))
+    assert found.verdict != 'bad_data', found.summary
+    assert found.findings[0].name == 'payload'
+    assert found.findings[0].values[0] == pytest.approx(mass, rel=0.05)
+
+
+def test_torques_in_other_units_are_one(bench):
+    recordings = [replace(r, tau=57.2958 * r.tau) for r in bench.recordings()]
+    found = diagnose(bench.arm, recordings, rng=np.random.default_rng(0))
+    assert found.verdict == 'bad_data'
+    assert 'degrees against radians' in found.summary

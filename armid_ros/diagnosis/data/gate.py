@@ -111,6 +111,7 @@ def _changes(bare: ArmModel, data: Sequence[Trajectory]) -> Iterator[tuple[Float
 
     def loaded(values: FloatArray) -> ArmModel | None:
         possible = load.plausible(values, np.zeros_like(values), bare)
+        possible = possible and bool(values[0] < load.spread(bare.robot)[0])
         return bare.with_effect(load, values) if possible else None
 
     yield np.concatenate([p.reduce(bare.gravity_columns(p.motion)) for p in data]), falling

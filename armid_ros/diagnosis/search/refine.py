@@ -110,7 +110,8 @@ def _line_search(
         low = np.log(max(kind.lower, value / ratio))
         high = np.log(min(kind.upper, value * ratio))
     else:
-        reach = max(0.15 * abs(value), 0.05 * float(np.ptp(kind.grid)), 1e-3)
+        apart = max([b - a for a, b in pairwise(sorted(kind.grid))] or [0.0])
+        reach = max(0.15 * abs(value), apart, 1e-3)
         low, high = max(kind.lower, value - reach), min(kind.upper, value + reach)
 
     def at(x: float) -> FloatArray:

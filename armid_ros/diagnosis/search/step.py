@@ -214,8 +214,10 @@ def _with_refined_shapes(
             first += len(inside)
             found.append(own / np.where(problem.weight > 0.0, problem.weight, 1.0)[:, :, None])
             bounded = _alone(problem, beside, group, own, here)
-            refined += [] if bounded is None else [replace(bounded[0], group=group)]
-            continue
+            if bounded is None:
+                continue
+            trial = replace(bounded[0], group=group)
+            refined.append(trial)
         if not effect.shapes:
             continue
         projection = projection or project(problem, beside.free, beside.hold)

@@ -1,0 +1,52 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Deviations of values that follow what a model gets wrong of a motion."""
+
+from armid_ros.diagnosis.data.evidence import Evidence, trajectories
+from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.patch import Named
+from armid_ros.diagnosis.search.resampled import widened
+from armid_ros.effects import CATALOGUE
+from armid_ros.identification import SignalSettings
+from armid_ros.identification.signals import conditioning
+import numpy as np
+
+
+def coulomb_of(bench, hide):
+    """Return Coulomb friction of the elbow that is fitted to a hidden torque, and its evidence."""
+    recordings = bench.recordings(hide)
+    used = conditioning(recordings, SignalSettings())
+    data = tuple(trajectories(recordings, used, bench.arm))
+    sigma = tuple(np.full(2, 0.03) for _ in data)
+    named = [Named(CATALOGUE['coulomb_friction'].on(bench.robot, ('elbow',)), (0,))]
+    return fit(bench.arm, named, data, sigma, None), Evidence(data, sigma, sigma)
+
+
+def on_elbow(torque):
+    return np.column_stack([np.zeros(len(torque)), torque])
+
+
+def test_a_value_that_every_part_tells_alike_is_as_sure_as_noise_has_it(bench):
+    fitted, evidence = coulomb_of(bench, lambda m, tau: on_elbow(0.2 * np.sign(m.dq[:, 1])))
+    wide = widened(fitted, evidence, None)
+    assert fitted.estimate.std[0] <= wide.estimate.std[0] < 3.0 * fitted.estimate.std[0]
+
+
+def test_a_value_that_parts_tell_otherwise_is_as_unsure_as_they_differ(bench):
+    def later(motion, tau):
+        half = motion.t > 0.5 * (motion.t[0] + motion.t[-1])
+        return on_elbow((0.1 + 0.2 * half) * np.sign(motion.dq[:, 1]))
+
+    fitted, evidence = coulomb_of(bench, later)
+    wide = widened(fitted, evidence, None)
+    np.testing.assert_array_equal(wide.estimate.values, fitted.estimate.values)
+    assert wide.estimate.std[0] > 2.0 * fitted.estimate.std[0]
+
+
+def test_nothing_named_is_nothing_to_widen(bench):
+    recordings = bench.recordings()
+    used = conditioning(recordings, SignalSettings())
+    data = tuple(trajectories(recordings, used, bench.arm))
+    sigma = tuple(np.full(2, 0.03) for _ in data)
+    fitted = fit(bench.arm, (), data, sigma, None)
+    assert widened(fitted, Evidence(data, sigma, sigma), None) is fitted
