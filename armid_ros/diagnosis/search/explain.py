@@ -89,10 +89,6 @@ class Explanation:
         steps = tuple(self.steps[k] for k in keep)
         return replace(self, fitted=fitted, steps=steps, minor=minor)
 
-    def withdrawn(self) -> Explanation:
-        """Return the explanation without any name."""
-        return replace(self, fitted=self.reference, steps=())
-
     @property
     def losses(self) -> FloatArray:
         """Loss of each joint with the patched arm, shape (n,)."""
@@ -112,13 +108,14 @@ def explain(
     baseline: Baseline | None = None,
 ) -> Explanation:
     """Take causes as long as any passes, then name the friction that matters, and prune."""
-    found = _forward(question, evidence, settings, start, baseline)
-    width = max((trial.gain for trial in found[5].ranking), default=0.0) if found[5] else 0.0
+    taken = _forward(question, evidence, settings, start, baseline)
+    width = max((trial.gain for trial in taken.last.ranking), default=0.0) if taken.last else 0.0
     here = Round(evidence, Workspace(memoized_arm(question.arm), evidence.data), settings, None)
     here = replace(here, width=width)
-    if any(undecided(step.trial, step.ranking, here) for step in found[1][len(start) :]):
-        found = _forward(question, evidence, settings, start, baseline, width)
-    named, steps, values, survey, minor, _ = found
+    if any(undecided(step.trial, step.ranking, here) for step in taken.steps[len(start) :]):
+        taken = _forward(question, evidence, settings, start, baseline, width)
+    named, steps, values, survey = taken.named, taken.steps, taken.values, taken.first
+    minor = () if taken.last is None else taken.last.there
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
     kept = _friction(question, named, values, evidence, settings, whole)
     named = [*named, *(own for own, _, _ in kept)]
@@ -129,8 +126,8 @@ def explain(
     )
     named, steps, fitted = _pruned(question, named, steps, values, evidence, settings)
     fitted = widened(fitted, evidence, question.told)
-    taken = {own.effect.name for own in named}
-    small = tuple(trial for trial in minor if trial.group.effect.name not in taken)
+    said = {own.effect.name for own in named}
+    small = tuple(trial for trial in minor if trial.group.effect.name not in said)
     return Explanation(
         question.arm,
         question.base,
@@ -144,14 +141,15 @@ def explain(
     )
 
 
-_Found = tuple[
-    list[Named],
-    list[Step],
-    list[FloatArray],
-    Survey | None,
-    tuple[Trial, ...],
-    Survey | None,
-]
+@dataclass(frozen=True)
+class _Taken:
+    """Causes in the order in which they were taken, the first look at all, and the last one."""
+
+    named: list[Named]
+    steps: list[Step]
+    values: list[FloatArray]
+    first: Survey | None
+    last: Survey | None
 
 
 def _forward(
@@ -161,7 +159,7 @@ def _forward(
     start: Sequence[tuple[Named, Step, FloatArray]],
     baseline: Baseline | None,
     width: float = 0.0,
-) -> _Found:
+) -> _Taken:
     """Take the cause that explains most, and ask again, until none passes."""
     data, sigma = evidence.data, evidence.sigma
     named = [row[0] for row in start]
@@ -172,7 +170,6 @@ def _forward(
     least = 0.0 if baseline is None else settings.thresholds.headline
     total: float | None = None
     survey: Survey | None = None
-    minor: tuple[Trial, ...] = ()
     look: Survey | None = None
     found: Candidates | None = None
     problem, beside = None, None
@@ -187,7 +184,7 @@ def _forward(
             before = Before(baseline, question.beside_told, current.change)
         here = Round(evidence, work, settings, total, before, width)
         step, look, problem = next_step(problem, beside, found.groups, here)
-        total, survey, minor = look.total, survey or look, look.there
+        total, survey = look.total, survey or look
         if step is None or step.trial.gain < least * total:
             break
         group = step.trial.group
@@ -202,7 +199,7 @@ def _forward(
             current = fit(arm, named, data, sigma, base, values, question.beside_told)
             named, values = list(current.named), list(current.values)
             found = None
-    return named, steps, values, survey, minor, look
+    return _Taken(named, steps, values, survey, look)
 
 
 def _problem(found: Candidates, current: Fitted, evidence: Evidence) -> tuple[Problem, Beside]:
