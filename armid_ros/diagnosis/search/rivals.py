@@ -89,7 +89,7 @@ def contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: R
     target = projection.rest(problem.x[:, :, small.group.columns]) @ small.values
     squares = float(np.sum(target**2))
     if np.sum((columns @ big.values - target) ** 2) < _SAME * squares:
-        return True
+        return here.before is not None  # links do not change; a description of them may be off
     if cost(big, here.settings) <= cost(small, here.settings):
         return False
     flat = columns.reshape(-1, big.group.size)
