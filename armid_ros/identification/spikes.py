@@ -12,7 +12,8 @@ used. So damage costs the samples that are damaged, and no change is lost, howev
 Positions are continuous. One that steps and goes on from there is of a clock that was set or of an
 encoder that was zeroed, and what follows is a new stretch (``StreamSample.begins``). A torque may
 jump and come back, as where free play is crossed; such pulses are told from damage by what the
-torque reaches otherwise.
+torque reaches otherwise. In a stream they are left out and not called damage, as what the torque
+reaches is known too late; in a recording they are kept.
 
 Three things say how far is too far; the largest of them counts. The noise: what predictions
 usually miss by, as much as in the loudest part of the last minute, since an arm at rest must not
@@ -33,12 +34,16 @@ from dataclasses import replace
 import math
 
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.line_errors import line_errors, LineErrors
 from armid_ros.identification.straight_line import (
+    all_unwrapped,
+    Excursion,
     Missed,
     missed_by,
     share_of_noise,
     StreamSample,
     unwrapped,
+    Usual,
     usual_size,
 )
 from armid_ros.motion import FloatArray
@@ -88,6 +93,8 @@ class SpikeGate:
     rejected : Counter of str
         Samples left out, by reason: spike; pulse, which the arm may have made; stamp, which alone
         was off; erratic, which followed neither what was before nor each other; out_of_order.
+    left_out : list of Excursion
+        What the last call to `take` left out as spike, pulse or erratic.
 
     """
 
@@ -116,6 +123,7 @@ class SpikeGate:
         """Forget everything."""
         self.spikes: Counter[int] = Counter()
         self.rejected: Counter[str] = Counter()
+        self.left_out: list[Excursion] = []
         count = len(self._turn)
         self._steps = np.full((_SEEN, count), np.inf)
         self._usual: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=_REMEMBERED)
@@ -139,6 +147,7 @@ class SpikeGate:
             What a sample may be off by without consequence.
 
         """
+        self.left_out = []
         sample = StreamSample(t, unwrapped(x, self._known[1].x, self._turn) if self._known else x)
         if not self._in_time(sample):
             return []
@@ -153,65 +162,104 @@ class SpikeGate:
         self._restart([])
         return waiting
 
-    def furthest_off(
-        self, t: FloatArray, x: FloatArray, floor: FloatArray | float = 0.0
-    ) -> FloatArray:
+    @classmethod
+    def of_joints(
+        cls,
+        prismatic: npt.ArrayLike,
+        signals: str,
+        *,
+        max_gap: int = 10,
+        false_alarm_time: float = 360000.0,
+    ) -> SpikeGate:
         """
-        Return how far off its prediction every sample of a whole stream is, over the limit.
-
-        Quick, for streams of which most have no damage: where nothing is above 1 by the noise of
-        the loudest part of the whole, there is none.
+        Return a gate for joint states: a position never steps, a torque may jump and come back.
 
         Parameters
         ----------
-        t : ndarray, shape (N,)
-            Stamps [s].
-        x : ndarray, shape (N, m)
-            Signals.
-        floor : ndarray, shape (m,), or float
-            As for `take`.
+        prismatic : array_like of bool, shape (n,)
+            Whether each joint is prismatic; the angles of the others may jump by full turns.
+        signals : str
+            What a sample holds of all joints, in turn: q for positions, v for velocities, t for
+            torques, as in 'qt'.
+        max_gap, false_alarm_time
+            As for the class.
 
         Returns
         -------
-        ndarray, shape (N, m)
+        SpikeGate
 
         """
-        dt, moves = np.diff(t), np.diff(x, axis=0)
-        turn = np.where(self._turn > 0.0, self._turn, np.inf)
-        moves -= np.rint(moves / turn) * self._turn
-        ratio, period = dt[1:] / dt[:-1], float(np.median(dt))
-        noise = np.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)
-        growth = np.maximum(noise, 0.5 * dt[1:] * (dt[1:] + dt[:-1]) / period**2)
-        error = np.abs(moves[1:] - ratio[:, np.newaxis] * moves[:-1])
-        usual = _loudest(error / growth[:, np.newaxis])
-        # by the growth of noise, which is the least: what is damage is judged by `take`
-        limit = np.maximum(self._quantile_of(period) * usual * noise[:, np.newaxis], floor)
-        off = np.zeros(x.shape)
-        off[2:] = error / np.maximum(limit, _TINY)
-        return off
+        turning = ~np.asarray(prismatic, dtype=bool)
+        kind, revolute = np.repeat(list(signals), len(turning)), np.tile(turning, len(signals))
+        position = kind == 'q'
+        return cls(
+            position & revolute,
+            max_gap=max_gap,
+            false_alarm_time=false_alarm_time,
+            continuous=position,
+            pulsing=kind == 't',
+        )
+
+    def begin(self, usual: Usual, known: Sequence[StreamSample] = ()) -> None:
+        """
+        Begin somewhere in a recording of which is known what is usual of the whole.
+
+        Parameters
+        ----------
+        usual : Usual
+            What is usual of its signals.
+        known : sequence of StreamSample
+            The two good samples before; none where a stretch begins.
+
+        """
+        self._usual.clear()
+        self._usual.append((usual.size, usual.noisy))
+        self._scale, self._noisy = usual.size, usual.noisy
+        self._restart(None if known else [], known)
+        if known:
+            self._period, self._quantile = usual.period, self._quantile_of(usual.period)
+
+    @property
+    def waits(self) -> bool:
+        """Whether samples wait for those that come."""
+        return bool(self._held) or self._first is not None
+
+    def line_errors(self, t: FloatArray, x: FloatArray) -> LineErrors:
+        """Return how far off the samples of a whole recording are, as `take` would predict."""
+        lines = line_errors(
+            t, x, self._turn, max_gap=self._max_gap, window=WINDOW, share=_USUAL, seen=_SEEN
+        )
+        return replace(lines, quantile=self._quantile_of(lines.usual.period))
+
+    def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
+        """
+        Return whether an arm may have made what left its line and came back.
+
+        A position cannot jump and come back. A torque can, and where free play is crossed it goes
+        beyond what it reaches otherwise, from `lowest` to `highest`, but by no more than that
+        spans: an impact is of the order of what drives it.
+
+        """
+        most = np.maximum(excursion.limit, highest - lowest)
+        far = excursion.beyond(lowest, highest) > most
+        return not bool(np.any(far | ((excursion.off > 1.0) & ~self._pulsing)))
 
     def _quantile_of(self, period: float) -> float:
-        """Return how many standard deviations normal noise exceeds with so small a chance."""
+        """Return how many standard deviations noise exceeds at one false alarm in that time."""
         chance = period / self._false_alarm_time / len(self._turn)
         return float(stats.norm.isf(min(chance, 0.5) / 2.0))
 
-    def _restart(self, first: list[StreamSample]) -> None:
+    def _restart(
+        self, first: list[StreamSample] | None, known: Sequence[StreamSample] = ()
+    ) -> None:
         """Begin a new stretch with some samples; what is usual stays known."""
-        self._first: list[StreamSample] | None = first
-        self._known: tuple[StreamSample, ...] = ()
+        self._first, self._known = first, tuple(known)
         self._held: list[StreamSample] = []
         self._went_on, self._suspect = 0, np.empty(0, dtype=np.intp)
-        self._off = np.zeros(len(self._turn))
+        self._off = self._limit = np.zeros(len(self._turn))
         self._stray: StreamSample | None = None
         self._period = np.inf
         self._quantile = 0.0
-
-    def _unwrapped(self, samples: Sequence[StreamSample]) -> list[StreamSample]:
-        """Return samples without the jumps by full turns between them."""
-        found = [samples[0]]
-        for sample in samples[1:]:
-            found.append(replace(sample, x=unwrapped(sample.x, found[-1].x, self._turn)))
-        return found
 
     @property
     def _tail(self) -> StreamSample | None:
@@ -242,7 +290,7 @@ class SpikeGate:
     def _begin(self, floor: FloatArray | float) -> list[StreamSample]:
         """Learn from the first samples, and judge them."""
         raw, self._first = self._first or [], None
-        first = self._unwrapped(raw)
+        first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
         self._quantile = self._quantile_of(self._period)
         missed = [
@@ -255,14 +303,18 @@ class SpikeGate:
             self._noisy = share_of_noise(errors, self._scale)
         straight = [bool(np.all(self._off_by(m, floor) <= 1.0)) for m in missed]
         if not any(straight):  # or the noise is not what it was: it is learned anew
-            self.rejected['erratic'] += len(first)
+            off = np.max([self._off_by(m, floor) for m in missed], axis=0)
+            self._leave_out(Excursion(tuple(first), off, self._limits(missed[0], floor)), True)
             self._usual.clear()
             self._restart([])
             return []
         start = straight.index(True)
-        first = first[:start] + self._unwrapped(raw[start:])  # not from what is damaged
+        first = first[:start] + all_unwrapped(raw[start:], self._turn)  # not from what is damaged
         self._known = first[start], first[start + 1]
-        self._leave_out(first[:start], self._off_by(missed[0], floor))
+        if start:
+            off = self._off_by(missed[0], floor)
+            limit = self._limits(missed[0], floor)
+            self._leave_out(Excursion(tuple(first[:start]), off, limit))
         good = list(self._known)
         for sample in first[start + 2 :]:
             good += self._judge(sample, floor)
@@ -279,14 +331,16 @@ class SpikeGate:
             if float(np.max(off)) <= 1.0:
                 return self._accept([sample], missed)
             self._held, self._went_on, self._off = [sample], 0, off
+            self._limit = self._limits(missed, floor)
             self._suspect = np.flatnonzero(off > 1.0)
             return []
         goes_on = self._goes_on(sample, off, floor)
         if not goes_on and float(np.max(off[self._suspect])) <= 1.0:
-            self._leave_out(self._held, self._off)
+            self._leave_out(Excursion(tuple(self._held), self._off, self._limit))
             self._held = []
             return self._judge(sample, floor)
         self._held.append(sample)
+        self._off = np.maximum(self._off, off)
         self._went_on += goes_on
         if len(self._held) <= self._max_gap:
             return []
@@ -294,7 +348,7 @@ class SpikeGate:
             if self._stepped(floor):
                 self._held[0] = replace(self._held[0], begins=True)
             return self._accept(self._held)
-        self.rejected['erratic'] += len(self._held)
+        self._leave_out(Excursion(tuple(self._held), self._off, self._limit), True)
         self._restart([])
         return []
 
@@ -333,10 +387,14 @@ class SpikeGate:
         bend = missed.bend**2
         return np.asarray(np.sqrt(bend + self._noisy * (missed.noise**2 - bend)))
 
+    def _limits(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
+        """Return what a sample may be off its prediction by, shape (m,)."""
+        return np.maximum(self._quantile * self._scale * self._growth(missed), floor)
+
     def _off_by(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
         """Return how far off its prediction a sample is, over the limit, shape (m,)."""
-        limit = np.maximum(self._quantile * self._scale * self._growth(missed), floor)
-        return np.asarray(np.abs(missed.error) / np.maximum(limit, _TINY))
+        limit = np.maximum(self._limits(missed, floor), _TINY)
+        return np.asarray(np.abs(missed.error) / limit)
 
     def _accept(
         self, samples: list[StreamSample], missed: Missed | None = None
@@ -354,17 +412,21 @@ class SpikeGate:
             self._learn()
         return samples
 
-    def _leave_out(self, samples: Sequence[StreamSample], off: FloatArray) -> None:
-        if not samples:
+    def _leave_out(self, excursion: Excursion, erratic: bool = False) -> None:
+        """Count what is left out, by its reason."""
+        self.left_out.append(excursion)
+        count = len(excursion.samples)
+        if erratic:
+            self.rejected['erratic'] += count
             return
-        values = np.stack([sample.x for sample in samples])
-        inside = np.all((self._lowest <= values) & (values <= self._highest), axis=0)
-        if np.all((self._pulsing & inside)[off > 1.0]):
-            self.rejected['pulse'] += len(samples)
+        if self.possible(excursion, self._lowest, self._highest):
+            self.rejected['pulse'] += count
         else:
-            self.rejected['spike'] += len(samples)
-            self.spikes[int(np.argmax(off))] += len(samples)
-        self._see_steps(np.abs(np.diff(values, axis=0, prepend=self._known[1].x[np.newaxis])))
+            self.rejected['spike'] += count
+            self.spikes[int(np.argmax(excursion.off))] += count
+        values = np.stack([sample.x for sample in excursion.samples])
+        before = self._known[1].x[np.newaxis] if self._known else values[:1]
+        self._see_steps(np.abs(np.diff(values, axis=0, prepend=before)))
 
     def _learn(self) -> None:
         """Learn what is usual from a window of errors."""
@@ -387,14 +449,3 @@ class SpikeGate:
     def _resolution(self) -> FloatArray:
         """The smallest step of every signal, 0 where it is not known."""
         return np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
-
-
-def _loudest(errors: FloatArray) -> FloatArray:
-    """Return the largest usual size of all windows of errors (N, m), shape (m,)."""
-    windows = max(1, len(errors) // WINDOW)
-    size, longer = divmod(len(errors), windows)
-    signals, cut = errors.shape[1], longer * (size + 1)
-    first = errors[:cut].reshape(longer, size + 1, signals)
-    rest = errors[cut:].reshape(windows - longer, size, signals)
-    usual = [usual_size(part.swapaxes(0, 1), _USUAL) for part in (first, rest) if len(part)]
-    return np.asarray(np.max(np.concatenate(usual), axis=0))

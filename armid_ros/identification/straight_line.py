@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 import math
 from typing import NamedTuple
@@ -41,6 +41,58 @@ class StreamSample:
     begins: bool = False
 
 
+@dataclass(frozen=True, eq=False)
+class Excursion:
+    """
+    Samples that leave the line that was led to them, and come back to it.
+
+    Attributes
+    ----------
+    samples : tuple of StreamSample
+        Those between the line before and behind.
+    off : ndarray, shape (m,)
+        How far off the line they are at most, over what is too far.
+    limit : ndarray, shape (m,)
+        What is too far, in units of the signals.
+
+    """
+
+    samples: tuple[StreamSample, ...]
+    off: FloatArray
+    limit: FloatArray
+
+    def beyond(self, lowest: FloatArray, highest: FloatArray) -> FloatArray:
+        """Return how far the signals that jump are beyond some range, shape (m,)."""
+        values = np.stack([sample.x for sample in self.samples])
+        outside = np.maximum(lowest - values, values - highest).max(axis=0)
+        return np.where(self.off > 1.0, np.maximum(outside, 0.0), 0.0)
+
+
+class Usual(NamedTuple):
+    """
+    What predictions usually miss by.
+
+    Attributes
+    ----------
+    period : float
+        Sampling period [s].
+    size : ndarray, shape (m,)
+        Standard deviation of the errors over a period, where the signals are loudest.
+    noisy : ndarray, shape (m,)
+        Share of white noise in their squares.
+
+    """
+
+    period: float
+    size: FloatArray
+    noisy: FloatArray
+
+    def growth(self, noise: FloatArray, bend: FloatArray) -> FloatArray:
+        """Return by how much more they miss over other times, shape (N, m)."""
+        squares = bend[:, np.newaxis] ** 2
+        return np.sqrt(squares + self.noisy * (noise[:, np.newaxis] ** 2 - squares))
+
+
 class Missed(NamedTuple):
     """
     What a prediction missed a sample by.
@@ -74,6 +126,14 @@ def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
     """Undo the jump by a full turn, where there is one, with which drivers keep within +-pi."""
     turns = np.rint(np.divide(x - last, turn, where=turn > 0.0, out=np.zeros_like(x)))
     return np.asarray(x - turns * turn)
+
+
+def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[StreamSample]:
+    """Return samples without the jumps by full turns between them."""
+    found = [samples[0]]
+    for sample in samples[1:]:
+        found.append(replace(sample, x=unwrapped(sample.x, found[-1].x, turn)))
+    return found
 
 
 def usual_size(missed: FloatArray, share: float) -> FloatArray:
