@@ -139,11 +139,11 @@ def impossible_excursions(
         start, known = int(lines.stretch[k]), []
         if k - start >= FIRST or start < done:
             start, known = k, [StreamSample(float(t[i]), x[i]) for i in (k - 2, k - 1)]
-        gate.begin(lines.usual, known)
+        gate.begin(lines.usual, known, lines.bent[k - 1] if known else 0.0)
         passed, done = 0, start
         while done < len(t) and (passed < 2 or done <= k):
             good = gate.take(float(t[done]), x[done], floor)
-            passed = passed + 1 if len(good) == 1 and not gate.waits else 0
+            passed = passed + 1 if len(good) == 1 else 0
             found += gate.left_out
             done += 1
     good_ones = ~np.isin(t, [sample.t for one in found for sample in one.samples])

@@ -22,9 +22,12 @@ class LineErrors:
     stretch : ndarray of int, shape (N,)
         First sample of the stretch without a long gap that a sample is of.
     error : ndarray, shape (N, m)
-        How far off each sample is; 0 for the first two of a stretch.
-    growth : ndarray, shape (N, m)
-        How much more a prediction over this time usually misses than one over a period.
+        How far off each sample is, when a smooth signal bends on; 0 for the first of a stretch.
+    bent : ndarray, shape (N, m)
+        How far off the straight line it is, over a period.
+    noise, bend : ndarray, shape (N, 1)
+        How much more noise, and an acceleration, make a prediction over this time miss than one
+        over a period.
     usual : Usual
         What is usual of the loudest part of the whole.
     quantile : float
@@ -34,7 +37,9 @@ class LineErrors:
 
     stretch: npt.NDArray[np.intp]
     error: FloatArray
-    growth: FloatArray
+    bent: FloatArray
+    noise: FloatArray
+    bend: FloatArray
     usual: Usual
     quantile: float = 1.0
 
@@ -52,8 +57,9 @@ class LineErrors:
         ndarray, shape (N, m)
 
         """
-        limit = np.maximum(self.quantile * self.usual.size * self.growth, floor)
-        return np.asarray(self.error / np.maximum(limit, np.finfo(float).tiny))
+        limit = self.usual.limits(self.quantile, self.noise, self.bend)
+        limit = np.maximum(limit, floor)
+        return np.asarray(np.abs(self.error) / np.maximum(limit, np.finfo(float).tiny))
 
 
 def line_errors(
@@ -104,11 +110,15 @@ def line_errors(
     usual = _usual(period, error / np.maximum(noise, bend)[:, np.newaxis], window, share)
     smallest = _smallest_steps(np.abs(moves), seen)
     usual = usual._replace(size=np.maximum(usual.size, smallest))
+    bent = error / bend[:, np.newaxis]
+    error[1:] -= usual.smoothness * bent[:-1] * bend[1:, np.newaxis]
     none = np.zeros((2, x.shape[1]))
     return LineErrors(
         np.maximum.accumulate(first),
-        np.concatenate([none, np.abs(error)]),
-        np.concatenate([1.0 + none, usual.growth(noise, bend)]),
+        np.concatenate([none, error]),
+        np.concatenate([none, bent]),
+        np.concatenate([[1.0, 1.0], noise])[:, np.newaxis],
+        np.concatenate([[1.0, 1.0], bend])[:, np.newaxis],
         usual,
     )
 

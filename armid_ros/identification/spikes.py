@@ -4,10 +4,11 @@
 Damaged samples in a stream of joint states, told from what the arm really does.
 
 A torque or an encoder that is off in one sample bends an estimate by as much as thousands of good
-samples mend. Every sample is predicted by the straight line through the two before it. One that is
-too far from the prediction waits for those after it. When they return to where the line leads and
-do not go on from it, it was damaged and is left out; otherwise the arm has changed, and all are
-used. So damage costs the samples that are damaged, and no change is lost, however large.
+samples mend. Every sample is predicted by the straight line through the two before it, which
+bends on as it did where a signal is smooth. One that is too far from the prediction waits for
+those after it. When they return to where the line leads and do not go on from it, it was damaged
+and is left out; otherwise the arm has changed, and all are used. So damage costs the samples that
+are damaged, and no change is lost, however large.
 
 Positions are continuous. One that steps and goes on from there is of a clock that was set or of an
 encoder that was zeroed, and what follows is a new stretch (``StreamSample.begins``). A torque may
@@ -92,7 +93,7 @@ class SpikeGate:
         Samples left out as damaged, by the signal that was furthest off.
     rejected : Counter of str
         Samples left out, by reason: spike; pulse, which the arm may have made; stamp, which alone
-        was off; erratic, which followed neither what was before nor each other; out_of_order.
+        was off; erratic, which followed neither what was before nor other ones; out_of_order.
     left_out : list of Excursion
         What the last call to `take` left out as spike, pulse or erratic.
 
@@ -130,7 +131,7 @@ class SpikeGate:
         self._lowest, self._highest = np.full(count, np.inf), np.full(count, -np.inf)
         self._errors: list[FloatArray] = []
         self._moves: list[FloatArray] = []
-        self._scale, self._noisy = np.zeros(count), np.zeros(count)
+        self._noise = Usual(np.inf, np.zeros(count), np.zeros(count))
         self._restart([])
 
     def take(self, t: float, x: FloatArray, floor: FloatArray | float = 0.0) -> list[StreamSample]:
@@ -200,7 +201,9 @@ class SpikeGate:
             pulsing=kind == 't',
         )
 
-    def begin(self, usual: Usual, known: Sequence[StreamSample] = ()) -> None:
+    def begin(
+        self, usual: Usual, known: Sequence[StreamSample] = (), bent: FloatArray | float = 0.0
+    ) -> None:
         """
         Begin somewhere in a recording of which is known what is usual of the whole.
 
@@ -210,19 +213,16 @@ class SpikeGate:
             What is usual of its signals.
         known : sequence of StreamSample
             The two good samples before; none where a stretch begins.
+        bent : ndarray, shape (m,)
+            What the prediction of the last of them missed, over a period.
 
         """
         self._usual.clear()
         self._usual.append((usual.size, usual.noisy))
-        self._scale, self._noisy = usual.size, usual.noisy
-        self._restart(None if known else [], known)
+        self._noise = usual
+        self._restart(None if known else [], known, bent)
         if known:
             self._period, self._quantile = usual.period, self._quantile_of(usual.period)
-
-    @property
-    def waits(self) -> bool:
-        """Whether samples wait for those that come."""
-        return bool(self._held) or self._first is not None
 
     def line_errors(self, t: FloatArray, x: FloatArray) -> LineErrors:
         """Return how far off the samples of a whole recording are, as `take` would predict."""
@@ -250,10 +250,14 @@ class SpikeGate:
         return float(stats.norm.isf(min(chance, 0.5) / 2.0))
 
     def _restart(
-        self, first: list[StreamSample] | None, known: Sequence[StreamSample] = ()
+        self,
+        first: list[StreamSample] | None,
+        known: Sequence[StreamSample] = (),
+        bent: FloatArray | float = 0.0,
     ) -> None:
         """Begin a new stretch with some samples; what is usual stays known."""
         self._first, self._known = first, tuple(known)
+        self._bent = bent
         self._held: list[StreamSample] = []
         self._went_on, self._suspect = 0, np.empty(0, dtype=np.intp)
         self._off = self._limit = np.zeros(len(self._turn))
@@ -299,8 +303,8 @@ class SpikeGate:
         self._see_steps(np.abs(np.diff([s.x for s in first], axis=0)))
         if not self._usual:
             errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
-            self._scale = np.maximum(usual_size(errors, _USUAL_FIRST), self._resolution)
-            self._noisy = share_of_noise(errors, self._scale)
+            size = np.maximum(usual_size(errors, _USUAL_FIRST), self._resolution)
+            self._noise = Usual(self._period, size, share_of_noise(errors, size))
         straight = [bool(np.all(self._off_by(m, floor) <= 1.0)) for m in missed]
         if not any(straight):  # or the noise is not what it was: it is learned anew
             off = np.max([self._off_by(m, floor) for m in missed], axis=0)
@@ -312,9 +316,8 @@ class SpikeGate:
         first = first[:start] + all_unwrapped(raw[start:], self._turn)  # not from what is damaged
         self._known = first[start], first[start + 1]
         if start:
-            off = self._off_by(missed[0], floor)
-            limit = self._limits(missed[0], floor)
-            self._leave_out(Excursion(tuple(first[:start]), off, limit))
+            of = self._off_by(missed[0], floor), self._limits(missed[0], floor)
+            self._leave_out(Excursion(tuple(first[:start]), *of))
         good = list(self._known)
         for sample in first[start + 2 :]:
             good += self._judge(sample, floor)
@@ -326,7 +329,9 @@ class SpikeGate:
             self._first.append(sample)
             return []
         missed = missed_by(self._known, sample, self._period)
-        off = self._off_by(missed, floor)
+        # a smooth signal goes on bending as it does
+        bent = self._noise.smoothness * self._bent * missed.bend
+        off = self._off_by(missed._replace(error=missed.error - bent), floor)
         if not self._held:
             if float(np.max(off)) <= 1.0:
                 return self._accept([sample], missed)
@@ -345,7 +350,7 @@ class SpikeGate:
         if len(self._held) <= self._max_gap:
             return []
         if 2 * self._went_on > self._max_gap:
-            if self._stepped(floor):
+            if len(self._held) > 1 and self._stepped(floor):
                 self._held[0] = replace(self._held[0], begins=True)
             return self._accept(self._held)
         self._leave_out(Excursion(tuple(self._held), self._off, self._limit), True)
@@ -374,22 +379,15 @@ class SpikeGate:
         collision, do.
 
         """
-        if len(self._held) < 2:
-            return False
         ahead = missed_by(self._known, self._held[0], self._period)
         back = missed_by((self._held[1], self._held[0]), self._known[1], self._period)
-        apart = self._continuous & (ahead.error * back.error < 0.0)
         far = np.minimum(self._off_by(ahead, floor), self._off_by(back, floor))
-        return bool(np.any(far[apart] > 1.0))
-
-    def _growth(self, missed: Missed) -> FloatArray:
-        """Return how much more the signals usually miss over this time, shape (m,)."""
-        bend = missed.bend**2
-        return np.asarray(np.sqrt(bend + self._noisy * (missed.noise**2 - bend)))
+        return bool(np.any(far[self._continuous & (ahead.error * back.error < 0.0)] > 1.0))
 
     def _limits(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
         """Return what a sample may be off its prediction by, shape (m,)."""
-        return np.maximum(self._quantile * self._scale * self._growth(missed), floor)
+        limits = self._noise.limits(self._quantile, missed.noise, missed.bend)
+        return np.maximum(limits, floor)
 
     def _off_by(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
         """Return how far off its prediction a sample is, over the limit, shape (m,)."""
@@ -403,7 +401,8 @@ class SpikeGate:
         self._held = []
         for sample in samples:
             one = missed or missed_by(self._known, sample, self._period)
-            self._errors.append(one.error / self._growth(one))
+            self._errors.append(one.error / self._noise.growth(one.noise, one.bend))
+            self._bent = one.error / one.bend
             self._moves.append(sample.x - self._known[1].x)
             np.minimum(self._lowest, sample.x, out=self._lowest)
             np.maximum(self._highest, sample.x, out=self._highest)
@@ -437,8 +436,8 @@ class SpikeGate:
         self._errors, self._moves = [], []
         sizes, shares = (np.array(part) for part in zip(*self._usual, strict=True))
         loudest = np.argmax(sizes, axis=0)[np.newaxis]
-        self._scale = np.maximum(np.take_along_axis(sizes, loudest, 0)[0], self._resolution)
-        self._noisy = np.take_along_axis(shares, loudest, 0)[0]
+        size = np.maximum(np.take_along_axis(sizes, loudest, 0)[0], self._resolution)
+        self._noise = Usual(self._period, size, np.take_along_axis(shares, loudest, 0)[0])
 
     def _see_steps(self, steps: FloatArray) -> None:
         """Learn the resolution from steps of shape (k, m)."""

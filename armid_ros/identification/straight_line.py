@@ -16,8 +16,15 @@ from scipy import stats
 
 #: Correlation of successive errors of a straight line in white noise.
 _NOISE_CORRELATION = -2.0 / 3.0
+#: How hard an arm may accelerate over what 95 % of the time it does at most, times the standard
+#: deviations that those are of a normal variable.
+_HARDER = 2.0 * 1.96
 #: Usual errors beyond which one says nothing of the correlation.
 _CLIPPED = 3.0
+
+
+#: How much more something is over other times, of one sample or of each, shape (N, 1).
+Factor = float | FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +94,30 @@ class Usual(NamedTuple):
     size: FloatArray
     noisy: FloatArray
 
-    def growth(self, noise: FloatArray, bend: FloatArray) -> FloatArray:
-        """Return by how much more they miss over other times, shape (N, m)."""
-        squares = bend[:, np.newaxis] ** 2
-        return np.sqrt(squares + self.noisy * (noise[:, np.newaxis] ** 2 - squares))
+    def growth(self, noise: Factor, bend: Factor) -> FloatArray:
+        """Return by how much more they miss over other times, shape (m,) or (N, m)."""
+        squares = bend**2
+        return np.asarray(np.sqrt(squares + self.noisy * (noise**2 - squares)))
+
+    @property
+    def smoothness(self) -> FloatArray:
+        """Correlation of successive errors, 0 for noise, shape (m,)."""
+        return np.clip(1.0 - (1.0 - _NOISE_CORRELATION) * self.noisy, 0.0, 1.0)
+
+    def limits(self, quantile: float, noise: Factor, bend: Factor) -> FloatArray:
+        """
+        Return what a prediction may miss by, shape (m,) or (N, m).
+
+        An arm has a hardest acceleration, unlike noise, which has tails. So a smooth signal is
+        held to a small multiple of what it usually misses by, not to a quantile of the normal
+        distribution.
+
+        """
+        tails = quantile * self.growth(noise, bend)
+        bounded = np.sqrt(1.0 - self.noisy) * _HARDER * bend
+        return np.asarray(
+            self.size * np.minimum(tails, quantile * np.sqrt(self.noisy) * noise + bounded)
+        )
 
 
 class Missed(NamedTuple):

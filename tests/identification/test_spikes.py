@@ -52,6 +52,18 @@ def test_damage_costs_the_damaged_samples_alone(signal, size, length):
     assert gate.spikes == {signal: length}
 
 
+@pytest.mark.parametrize('where', [630, 880, DAMAGED])
+@pytest.mark.parametrize('sign', [-1.0, 1.0])
+def test_a_glitch_of_a_smooth_signal_does_not_hide_in_its_acceleration(where, sign):
+    """Its line may be missed by twice what acceleration does, whichever way it turns."""
+    t, x = stream(np.random.default_rng(18))
+    x[:, 0] = np.sin(9.0 * t)
+    x[where, 0] += sign * 2.5 * (9.0 / RATE) ** 2
+    gate, good = passed(t, x)
+    np.testing.assert_array_equal(good, np.delete(t, where))
+    assert gate.spikes == {0: 1}
+
+
 @pytest.mark.parametrize('where', [0, 1, 2, 7, FIRST - 1, FIRST, FIRST + 1])
 def test_damage_among_the_first_samples_is_no_measure_of_noise(where):
     t, x = stream(np.random.default_rng(2))
