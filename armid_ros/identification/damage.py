@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from armid_ros.identification.joint_gate import joint_gate
 from armid_ros.identification.row_noise import NOISE_OF_TORQUE
 from armid_ros.identification.signals import Conditioning, conditioning, SignalSettings
 from armid_ros.identification.spikes import FIRST, SpikeGate
@@ -89,7 +90,7 @@ def _damage(
     peak = float(np.max(used.taps()) / np.sum(used.taps()))
     floor = np.concatenate([np.zeros(recording.n_joints), NOISE_OF_TORQUE * spread / peak])
     # angles of a recording are not wrapped
-    gate = SpikeGate.of_joints([True] * recording.n_joints, 'qt')
+    gate = joint_gate([True] * recording.n_joints, 'qt')
     signals = np.hstack([recording.q, recording.tau])
     excursions = impossible_excursions(gate, recording.t, signals, floor)
     names = [f'{what} of {joint}' for what in ('position', 'effort') for joint in recording.joints]

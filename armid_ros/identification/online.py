@@ -15,6 +15,7 @@ from armid_ros.identification.causal import CausalFilter, CausalMotion, TripleLa
 from armid_ros.identification.change import Change, change_candidates
 from armid_ros.identification.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.friction_beside import by_joint, FrictionBeside
+from armid_ros.identification.joint_gate import joint_gate
 from armid_ros.identification.online_checks import StreamChecks
 from armid_ros.identification.online_settings import OnlineSettings
 from armid_ros.identification.recursive import RecursiveLeastSquares
@@ -380,7 +381,7 @@ def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
     if settings.longest_damage < 1:
         return None
     changes = settings.changes or ChangeSettings()
-    return SpikeGate.of_joints(
+    return joint_gate(
         arm.robot.prismatic,
         'qvt' if settings.measured_velocity else 'qt',
         max_gap=settings.longest_damage,

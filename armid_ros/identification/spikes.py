@@ -66,6 +66,8 @@ _USUAL_FIRST = 0.75
 _SEEN = 3
 #: A sample goes on from others that are nearer by this factor than where the line leads.
 _NEARER = 0.5
+#: Periods without a sample after which one waits for the next, which may contradict its stamp.
+_LEAP = 1.5
 #: What is divided by is at least this.
 _TINY = 1e-300
 
@@ -125,6 +127,7 @@ class SpikeGate:
         self.spikes: Counter[int] = Counter()
         self.rejected: Counter[str] = Counter()
         self.left_out: list[Excursion] = []
+        self._early: StreamSample | None = None
         count = len(self._turn)
         self._steps = np.full((_SEEN, count), np.inf)
         self._usual: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=_REMEMBERED)
@@ -149,7 +152,27 @@ class SpikeGate:
 
         """
         self.left_out = []
-        sample = StreamSample(t, unwrapped(x, self._known[1].x, self._turn) if self._known else x)
+        early, self._early, tail = self._early, None, self._tail
+        good: list[StreamSample] = []
+        if early is not None and tail is not None:
+            if tail.t < t < early.t:  # what goes on from before shows whose stamp is off
+                self.rejected['stamp'] += 1
+            else:
+                good = self._take(early, floor)
+        if self._leaps(t):
+            self._early = StreamSample(t, x)
+            return good
+        return good + self._take(StreamSample(t, x), floor)
+
+    def _leaps(self, t: float) -> bool:
+        """Return whether something seems to be lost before a sample."""
+        ahead = 0.0 if self._tail is None else t - self._tail.t
+        return _LEAP * self._period < ahead <= self._max_gap * self._period < math.inf
+
+    def _take(self, sample: StreamSample, floor: FloatArray | float) -> list[StreamSample]:
+        """Take in a sample whose stamp is not contradicted by the next one."""
+        if self._known:
+            sample = replace(sample, x=unwrapped(sample.x, self._known[1].x, self._turn))
         if not self._in_time(sample):
             return []
         if self._first is None:
@@ -160,46 +183,9 @@ class SpikeGate:
     def rest(self) -> list[StreamSample]:
         """Return the samples that still wait, at the end of a stream."""
         waiting = self._first if self._first is not None else self._held
+        waiting = waiting + ([self._early] if self._early is not None else [])
         self._restart([])
         return waiting
-
-    @classmethod
-    def of_joints(
-        cls,
-        prismatic: npt.ArrayLike,
-        signals: str,
-        *,
-        max_gap: int = 10,
-        false_alarm_time: float = 360000.0,
-    ) -> SpikeGate:
-        """
-        Return a gate for joint states: a position never steps, a torque may jump and come back.
-
-        Parameters
-        ----------
-        prismatic : array_like of bool, shape (n,)
-            Whether each joint is prismatic; the angles of the others may jump by full turns.
-        signals : str
-            What a sample holds of all joints, in turn: q for positions, v for velocities, t for
-            torques, as in 'qt'.
-        max_gap, false_alarm_time
-            As for the class.
-
-        Returns
-        -------
-        SpikeGate
-
-        """
-        turning = ~np.asarray(prismatic, dtype=bool)
-        kind, revolute = np.repeat(list(signals), len(turning)), np.tile(turning, len(signals))
-        position = kind == 'q'
-        return cls(
-            position & revolute,
-            max_gap=max_gap,
-            false_alarm_time=false_alarm_time,
-            continuous=position,
-            pulsing=kind == 't',
-        )
 
     def begin(
         self, usual: Usual, known: Sequence[StreamSample] = (), bent: FloatArray | float = 0.0
@@ -262,6 +248,7 @@ class SpikeGate:
         self._went_on, self._suspect = 0, np.empty(0, dtype=np.intp)
         self._off = self._limit = np.zeros(len(self._turn))
         self._stray: StreamSample | None = None
+        self._early = None
         self._period = np.inf
         self._quantile = 0.0
 

@@ -13,8 +13,8 @@ from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.identification.causal import LARGEST
 from armid_ros.identification.interaction import Interaction
 from armid_ros.identification.interaction_online import InteractionSettings, OnlineInteraction
+from armid_ros.identification.joint_gate import joint_gate
 from armid_ros.identification.joint_order import JointOrder
-from armid_ros.identification.spikes import SpikeGate
 from armid_ros.identification.straight_line import StreamSample
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
@@ -83,7 +83,7 @@ class InteractionIdentifierNode(ArmidNode):
         core = self.identifier
         self._orders = JointOrder(core.robot.joints), JointOrder(core.other.joints)
         self._gates = tuple(
-            SpikeGate.of_joints(robot.prismatic, signals)
+            joint_gate(robot.prismatic, signals)
             for robot, signals in ((core.robot, 'qt'), (core.other, 'q'))
         )
         self._told: list[Counter[str]] = [Counter(), Counter()]

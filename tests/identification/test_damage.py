@@ -9,8 +9,8 @@ from dataclasses import replace
 from armid_ros.effects import make_effect
 from armid_ros.identification import identify
 from armid_ros.identification.damage import impossible_excursions, without_damage
+from armid_ros.identification.joint_gate import joint_gate
 from armid_ros.identification.signals import SignalSettings
-from armid_ros.identification.spikes import SpikeGate
 import numpy as np
 import pytest
 
@@ -86,8 +86,8 @@ def test_a_gate_that_takes_every_sample_finds_the_same(seed):
     ):
         x[start : start + length, signal] += 9.0
     x[1525:, 1] += 0.5  # a change that lasts is none
-    found = impossible_excursions(SpikeGate.of_joints([True], 'qt'), t, x, np.zeros(2))
-    gate = SpikeGate.of_joints([True], 'qt')
+    found = impossible_excursions(joint_gate([True], 'qt'), t, x, np.zeros(2))
+    gate = joint_gate([True], 'qt')
     passed = [s.t for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
     left = [sample.t for one in found for sample in one.samples]
     assert len(left) == len(set(left))
