@@ -90,7 +90,7 @@ class DiagnosisResult(Shown):
         """Return the description with what was found; write it where a path is given."""
         text = arm_urdf(self.arm).text
         if path is not None:
-            Path(path).write_text(text, encoding='utf-8')
+            write_file(path, text)
         return text
 
     def to_dataframe(self) -> pandas.DataFrame:

@@ -19,6 +19,7 @@ import click
 
 if TYPE_CHECKING:
     from armid_ros.fleet.identify import FleetOutcome
+    from armid_ros.fleet.store import Store
     from distributed import Client
 
 #: Refused bags that are shown; all are in the table `refused`.
@@ -117,6 +118,7 @@ def identify(
     from armid_ros.fleet.bags import find_bags
     from armid_ros.fleet.identify import FleetSettings, identify_fleet, plan_fleet
     from armid_ros.fleet.kinds import read_table
+    from armid_ros.fleet.store import Store
 
     if (robot_source is None) == (table is None):
         raise FleetError('name the robot of all arms with --robot, or a table with --robots')
@@ -135,6 +137,7 @@ def identify(
     start = time.monotonic()
     with progress('listing bags') as tick:
         bags = find_bags(globs, arm)
+        _hold(Store(out))
         jobs = plan_fleet(bags, robots, out, settings)
         tick(0.0, 'starting workers')
         with _cluster(scheduler, workers) as client:
@@ -145,6 +148,14 @@ def identify(
                 lambda ended, of: tick(ended / of, f'{ended} of {of} bags'),
             )
     _print(outcome, out, time.monotonic() - start, as_json)
+
+
+def _hold(store: Store) -> None:
+    """Keep a folder of this machine for the results of this command as long as it runs."""
+    from armid_ros.fleet.kinds import SCHEMA
+
+    if store.local is not None:
+        options.hold(store.local, SCHEMA)
 
 
 @contextmanager
@@ -216,6 +227,7 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
     from armid_ros.fleet.watch import watch as look
 
     store = Store(out)
+    _hold(store)
     with progress('reading results') as tick:
         found = look(store, alpha)
         tick(0.5, 'writing')
@@ -267,6 +279,7 @@ def diagnose(
     from armid_ros.fleet.watch import write_watch
 
     store = Store(out)
+    _hold(store)
     with progress('reading results') as tick:
         found = look(store, alpha)
         chosen = cases(found, arms, everyone)

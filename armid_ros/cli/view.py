@@ -11,8 +11,9 @@ from typing import Any
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns, options
 from armid_ros.cli.terminal import say
-from armid_ros.errors import ArmidError
+from armid_ros.errors import ArmidError, OutputError
 from armid_ros.view import log_scene, make_scene, open_stream, rerun
+from armid_ros.view.scene import Scene
 import click
 
 
@@ -72,16 +73,32 @@ def view(
     (recording,) = columns.read([bag], arm.robot, topic)
     marked = tuple(mark.split(',')) if mark else _named(model)
     scene = make_scene(arm, recording, marked)
-    if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
-    stream = open_stream(scene.name, out)
-    log_scene(scene, stream)
-    stream.disconnect()
+    if out is None:
+        stream = open_stream(scene.name)
+        log_scene(scene, stream)
+        stream.disconnect()
+    else:
+        _save(scene, out)
     for note in scene.notes:
         say(f'note: {note}')
     said = f', coloured: {", ".join(marked)}' if marked else ''
     if out is not None:
         say(f'{out}: {len(recording)} samples of {arm.robot.n_joints} joints{said}; rerun {out}')
+
+
+def _save(scene: Scene, out: Path) -> None:
+    """Write a file beside its place and move it there, so that it is whole or absent."""
+    beside = out.with_name(f'.{out.name}.part')
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        beside.unlink(missing_ok=True)
+        beside.touch(exist_ok=False)
+        stream = open_stream(scene.name, beside)
+        log_scene(scene, stream)
+        stream.disconnect()
+        beside.replace(out)
+    except OSError as error:
+        raise OutputError(f'{out}: cannot be written: {error.strerror}') from error
 
 
 def _live(parameters: dict[str, Any], namespace: str) -> None:

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import OutputError
-from armid_ros.files.documents import load_json, reading
+from armid_ros.files.documents import load_json, load_yaml, reading
 from armid_ros.files.regular import read_text
 
 #: Files by whose schema a folder is known; each is the one that its command writes last.
@@ -32,7 +32,12 @@ _RESULTS = (
     'elastic.json',
     'exo.json',
     'comparison.json',
+    'lunar.json',
+    'fleet.json',
 )
+#: What a run that was ended early leaves, or somebody put there, and the kinds that replace it.
+_MODEL = 'model.yaml'
+_WITH_MODEL = ('armid/identification/1', 'armid/diagnosis/1')
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:
@@ -149,6 +154,20 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
             raise OutputError(f'{path}: holds {kind}, not {schema}; {_HINT}')
         if robot and other and not _same(robot, other):
             raise OutputError(f'{path}: holds {kind} of {other}, not of {robot}; {_HINT}')
+    alone = not any(os.path.lexists(path / name) for name in _RESULTS)
+    if alone and schema in _WITH_MODEL and os.path.lexists(path / _MODEL):
+        _refuse_other_model(path, robot)
+
+
+def _refuse_other_model(path: Path, robot: str) -> None:
+    try:
+        with reading(path / _MODEL, OutputError):
+            found = load_yaml(read_text(path / _MODEL, OutputError))
+            kind, other = str(found['schema']), str(found['robot'])
+    except OutputError:
+        raise OutputError(f'{path}: holds a {_MODEL} that cannot be read; {_HINT}') from None
+    if not kind.startswith('armid/model/') or (robot and not _same(robot, other)):
+        raise OutputError(f'{path}: holds {kind} of {other}, not of {robot}; {_HINT}')
 
 
 _HINT = 'name another folder, or write over it with --force'

@@ -7,9 +7,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from armid_ros.identification.joint_gate import joint_gate
 from armid_ros.identification.row_noise import NOISE_OF_TORQUE
 from armid_ros.identification.signals import Conditioning, conditioning, SignalSettings
-from armid_ros.identification.spikes import SpikeGate
+from armid_ros.identification.spikes import FIRST, SpikeGate
+from armid_ros.identification.straight_line import Excursion, StreamSample
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -68,66 +70,88 @@ def without_damage(
     used = conditioning(list(recordings), settings)
     repaired, found = [], []
     for recording in recordings:
-        bad = np.zeros(len(recording), dtype=bool)
+        one = None
         if recording.tau is not None and len(recording) > 2:
-            bad, signal = _damaged(recording, used)
-        if bad.any():
-            names = [f'{what} of {j}' for what in ('position', 'effort') for j in recording.joints]
-            worst = tuple(
-                f'{names[int(signal[k])]} at {recording.t[k]:.3f} s'
-                for k in np.flatnonzero(bad)[:_NAMED]
-            )
-            found.append(Damage(recording.source, int(bad.sum()), worst))
+            one, bad = _damage(recording, used)
+        if one is not None:
+            found.append(one)
             recording = _repaired(recording, bad)
         repaired.append(recording)
     return repaired, tuple(found)
 
 
-def _damaged(
+def _damage(
     recording: Recording, used: Conditioning
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.intp]]:
-    """Return which samples are damaged, shape (N,), and which signal of each is furthest off."""
+) -> tuple[Damage | None, npt.NDArray[np.bool_]]:
+    """Return the damage of a recording, None without, and which samples it is, shape (N,)."""
     assert recording.tau is not None
-    signals = np.hstack([recording.q, recording.tau])
     middle = np.median(recording.tau, axis=0)
     spread = 1.4826 * np.median(np.abs(recording.tau - middle), axis=0)
     peak = float(np.max(used.taps()) / np.sum(used.taps()))
     floor = np.concatenate([np.zeros(recording.n_joints), NOISE_OF_TORQUE * spread / peak])
-    gate = SpikeGate(np.zeros(signals.shape[1], dtype=bool))
-    off = gate.furthest_off(recording.t, signals, floor)
-    bad = np.zeros(len(recording), dtype=bool)
-    if np.any(off > 1.0):
-        kept = [
-            sample.t
-            for t, x in zip(recording.t, signals, strict=True)
-            for sample in gate.take(float(t), x, floor)
-        ]
-        kept += [sample.t for sample in gate.rest()]
-        bad = ~np.isin(recording.t, kept)
-        bad = _impossible(bad, off, recording)
-    return bad, np.argmax(off, axis=1)
+    # angles of a recording are not wrapped
+    gate = joint_gate([True] * recording.n_joints, 'qt')
+    signals = np.hstack([recording.q, recording.tau])
+    excursions = impossible_excursions(gate, recording.t, signals, floor)
+    names = [f'{what} of {joint}' for what in ('position', 'effort') for joint in recording.joints]
+    worst = [
+        f'{names[int(np.argmax(one.off))]} at {sample.t:.3f} s'
+        for one in excursions
+        for sample in one.samples
+    ]
+    damaged = [sample.t for one in excursions for sample in one.samples]
+    bad = np.isin(recording.t, damaged)
+    if not excursions or bad.all():
+        return None, bad
+    return Damage(recording.source, len(damaged), tuple(worst[:_NAMED])), bad
 
 
-def _impossible(
-    bad: npt.NDArray[np.bool_], off: FloatArray, recording: Recording
-) -> npt.NDArray[np.bool_]:
+def impossible_excursions(
+    gate: SpikeGate, t: FloatArray, x: FloatArray, floor: FloatArray
+) -> list[Excursion]:
     """
-    Return the pulses that no arm makes, shape (N,).
+    Return what no arm makes in a whole recording, as if a gate had taken every sample of it.
 
-    A position cannot jump and come back. A torque can, as where free play is crossed, but not to
-    where it never is otherwise.
+    What is usual, and what the signals reach, is that of the whole. Only samples that are too far
+    off what is predicted of them are taken indeed, and those after them.
+
+    Parameters
+    ----------
+    gate : SpikeGate
+        What judges.
+    t : ndarray, shape (N,)
+        Stamps, at least 3, each after the one before [s].
+    x : ndarray, shape (N, m)
+        Signals.
+    floor : ndarray, shape (m,)
+        What a sample may be off by without consequence.
+
+    Returns
+    -------
+    list of Excursion
 
     """
-    assert recording.tau is not None
-    tau, n = recording.tau, recording.n_joints
-    good = tau[~bad]
-    beyond = (tau < good.min(axis=0)) | (tau > good.max(axis=0))
-    sure = np.any(off[:, :n] > 1.0, axis=1) | np.any((off[:, n:] > 1.0) & beyond, axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], bad.astype(int), [0]]))).reshape(-1, 2)
-    result = np.zeros_like(bad)
-    for start, stop in edges:
-        result[start:stop] = sure[start:stop].any()
-    return result
+    lines = gate.line_errors(t, x)
+    found: list[Excursion] = []
+    done = 0
+    for k in np.flatnonzero(np.any(lines.off(floor) > 1.0, axis=1)).tolist():
+        if k < done:
+            continue
+        start, known = int(lines.stretch[k]), []
+        if k - start >= FIRST or start < done:
+            start, known = k, [StreamSample(float(t[i]), x[i]) for i in (k - 2, k - 1)]
+        gate.begin(lines.usual, known, lines.bent[k - 1] if known else 0.0)
+        passed, done = 0, start
+        while done < len(t) and (passed < 2 or done <= k):
+            good = gate.take(float(t[done]), x[done], floor)
+            passed = passed + 1 if len(good) == 1 else 0
+            found += gate.left_out
+            done += 1
+    good_ones = ~np.isin(t, [sample.t for one in found for sample in one.samples])
+    if not (found and good_ones.any()):
+        return found
+    lowest, highest = np.min(x[good_ones], axis=0), np.max(x[good_ones], axis=0)
+    return [one for one in found if not gate.possible(one, lowest, highest)]
 
 
 def _repaired(recording: Recording, bad: npt.NDArray[np.bool_]) -> Recording:

@@ -127,11 +127,15 @@ class OnlineInteraction:
 
     def reset(self) -> None:
         """Forget everything."""
-        self._own.clear()
-        self._far.clear()
+        self.interrupt()
         self.together: Interaction | None = None
         self.separate: Interaction | None = None
         self.slack: Slack | None = None
+
+    def interrupt(self) -> None:
+        """Forget the motion so far, which what comes does not continue; estimates stay."""
+        self._own.clear()
+        self._far.clear()
         self._due: float | None = None
         self._slack_due: float | None = None
 

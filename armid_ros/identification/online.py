@@ -15,6 +15,7 @@ from armid_ros.identification.causal import CausalFilter, CausalMotion, TripleLa
 from armid_ros.identification.change import Change, change_candidates
 from armid_ros.identification.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.friction_beside import by_joint, FrictionBeside
+from armid_ros.identification.joint_gate import joint_gate
 from armid_ros.identification.online_checks import StreamChecks
 from armid_ros.identification.online_settings import OnlineSettings
 from armid_ros.identification.recursive import RecursiveLeastSquares
@@ -379,17 +380,12 @@ def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
     """Return what leaves damaged samples out, if that is wanted."""
     if settings.longest_damage < 1:
         return None
-    signals = 3 if settings.measured_velocity else 2
-    turning, position, torque = np.zeros((3, signals, arm.robot.n_joints), dtype=bool)
-    position[0], torque[-1] = True, True
-    turning[0] = ~np.asarray(arm.robot.prismatic, dtype=bool)
     changes = settings.changes or ChangeSettings()
-    return SpikeGate(
-        turning.ravel(),
+    return joint_gate(
+        arm.robot.prismatic,
+        'qvt' if settings.measured_velocity else 'qt',
         max_gap=settings.longest_damage,
         false_alarm_time=changes.false_alarm_time,
-        continuous=position.ravel(),
-        pulsing=torque.ravel(),
     )
 
 

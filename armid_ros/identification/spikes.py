@@ -4,15 +4,17 @@
 Damaged samples in a stream of joint states, told from what the arm really does.
 
 A torque or an encoder that is off in one sample bends an estimate by as much as thousands of good
-samples mend. Every sample is predicted by the straight line through the two before it. One that is
-too far from the prediction waits for those after it. When they return to where the line leads and
-do not go on from it, it was damaged and is left out; otherwise the arm has changed, and all are
-used. So damage costs the samples that are damaged, and no change is lost, however large.
+samples mend. Every sample is predicted by the straight line through the two before it, which
+bends on as it did where a signal is smooth. One that is too far from the prediction waits for
+those after it. When they return to where the line leads and do not go on from it, it was damaged
+and is left out; otherwise the arm has changed, and all are used. So damage costs the samples that
+are damaged, and no change is lost, however large.
 
 Positions are continuous. One that steps and goes on from there is of a clock that was set or of an
 encoder that was zeroed, and what follows is a new stretch (``StreamSample.begins``). A torque may
 jump and come back, as where free play is crossed; such pulses are told from damage by what the
-torque reaches otherwise.
+torque reaches otherwise. In a stream they are left out and not called damage, as what the torque
+reaches is known too late; in a recording they are kept.
 
 Three things say how far is too far; the largest of them counts. The noise: what predictions
 usually miss by, as much as in the loudest part of the last minute, since an arm at rest must not
@@ -33,12 +35,16 @@ from dataclasses import replace
 import math
 
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.line_errors import line_errors, LineErrors
 from armid_ros.identification.straight_line import (
+    all_unwrapped,
+    Excursion,
     Missed,
     missed_by,
     share_of_noise,
     StreamSample,
     unwrapped,
+    Usual,
     usual_size,
 )
 from armid_ros.motion import FloatArray
@@ -60,6 +66,8 @@ _USUAL_FIRST = 0.75
 _SEEN = 3
 #: A sample goes on from others that are nearer by this factor than where the line leads.
 _NEARER = 0.5
+#: Periods without a sample after which one waits for the next, which may contradict its stamp.
+_LEAP = 1.5
 #: What is divided by is at least this.
 _TINY = 1e-300
 
@@ -87,7 +95,9 @@ class SpikeGate:
         Samples left out as damaged, by the signal that was furthest off.
     rejected : Counter of str
         Samples left out, by reason: spike; pulse, which the arm may have made; stamp, which alone
-        was off; erratic, which followed neither what was before nor each other; out_of_order.
+        was off; erratic, which followed neither what was before nor other ones; out_of_order.
+    left_out : list of Excursion
+        What the last call to `take` left out as spike, pulse or erratic.
 
     """
 
@@ -116,13 +126,15 @@ class SpikeGate:
         """Forget everything."""
         self.spikes: Counter[int] = Counter()
         self.rejected: Counter[str] = Counter()
+        self.left_out: list[Excursion] = []
+        self._early: StreamSample | None = None
         count = len(self._turn)
         self._steps = np.full((_SEEN, count), np.inf)
         self._usual: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=_REMEMBERED)
         self._lowest, self._highest = np.full(count, np.inf), np.full(count, -np.inf)
         self._errors: list[FloatArray] = []
         self._moves: list[FloatArray] = []
-        self._scale, self._noisy = np.zeros(count), np.zeros(count)
+        self._noise = Usual(np.inf, np.zeros(count), np.zeros(count))
         self._restart([])
 
     def take(self, t: float, x: FloatArray, floor: FloatArray | float = 0.0) -> list[StreamSample]:
@@ -139,7 +151,28 @@ class SpikeGate:
             What a sample may be off by without consequence.
 
         """
-        sample = StreamSample(t, unwrapped(x, self._known[1].x, self._turn) if self._known else x)
+        self.left_out = []
+        early, self._early, tail = self._early, None, self._tail
+        good: list[StreamSample] = []
+        if early is not None and tail is not None:
+            if tail.t < t < early.t:  # what goes on from before shows whose stamp is off
+                self.rejected['stamp'] += 1
+            else:
+                good = self._take(early, floor)
+        if self._leaps(t):
+            self._early = StreamSample(t, x)
+            return good
+        return good + self._take(StreamSample(t, x), floor)
+
+    def _leaps(self, t: float) -> bool:
+        """Return whether something seems to be lost before a sample."""
+        ahead = 0.0 if self._tail is None else t - self._tail.t
+        return _LEAP * self._period < ahead <= self._max_gap * self._period < math.inf
+
+    def _take(self, sample: StreamSample, floor: FloatArray | float) -> list[StreamSample]:
+        """Take in a sample whose stamp is not contradicted by the next one."""
+        if self._known:
+            sample = replace(sample, x=unwrapped(sample.x, self._known[1].x, self._turn))
         if not self._in_time(sample):
             return []
         if self._first is None:
@@ -150,68 +183,74 @@ class SpikeGate:
     def rest(self) -> list[StreamSample]:
         """Return the samples that still wait, at the end of a stream."""
         waiting = self._first if self._first is not None else self._held
+        waiting = waiting + ([self._early] if self._early is not None else [])
         self._restart([])
         return waiting
 
-    def furthest_off(
-        self, t: FloatArray, x: FloatArray, floor: FloatArray | float = 0.0
-    ) -> FloatArray:
+    def begin(
+        self, usual: Usual, known: Sequence[StreamSample] = (), bent: FloatArray | float = 0.0
+    ) -> None:
         """
-        Return how far off its prediction every sample of a whole stream is, over the limit.
-
-        Quick, for streams of which most have no damage: where nothing is above 1 by the noise of
-        the loudest part of the whole, there is none.
+        Begin somewhere in a recording of which is known what is usual of the whole.
 
         Parameters
         ----------
-        t : ndarray, shape (N,)
-            Stamps [s].
-        x : ndarray, shape (N, m)
-            Signals.
-        floor : ndarray, shape (m,), or float
-            As for `take`.
-
-        Returns
-        -------
-        ndarray, shape (N, m)
+        usual : Usual
+            What is usual of its signals.
+        known : sequence of StreamSample
+            The two good samples before; none where a stretch begins.
+        bent : ndarray, shape (m,)
+            What the prediction of the last of them missed, over a period.
 
         """
-        dt, moves = np.diff(t), np.diff(x, axis=0)
-        turn = np.where(self._turn > 0.0, self._turn, np.inf)
-        moves -= np.rint(moves / turn) * self._turn
-        ratio, period = dt[1:] / dt[:-1], float(np.median(dt))
-        noise = np.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)
-        growth = np.maximum(noise, 0.5 * dt[1:] * (dt[1:] + dt[:-1]) / period**2)
-        error = np.abs(moves[1:] - ratio[:, np.newaxis] * moves[:-1])
-        usual = _loudest(error / growth[:, np.newaxis])
-        # by the growth of noise, which is the least: what is damage is judged by `take`
-        limit = np.maximum(self._quantile_of(period) * usual * noise[:, np.newaxis], floor)
-        off = np.zeros(x.shape)
-        off[2:] = error / np.maximum(limit, _TINY)
-        return off
+        self._usual.clear()
+        self._usual.append((usual.size, usual.noisy))
+        self._noise = usual
+        self._restart(None if known else [], known, bent)
+        if known:
+            self._period, self._quantile = usual.period, self._quantile_of(usual.period)
+
+    def line_errors(self, t: FloatArray, x: FloatArray) -> LineErrors:
+        """Return how far off the samples of a whole recording are, as `take` would predict."""
+        lines = line_errors(
+            t, x, self._turn, max_gap=self._max_gap, window=WINDOW, share=_USUAL, seen=_SEEN
+        )
+        return replace(lines, quantile=self._quantile_of(lines.usual.period))
+
+    def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
+        """
+        Return whether an arm may have made what left its line and came back.
+
+        A position cannot jump and come back. A torque can, and where free play is crossed it goes
+        beyond what it reaches otherwise, from `lowest` to `highest`, but by no more than that
+        spans: an impact is of the order of what drives it.
+
+        """
+        most = np.maximum(excursion.limit, highest - lowest)
+        far = excursion.beyond(lowest, highest) > most
+        return not bool(np.any(far | ((excursion.off > 1.0) & ~self._pulsing)))
 
     def _quantile_of(self, period: float) -> float:
-        """Return how many standard deviations normal noise exceeds with so small a chance."""
+        """Return how many standard deviations noise exceeds at one false alarm in that time."""
         chance = period / self._false_alarm_time / len(self._turn)
         return float(stats.norm.isf(min(chance, 0.5) / 2.0))
 
-    def _restart(self, first: list[StreamSample]) -> None:
+    def _restart(
+        self,
+        first: list[StreamSample] | None,
+        known: Sequence[StreamSample] = (),
+        bent: FloatArray | float = 0.0,
+    ) -> None:
         """Begin a new stretch with some samples; what is usual stays known."""
-        self._first: list[StreamSample] | None = first
-        self._known: tuple[StreamSample, ...] = ()
+        self._first, self._known = first, tuple(known)
+        self._bent = bent
         self._held: list[StreamSample] = []
         self._went_on, self._suspect = 0, np.empty(0, dtype=np.intp)
-        self._off = np.zeros(len(self._turn))
+        self._off = self._limit = np.zeros(len(self._turn))
         self._stray: StreamSample | None = None
+        self._early = None
         self._period = np.inf
         self._quantile = 0.0
-
-    def _unwrapped(self, samples: Sequence[StreamSample]) -> list[StreamSample]:
-        """Return samples without the jumps by full turns between them."""
-        found = [samples[0]]
-        for sample in samples[1:]:
-            found.append(replace(sample, x=unwrapped(sample.x, found[-1].x, self._turn)))
-        return found
 
     @property
     def _tail(self) -> StreamSample | None:
@@ -242,7 +281,7 @@ class SpikeGate:
     def _begin(self, floor: FloatArray | float) -> list[StreamSample]:
         """Learn from the first samples, and judge them."""
         raw, self._first = self._first or [], None
-        first = self._unwrapped(raw)
+        first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
         self._quantile = self._quantile_of(self._period)
         missed = [
@@ -251,18 +290,21 @@ class SpikeGate:
         self._see_steps(np.abs(np.diff([s.x for s in first], axis=0)))
         if not self._usual:
             errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
-            self._scale = np.maximum(usual_size(errors, _USUAL_FIRST), self._resolution)
-            self._noisy = share_of_noise(errors, self._scale)
+            size = np.maximum(usual_size(errors, _USUAL_FIRST), self._resolution)
+            self._noise = Usual(self._period, size, share_of_noise(errors, size))
         straight = [bool(np.all(self._off_by(m, floor) <= 1.0)) for m in missed]
         if not any(straight):  # or the noise is not what it was: it is learned anew
-            self.rejected['erratic'] += len(first)
+            off = np.max([self._off_by(m, floor) for m in missed], axis=0)
+            self._leave_out(Excursion(tuple(first), off, self._limits(missed[0], floor)), True)
             self._usual.clear()
             self._restart([])
             return []
         start = straight.index(True)
-        first = first[:start] + self._unwrapped(raw[start:])  # not from what is damaged
+        first = first[:start] + all_unwrapped(raw[start:], self._turn)  # not from what is damaged
         self._known = first[start], first[start + 1]
-        self._leave_out(first[:start], self._off_by(missed[0], floor))
+        if start:
+            of = self._off_by(missed[0], floor), self._limits(missed[0], floor)
+            self._leave_out(Excursion(tuple(first[:start]), *of))
         good = list(self._known)
         for sample in first[start + 2 :]:
             good += self._judge(sample, floor)
@@ -274,27 +316,31 @@ class SpikeGate:
             self._first.append(sample)
             return []
         missed = missed_by(self._known, sample, self._period)
-        off = self._off_by(missed, floor)
+        # a smooth signal goes on bending as it does
+        bent = self._noise.smoothness * self._bent * missed.bend
+        off = self._off_by(missed._replace(error=missed.error - bent), floor)
         if not self._held:
             if float(np.max(off)) <= 1.0:
                 return self._accept([sample], missed)
             self._held, self._went_on, self._off = [sample], 0, off
+            self._limit = self._limits(missed, floor)
             self._suspect = np.flatnonzero(off > 1.0)
             return []
         goes_on = self._goes_on(sample, off, floor)
         if not goes_on and float(np.max(off[self._suspect])) <= 1.0:
-            self._leave_out(self._held, self._off)
+            self._leave_out(Excursion(tuple(self._held), self._off, self._limit))
             self._held = []
             return self._judge(sample, floor)
         self._held.append(sample)
+        self._off = np.maximum(self._off, off)
         self._went_on += goes_on
         if len(self._held) <= self._max_gap:
             return []
         if 2 * self._went_on > self._max_gap:
-            if self._stepped(floor):
+            if len(self._held) > 1 and self._stepped(floor):
                 self._held[0] = replace(self._held[0], begins=True)
             return self._accept(self._held)
-        self.rejected['erratic'] += len(self._held)
+        self._leave_out(Excursion(tuple(self._held), self._off, self._limit), True)
         self._restart([])
         return []
 
@@ -320,23 +366,20 @@ class SpikeGate:
         collision, do.
 
         """
-        if len(self._held) < 2:
-            return False
         ahead = missed_by(self._known, self._held[0], self._period)
         back = missed_by((self._held[1], self._held[0]), self._known[1], self._period)
-        apart = self._continuous & (ahead.error * back.error < 0.0)
         far = np.minimum(self._off_by(ahead, floor), self._off_by(back, floor))
-        return bool(np.any(far[apart] > 1.0))
+        return bool(np.any(far[self._continuous & (ahead.error * back.error < 0.0)] > 1.0))
 
-    def _growth(self, missed: Missed) -> FloatArray:
-        """Return how much more the signals usually miss over this time, shape (m,)."""
-        bend = missed.bend**2
-        return np.asarray(np.sqrt(bend + self._noisy * (missed.noise**2 - bend)))
+    def _limits(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
+        """Return what a sample may be off its prediction by, shape (m,)."""
+        limits = self._noise.limits(self._quantile, missed.noise, missed.bend)
+        return np.maximum(limits, floor)
 
     def _off_by(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
         """Return how far off its prediction a sample is, over the limit, shape (m,)."""
-        limit = np.maximum(self._quantile * self._scale * self._growth(missed), floor)
-        return np.asarray(np.abs(missed.error) / np.maximum(limit, _TINY))
+        limit = np.maximum(self._limits(missed, floor), _TINY)
+        return np.asarray(np.abs(missed.error) / limit)
 
     def _accept(
         self, samples: list[StreamSample], missed: Missed | None = None
@@ -345,7 +388,8 @@ class SpikeGate:
         self._held = []
         for sample in samples:
             one = missed or missed_by(self._known, sample, self._period)
-            self._errors.append(one.error / self._growth(one))
+            self._errors.append(one.error / self._noise.growth(one.noise, one.bend))
+            self._bent = one.error / one.bend
             self._moves.append(sample.x - self._known[1].x)
             np.minimum(self._lowest, sample.x, out=self._lowest)
             np.maximum(self._highest, sample.x, out=self._highest)
@@ -354,17 +398,21 @@ class SpikeGate:
             self._learn()
         return samples
 
-    def _leave_out(self, samples: Sequence[StreamSample], off: FloatArray) -> None:
-        if not samples:
+    def _leave_out(self, excursion: Excursion, erratic: bool = False) -> None:
+        """Count what is left out, by its reason."""
+        self.left_out.append(excursion)
+        count = len(excursion.samples)
+        if erratic:
+            self.rejected['erratic'] += count
             return
-        values = np.stack([sample.x for sample in samples])
-        inside = np.all((self._lowest <= values) & (values <= self._highest), axis=0)
-        if np.all((self._pulsing & inside)[off > 1.0]):
-            self.rejected['pulse'] += len(samples)
+        if self.possible(excursion, self._lowest, self._highest):
+            self.rejected['pulse'] += count
         else:
-            self.rejected['spike'] += len(samples)
-            self.spikes[int(np.argmax(off))] += len(samples)
-        self._see_steps(np.abs(np.diff(values, axis=0, prepend=self._known[1].x[np.newaxis])))
+            self.rejected['spike'] += count
+            self.spikes[int(np.argmax(excursion.off))] += count
+        values = np.stack([sample.x for sample in excursion.samples])
+        before = self._known[1].x[np.newaxis] if self._known else values[:1]
+        self._see_steps(np.abs(np.diff(values, axis=0, prepend=before)))
 
     def _learn(self) -> None:
         """Learn what is usual from a window of errors."""
@@ -375,8 +423,8 @@ class SpikeGate:
         self._errors, self._moves = [], []
         sizes, shares = (np.array(part) for part in zip(*self._usual, strict=True))
         loudest = np.argmax(sizes, axis=0)[np.newaxis]
-        self._scale = np.maximum(np.take_along_axis(sizes, loudest, 0)[0], self._resolution)
-        self._noisy = np.take_along_axis(shares, loudest, 0)[0]
+        size = np.maximum(np.take_along_axis(sizes, loudest, 0)[0], self._resolution)
+        self._noise = Usual(self._period, size, np.take_along_axis(shares, loudest, 0)[0])
 
     def _see_steps(self, steps: FloatArray) -> None:
         """Learn the resolution from steps of shape (k, m)."""
@@ -387,14 +435,3 @@ class SpikeGate:
     def _resolution(self) -> FloatArray:
         """The smallest step of every signal, 0 where it is not known."""
         return np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
-
-
-def _loudest(errors: FloatArray) -> FloatArray:
-    """Return the largest usual size of all windows of errors (N, m), shape (m,)."""
-    windows = max(1, len(errors) // WINDOW)
-    size, longer = divmod(len(errors), windows)
-    signals, cut = errors.shape[1], longer * (size + 1)
-    first = errors[:cut].reshape(longer, size + 1, signals)
-    rest = errors[cut:].reshape(windows - longer, size, signals)
-    usual = [usual_size(part.swapaxes(0, 1), _USUAL) for part in (first, rest) if len(part)]
-    return np.asarray(np.max(np.concatenate(usual), axis=0))

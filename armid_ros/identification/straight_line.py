@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 import math
 from typing import NamedTuple
@@ -16,8 +16,15 @@ from scipy import stats
 
 #: Correlation of successive errors of a straight line in white noise.
 _NOISE_CORRELATION = -2.0 / 3.0
+#: How hard an arm may accelerate over what 95 % of the time it does at most, times the standard
+#: deviations that those are of a normal variable.
+_HARDER = 2.0 * 1.96
 #: Usual errors beyond which one says nothing of the correlation.
 _CLIPPED = 3.0
+
+
+#: How much more something is over other times, of one sample or of each, shape (N, 1).
+Factor = float | FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +46,78 @@ class StreamSample:
     t: float
     x: FloatArray
     begins: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Excursion:
+    """
+    Samples that leave the line that was led to them, and come back to it.
+
+    Attributes
+    ----------
+    samples : tuple of StreamSample
+        Those between the line before and behind.
+    off : ndarray, shape (m,)
+        How far off the line they are at most, over what is too far.
+    limit : ndarray, shape (m,)
+        What is too far, in units of the signals.
+
+    """
+
+    samples: tuple[StreamSample, ...]
+    off: FloatArray
+    limit: FloatArray
+
+    def beyond(self, lowest: FloatArray, highest: FloatArray) -> FloatArray:
+        """Return how far the signals that jump are beyond some range, shape (m,)."""
+        values = np.stack([sample.x for sample in self.samples])
+        outside = np.maximum(lowest - values, values - highest).max(axis=0)
+        return np.where(self.off > 1.0, np.maximum(outside, 0.0), 0.0)
+
+
+class Usual(NamedTuple):
+    """
+    What predictions usually miss by.
+
+    Attributes
+    ----------
+    period : float
+        Sampling period [s].
+    size : ndarray, shape (m,)
+        Standard deviation of the errors over a period, where the signals are loudest.
+    noisy : ndarray, shape (m,)
+        Share of white noise in their squares.
+
+    """
+
+    period: float
+    size: FloatArray
+    noisy: FloatArray
+
+    def growth(self, noise: Factor, bend: Factor) -> FloatArray:
+        """Return by how much more they miss over other times, shape (m,) or (N, m)."""
+        squares = bend**2
+        return np.asarray(np.sqrt(squares + self.noisy * (noise**2 - squares)))
+
+    @property
+    def smoothness(self) -> FloatArray:
+        """Correlation of successive errors, 0 for noise, shape (m,)."""
+        return np.clip(1.0 - (1.0 - _NOISE_CORRELATION) * self.noisy, 0.0, 1.0)
+
+    def limits(self, quantile: float, noise: Factor, bend: Factor) -> FloatArray:
+        """
+        Return what a prediction may miss by, shape (m,) or (N, m).
+
+        An arm has a hardest acceleration, unlike noise, which has tails. So a smooth signal is
+        held to a small multiple of what it usually misses by, not to a quantile of the normal
+        distribution.
+
+        """
+        tails = quantile * self.growth(noise, bend)
+        bounded = np.sqrt(1.0 - self.noisy) * _HARDER * bend
+        return np.asarray(
+            self.size * np.minimum(tails, quantile * np.sqrt(self.noisy) * noise + bounded)
+        )
 
 
 class Missed(NamedTuple):
@@ -74,6 +153,14 @@ def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
     """Undo the jump by a full turn, where there is one, with which drivers keep within +-pi."""
     turns = np.rint(np.divide(x - last, turn, where=turn > 0.0, out=np.zeros_like(x)))
     return np.asarray(x - turns * turn)
+
+
+def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[StreamSample]:
+    """Return samples without the jumps by full turns between them."""
+    found = [samples[0]]
+    for sample in samples[1:]:
+        found.append(replace(sample, x=unwrapped(sample.x, found[-1].x, turn)))
+    return found
 
 
 def usual_size(missed: FloatArray, share: float) -> FloatArray:

@@ -13,8 +13,8 @@ from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.identification.causal import LARGEST
 from armid_ros.identification.interaction import Interaction
 from armid_ros.identification.interaction_online import InteractionSettings, OnlineInteraction
+from armid_ros.identification.joint_gate import joint_gate
 from armid_ros.identification.joint_order import JointOrder
-from armid_ros.identification.spikes import SpikeGate
 from armid_ros.identification.straight_line import StreamSample
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
@@ -35,6 +35,7 @@ _TOPICS = ('exo/joint_states', 'human/joint_states')
 #: What is said of joint states that are left out.
 _DAMAGED = {
     'spike': 'joint states that jump for single samples are left out',
+    'pulse': 'torques that jump for single samples, as an arm may do, are left out',
     'stamp': 'joint states whose stamp alone is off are left out',
     'out_of_order': 'joint states whose stamp is not after that of the one before are left out',
     'erratic': 'joint states that follow neither those before nor each other are left out',
@@ -82,8 +83,8 @@ class InteractionIdentifierNode(ArmidNode):
         core = self.identifier
         self._orders = JointOrder(core.robot.joints), JointOrder(core.other.joints)
         self._gates = tuple(
-            SpikeGate(np.repeat([True, False], [robot.n_joints, extra]))
-            for robot, extra in ((core.robot, core.robot.n_joints), (core.other, 0))
+            joint_gate(robot.prismatic, signals)
+            for robot, signals in ((core.robot, 'qt'), (core.other, 'q'))
         )
         self._told: list[Counter[str]] = [Counter(), Counter()]
         self.freshness = tuple(Freshness(topic) for topic in _TOPICS)
@@ -147,6 +148,7 @@ class InteractionIdentifierNode(ArmidNode):
         self.received += 1
         self.freshness[1].heard()
         for sample in self._signals(1, message, ('position',)):
+            self._follow(1, sample)
             self.identifier.take_other(sample.t, sample.x)
 
     def _on_machine(self, message: JointState) -> None:
@@ -154,11 +156,21 @@ class InteractionIdentifierNode(ArmidNode):
         self.freshness[0].heard()
         n = self.identifier.robot.n_joints
         for sample in self._signals(0, message, ('position', 'effort')):
+            self._follow(0, sample)
             try:
                 if self.identifier.take(sample.t, sample.x[:n], sample.x[n:]):
                     self._publish(message)
             except ArmidError as error:
                 self.complaints.say(_TOPICS[0], str(error))
+
+    def _follow(self, machine: int, sample: StreamSample) -> None:
+        """Begin a new stretch where positions have stepped, and say so."""
+        if sample.begins:
+            self.identifier.interrupt()
+            topic = _TOPICS[machine]
+            self.complaints.say(
+                f'{topic} step', f'{topic}: positions step; what was before them is left behind'
+            )
 
     def _signals(
         self, machine: int, message: JointState, fields: tuple[str, ...]

@@ -11,6 +11,7 @@ exactly that is damaged, and nothing is unpacked beyond it.
 from __future__ import annotations
 
 from collections.abc import Iterator
+import threading
 from typing import BinaryIO
 
 from armid_ros.errors import RecordingError
@@ -59,7 +60,7 @@ def decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
         if not size:
             return b''
         if compression == 'zstd':
-            content = zstandard.ZstdDecompressor().decompress(stored, max_output_size=size)
+            content = _ZSTD.decompressor.decompress(stored, max_output_size=size)
         else:
             content = _lz4(stored, size)
     except CORRUPT as error:
@@ -67,6 +68,16 @@ def decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
     if len(content) != size:
         raise RecordingError(f'holds {len(content)} bytes where {size} are stated')
     return content
+
+
+class _Zstd(threading.local):
+    """A decompressor of each thread's own, for to make one takes as long as to unpack 20 kB."""
+
+    def __init__(self) -> None:
+        self.decompressor = zstandard.ZstdDecompressor()
+
+
+_ZSTD = _Zstd()
 
 
 def _lz4(stored: _Buffer, size: int) -> bytes:

@@ -16,6 +16,8 @@ import numpy.typing as npt
 # A topic of more layouts in one block is not one publisher's; messages are then read one by one.
 _LAYOUTS_A_BLOCK = 32
 _FIELDS = ('position', 'velocity', 'effort')
+#: What is reserved at once of a quantity, as counts of damaged files may be anything [bytes].
+_MOST_ROOM = 1 << 30
 
 
 @dataclass(frozen=True)
@@ -73,9 +75,20 @@ class JointStateDecoder:
 
     """
 
-    def __init__(self, joints: Sequence[str]) -> None:
-        """Decode the values of these joints, as far as messages name them."""
+    def __init__(self, joints: Sequence[str], expected: int = 0) -> None:
+        """
+        Decode the values of these joints, as far as messages name them.
+
+        Parameters
+        ----------
+        joints : sequence of str
+            The joints.
+        expected : int
+            How many messages are put together in the end, for which room is made at once.
+
+        """
         self._wanted = tuple(joints)
+        self._room = _Room(expected)
         self._plans: dict[int, list[_Plan]] = {}
         self._names: dict[str, None] = {}
         self.messages = 0
@@ -118,15 +131,16 @@ class JointStateDecoder:
             rows = raw.view(plan.dtype)
             fits = plan.layout.fits(rows)
             if fits.all():
-                yield from plan.read(rows, numbers, receive)
+                yield from plan.read(rows, numbers, receive, self._room)
                 return
-            yield from plan.read(rows[fits], numbers[fits], receive[fits])
+            yield from plan.read(rows[fits], numbers[fits], receive[fits], self._room)
             raw, numbers, receive = raw[~fits], numbers[~fits], receive[~fits]
         for at in range(len(raw)):
             plan = self._plan_for(raw[at : at + 1])
             if plan is not None:
                 rows = raw[at : at + 1].view(plan.dtype)
-                yield from plan.read(rows, numbers[at : at + 1], receive[at : at + 1])
+                one = numbers[at : at + 1], receive[at : at + 1]
+                yield from plan.read(rows, *one, self._room)
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
         """Return how to read a message; None, and the message counted, if there is no way."""
@@ -146,6 +160,25 @@ class JointStateDecoder:
         known.insert(0, plan)
         del known[_LAYOUTS_A_BLOCK:]
         return plan
+
+
+class _Room:
+    """Room for the values of messages, so that those of one kind follow each other in memory."""
+
+    def __init__(self, expected: int) -> None:
+        self._expected = expected
+        self._free: dict[tuple[str, int], FloatArray] = {}
+
+    def take(self, name: str, count: int, joints: int) -> FloatArray:
+        """Return an array of shape (count, joints), behind the one before if there is room."""
+        expected = min(self._expected, _MOST_ROOM // (8 * joints))
+        free = self._free.get((name, joints))
+        if free is None:
+            free = np.empty((expected, joints))
+        if count > len(free):
+            return np.empty((count, joints))
+        self._free[name, joints] = free[count:]
+        return free[:count]
 
 
 @dataclass(frozen=True)
@@ -179,7 +212,7 @@ class _Plan:
         )
 
     def read(
-        self, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
+        self, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray, room: _Room
     ) -> Iterator[JointStates]:
         """Yield the values of messages of this layout, if there is a joint asked for in them."""
         if not self.joints:
@@ -187,8 +220,10 @@ class _Plan:
         header = rows['sec'].astype(np.int64)
         header *= 10**9
         header += rows['nanosec']
-        values = [
-            rows[name][:, self.columns].astype(np.float64, order='C') if count else None
-            for name, count in zip(_FIELDS, self.layout.counts, strict=True)
-        ]
+        values: list[FloatArray | None] = []
+        for name, count in zip(_FIELDS, self.layout.counts, strict=True):
+            place = room.take(name, len(rows), len(self.joints)) if count else None
+            if place is not None:
+                place[:] = rows[name][:, self.columns]
+            values.append(place)
         yield JointStates(self.joints, numbers, header, receive, *values)

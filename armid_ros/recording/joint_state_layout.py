@@ -189,7 +189,8 @@ class JointStateLayout:
         # As a rule all padding is alike, and plain comparison of the first row's is enough.
         reference = names[0]
         if np.array_equal(reference & mask, expected):
-            same = (names == reference).all(axis=1)
+            equal = names == reference
+            same = np.ones(len(rows), dtype=np.bool_) if equal.all() else equal.all(axis=1)
         else:
             same = np.zeros(len(rows), dtype=np.bool_)
         if not same.all():

@@ -4,8 +4,11 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 import mmap
+import os
 from typing import NamedTuple
 import zlib
 
@@ -20,6 +23,11 @@ from armid_ros.recording.mcap_records import Chunk, FileMap
 from armid_ros.recording.settings import ReadSettings
 
 _COMPRESSIONS = ('', 'zstd', 'lz4')
+#: Threads that unpack ahead of what is read. Decompression and checksums let others run meanwhile.
+_THREADS = 2
+#: What a thread unpacks at a time, as handing over takes a tenth of what a chunk takes, and what
+#: may lie unpacked ahead [bytes]; a larger chunk is unpacked when nothing else is.
+_AT_A_TIME, _AHEAD = 2 << 20, 16 << 20
 
 
 class Content(NamedTuple):
@@ -49,12 +57,42 @@ class Contents:
             A chunk takes more memory than the settings allow.
 
         """
+        chunks = list(chunks)
+        if not any(chunk.compression for chunk in chunks):
+            for chunk in chunks:  # their checksums are quicker than to hand them over
+                yield from self._whole(self._all_checked([chunk]))
+            return
+        begun: deque[tuple[int, Future[list[_Unpacked]]]] = deque()
+        size = 0
+        with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as threads:
+            for part in _parts(chunks):
+                more = sum(chunk.size for chunk in part)
+                while begun and (size + more > _AHEAD or len(begun) > _THREADS):
+                    yield from self._whole(begun[0][1].result())
+                    size -= begun.popleft()[0]
+                begun.append((more, threads.submit(self._all_checked, part)))
+                size += more
+            while begun:
+                yield from self._whole(begun.popleft()[1].result())
+
+    def _whole(self, unpacked: Iterable[_Unpacked]) -> Iterator[tuple[Chunk, Content]]:
+        """Yield the contents that are whole, and note the others."""
+        for chunk, content in unpacked:
+            if isinstance(content, Content):
+                yield chunk, content
+            else:
+                span = self._found.span(chunk)
+                self._found.damage.add(f'{content}: messages {span} are left out')
+
+    def _all_checked(self, chunks: Iterable[Chunk]) -> list[_Unpacked]:
+        """Return contents whose checksums are right, and what is wrong with the others."""
+        found: list[_Unpacked] = []
         for chunk in chunks:
             try:
-                yield chunk, self._checked(chunk)
+                found.append((chunk, self._checked(chunk)))
             except _DamagedChunk as problem:
-                span = self._found.span(chunk)
-                self._found.damage.add(f'{problem}: messages {span} are left out')
+                found.append((chunk, problem))
+        return found
 
     def _checked(self, chunk: Chunk) -> Content:
         """Return a content whose checksum is right."""
@@ -94,5 +132,20 @@ class Contents:
         return Content(content, 0, len(content))
 
 
+def _parts(chunks: Iterable[Chunk]) -> Iterator[list[Chunk]]:
+    """Yield chunks in groups that are worth a thread's while."""
+    part: list[Chunk] = []
+    for chunk in chunks:
+        part.append(chunk)
+        if sum(one.size for one in part) >= _AT_A_TIME:
+            yield part
+            part = []
+    if part:
+        yield part
+
+
 class _DamagedChunk(Exception):
     """A chunk whose content is not to be had."""
+
+
+_Unpacked = tuple[Chunk, Content | _DamagedChunk]

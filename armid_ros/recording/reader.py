@@ -76,7 +76,7 @@ def read_recording(
         raise RecordingError(f'{path}: joints wanted must differ and not be none, got {joints}')
     with Bag(path, settings) as bag:
         chosen = choose_topic(bag, joints, topic)
-        decoder = JointStateDecoder(joints)
+        decoder = JointStateDecoder(joints, chosen.count)
         where = f'{path}: {chosen.name}'
         with reading(path, RecordingError):
             pieces = list(_within(settings, where, _decoded(bag, chosen, decoder)))
@@ -152,6 +152,9 @@ def _recording(
     report: ReadReport,
 ) -> Recording:
     q, dq, tau = values
+    for array in (t, q, dq, tau):
+        if array is not None:
+            array.setflags(write=False)  # nobody else has it, so that it need not be copied
     return Recording(
         joints=joints,
         t=t,

@@ -205,12 +205,31 @@ def _stacked(
     """Concatenate along time, NaN for what is missing."""
     if all(values is None for values in arrays):
         return None
-    return np.concatenate(
-        [
-            np.full((len(part), k), np.nan) if values is None else values
-            for values, part in zip(arrays, parts, strict=True)
-        ]
-    )
+    whole = [
+        np.full((len(part), k), np.nan) if values is None else values
+        for values, part in zip(arrays, parts, strict=True)
+    ]
+    together = _adjacent(whole)
+    return np.concatenate(whole) if together is None else together
+
+
+def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
+    """Return the part of an array that others are, each behind the one before; or None."""
+    whole = arrays[0].base
+    if not isinstance(whole, np.ndarray) or whole.ndim != 2:
+        return None
+    first = at = arrays[0].ctypes.data
+    for array in arrays:
+        if (
+            array.base is not whole
+            or array.ctypes.data != at
+            or array.shape[1:] != whole.shape[1:]
+        ):
+            return None
+        at += array.nbytes
+    row = whole.strides[0]
+    begin = whole.ctypes.data
+    return whole[(first - begin) // row : (at - begin) // row]
 
 
 def _side_by_side(

@@ -16,6 +16,9 @@ import pinocchio as pin
 
 PARAMETERS_PER_BODY = 10
 
+#: How much of the largest number of a body may be lost to floating point.
+_LOST = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
@@ -177,7 +180,8 @@ class Robot:
         Raises
         ------
         RobotError
-            If the shape is wrong, a number is not finite, or a first moment has no mass.
+            If the shape is wrong, a number is not finite, or a first moment has no mass or so
+            little that the inertia about its centre is not to be told in floating point.
 
         """
         pi = np.asarray(parameters, dtype=np.float64)
@@ -202,4 +206,11 @@ def _inertia(link: str, values: FloatArray) -> pin.Inertia:
         ixx, ixy, iyy, ixz, iyz, izz = about_origin
         rotational = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
         return pin.Inertia(0.0, np.zeros(3), rotational)
-    return pin.Inertia.FromDynamicParameters(values)
+    inertia = pin.Inertia.FromDynamicParameters(values)
+    lost = np.abs(inertia.toDynamicParameters() - values).max()
+    if not lost <= _LOST * np.abs(values).max():
+        raise RobotError(
+            f"link '{link}': a first moment {moment} kg m needs more mass than {mass:g} kg, which "
+            f'puts its centre {np.abs(moment).max() / abs(mass):g} m away'
+        )
+    return inertia

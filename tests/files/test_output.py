@@ -99,6 +99,35 @@ def test_results_of_another_kind_or_robot_are_kept_unless_forced(tmp_path, conte
         pass
 
 
+@pytest.mark.parametrize(
+    ('text', 'refusal'),
+    [
+        ('schema: armid/model/1\nrobot: ur5\n', None),
+        ('schema: armid/model/1\nrobot: panda\n', 'of panda, not of ur5; .*--force'),
+        ('schema: other/1\nrobot: ur5\n', 'holds other/1'),
+        ('hello', 'holds a model.yaml that cannot be read'),
+    ],
+)
+def test_a_model_that_no_run_of_this_kind_left_is_kept_unless_forced(tmp_path, text, refusal):
+    (tmp_path / 'model.yaml').write_text(text)
+    if refusal:
+        with pytest.raises(OutputError, match=refusal):
+            with result_folder(tmp_path, SCHEMA, 'ur5'):
+                pass
+    with result_folder(tmp_path, SCHEMA, 'ur5', force=refusal is not None):
+        pass
+    with result_folder(tmp_path, 'armid/comparison/1', 'ur5'):  # which writes none
+        pass
+
+
+@pytest.mark.parametrize('name', ['lunar', 'fleet'])
+def test_results_of_a_paper_and_of_a_fleet_are_results_too(tmp_path, name):
+    (tmp_path / f'{name}.json').write_text(json.dumps({'schema': f'armid/{name}/1'}))
+    with pytest.raises(OutputError, match=f'holds armid/{name}/1'):
+        with result_folder(tmp_path, SCHEMA):
+            pass
+
+
 def test_what_fails_before_it_writes_leaves_no_folder(tmp_path):
     with pytest.raises(RuntimeError):
         with result_folder(tmp_path / 'a' / 'b', SCHEMA):

@@ -178,6 +178,8 @@ def test_the_undamaged_stream_gives_the_truth(velocity):
 @example(damage={0: ('number', 'position', 0, 16.0)}, velocity=False)
 @example(damage=dict.fromkeys(range(150, 154), ('lost',)), velocity=False)
 @example(damage={149: ('lost',), 150: ('number', 'effort', 1, 4.0)}, velocity=False)
+@example(damage={127: ('scale', 'position', 1, 1.03125)}, velocity=False)
+@example(damage={392: ('stamp', 1004, 0)}, velocity=True)
 @example(damage={150: ('names', ['shoulder']), 151: ('length', 'effort', 0)}, velocity=True)
 def test_damaged_messages_change_nothing(damage, velocity):
     online = learned(damage, velocity)

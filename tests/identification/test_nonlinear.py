@@ -31,8 +31,6 @@ NONLINEAR = (
 _ORDER = np.random.default_rng(0).permutation(list(CATALOGUE)).tolist()
 #: Every effect with two others.
 PAIRS = list(pairwise([*_ORDER, _ORDER[0]]))
-#: Of which some pulses of the torque are taken for damage and interpolated across.
-LATE_PULSES = 'time_delay', 'backlash'
 
 
 @pytest.fixture(scope='module')
@@ -100,14 +98,9 @@ def test_the_training_data_given_again_have_the_training_error_and_the_truth_com
     assert (result.passes > 1) == (name in NONLINEAR)
 
 
-@pytest.mark.parametrize('pair', [p for p in PAIRS if p != LATE_PULSES], ids='+'.join)
+@pytest.mark.parametrize('pair', PAIRS, ids='+'.join)
 def test_pairs_too(robot, pair):
     agrees(robot, pair, seed=1)
-
-
-@pytest.mark.xfail(strict=True, reason='delayed pulses of backlash are taken for damage')
-def test_a_delay_and_backlash_too(robot):
-    agrees(robot, LATE_PULSES, seed=1)
 
 
 @pytest.mark.parametrize('name', ['load_dependent_friction', 'torque_gain'])

@@ -52,6 +52,19 @@ def test_damage_costs_the_damaged_samples_alone(signal, size, length):
     assert gate.spikes == {signal: length}
 
 
+@pytest.mark.parametrize('where', [630, 880, DAMAGED])
+@pytest.mark.parametrize('sign', [-1.0, 1.0])
+def test_a_glitch_of_a_smooth_signal_does_not_hide_in_its_acceleration(where, sign):
+    """Its line may be missed by twice what acceleration does, whichever way it turns."""
+    t, x = stream(np.random.default_rng(18))
+    x[:, 0] = np.sin(9.0 * t)
+    x[where, 0] += sign * 2.5 * (9.0 / RATE) ** 2
+    gate, good = passed(t, x)
+    assert t[where] not in good
+    assert len(good) >= COUNT - 2  # so near its line, the next one may seem to go on from it
+    assert set(gate.spikes) == {0}
+
+
 @pytest.mark.parametrize('where', [0, 1, 2, 7, FIRST - 1, FIRST, FIRST + 1])
 def test_damage_among_the_first_samples_is_no_measure_of_noise(where):
     t, x = stream(np.random.default_rng(2))
@@ -173,6 +186,17 @@ def test_a_stamp_from_elsewhere_costs_one_sample_and_a_new_clock_none():
     gate, good = passed(stamps, x)
     np.testing.assert_array_equal(good, np.delete(stamps, [500, 700]))
     assert gate.rejected == {'stamp': 2}
+
+
+@pytest.mark.parametrize('ahead', [2, 5, 9])
+@pytest.mark.parametrize('where', [DAMAGED, COUNT - 3])
+def test_a_stamp_a_little_ahead_costs_its_own_sample_and_none_after_it(ahead, where):
+    t, x = stream(np.random.default_rng(19))
+    stamps = t.copy()
+    stamps[where] = t[where] + (ahead + 0.5) / RATE
+    gate, good = passed(stamps, x)
+    np.testing.assert_array_equal(good, np.delete(t, where))
+    assert gate.rejected == {'stamp': 1}
 
 
 def test_what_follows_nothing_is_left_out():

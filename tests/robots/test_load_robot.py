@@ -311,10 +311,11 @@ class TestRigidParameters:
             sum_of_each += torque
         np.testing.assert_allclose(sum_of_each, inverse_dynamics(arm, *state), rtol=1e-10)
 
-    def test_a_moment_without_a_mass_is_refused(self) -> None:
+    @pytest.mark.parametrize('mass', [0.0, 1e-157, -1e-40])
+    def test_a_moment_without_a_mass_is_refused(self, mass: float) -> None:
         arm = robot_from_urdf(TWO_LINKS)
         without_mass = np.array(arm.rigid_parameters)
-        without_mass[10] = 0.0
+        without_mass[10] = mass
         with pytest.raises(RobotError, match="link 'lower'"):
             arm.with_inertias(without_mass)
 
