@@ -16,7 +16,8 @@ from typing import Any
 from urllib.parse import quote
 
 from armid_ros.fleet.bags import BagFile, folder_of
-from armid_ros.fleet.changes import Change, Series
+from armid_ros.fleet.changes import Change
+from armid_ros.fleet.scatter import Series
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import change_rows, day_text, RESIDUAL, Watch, WatchedArm, wear_rows
 from armid_ros.report.notation import counted, digits, with_interval
