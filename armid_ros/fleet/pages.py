@@ -56,6 +56,15 @@ def write_pages(store: Store, found: Watch) -> None:
     store.write('index.html', overview(found, diagnoses))
 
 
+def write_arm_page(store: Store, found: Watch, arm: WatchedArm) -> None:
+    """Write the page of one arm anew, as when a bag of it has got a report."""
+    reports = set(store.names(f'reports/{folder_of(arm.arm)}/*/report.html'))
+    table = store.read_table('watch/diagnoses.parquet')
+    rows = [] if table is None else table.to_pylist()
+    diagnosis = next((row for row in rows if row['arm'] == arm.arm), None)
+    store.write(f'pages/{_file(arm.arm)}', arm_page(found, arm, reports, diagnosis))
+
+
 def overview(found: Watch, diagnoses: Mapping[str, Mapping[str, Any]]) -> str:
     """Return the page with all arms, and what the diagnosis says of some."""
     columns = _columns(found)
@@ -252,7 +261,11 @@ def _bags(arm: WatchedArm, reports: set[str]) -> Bags:
         ]
         rows.append(Row(cells, name))
     heads = ('Start (UTC)', 'Bag', 'Length', 'Error', 'Largest residual [N m]', 'Notes')
-    hint = 'A bag with a link has a report of its own, by `armid fleet diagnose`.'
+    hint = (
+        'A bag with a link has a report of its own. That of any other is made by '
+        f'`armid fleet report --out RESULTS --arm {arm.arm} --bag NAME`; without --bag, those '
+        'beside its change and the latest.'
+    )
     return Bags(heads, rows, (2, 3, 4), hint)
 
 
