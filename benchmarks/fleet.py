@@ -207,7 +207,9 @@ def run_cost(bags, workers):
 
     with tempfile.TemporaryDirectory() as out, connected(None, workers) as client:
         settings = FleetSettings(EFFECTS)
-        identify_fleet(client, bags[:4], plan_fleet(bags, str(ROBOT), f'{out}/warm', settings))
+        one_each = list({bag.arm: bag for bag in bags}.values())[: 4 * workers]
+        warm = plan_fleet(bags, str(ROBOT), f'{out}/warm', settings)
+        identify_fleet(client, one_each, warm)  # so that every worker has imported what it needs
         jobs = plan_fleet(bags, str(ROBOT), f'{out}/run', settings)
         before = client.run(_used)
         start, own = time.perf_counter(), time.process_time()

@@ -303,3 +303,37 @@ def diagnose(
     for row in rows:
         say(f'{row["arm"]}: {row["verdict"].replace("_", " ")}: {row["summary"]}')
     say(f'{out}: index.html, pages/, reports/, watch/diagnoses.parquet')
+
+
+@fleet.command(epilog='Example: armid fleet report --out results --arm arm_7 --bag 2026-01-31')
+@_out
+@click.option('--arm', required=True, help='Which arm.')
+@click.option(
+    '--bag',
+    'bags',
+    multiple=True,
+    metavar='NAME',
+    help='As on the page of the arm, or a URL; those beside its change and the latest, if none.',
+)
+@options.as_json
+def report(out: str, arm: str, bags: tuple[str, ...], as_json: bool) -> None:
+    """Make the reports of bags of an arm, and link them on its page."""
+    from armid_ros.fleet.bag_reports import asked_bags, write_reports
+    from armid_ros.fleet.pages import write_arm_page
+    from armid_ros.fleet.store import Store
+    from armid_ros.fleet.watch import watch as look
+
+    store = Store(out)
+    with progress('reading results') as tick:
+        found = look(store)
+        urls = asked_bags(found, arm, bags)
+        watched = next(one for one in found.arms if one.arm == arm)
+        written = write_reports(
+            store, watched, urls, lambda ended, of: tick(ended / of, f'{ended} of {of} bags')
+        )
+        write_arm_page(store, found, watched)
+    if as_json:
+        click.echo(json_text({'schema': 'armid/fleet-reports/1', 'reports': written}, indent=1))
+        return
+    for name in written:
+        say(f'{out}/{name}')

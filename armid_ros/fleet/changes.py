@@ -3,12 +3,10 @@
 """
 Steps and trends in series of estimates, and how many arms of a fleet may be named for them.
 
-A value of a series is theta + e with the variance s^2 + t^2: s is the deviation that its bag
-states, t how much bags differ beyond that, by temperature, motion or what the model lacks. t is
-one number a parameter for all arms of a kind, from the median of squared differences of
-neighbours, which a step or a slow trend does not change. A bag further from the median of its
-neighbours than noise is an odd bag, not a change, and moved to the edge of the noise (the
-identifier of Hampel 1974); what lasts has neighbours that agree with it.
+What all siblings do on a day is no change of an arm, and is subtracted; how much else differs from
+bag to bag is learned from all arms (`scatter`). A bag further from the median of its neighbours
+than noise is an odd bag, not a change, and moved to the edge of the noise (the identifier of
+Hampel 1974); what lasts has neighbours that agree with it.
 
 Of every series the largest step and the trend are tested, of every arm all its series, with
 Bonferroni's factor for as many as were tried. Over arms the false discovery rate is controlled
@@ -23,74 +21,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from armid_ros.motion import FloatArray
+from armid_ros.fleet.scatter import (
+    FEWEST,
+    line_through,
+    Series,
+    splits,
+    Spread,
+    spreads,
+)
 import numpy as np
-from scipy import optimize, stats
+from scipy import stats
 
 Kind = Literal['step', 'trend']
 
 #: Days of a month.
 MONTH = 365.25 / 12.0
-#: Bags below which a series is not tested.
-FEWEST = 4
-#: Median of a squared standard normal variable.
-_MEDIAN = float(stats.chi2.ppf(0.5, 1))
-#: Bags that one is compared with, itself among them, and how many deviations make it an odd one.
-_WINDOW, _ODD = 5, 3.0
 #: No probability is less: that of larger scores is no number any more.
 _SMALLEST = 1e-300
-#: Degrees of freedom of a variance from the median of n squares, over n.
-_EFFICIENCY = 0.37
-
-
-@dataclass(frozen=True, eq=False)
-class Series:
-    """
-    A parameter of an arm over time.
-
-    Attributes
-    ----------
-    arm : str
-        Whose.
-    name, joint, unit : str
-        What.
-    days : ndarray, shape (K,)
-        When, in days of the epoch, increasing.
-    values, std : ndarray, shape (K,)
-        Estimates and stated deviations.
-
-    """
-
-    arm: str
-    name: str
-    joint: str
-    unit: str
-    days: FloatArray
-    values: FloatArray
-    std: FloatArray
-
-    @property
-    def parameter(self) -> tuple[str, str]:
-        """Name and joint."""
-        return self.name, self.joint
-
-
-@dataclass(frozen=True)
-class Spread:
-    """
-    How much estimates of a parameter differ from bag to bag beyond what they state.
-
-    Attributes
-    ----------
-    std : float
-        Its standard deviation.
-    freedom : float
-        Degrees of freedom of that.
-
-    """
-
-    std: float
-    freedom: float
 
 
 @dataclass(frozen=True)
@@ -148,14 +95,6 @@ class Judged:
     adjusted: float
 
 
-def spreads(series: Sequence[Series]) -> dict[tuple[str, str], Spread]:
-    """Return by how much estimates of each parameter differ beyond what they state."""
-    groups: dict[tuple[str, str], list[Series]] = {}
-    for one in series:
-        groups.setdefault(one.parameter, []).append(one)
-    return {parameter: _spread(group) for parameter, group in groups.items()}
-
-
 def judge(
     series: Sequence[Series], spread: Mapping[tuple[str, str], Spread] | None = None
 ) -> list[Judged]:
@@ -165,7 +104,7 @@ def judge(
     Parameters
     ----------
     series : sequence of Series
-        All parameters of all arms.
+        All parameters of all arms, without what siblings share on a day.
     spread : mapping, optional
         As of ``spreads``, which is the default.
 
@@ -201,31 +140,22 @@ def named(judged: Judged, alpha: float) -> tuple[Change, ...]:
 
 def largest_change(series: Series, spread: Spread) -> Change:
     """Return the largest step of a series, or its trend if that explains it as well."""
-    variance = np.maximum(series.std**2 + spread.std**2, 1e-300)
-    weights = 1.0 / variance
-    x, count = _bounded(series.values, np.sqrt(variance)), len(series.values)
-    before, after = np.cumsum(weights)[:-1], np.cumsum(weights[::-1])[::-1][1:]
-    low = np.cumsum(weights * x)[:-1] / before
-    high = np.cumsum((weights * x)[::-1])[::-1][1:] / after
-    std = np.sqrt(1.0 / before + 1.0 / after)
-    score = np.abs(high - low) / std
-    at = int(np.argmax(score))
-    slope, slope_std, start = _line(series.days, x, weights)
-    trend = abs(slope) / slope_std if slope_std < np.inf else 0.0
+    cut, count = splits(series, spread), len(series.values)
+    scores, trend = cut.scores / spread.steps, cut.trend / spread.trends
+    at = int(np.argmax(scores))
     # a step has a place that was searched for, a trend has none
-    if trend**2 + np.log(count) >= score[at] ** 2:
-        p = _p(trend, spread.freedom, count)
-        return Change(series, 'trend', 0, slope * MONTH, slope_std * MONTH, start, p)
-    p = _p(float(score[at]), spread.freedom, count)
-    return Change(
-        series, 'step', at + 1, float(high[at] - low[at]), float(std[at]), float(low[at]), p
-    )
+    if trend**2 + np.log(count) >= scores[at] ** 2:
+        p = _p(trend, cut.freedom, count)
+        std = cut.slope_std * spread.trends * MONTH
+        return Change(series, 'trend', 0, cut.slope * MONTH, std, cut.start, p)
+    p = _p(float(scores[at]), cut.freedom, count)
+    size, std = float(cut.high[at] - cut.low[at]), float(cut.std[at]) * spread.steps
+    return Change(series, 'step', at + 1, size, std, float(cut.low[at]), p)
 
 
 def wear(series: Series, spread: Spread) -> tuple[float, float]:
     """Return the slope of a series and its standard deviation, in a month."""
-    weights = 1.0 / np.maximum(series.std**2 + spread.std**2, 1e-300)
-    slope, std, _ = _line(series.days, series.values, weights)
+    slope, std = line_through(series, spread)
     return slope * MONTH, std * MONTH
 
 
@@ -247,44 +177,6 @@ def unlike_siblings(series: Sequence[Series]) -> dict[tuple[str, str, str], floa
         for one, level in zip(group, levels, strict=True):
             found[one.arm, *parameter] = float((level - middle) / size) if size > 0.0 else 0.0
     return found
-
-
-def _spread(group: Sequence[Series]) -> Spread:
-    """Solve median(d^2 / (s_k^2 + s_k+1^2 + 2 t^2)) = median of chi^2 for t."""
-    squares = np.concatenate([np.diff(one.values) ** 2 for one in group])
-    stated = np.concatenate([one.std[1:] ** 2 + one.std[:-1] ** 2 for one in group])
-    freedom = max(1.0, _EFFICIENCY * len(squares))
-    if not len(squares):
-        return Spread(0.0, freedom)
-
-    def excess(extra: float) -> float:
-        return float(np.median(squares / np.maximum(stated + 2.0 * extra, 1e-300))) - _MEDIAN
-
-    most = float(np.max(squares)) + 1e-300
-    if excess(0.0) <= 0.0 or excess(most) >= 0.0:
-        return Spread(0.0, freedom)
-    extra = optimize.brentq(excess, 0.0, most, xtol=1e-9 * most, rtol=1e-6)
-    return Spread(float(np.sqrt(extra)), freedom)
-
-
-def _bounded(x: FloatArray, std: FloatArray) -> FloatArray:
-    """Return a series with odd values moved to the edge of the noise about their neighbours."""
-    windows = np.lib.stride_tricks.sliding_window_view(x, min(_WINDOW, len(x)))
-    nearest = np.clip(np.arange(len(x)) - _WINDOW // 2, 0, len(windows) - 1)
-    middle = np.median(windows, axis=1)[nearest]
-    return np.asarray(np.clip(x, middle - _ODD * std, middle + _ODD * std))
-
-
-def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Return slope, its standard deviation, and the value at the beginning."""
-    total = weights.sum()
-    middle, mean = weights @ days / total, weights @ x / total
-    away = days - middle
-    inertia = float(weights @ away**2)
-    if not inertia > 0.0:
-        return 0.0, np.inf, float(mean)
-    slope = float(weights @ (away * (x - mean))) / inertia
-    return slope, 1.0 / np.sqrt(inertia), float(mean + slope * (days[0] - middle))
 
 
 def _p(score: float, freedom: float, tried: int) -> float:

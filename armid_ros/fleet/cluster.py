@@ -28,6 +28,12 @@ _QUIET = {
     'distributed.worker.profile.enabled': False,
     'distributed.admin.tick.interval': '1s',
     'distributed.admin.system-monitor.interval': '2s',
+    'distributed.worker.memory.monitor-interval': '500ms',
+    'distributed.scheduler.active-memory-manager.start': False,
+    # without MALLOC_TRIM_THRESHOLD_, for which every array is fetched from the kernel anew
+    'distributed.nanny.pre-spawn-environ': dict.fromkeys(
+        ('OMP_NUM_THREADS', 'MKL_NUM_THREADS', 'OPENBLAS_NUM_THREADS'), '1'
+    ),
 }
 
 

@@ -17,15 +17,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
-import tempfile
 from typing import Any
 
 from armid_ros.api.diagnosis import diagnose
 from armid_ros.api.identification import identify
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError, FleetError
-from armid_ros.fleet.bags import BagFile, folder_of
+from armid_ros.fleet.bag_reports import keep, write_report
+from armid_ros.fleet.bags import folder_of
 from armid_ros.fleet.identify import kind_arm
 from armid_ros.fleet.job import Filters
 from armid_ros.fleet.kinds import document
@@ -158,11 +157,7 @@ def one_arm(
             for url, recording in zip(
                 (*case.before[-1:], *case.after[:1]), (*before[-1:], *after[:1]), strict=True
             ):
-                one = identify(
-                    model, recording, cutoff=filters.cutoff_hz, decimation=filters.decimation
-                )
-                name = BagFile(case.arm, url).name
-                _keep(store, one.save, f'reports/{folder_of(case.arm)}/{name}')
+                write_report(store, case.arm, url, recording, model, filters)
             past = identify(model, before, cutoff=filters.cutoff_hz, decimation=filters.decimation)
             held_out = after[2:] if len(after) > 2 else []
             result = diagnose(
@@ -174,7 +169,7 @@ def one_arm(
                 decimation=filters.decimation,
             )
             report = f'reports/{folder_of(case.arm)}/diagnosis'
-            _keep(store, result.save, report)
+            keep(store, result.save, report)
     except ArmidError as error:
         return _row(case, 'failed', str(error))
     gap = result.core.gap
@@ -204,15 +199,6 @@ def _case(arm: WatchedArm) -> Case:
 def _read(stack: ExitStack, url: str, model: ArmModel, topic: str | None) -> Recording:
     path = stack.enter_context(fetched(url))
     return read_recording(path, joints=model.robot.joints, topic=topic)
-
-
-def _keep(store: Store, save: Callable[[str], Path], name: str) -> None:
-    """Put the files that a result saves among the results, report.html last."""
-    with tempfile.TemporaryDirectory(prefix='armid-report-') as folder:
-        save(folder)
-        files = sorted(Path(folder).iterdir(), key=lambda file: file.name == 'report.html')
-        for file in files:
-            store.write(f'{name}/{file.name}', file.read_bytes())
 
 
 def _row(

@@ -90,6 +90,24 @@ class ArmFit:
 
 
 @dataclass(frozen=True, eq=False)
+class Root:
+    """
+    All bags of an arm, merged and fitted.
+
+    Attributes
+    ----------
+    branch : Branch
+        All of them.
+    fit : ArmFit or None
+        Their values; None if all were refused.
+
+    """
+
+    branch: Branch
+    fit: ArmFit | None
+
+
+@dataclass(frozen=True, eq=False)
 class ArmEstimate:
     """
     What the bags of an arm tell together.
@@ -139,15 +157,16 @@ def merged(branches: Sequence[Branch]) -> Branch:
     )
 
 
-def fitted(branch: Branch, job: Job) -> ArmFit | None:
-    """Fit the bags of an arm; None if there are none."""
+def rooted(branches: Sequence[Branch], job: Job) -> Root:
+    """Merge what is left of a tree, and fit the bags of the arm."""
+    branch = merged(branches)
     if branch.triangle is None:
-        return None
+        return Root(branch, None)
     base, kept = told_apart(job.theory, branch.triangle)
     fit = fit_triangle(
         branch.triangle.restrict(kept), weighted=job.weighted, bounds=bounds(job.arm, base)
     )
-    return ArmFit(base, tuple(kept), fit)
+    return Root(branch, ArmFit(base, tuple(kept), fit))
 
 
 def noise_products_of(prepared: Prepared, fit: ArmFit | None, job: Job) -> Packed | None:
@@ -163,10 +182,9 @@ def summed(products: Sequence[Packed | None]) -> Packed | None:
     return Packed(np.sum(there, axis=0)) if there else None
 
 
-def estimated(
-    branch: Branch, fit: ArmFit | None, products: Packed | None, job: Job
-) -> ArmEstimate | None:
+def estimated(root: Root, products: Packed | None, job: Job) -> ArmEstimate | None:
     """Return the estimate of an arm; None if it has no bags."""
+    branch, fit = root.branch, root.fit
     if fit is None or products is None or branch.triangle is None or branch.motion is None:
         return None
     triangle = branch.triangle.restrict(fit.kept)

@@ -16,7 +16,8 @@ from typing import Any
 from urllib.parse import quote
 
 from armid_ros.fleet.bags import BagFile, folder_of
-from armid_ros.fleet.changes import Change, Series
+from armid_ros.fleet.changes import Change
+from armid_ros.fleet.scatter import Series
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import change_rows, day_text, RESIDUAL, Watch, WatchedArm, wear_rows
 from armid_ros.report.notation import counted, digits, with_interval
@@ -53,6 +54,15 @@ def write_pages(store: Store, found: Watch) -> None:
         page = arm_page(found, arm, reports, diagnoses.get(arm.arm))
         store.write(f'pages/{_file(arm.arm)}', page)
     store.write('index.html', overview(found, diagnoses))
+
+
+def write_arm_page(store: Store, found: Watch, arm: WatchedArm) -> None:
+    """Write the page of one arm anew, as when a bag of it has got a report."""
+    reports = set(store.names(f'reports/{folder_of(arm.arm)}/*/report.html'))
+    table = store.read_table('watch/diagnoses.parquet')
+    rows = [] if table is None else table.to_pylist()
+    diagnosis = next((row for row in rows if row['arm'] == arm.arm), None)
+    store.write(f'pages/{_file(arm.arm)}', arm_page(found, arm, reports, diagnosis))
 
 
 def overview(found: Watch, diagnoses: Mapping[str, Mapping[str, Any]]) -> str:
@@ -251,7 +261,11 @@ def _bags(arm: WatchedArm, reports: set[str]) -> Bags:
         ]
         rows.append(Row(cells, name))
     heads = ('Start (UTC)', 'Bag', 'Length', 'Error', 'Largest residual [N m]', 'Notes')
-    hint = 'A bag with a link has a report of its own, by `armid fleet diagnose`.'
+    hint = (
+        'A bag with a link has a report of its own. That of any other is made by '
+        f'`armid fleet report --out RESULTS --arm {arm.arm} --bag NAME`; without --bag, those '
+        'beside its change and the latest.'
+    )
     return Bags(heads, rows, (2, 3, 4), hint)
 
 

@@ -15,14 +15,14 @@ from armid_ros.errors import ArmidError, FleetError
 from armid_ros.fleet.bags import BagFile
 from armid_ros.fleet.job import Job
 from armid_ros.fleet.merge import (
-    ArmFit,
     Branch,
     estimated,
     FAN_IN,
-    fitted,
     merged,
     noise_products_of,
     Packed,
+    Root,
+    rooted,
     summed,
 )
 from armid_ros.fleet.results import (
@@ -38,8 +38,11 @@ from distributed import as_completed, Client, Future, KilledWorker
 
 #: Times that Dask repeats a task whose store failed.
 RETRIES = 3
-#: Bags under way: so many, and so many more for every thread of the cluster.
-_UNDER_WAY, _MORE = 32, 8
+#: Bags of an arm are read together until they are so large [bytes], or so many: about a second of
+#: work, of which what Dask does for a task is a small part.
+TASK_BYTES, TASK_BAGS = 16_000_000, 16
+#: Groups of bags under way: so many, and so many more for every thread of the cluster.
+_UNDER_WAY, _MORE = 2, 3
 #: Times that a scheduler may be lost.
 _LOST = 5
 #: How often is looked whether it is back [s].
@@ -92,12 +95,12 @@ class Tally:
         self._bags, self._tell = bags, tell
         self._ended: set[str] = set()
 
-    def watch(self, bag: BagFile, future: Future) -> None:
-        """Count a bag when its task ends; one that is lost will come again."""
+    def watch(self, bags: Sequence[BagFile], future: Future) -> None:
+        """Count bags when their task ends; those that are lost or shared out will come again."""
 
         def ended(future: Future) -> None:
-            if future.status in ('finished', 'error'):
-                self.add([bag])
+            if future.status == 'finished' or (future.status == 'error' and len(bags) == 1):
+                self.add(bags)
 
         future.add_done_callback(ended)
 
@@ -107,31 +110,33 @@ class Tally:
         self._tell(len(self._ended), self._bags)
 
 
-@dataclass
-class _UnderWay:
-    """The tasks of an arm."""
+#: Bags of an arm that are read by one task.
+Group = tuple[BagFile, ...]
+
+
+@dataclass(frozen=True)
+class _Waiting:
+    """An arm that is to be done: its bags, and those of which it is known that they fail."""
 
     arm: str
-    bags: list[BagFile]
-    refused: tuple[Refused, ...]
-    prepared: dict[BagFile, Future]
-    fit: Future
-    noise: dict[BagFile, Future]
+    groups: tuple[Group, ...]
+    refused: tuple[Refused, ...] = ()
+
+
+@dataclass
+class _UnderWay:
+    """The tasks of an arm, in the order of its groups."""
+
+    arm: _Waiting
+    prepared: list[Future]
+    root: Future
+    noise: list[Future]
     last: Future
 
 
-def take(bag: BagFile, job: Job, bags_of_arm: int) -> Prepared:
-    """Task: find a bag among the results, or read it and write it there."""
-    store = Store(job.out)
-    known = find_summary(store, bag, job)
-    if known is not None:
-        return Prepared(known)
-    prepared = prepare(bag, job, bags_of_arm)
-    if isinstance(prepared.summary, Refused):
-        write_refused(store, prepared.summary, job)
-    else:
-        write_summary(store, prepared.summary, job)
-    return prepared
+def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[Prepared, ...]:
+    """Task: find bags among the results, or read them and write them there."""
+    return tuple(_taken(bag, job, bags_of_arm) for bag in bags)
 
 
 def same(job: Job) -> Job:
@@ -139,20 +144,44 @@ def same(job: Job) -> Job:
     return job
 
 
-def branch(prepared: Prepared) -> Branch:
-    """Task: leave the rows where they are."""
-    return Branch.of(prepared.summary)
+def branch(prepared: Sequence[Prepared]) -> Branch:
+    """Task: merge the bags of a group, and leave their rows where they are."""
+    return merged([Branch.of(one.summary) for one in prepared])
 
 
-def finish(
-    arm: str, whole: Branch, fit: ArmFit | None, products: Packed | None, job: Job
-) -> ArmOutcome:
+def noise(prepared: Sequence[Prepared], root: Root, job: Job) -> Packed | None:
+    """Task: what the residuals of a group at its arm's values say of the deviations."""
+    return summed([noise_products_of(one, root.fit, job) for one in prepared])
+
+
+def finish(arm: str, root: Root, products: Sequence[Packed | None], job: Job) -> ArmOutcome:
     """Task: write the estimate of an arm."""
-    estimate = estimated(whole, fit, products, job)
+    whole = root.branch
+    estimate = estimated(root, summed(products), job)
     if estimate is not None:
         write_arm(Store(job.out), arm, estimate, job)
     problem = '' if estimate is not None else 'no bag of it can be used'
     return ArmOutcome(arm, len(whole.versions), whole.found, whole.refused, problem)
+
+
+def grouped(bags: Sequence[BagFile]) -> tuple[Group, ...]:
+    """
+    Share the bags of an arm out to tasks, in order.
+
+    By their sizes alone, so that the tree of merges, and with it the last digit, is the same on
+    every cluster. A bag of unknown size is alone.
+
+    """
+    groups: list[list[BagFile]] = []
+    total = 0
+    for bag in bags:
+        size = bag.size or TASK_BYTES
+        if not groups or total + size > TASK_BYTES or len(groups[-1]) == TASK_BAGS:
+            groups.append([])
+            total = 0
+        groups[-1].append(bag)
+        total += size
+    return tuple(tuple(group) for group in groups)
 
 
 def run_fleet(
@@ -183,13 +212,13 @@ def run_fleet(
     """
     tally = Tally(len(bags), tell)
     outcomes: list[ArmOutcome] = []
-    waiting: deque[tuple[str, list[BagFile], tuple[Refused, ...]]] = deque()
+    waiting: deque[_Waiting] = deque()
     for arm, group in itertools.groupby(sorted(bags), key=lambda bag: bag.arm):
         own = list(group)
         job = job_of[arm]
         refused = arm_is_done(Store(job.out), arm, own, job) if job.resume else None
         if refused is None:
-            waiting.append((arm, own, ()))
+            waiting.append(_Waiting(arm, grouped(own)))
         else:
             done = len(own) - len(refused)
             outcomes.append(ArmOutcome(arm, done, done, tuple(refused)))
@@ -198,10 +227,7 @@ def run_fleet(
 
 
 def _worked_off(
-    client: Client,
-    waiting: deque[tuple[str, list[BagFile], tuple[Refused, ...]]],
-    job_of: Mapping[str, Job],
-    tally: Tally,
+    client: Client, waiting: deque[_Waiting], job_of: Mapping[str, Job], tally: Tally
 ) -> list[ArmOutcome]:
     """Work on all arms; begin again with those under way where the scheduler was lost."""
     outcomes: list[ArmOutcome] = []
@@ -209,7 +235,7 @@ def _worked_off(
         under_way: dict[Any, _UnderWay] = {}
         if _ended(client, waiting, under_way, job_of, tally, outcomes):
             return outcomes
-        waiting.extendleft((one.arm, one.bags, one.refused) for one in under_way.values())
+        waiting.extendleft(one.arm for one in under_way.values())
         while client.status == 'connecting':
             time.sleep(_LOOK_EVERY)
         if client.status != 'running':
@@ -222,7 +248,7 @@ def _worked_off(
 
 def _ended(
     client: Client,
-    waiting: deque[tuple[str, list[BagFile], tuple[Refused, ...]]],
+    waiting: deque[_Waiting],
     under_way: dict[Any, _UnderWay],
     job_of: Mapping[str, Job],
     tally: Tally,
@@ -233,79 +259,98 @@ def _ended(
     jobs: dict[str, Future] = {}
     ended = as_completed(raise_errors=False)
     while waiting or under_way:
-        while waiting and sum(len(one.bags) for one in under_way.values()) < limit:
-            arm, bags, refused = waiting.popleft()
-            job = job_of[arm]
+        while waiting and sum(len(one.prepared) for one in under_way.values()) < limit:
+            arm = waiting.popleft()
+            job = job_of[arm.arm]
             if job.digest not in jobs:
                 jobs[job.digest] = client.submit(same, job, pure=False)
-            tasks = _submitted(client, arm, bags, refused, jobs[job.digest], tally)
+            tasks = _submitted(client, arm, jobs[job.digest], tally)
             under_way[tasks.last.key] = tasks
             ended.add(tasks.last)
         future = next(ended)
         if future.status in _BROKEN:
             return False
         tasks = under_way.pop(future.key)
+        known = tasks.arm.refused
         if future.status == 'finished':
             outcome: ArmOutcome = future.result()
-            outcomes.append(replace(outcome, refused=(*tasks.refused, *outcome.refused)))
+            outcomes.append(replace(outcome, refused=(*known, *outcome.refused)))
             continue
-        failed = _failed(tasks)
+        left, failed = _without_failed(tasks)
         for one in failed:
-            write_refused(Store(job_of[tasks.arm].out), one, job_of[tasks.arm])
-        refused, out = (*tasks.refused, *failed), {one.bag for one in failed}
-        rest = [bag for bag in tasks.bags if bag not in out]
-        if failed and rest:
-            waiting.appendleft((tasks.arm, rest, refused))
+            write_refused(Store(job_of[tasks.arm.arm].out), one, job_of[tasks.arm.arm])
+        if left.groups and left != tasks.arm:
+            waiting.appendleft(left)
         else:
             problem = 'no bag of it can be used' if failed else _said(future.exception())
-            outcomes.append(ArmOutcome(tasks.arm, refused=refused, problem=problem))
+            outcomes.append(ArmOutcome(left.arm, refused=left.refused, problem=problem))
     return True
 
 
-def _submitted(
-    client: Client,
-    arm: str,
-    bags: list[BagFile],
-    refused: tuple[Refused, ...],
-    job: Future,
-    tally: Tally,
-) -> _UnderWay:
-    """Submit the tasks of an arm: bags, their tree, the fit, its noise, the end."""
+def _submitted(client: Client, arm: _Waiting, job: Future, tally: Tally) -> _UnderWay:
+    """Submit the tasks of an arm: groups of bags, their tree and its fit, their noise, the end."""
 
     def submit(task: Callable[..., Any], *arguments: Any, **options: Any) -> Future:
         return client.submit(task, *arguments, pure=False, **options)
 
-    prepared = {bag: submit(take, bag, job, len(bags), retries=RETRIES) for bag in bags}
-    for bag, future in prepared.items():
-        tally.watch(bag, future)
-    whole = _tree(submit, merged, [submit(branch, one) for one in prepared.values()])
-    fit = submit(fitted, whole, job)
-    noise = {
-        bag: submit(noise_products_of, one, fit, job, retries=RETRIES)
-        for bag, one in prepared.items()
-    }
-    products = _tree(submit, summed, list(noise.values()))
-    last = submit(finish, arm, whole, fit, products, job, retries=RETRIES)
-    return _UnderWay(arm, bags, refused, prepared, fit, noise, last)
+    count = sum(len(group) for group in arm.groups)
+    prepared = [submit(take, group, job, count, retries=RETRIES) for group in arm.groups]
+    for group, future in zip(arm.groups, prepared, strict=True):
+        tally.watch(group, future)
+    root = submit(rooted, _tree(submit, merged, [submit(branch, one) for one in prepared]), job)
+    products = [submit(noise, one, root, job, retries=RETRIES) for one in prepared]
+    last = submit(finish, arm.arm, root, _tree(submit, summed, products), job, retries=RETRIES)
+    return _UnderWay(arm, prepared, root, products, last)
 
 
-def _tree(submit: Callable[..., Future], join: Callable[..., Any], leaves: list[Future]) -> Future:
-    """Join results, a few at a time."""
+def _tree(
+    submit: Callable[..., Future], join: Callable[..., Any], leaves: list[Future]
+) -> list[Future]:
+    """Join results, a few at a time, until few are left."""
     level = leaves
-    while True:
+    while len(level) > FAN_IN:
         starts = range(0, len(level), FAN_IN)
         level = [submit(join, level[start : start + FAN_IN]) for start in starts]
-        if len(level) == 1:
-            return level[0]
+    return level
 
 
-def _failed(tasks: _UnderWay) -> list[Refused]:
-    """Return the bags whose own tasks have failed; what waits for them fails with them."""
-    for futures in (tasks.prepared, tasks.noise if tasks.fit.status == 'finished' else {}):
-        failed = [(bag, future) for bag, future in futures.items() if future.status == 'error']
-        if failed:
-            return [Refused(bag, _said(future.exception()), failed=True) for bag, future in failed]
-    return []
+def _without_failed(tasks: _UnderWay) -> tuple[_Waiting, list[Refused]]:
+    """
+    Return what is left of an arm whose tasks have failed, and the bags that are given up.
+
+    A group that has failed is shared out, bag by bag, to find the one to blame. What waits for a
+    task fails with it, so noise is asked of only where all bags were read.
+
+    """
+    arm = tasks.arm
+    for futures in (tasks.prepared, tasks.noise if tasks.root.status == 'finished' else []):
+        if any(future.status == 'error' for future in futures):
+            break
+    else:
+        return arm, []
+    groups: list[Group] = []
+    failed: list[Refused] = []
+    for group, future in zip(arm.groups, futures, strict=True):
+        if future.status != 'error':
+            groups.append(group)
+        elif len(group) > 1:
+            groups.extend((bag,) for bag in group)
+        else:
+            failed.append(Refused(group[0], _said(future.exception()), failed=True))
+    return _Waiting(arm.arm, tuple(groups), (*arm.refused, *failed)), failed
+
+
+def _taken(bag: BagFile, job: Job, bags_of_arm: int) -> Prepared:
+    store = Store(job.out)
+    known = find_summary(store, bag, job)
+    if known is not None:
+        return Prepared(known)
+    prepared = prepare(bag, job, bags_of_arm)
+    if isinstance(prepared.summary, Refused):
+        write_refused(store, prepared.summary, job)
+    else:
+        write_summary(store, prepared.summary, job)
+    return prepared
 
 
 def _said(error: BaseException | None) -> str:

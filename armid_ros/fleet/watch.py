@@ -12,27 +12,19 @@ A fleet over time: series of its results, what has changed, and who is told.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 import datetime
+import itertools
 import json
 from typing import Any
 
 from armid_ros.errors import FleetError
-from armid_ros.fleet.changes import (
-    Change,
-    judge,
-    Judged,
-    named,
-    Series,
-    Spread,
-    spreads,
-    unlike_siblings,
-    wear,
-)
+from armid_ros.fleet.changes import Change, judge, Judged, named, unlike_siblings, wear
 from armid_ros.fleet.identify import kind_arm
 from armid_ros.fleet.kinds import document
 from armid_ros.fleet.results import table_of
+from armid_ros.fleet.scatter import Series, Spread, spreads, without_days
 from armid_ros.fleet.store import Store
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -103,6 +95,8 @@ class WatchedArm:
         That of its robot.
     series : tuple of Series
         Its parameters, and the logarithm of its residuals.
+    compared : tuple of Series
+        The same without what its siblings share on a day, which is no change of its own.
     bags : tuple of dict
         A row of the table ``bags`` each, in order of time, without triangles.
     judged : Judged
@@ -119,6 +113,7 @@ class WatchedArm:
     arm: str
     kind: str
     series: tuple[Series, ...]
+    compared: tuple[Series, ...]
     bags: tuple[dict[str, Any], ...]
     judged: Judged
     named: tuple[Change, ...]
@@ -185,17 +180,17 @@ def watch(store: Store, alpha: float = ALPHA) -> Watch:
     by_kind: dict[str, list[Series]] = {}
     for one in series:
         by_kind.setdefault(kind_of.get(one.arm, ''), []).append(one)
-    spread = {kind: spreads(group) for kind, group in by_kind.items()}
-    judged = _judged(by_kind, spread)
+    compared = {kind: without_days(group) for kind, group in by_kind.items()}
+    spread = {kind: spreads(group) for kind, group in compared.items()}
+    judged = _judged(compared, spread)
     unlike = {kind: unlike_siblings(group) for kind, group in by_kind.items()}
-    own: dict[str, list[Series]] = {}
-    for one in series:
-        own.setdefault(one.arm, []).append(one)
+    own, beside = (_by_arm(some) for some in (series, itertools.chain(*compared.values())))
     arms = [
         WatchedArm(
             one.arm,
             kind_of.get(one.arm, ''),
             tuple(own[one.arm]),
+            tuple(beside[one.arm]),
             tuple(bags.get(one.arm, ())),
             one,
             named(one, alpha),
@@ -250,7 +245,7 @@ def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
 def wear_rows(found: Watch) -> Iterator[dict[str, Any]]:
     """Yield the slope of every parameter that is none of a rigid body, of every arm."""
     for arm in found.arms:
-        for series in arm.series:
+        for series in arm.compared:
             if series.name not in found.wearing or len(series.values) < 2:
                 continue
             slope, std = wear(series, found.spread[arm.kind][series.parameter])
@@ -317,6 +312,13 @@ def _judged(
     adjusted = stats.false_discovery_control([one.p for one in judged]) if judged else []
     both = [replace(one, adjusted=float(q)) for one, q in zip(judged, adjusted, strict=True)]
     return sorted(both, key=lambda one: (one.adjusted, one.p, one.arm))
+
+
+def _by_arm(series: Iterable[Series]) -> dict[str, list[Series]]:
+    own: dict[str, list[Series]] = {}
+    for one in series:
+        own.setdefault(one.arm, []).append(one)
+    return own
 
 
 def _bags(store: Store) -> dict[str, list[dict[str, Any]]]:

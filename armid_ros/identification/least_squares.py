@@ -29,6 +29,7 @@ from armid_ros.identification.triangle import (
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
+from scipy import fft
 import scipy.linalg
 
 Method = Literal['ols', 'wls', 'irls']
@@ -193,17 +194,18 @@ def noise_products(
         for joint in range(part.tau.shape[1]):
             columns = np.concatenate([part.columns[:, joint], more[:, joint]], axis=1)
             active = np.flatnonzero(columns.any(axis=0))
-            columns = columns[:, active] * weights[start:stop, joint, np.newaxis]
-            transformed = np.fft.rfft(columns, 2 * count, axis=0)
+            weighted = columns.T[active] * weights[start:stop, joint]
+            # one row a column: real and imaginary parts side by side make real products of it
+            transformed = fft.rfft(weighted, 2 * count).view(float)
             fitted = active < rank
-            taken = transformed[:, fitted] @ inverse[active[fitted]]
+            taken = inverse[active[fitted]].T @ transformed[fitted]
             told = weights[start:stop, joint] > 0.0
-            leverage = np.sum(np.abs(taken) ** 2, axis=1) / max(np.count_nonzero(told), 1)
+            shares = np.einsum('ab,ab->b', taken, taken).reshape(-1, 2).sum(axis=1)
+            leverage = shares / max(np.count_nonzero(told), 1)
             spectrum = _noise_spectrum(residual[start:stop, joint], told, leverage)
             spectrum[1:-1] *= 2.0  # the constant and the Nyquist bin have no mirror image
-            transformed *= np.sqrt(spectrum / (2 * count))[:, np.newaxis]
-            power = transformed.real.T @ transformed.real + transformed.imag.T @ transformed.imag
-            products[np.ix_(active, active)] += power
+            transformed *= np.repeat(np.sqrt(spectrum / (2 * count)), 2)
+            products[np.ix_(active, active)] += transformed @ transformed.T
         start = stop
     return products
 

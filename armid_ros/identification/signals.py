@@ -22,7 +22,7 @@ from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.recording import Beside, Recording
 import numpy as np
 import numpy.typing as npt
-from scipy import signal
+from scipy import fft, signal
 from scipy.interpolate import CubicSpline
 
 #: Samples per second below which no motion of an arm is followed [Hz].
@@ -230,7 +230,8 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
     count = len(range(len(taps) // 2, len(values) - len(taps) // 2, factor))
     flat = values.reshape(len(values), -1)
     result = np.zeros((count, flat.shape[1]))
-    active = np.flatnonzero(flat.any(axis=0))  # a link moves no joint after its own: half are zero
+    # a link moves no joint after its own: half are zero
+    active = np.flatnonzero(flat.any(axis=0))
     flat = np.ascontiguousarray(flat[:, active])
     band = np.zeros((_BLOCK, (_BLOCK - 1) * factor + len(taps)))
     for row in range(_BLOCK):
@@ -309,17 +310,28 @@ def _motion_band(
 
     """
     band = rate / max(len(q) for q in positions)
+    spectra = [_velocity_spectrum(q, rate) for q in positions]
     for joint in range(positions[0].shape[1]):
-        spectra = []
-        for q, end in zip(positions, ends, strict=True):
-            spectrum = np.array(signal.periodogram(np.diff(q[:, joint]), fs=rate))
-            spectra.append(spectrum[:, spectrum[0] <= np.broadcast_to(end, q.shape[1])[joint]])
-        frequency, power = np.hstack(spectra)
+        kept = [
+            (frequency[inside], power[inside, joint])
+            for (frequency, power), end in zip(spectra, ends, strict=True)
+            for inside in [frequency <= np.broadcast_to(end, power.shape[1])[joint]]
+        ]
+        frequency, power = (np.concatenate(part) for part in zip(*kept, strict=True))
         order = np.argsort(frequency)
         share = np.cumsum(power[order])
         if share[-1] > 0.0:
             band = max(band, float(frequency[order[np.searchsorted(share, 0.99 * share[-1])]]))
     return band
+
+
+def _velocity_spectrum(q: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies (K,) [Hz] and the power of all velocities there, shape (K, n)."""
+    steps = np.diff(q, axis=0)
+    transformed = fft.rfft(steps - steps.mean(axis=0), axis=0)
+    power = np.abs(transformed) ** 2 / len(steps)
+    power[1 : (len(steps) + 1) // 2] *= 2.0  # the constant and the Nyquist bin are single
+    return fft.rfftfreq(len(steps), 1.0 / rate), power
 
 
 def _noise_crossing(recording: Recording) -> FloatArray:

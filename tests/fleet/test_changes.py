@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Changes of arms over time: found where there are, and rarely where there are none."""
 
-from armid_ros.fleet.changes import judge, largest_change, MONTH, named, Series, spreads, wear
+from armid_ros.fleet.changes import judge, largest_change, MONTH, named, wear
+from armid_ros.fleet.scatter import Series, spreads, without_days
 import numpy as np
 import pytest
+
+from benchmarks.healthy_arms import lasting, tally
 
 PARAMETERS = [('viscous_coefficient', f'joint_{k}') for k in range(8)]
 
@@ -121,3 +124,30 @@ def test_what_lasts_three_bags_is_a_change(lasting):
     series = fleet(np.random.default_rng(9), 50)
     series[16] = changed(series[16], np.where(np.arange(10) >= 10 - lasting, 0.5, 0.0))
     assert names(series) == {'arm_2'}
+
+
+def test_a_day_that_all_siblings_share_is_no_change_of_any():
+    series = fleet(np.random.default_rng(10), 20)
+    shared = 0.2 * np.sin(np.arange(10.0))
+    polished = without_days([changed(one, shared * one.values.mean()) for one in series])
+    for one, before in zip(polished, series, strict=True):
+        kept = one.values - one.values.mean() - (before.values - before.values.mean())
+        assert np.abs(kept).max() < 0.05
+
+
+@pytest.mark.parametrize('bags', [10, 30])
+def test_healthy_arms_whose_days_differ_as_real_ones_do_are_rarely_named(bags):
+    counts = [tally(120, bags, 20, np.random.default_rng([11, bags, k])) for k in range(2)]
+    true, false = np.sum(counts, axis=0)
+    assert false <= 0.05 * (true + false) + 2 * np.sqrt(0.05 * (true + false))
+    assert true >= (10 if bags == 10 else 34)
+
+
+def test_wear_is_as_uncertain_as_scatter_that_lasts_for_days_makes_it():
+    rng = np.random.default_rng(12)
+    series = fleet(rng, 100, bags=40, beyond=0.0)
+    walks = lasting(rng, 40, (len(series), 40))
+    series = [changed(one, 0.03 * walk) for one, walk in zip(series, walks, strict=True)]
+    spread = spreads(series)
+    slopes = np.array([wear(one, spread[one.parameter]) for one in series])
+    assert np.mean(np.abs(slopes[:, 0]) < 1.96 * slopes[:, 1]) == pytest.approx(0.95, abs=0.03)

@@ -4,11 +4,13 @@
 
 import json
 import re
+from urllib.parse import quote
 
 from armid_ros.errors import FleetError
+from armid_ros.fleet.bag_reports import asked_bags, write_reports
 from armid_ros.fleet.bags import find_bags
 from armid_ros.fleet.diagnose import cases, diagnose_fleet
-from armid_ros.fleet.pages import write_pages
+from armid_ros.fleet.pages import write_arm_page, write_pages
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import watch, write_watch
 import pytest
@@ -106,6 +108,23 @@ def test_the_diagnosis_names_what_happened_with_the_arms_own_past_as_baseline(li
     page = store.read(f'pages/{arm}.html').decode()
     assert 'payload' in page and 'diagnosis/report.html' in page
     assert re.search(r'href="\.\./reports/[^"]*2026[^"]*/report\.html"', page)
+
+
+def test_the_report_of_any_bag_is_made_when_it_is_asked_for_and_linked(lived):
+    store, found, _ = lived
+    arm = next(arm for arm in found.arms if not arm.named)
+    (url,) = asked_bags(found, arm.arm, ['2026-01-02'])
+    (report,) = write_reports(store, arm, [url])
+    write_arm_page(store, found, arm)
+    page = store.read(f'pages/{arm.arm}.html').decode()
+    assert f'href="../{quote(report)}"' in page
+    assert store.read(report) is not None
+
+
+def test_a_bag_that_is_not_there_is_said_with_the_latest_ones(lived):
+    _, found, _ = lived
+    with pytest.raises(FleetError, match=r"no bag 'never'; the latest are .*2026-01-08"):
+        asked_bags(found, found.arms[0].arm, ['never'])
 
 
 def test_an_arm_that_is_not_there_is_said(lived):

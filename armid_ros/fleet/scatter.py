@@ -1,0 +1,345 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+How much estimates of healthy arms differ from bag to bag, learned from all arms of a kind.
+
+A value of a series is theta + c + e. The part c is that of the day, which all siblings share, as
+by the temperature of a hall; it is the day's effect of a median polish (Tukey 1977). The part e
+has the variance s^2 + t^2: s is the deviation that the bag states, t how much bags differ beyond
+that, from the median of squared differences of neighbours, which a step or a slow trend does not
+change.
+Three things are not as simple, and are learned as well:
+
+- Arms differ in their scatter. The variance of an arm is its own, moderated by that of all arms as
+  far as these agree (Smyth 2004).
+- Scatter lasts for days. Steps and trends of healthy arms are then larger than neighbours tell, by
+  a factor that is the median of their squares over that of chi squared (genomic control; Devlin
+  and Roeder 1999). Most arms have to be healthy for that, no more.
+- Few series know these factors only roughly; they are then drawn towards one.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+from armid_ros.motion import FloatArray
+import numpy as np
+from scipy import optimize, special, stats
+
+#: Bags below which a series is not tested.
+FEWEST = 4
+#: Median of a squared standard normal variable.
+_MEDIAN = float(stats.chi2.ppf(0.5, 1))
+#: Bags that one is compared with, itself among them, and how many deviations make it an odd one.
+_WINDOW, _ODD = 5, 3.0
+#: Degrees of freedom of a variance from the median of n squares, over n.
+_EFFICIENCY = 0.37
+#: Series of white noise by which is learned how well one tells its own variance.
+_DRAWN = 4000
+#: Siblings with a bag on a day, of which the day's effect is taken.
+_SIBLINGS = 8
+#: Rounds of the median polish.
+_ROUNDS = 4
+#: Series that count as much as the expectation that scatter does not last.
+_EXPECTED = 10.0
+#: Degrees of freedom of what arms have in common, where they do not differ.
+_ALIKE = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """
+    A parameter of an arm over time.
+
+    Attributes
+    ----------
+    arm : str
+        Whose.
+    name, joint, unit : str
+        What.
+    days : ndarray, shape (K,)
+        When, in days of the epoch, increasing.
+    values, std : ndarray, shape (K,)
+        Estimates and stated deviations.
+
+    """
+
+    arm: str
+    name: str
+    joint: str
+    unit: str
+    days: FloatArray
+    values: FloatArray
+    std: FloatArray
+
+    @property
+    def parameter(self) -> tuple[str, str]:
+        """Name and joint."""
+        return self.name, self.joint
+
+
+@dataclass(frozen=True)
+class Spread:
+    """
+    How much estimates of a parameter differ from bag to bag beyond what they state.
+
+    Attributes
+    ----------
+    std : float
+        Its standard deviation.
+    freedom : float
+        Degrees of freedom of that.
+    alike : float
+        Degrees of freedom of what the variances of arms have in common.
+    steps, trends : float
+        By how much steps and trends of healthy arms are larger than differences of neighbours
+        tell, in deviations.
+
+    """
+
+    std: float
+    freedom: float
+    alike: float = _ALIKE
+    steps: float = 1.0
+    trends: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Splits:
+    """
+    A series cut in two at every place, and the straight line through it.
+
+    Attributes
+    ----------
+    low, high, std : ndarray, shape (K - 1,)
+        Means before and after, and the standard deviation of their difference.
+    slope, slope_std, start : float
+        Of the line in a day, and its value at the beginning; the deviation is infinite where all
+        bags are of one day.
+    freedom : float
+        Degrees of freedom of the variance.
+
+    """
+
+    low: FloatArray
+    high: FloatArray
+    std: FloatArray
+    slope: float
+    slope_std: float
+    start: float
+    freedom: float
+
+    @property
+    def scores(self) -> FloatArray:
+        """Steps in standard deviations, shape (K - 1,)."""
+        return np.asarray(np.abs(self.high - self.low) / self.std)
+
+    @property
+    def trend(self) -> float:
+        """The trend in standard deviations."""
+        return abs(self.slope) / self.slope_std if self.slope_std < np.inf else 0.0
+
+
+def splits(series: Series, spread: Spread) -> Splits:
+    """Return the steps and the trend of a series, in deviations of neighbours."""
+    variance, freedom = _variance(series, spread)
+    weights = 1.0 / variance
+    x = _bounded(series.values, np.sqrt(variance))
+    before, after = np.cumsum(weights)[:-1], np.cumsum(weights[::-1])[::-1][1:]
+    low = np.cumsum(weights * x)[:-1] / before
+    high = np.cumsum((weights * x)[::-1])[::-1][1:] / after
+    line = _line(series.days, x, weights)
+    return Splits(low, high, np.sqrt(1.0 / before + 1.0 / after), *line, freedom)
+
+
+def line_through(series: Series, spread: Spread) -> tuple[float, float]:
+    """Return the slope of a series in a day, and its standard deviation."""
+    variance, _ = _variance(series, spread)
+    slope, std, _ = _line(series.days, series.values, 1.0 / variance)
+    return slope, std * spread.trends
+
+
+def spreads(series: Sequence[Series]) -> dict[tuple[str, str], Spread]:
+    """Return by how much estimates of each parameter differ beyond what they state."""
+    found = {parameter: _spread(group) for parameter, group in _by_parameter(series).items()}
+    names: dict[str, list[Series]] = {}
+    for one in series:
+        names.setdefault(one.name, []).append(one)
+    alike = {name: _alike(group, found) for name, group in names.items()}
+    found = {one: replace(spread, alike=alike[one[0]]) for one, spread in found.items()}
+    factors = {name: _lasting(group, found) for name, group in names.items()}
+    return {
+        one: replace(spread, steps=factors[one[0]][0], trends=factors[one[0]][1])
+        for one, spread in found.items()
+    }
+
+
+def without_days(series: Sequence[Series]) -> list[Series]:
+    """
+    Return the series without what all siblings share on a day.
+
+    That goes with the size of the parameter, as of friction that is so much less in the heat.
+    Days on which few siblings have bags are left as they are.
+
+    """
+    changed: dict[int, Series] = {}
+    for group in _by_parameter(series).values():
+        for one, values in zip(group, _polished(group), strict=True):
+            changed[id(one)] = replace(one, values=values)
+    return [changed[id(one)] for one in series]
+
+
+def _by_parameter(series: Sequence[Series]) -> dict[tuple[str, str], list[Series]]:
+    groups: dict[tuple[str, str], list[Series]] = {}
+    for one in series:
+        groups.setdefault(one.parameter, []).append(one)
+    return groups
+
+
+def _polished(group: Sequence[Series]) -> list[FloatArray]:
+    """Subtract the effects of days by a median polish with the arms' levels."""
+    days = np.concatenate([np.floor(one.days) for one in group])
+    arm = np.repeat(np.arange(len(group)), [len(one.days) for one in group])
+    values = np.concatenate([one.values for one in group])
+    _, day = np.unique(days, return_inverse=True)
+    arms_of_day = np.bincount(np.unique(np.stack([day, arm]), axis=1)[0], minlength=day.max() + 1)
+    level = _medians(values, arm)
+    middle = float(np.median(level))
+    alike = bool(np.all(level * middle > 0.0))
+    share = level / middle if alike else np.ones(len(level))
+    common = np.zeros(len(arms_of_day))
+    for _ in range(_ROUNDS):
+        common = _medians((values - level[arm]) / share[arm], day)
+        common[arms_of_day < _SIBLINGS] = 0.0
+        level = _medians(values - share[arm] * common[day], arm)
+    rest = values - share[arm] * common[day]
+    return np.split(rest, np.cumsum([len(one.days) for one in group])[:-1])
+
+
+def _medians(values: FloatArray, label: FloatArray) -> FloatArray:
+    """Return the median of the values of every label 0, 1, ..."""
+    order = np.lexsort((values, label))
+    counts = np.bincount(label)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    ordered = values[order]
+    low, high = starts + (counts - 1) // 2, starts + counts // 2
+    return np.asarray(0.5 * (ordered[low] + ordered[high]))
+
+
+def _spread(group: Sequence[Series]) -> Spread:
+    """Solve median(d^2 / (s_k^2 + s_k+1^2 + 2 t^2)) = median of chi^2 for t."""
+    squares = np.concatenate([np.diff(one.values) ** 2 for one in group])
+    stated = np.concatenate([one.std[1:] ** 2 + one.std[:-1] ** 2 for one in group])
+    freedom = max(1.0, _EFFICIENCY * len(squares))
+    if not len(squares):
+        return Spread(0.0, freedom)
+
+    def excess(extra: float) -> float:
+        return float(np.median(squares / np.maximum(stated + 2.0 * extra, 1e-300))) - _MEDIAN
+
+    most = float(np.max(squares)) + 1e-300
+    extra = 0.0
+    if excess(0.0) > 0.0 > excess(most):
+        extra = float(optimize.brentq(excess, 0.0, most, xtol=1e-9 * most, rtol=1e-6))
+    return Spread(float(np.sqrt(extra)), freedom)
+
+
+def _alike(group: Sequence[Series], found: Mapping[tuple[str, str], Spread]) -> float:
+    """
+    Return the degrees of freedom of what the variances of arms have in common.
+
+    The logarithms of their ratios scatter by trigamma(d_a / 2) + trigamma(d_0 / 2); the former is
+    that of one series, the latter is solved for d_0.
+
+    """
+    tested = [one for one in group if len(one.values) >= FEWEST]
+    if len(tested) < _SIBLINGS:
+        return _ALIKE
+    logs = np.log([_ratio(one, found[one.parameter]) for one in tested])
+    own = [_trigamma(0.5 * _freedom(len(one.values))) for one in tested]
+    beyond = _usual_size(logs) ** 2 - float(np.mean(own))
+    return _inverse_trigamma(beyond)
+
+
+def _ratio(series: Series, spread: Spread) -> float:
+    """Return the variance of a series over the usual one."""
+    stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
+    squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
+    return max(float(np.median(squares)) / _MEDIAN, 1e-100)
+
+
+@cache
+def _freedom(bags: int) -> float:
+    """Return the degrees of freedom of the variance that so many bags tell, from white noise."""
+    noise = np.random.default_rng(0).normal(size=(_DRAWN, bags))
+    medians = np.median(np.diff(noise, axis=1) ** 2, axis=1)
+    return _inverse_trigamma(_usual_size(np.log(medians)) ** 2)
+
+
+def _usual_size(values: FloatArray) -> float:
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+
+
+def _trigamma(x: float) -> float:
+    return float(special.polygamma(1, x))
+
+
+def _inverse_trigamma(value: float) -> float:
+    """Return 2 x with trigamma(x) = value, between 1 and that of arms that do not differ."""
+    if value <= _trigamma(0.5 * _ALIKE):
+        return _ALIKE
+    if value >= _trigamma(0.5):
+        return 1.0
+    return 2.0 * float(optimize.brentq(lambda x: _trigamma(x) - value, 0.5, 0.5 * _ALIKE))
+
+
+def _variance(series: Series, spread: Spread) -> tuple[FloatArray, float]:
+    """Return the variance of every value, shape (K,), and its degrees of freedom."""
+    usual = np.maximum(series.std**2 + spread.std**2, 1e-300)
+    if len(series.values) < FEWEST or spread.alike >= _ALIKE:
+        return usual, spread.freedom
+    ratio, freedom = _ratio(series, spread), _freedom(len(series.values))
+    both = spread.alike + freedom
+    return usual * (spread.alike + freedom * ratio) / both, min(both, spread.freedom + freedom)
+
+
+def _lasting(group: Sequence[Series], found: dict[tuple[str, str], Spread]) -> tuple[float, float]:
+    """Return by how much steps and trends are larger than neighbours tell, in deviations."""
+    steps, trends = [], []
+    for one in group:
+        if len(one.values) < FEWEST:
+            continue
+        cut = splits(one, found[one.parameter])
+        third = len(cut.scores) // 3
+        steps.append(float(np.median(cut.scores[third : len(cut.scores) - third] ** 2)))
+        trends.append(cut.trend**2)
+    if not steps:
+        return 1.0, 1.0
+    weight = len(steps) / (len(steps) + _EXPECTED)
+    return tuple(  # type: ignore[return-value]
+        max(1.0, float(np.median(squares)) / _MEDIAN) ** (0.5 * weight)
+        for squares in (steps, trends)
+    )
+
+
+def _bounded(x: FloatArray, std: FloatArray) -> FloatArray:
+    """Return a series with odd values moved to the edge of the noise about their neighbours."""
+    windows = np.lib.stride_tricks.sliding_window_view(x, min(_WINDOW, len(x)))
+    nearest = np.clip(np.arange(len(x)) - _WINDOW // 2, 0, len(windows) - 1)
+    middle = np.median(windows, axis=1)[nearest]
+    return np.asarray(np.clip(x, middle - _ODD * std, middle + _ODD * std))
+
+
+def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
+    """Return slope, its standard deviation, and the value at the beginning."""
+    total = weights.sum()
+    middle, mean = weights @ days / total, weights @ x / total
+    away = days - middle
+    inertia = float(weights @ away**2)
+    if not inertia > 0.0:
+        return 0.0, np.inf, float(mean)
+    slope = float(weights @ (away * (x - mean))) / inertia
+    return slope, 1.0 / np.sqrt(inertia), float(mean + slope * (days[0] - middle))
