@@ -52,8 +52,8 @@ def walker(robot: Robot) -> Robot:
     """
     prefix = robot.joints[0].split('_')[0]
     root = ElementTree.Element('robot', name=robot.name.replace('legs', 'walker'))
-    ElementTree.SubElement(root, 'link', name='ground')
-    parent = 'ground'
+    ElementTree.SubElement(root, 'link', name=f'{prefix}_ground')
+    parent = f'{prefix}_ground'
     axes = ('1 0 0', '0 0 1', '0 1 0')
     trunk = _inertial(robot, f'{prefix}_stance_hip')
     for name, axis in zip(FLOATING, axes, strict=True):
