@@ -3,10 +3,10 @@
 """
 The walking leg pair in MuJoCo: a whole cycle on ground as the source's Table 3 has it.
 
-MuJoCo reads both bodies from their descriptions; the springs are its tendons. The ground is written
-here anew, as a force on heels and toes at every stage of the engine's integrator. Prescribed
-joints are moved by an armature that nothing else can move, and put back after every step; the hips
-of both machines are free, and a joint may follow a torque.
+MuJoCo reads both bodies from their descriptions; the springs are its tendons. The ground is
+written here anew, as a force on heels and toes at every stage of the engine's integrator.
+Prescribed joints are moved by an armature that nothing else can move, and put back after every
+step; the hips of both machines are free, and a joint may follow a torque.
 
 """
 
@@ -149,6 +149,6 @@ def _with_masses(urdf: str) -> str:
         if not link.get('name').endswith('ground') and link.find('inertial') is None:
             parts = ElementTree.SubElement(link, 'inertial')
             ElementTree.SubElement(parts, 'mass', value='1e-9')
-            small = {name: '1e-12' for name in ('ixx', 'iyy', 'izz')}
+            small = dict.fromkeys(('ixx', 'iyy', 'izz'), '1e-12')
             ElementTree.SubElement(parts, 'inertia', small, ixy='0', ixz='0', iyz='0')
     return ElementTree.tostring(root, encoding='unicode')

@@ -11,9 +11,10 @@ as prescribed, and the machine's hips go wherever springs, weight and ground pus
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 from armid_ros.model.kinematics import points_motion
-from armid_ros.motion import FloatArray
-from armid_ros.pair.contact import Ground
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.pair.gait_cycle import GaitCycle, walking_torques
 from armid_ros.pair.walkers import contacts, floating, leg_length
 from armid_ros.robots import Robot
@@ -25,13 +26,31 @@ import pinocchio as pin
 _PLANE = np.array([0, 2])
 
 
+@dataclass(frozen=True)
+class DrivenCycle:
+    """
+    A cycle of which one joint was walked by its torque.
+
+    Attributes
+    ----------
+    check : GaitCheck
+        The joint against what was prescribed.
+    motion : Motion
+        Positions of the machine at the samples of the check.
+
+    """
+
+    check: GaitCheck
+    motion: Motion
+
+
 def check_cycle(
     cycle: GaitCycle,
     joint: str,
     rate: float,
     believed: TiedPair | None = None,
-    ground: Ground | None = None,
-) -> GaitCheck:
+    ground_forces: FloatArray | None = None,
+) -> DrivenCycle:
     """
     Let one joint of the machine walk a cycle by its torque.
 
@@ -45,17 +64,18 @@ def check_cycle(
         Torque samples per second, joined by cubic splines.
     believed : TiedPair, optional
         The machines that the torques are computed for; by default those that there are.
-    ground : Ground, optional
-        The one that the cycle was walked on.
+    ground_forces : ndarray, shape (N, 4, 2), optional
+        Forces on heels and toes that the torques are computed for [N]; by default those that
+        there are.
 
     """
     own = cycle.motions.own
     robot = cycle.pair.robot
     free = [robot.index(name) for name in driven_joints(robot, joint)]
-    torque = driving_torque(cycle, joint, rate, believed)
-    body = _Body(cycle, ground or Ground(), free)
+    torque = driving_torque(cycle, joint, rate, believed, ground_forces)
+    body = _Body(cycle, free)
     x = np.concatenate([own.q[0, free], own.dq[0, free]])
-    followed = [x[2]]
+    states = [x]
     for k in range(0, len(own) - 2, 2):
         h = float(own.t[k + 2] - own.t[k])
         taus = [torque(float(own.t[k + part])) for part in range(3)]
@@ -64,8 +84,12 @@ def check_cycle(
         c = body.rate(k + 1, x + 0.5 * h * b, taus[1])
         d = body.rate(k + 2, x + h * c, taus[2])
         x = x + h / 6.0 * (a + 2.0 * (b + c) + d)
-        followed.append(x[2])
-    return GaitCheck(joint, own.t[::2], own.q[::2, free[2]], np.array(followed))
+        states.append(x)
+    moved = own.select(slice(None, None, 2))
+    q = np.array(moved.q)
+    q[:, free] = np.array(states)[:, :3]
+    check = GaitCheck(joint, moved.t, moved.q[:, free[2]], q[:, free[2]])
+    return DrivenCycle(check, replace(moved, q=q))
 
 
 def driven_joints(robot: Robot, joint: str) -> list[str]:
@@ -74,12 +98,18 @@ def driven_joints(robot: Robot, joint: str) -> list[str]:
 
 
 def driving_torque(
-    cycle: GaitCycle, joint: str, rate: float, believed: TiedPair | None = None
+    cycle: GaitCycle,
+    joint: str,
+    rate: float,
+    believed: TiedPair | None = None,
+    ground_forces: FloatArray | None = None,
 ) -> DrivingTorque:
     """Return nothing for the hips, and the splined torque of a joint, shape (3,) [N, N m]."""
     tau = cycle.torques.tau
-    if believed is not None:
-        tau = walking_torques(believed, cycle.motions, cycle.ground, cycle.other_ground).tau
+    if believed is not None or ground_forces is not None:
+        on_feet = cycle.ground if ground_forces is None else ground_forces
+        pair = believed or cycle.pair
+        tau = walking_torques(pair, cycle.motions, on_feet, cycle.other_ground).tau
     curve = splined(cycle.motions.own.t, tau[:, [cycle.pair.robot.index(joint)]], rate)
     return lambda t: np.concatenate([[0.0, 0.0], curve(t)])
 
@@ -87,10 +117,10 @@ def driving_torque(
 class _Body:
     """The machine of a cycle, of which some joints move freely and all others as prescribed."""
 
-    def __init__(self, cycle: GaitCycle, ground: Ground, free: list[int]):
+    def __init__(self, cycle: GaitCycle, free: list[int]):
         pair = cycle.pair
         robot = pair.robot
-        self._pair, self._ground, self._free = pair, ground, free
+        self._pair, self._ground, self._free = pair, cycle.soil, free
         self._own = cycle.motions.own
         self._model = robot.model.copy()
         self._model.gravity = robot.model.gravity

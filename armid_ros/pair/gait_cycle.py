@@ -54,6 +54,8 @@ class GaitCycle:
         Of all joints; those of the floating joints are what is left over.
     gaits : tuple of WalkableGait
         Of the machine and of its wearer.
+    soil : Ground
+        What they walk on.
 
     """
 
@@ -64,6 +66,7 @@ class GaitCycle:
     other_ground: FloatArray
     torques: PairTorques
     gaits: tuple[WalkableGait, WalkableGait]
+    soil: Ground
 
     def feet(self, *, other: bool = False) -> FloatArray:
         """Return the force on the right and on the left foot, shape (N, 2, 2) [N]."""
@@ -107,8 +110,8 @@ def gait_cycle(pair: TiedPair, gait: Gait, ground: Ground | None = None) -> Gait
         As the source has it by default.
 
     """
-    ground = ground or Ground()
     known = read_assumptions()
+    ground = ground or Ground(creep=known['ground_creep'].value)
     cycle, late = known['cycle_time'].value, known['exoskeleton_delay'].value
     worn = walkable(gait, leg_length(pair.other), cycle)
     phase = np.arange(100) / 100.0
@@ -145,6 +148,7 @@ def gait_cycle(pair: TiedPair, gait: Gait, ground: Ground | None = None) -> Gait
         read_only(forces[1]),
         walking_torques(pair, motions, forces[0], forces[1]),
         (own, worn),
+        ground,
     )
 
 
@@ -239,7 +243,11 @@ def _start(gaits: tuple[WalkableGait, WalkableGait], late: float, cycle: float) 
 
 
 def _walk(
-    pair: TiedPair, courses: tuple[_Course, _Course], ground: Ground, start: FloatArray, cycle: float
+    pair: TiedPair,
+    courses: tuple[_Course, _Course],
+    ground: Ground,
+    start: FloatArray,
+    cycle: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Integrate both hips (Runge-Kutta 4); returns states and their rates of the last cycle."""
     own, far = courses
@@ -260,7 +268,7 @@ def _walk(
 
     h, x, last = cycle / _STEPS, start, 2 * _STEPS
     states, rates = np.empty((_STEPS + 1, 8)), np.empty((_STEPS + 1, 8))
-    for number in range(1 + _SETTLING):
+    for _ in range(1 + _SETTLING):
         for step in range(_STEPS):
             k = 2 * step
             a = rate(k, x)

@@ -161,4 +161,6 @@ def _joint(
     ElementTree.SubElement(joint, 'child', link=child)
     ElementTree.SubElement(joint, 'axis', xyz=axis)
     far = '1000' if slides else '3.2'
-    ElementTree.SubElement(joint, 'limit', lower=f'-{far}', upper=far, velocity='100', effort='1e6')
+    ElementTree.SubElement(
+        joint, 'limit', lower=f'-{far}', upper=far, velocity='100', effort='1e6'
+    )
