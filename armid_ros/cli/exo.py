@@ -16,6 +16,7 @@ from armid_ros.identification.interaction import identify_interaction, Interacti
 from armid_ros.identification.interaction_recording import recorded_interaction_problem
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.pair.driven_cycle import check_cycle
+from armid_ros.pair.exercises import exercise, EXERCISES
 from armid_ros.pair.gait_cycle import gait_cycle, weight
 from armid_ros.pair.shares import ground_by_shares
 from armid_ros.pair.walkers import walking_pair
@@ -28,7 +29,6 @@ from armid_ros.simulation.leg_pair import (
     leg_pair,
     pair_torques,
     PairMotion,
-    stepping,
     TiedPair,
     walking,
 )
@@ -64,6 +64,13 @@ _RATE = 1000.0
 )
 @click.option('--gait', 'gait_file', type=click.Path(path_type=Path), help='CSV; level walking.')
 @click.option('--stiffness', type=float, help='Of simulated springs [N/m]; as assumed by default.')
+@click.option(
+    '--motion',
+    type=click.Choice(list(EXERCISES)),
+    default='step',
+    show_default=True,
+    help='What the simulated pair does on one foot.',
+)
 @click.option('--duration', default=10.0, show_default=True, help='Simulated recording [s].')
 @click.option('--torque-noise', default=0.5, show_default=True, help='Simulated [N m].')
 @click.option('--angle-noise', default=0.05, show_default=True, help='Simulated [deg].')
@@ -77,6 +84,7 @@ def exo(
     inertias: Any,
     gait_file: Path | None,
     stiffness: float | None,
+    motion: str,
     duration: float,
     torque_noise: float,
     angle_noise: float,
@@ -100,7 +108,8 @@ def exo(
         if bag is None:
             bag = out / 'recording'
             noise = torque_noise, np.radians(angle_noise)
-            _record(bag, names, pair, gait, duration, noise, np.random.default_rng(seed))
+            rng = np.random.default_rng(seed)
+            _record(bag, names, pair, exercise(pair, motion, _times(duration), gait), noise, rng)
         settings = options.read_settings()
         machine, wearer = both = tuple(
             read_recording(bag, joints=one.joints, topic=name, settings=settings)
@@ -161,18 +170,20 @@ def exo(
     say(f'{out}: exo.json, report.html')
 
 
+def _times(duration: float) -> FloatArray:
+    return np.arange(0.0, duration, 1.0 / _RATE)
+
+
 def _record(
     path: Path,
     topics: list[str],
     pair: TiedPair,
-    gait: Gait,
-    duration: float,
+    motions: PairMotion,
     noise: tuple[float, float],
     rng: np.random.Generator,
 ) -> None:
-    """Let the pair step to and fro and record both as their sensors see them."""
-    t = np.arange(0.0, duration, 1.0 / _RATE)
-    motions = stepping(pair, gait, t)
+    """Record a motion of both as their sensors see it."""
+    t = motions.own.t
     tau = pair_torques(pair, *motions).tau
     tau = tau + noise[0] * rng.normal(size=tau.shape)
     stamps = 10**9 + np.rint(t * 1e9).astype(np.int64)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots.assumptions import read_assumptions
-from armid_ros.simulation.gait import read_gait
+from armid_ros.simulation.gait import Gait, read_gait
 from armid_ros.simulation.leg_pair import PairMotion, stepping, TiedPair
 import numpy as np
 
@@ -64,7 +64,7 @@ EXERCISES = {
 }
 
 
-def exercise(pair: TiedPair, name: str, t: FloatArray) -> PairMotion:
+def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None) -> PairMotion:
     """
     Let the shipped pair, on one foot, do an exercise.
 
@@ -76,6 +76,8 @@ def exercise(pair: TiedPair, name: str, t: FloatArray) -> PairMotion:
         One of ``EXERCISES``.
     t : ndarray, shape (N,)
         Time [s].
+    gait : Gait, optional
+        Of steps; the shipped one by default.
 
     Raises
     ------
@@ -87,7 +89,7 @@ def exercise(pair: TiedPair, name: str, t: FloatArray) -> PairMotion:
         raise TrajectoryError(f"no exercise '{name}'; there are {', '.join(EXERCISES)}")
     plan = EXERCISES[name]
     if name.endswith('step'):
-        return stepping(pair, read_gait(), t, plan.period)
+        return stepping(pair, gait or read_gait(), t, plan.period)
     known = read_assumptions()
     other = _moving(plan, pair.other.joints, t)
     own = _moving(plan, pair.robot.joints, t - known['exoskeleton_delay'].value)

@@ -228,7 +228,7 @@ def _hurry(
 ) -> FloatArray:
     """Return the acceleration of the centre of mass, forward and up [m/s^2]."""
     pin.centerOfMass(robot.model, data, q, dq, ddq)
-    return np.array(data.acom[0])[_PLANE]
+    return np.asarray(np.asarray(data.acom[0])[_PLANE])
 
 
 def _start(gaits: tuple[WalkableGait, WalkableGait], late: float, cycle: float) -> FloatArray:

@@ -129,8 +129,10 @@ def test_springs_are_identified_live_at_a_kilohertz(bench):
     while taken < 1400:
         for _ in range(8):
             arm.step()
-        bench.spin_until(lambda: min(map(len, heard)) >= taken + 8, 'all topics')
-        for motor, link, *imus in zip(*(messages[taken : taken + 8] for messages in heard)):
+        bench.spin_until(lambda due=taken + 8: min(map(len, heard)) >= due, 'all topics')
+        for motor, link, *imus in zip(
+            *(messages[taken : taken + 8] for messages in heard), strict=True
+        ):
             stamps = {(m.header.stamp.sec, m.header.stamp.nanosec) for m in (motor, link, *imus)}
             assert len(stamps) == 1
             q, dq = np.array(link.position), np.array(link.velocity)

@@ -9,9 +9,8 @@ as the drives hold their torque so long,
 
     Jm dv_m / dt + dm v_m + fm sgn(v_m) + kg twist + dg twist' = tau,
 
-and the links' at each sample, M v_l' + h + dl v_l - kg twist - dg twist' = 0. Rows and torques pass
-one and the same low-pass filter, and recursive least squares takes them in. It has no look at the
-future and no second pass: what the three steps make of a recording is more accurate.
+and the links' at each sample, M v_l' + h + dl v_l - kg twist - dg twist' = 0. Rows and torques
+pass one and the same low-pass filter, and recursive least squares takes them in.
 
 """
 
