@@ -3,7 +3,7 @@
 """
 Deviations of springs as they are stated, beside the scatter of repeats.
 
-    python -m benchmarks.exo_deviations [--repeats 400]
+    python -m benchmarks.exo_deviations [--repeats 400] [--first-seed 0] [--row 6]
 
 """
 
@@ -24,7 +24,7 @@ STIFFNESS = 1e4
 _SHARE = 4
 
 
-def deviations(repeats: int) -> None:
+def deviations(repeats: int, first: int = 0, only: int | None = None) -> None:
     """Print stated deviations over scatter, and how many 95 % intervals hold the stiffness."""
     pair, gait = leg_pair(STIFFNESS), read_gait()
     poses = stepping(pair, gait, np.linspace(0.0, 1.8, 201)[:-1])
@@ -40,22 +40,22 @@ def deviations(repeats: int) -> None:
         ('10 s 1 kHz', seconds, 'known', True, repeats // _SHARE),
         ('10 s 1 kHz', seconds, 'free', True, repeats // (2 * _SHARE)),
     ]
-    for data, motions, inertias, separate, count in rows:
-        ratio, spread, inside = stated(motions, inertias, separate, count)
+    for data, motions, inertias, separate, count in rows if only is None else [rows[only - 1]]:
+        ratio, spread, inside = stated(motions, inertias, separate, count, first)
         what = f'{data}, inertias {inertias}, {"four" if separate else "one"} k, {count} times'
         wanted = '0.95-1.05' if motions is poses and not separate else '        -'
         print(f'  {what:50s}{wanted}  {ratio:.2f} +- {spread:.2f}  {inside:.0f} %', flush=True)
 
 
 def stated(
-    motions: PairMotion, inertias: Inertias, separate: bool, repeats: int
+    motions: PairMotion, inertias: Inertias, separate: bool, repeats: int, first: int = 0
 ) -> tuple[float, float, float]:
     """Return the ratio, its own deviation, and the per cent of intervals; means of all springs."""
     pair = leg_pair(STIFFNESS)
     exact = with_torques(pair, motions)
     found = [
         find_springs(pair, exact, 0.05, seed, inertias=inertias, separate=separate)
-        for seed in range(repeats)
+        for seed in range(first, first + repeats)
     ]
     values = np.array([part.stiffness for part in found])
     variance = np.mean([part.std**2 for part in found], axis=0)
@@ -76,4 +76,7 @@ def _spread(values: FloatArray) -> float:
 if __name__ == '__main__':
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--repeats', type=int, default=400, help='of 200 poses')
-    deviations(parser.parse_args().repeats)
+    parser.add_argument('--first-seed', type=int, default=0, help='of the noise')
+    parser.add_argument('--row', type=int, choices=range(1, 7), help='one row of the table alone')
+    asked = parser.parse_args()
+    deviations(asked.repeats, asked.first_seed, asked.row)

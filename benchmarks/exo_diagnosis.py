@@ -3,7 +3,7 @@
 """
 Straps hidden between an exoskeleton and its wearer in MuJoCo, found by the whole diagnosis.
 
-    python -m benchmarks.exo_diagnosis [--sets 24]
+    python -m benchmarks.exo_diagnosis [--sets 24] [--first-seed 0]
 
 """
 
@@ -48,14 +48,14 @@ def cases() -> list[tuple[float, tuple[str, ...]]]:
     return [(k, segments) for k in STIFFNESSES for segments in HIDDEN]
 
 
-def diagnosed(sets: int) -> None:
+def diagnosed(sets: int, first: int = 0) -> None:
     """Hide springs in bags of an independent engine, and let the whole diagnosis look."""
     ties = leg_pair()
     partner = Partner(ties.other, ties.ties, 'human_legs')
     right = alarms = words = 0
     closed, inside = [], []
     for number, (k, segments) in enumerate(cases()[:sets]):
-        recordings = recorded_pair(partner, Straps(segments, k), number)
+        recordings = recorded_pair(partner, Straps(segments, k), first + number)
         found = _diagnosis(partner, recordings)
         named = {tie.name for finding in found.findings for tie in finding.ties}
         hidden = {name: z for name, z in expected_z(recordings, k).items() if name in segments}
@@ -75,7 +75,7 @@ def diagnosed(sets: int) -> None:
         if not ok or found.verdict != 'named':
             print(f'  {k:g} N/m at {", ".join(segments)}: {found.verdict} {_said(found)}')
     for number in range(sets):
-        found = _diagnosis(partner, recorded_pair(partner, Straps(), 1000 + number))
+        found = _diagnosis(partner, recorded_pair(partner, Straps(), first + 1000 + number))
         body = number % 2 == 1 and [f.name for f in found.findings] == ['link_inertia']
         alarms += bool(found.findings) and not body
         if found.findings or found.verdict != 'consistent':
@@ -133,4 +133,6 @@ def _said(found: Diagnosis) -> str:
 if __name__ == '__main__':
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--sets', type=int, default=24, help='recordings with hidden springs')
-    diagnosed(parser.parse_args().sets)
+    parser.add_argument('--first-seed', type=int, default=0, help='of fit, masses and noise')
+    asked = parser.parse_args()
+    diagnosed(asked.sets, asked.first_seed)

@@ -15,15 +15,20 @@ from armid_ros.files import json_text, write_file
 from armid_ros.identification.interaction import identify_interaction, Interaction
 from armid_ros.identification.interaction_recording import recorded_interaction_problem
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.pair.driven_cycle import check_cycle
+from armid_ros.pair.exercises import exercise, EXERCISES
+from armid_ros.pair.gait_cycle import gait_cycle, weight
+from armid_ros.pair.shares import ground_by_shares
+from armid_ros.pair.walkers import walking_pair
 from armid_ros.recording import BagWriter, read_recording, Recording, write_joint_states
-from armid_ros.report.exo_report import exo_report, GaitChecks
+from armid_ros.report.exo_report import exo_report, GaitChecks, WholeCycle
+from armid_ros.report.sections.walk import Driven, SOURCE
 from armid_ros.robots.assumptions import read_assumptions
 from armid_ros.simulation.gait import Gait, read_gait
 from armid_ros.simulation.leg_pair import (
     leg_pair,
     pair_torques,
     PairMotion,
-    stepping,
     TiedPair,
     walking,
 )
@@ -33,6 +38,7 @@ import numpy as np
 
 #: Joints that the source drives by torque, one at a time.
 _DRIVEN = ('exo_swing_hip', 'exo_swing_knee')
+_DRIVEN_IN_CYCLE = ('exo_right_hip', 'exo_right_knee')
 _SOFTER = 0.2
 SCHEMA = 'armid/exo/1'
 _RATE = 1000.0
@@ -58,6 +64,13 @@ _RATE = 1000.0
 )
 @click.option('--gait', 'gait_file', type=click.Path(path_type=Path), help='CSV; level walking.')
 @click.option('--stiffness', type=float, help='Of simulated springs [N/m]; as assumed by default.')
+@click.option(
+    '--motion',
+    type=click.Choice(list(EXERCISES)),
+    default='step',
+    show_default=True,
+    help='What the simulated pair does on one foot.',
+)
 @click.option('--duration', default=10.0, show_default=True, help='Simulated recording [s].')
 @click.option('--torque-noise', default=0.5, show_default=True, help='Simulated [N m].')
 @click.option('--angle-noise', default=0.05, show_default=True, help='Simulated [deg].')
@@ -71,6 +84,7 @@ def exo(
     inertias: Any,
     gait_file: Path | None,
     stiffness: float | None,
+    motion: str,
     duration: float,
     torque_noise: float,
     angle_noise: float,
@@ -94,7 +108,8 @@ def exo(
         if bag is None:
             bag = out / 'recording'
             noise = torque_noise, np.radians(angle_noise)
-            _record(bag, names, pair, gait, duration, noise, np.random.default_rng(seed))
+            rng = np.random.default_rng(seed)
+            _record(bag, names, pair, exercise(pair, motion, _times(duration), gait), noise, rng)
         settings = options.read_settings()
         machine, wearer = both = tuple(
             read_recording(bag, joints=one.joints, topic=name, settings=settings)
@@ -104,8 +119,10 @@ def exo(
         found = _identify(pair, machine, wearer, inertias, tick)
         tick(0.6, 'driving joints by torque')
         checks = _checks(pair, gait) if simulated else None
+        tick(0.75, 'walking a whole cycle')
+        whole = _whole_cycle(stiffness, gait) if simulated else None
     truth = dict(zip(('all', *pair.segments), [pair.stiffness[0]] * 5, strict=False))
-    document = _document(found, truth if simulated else {}, checks, machine.source)
+    document = _document(found, truth if simulated else {}, checks, whole, machine.source)
     shown, abscissa, name = _shown(pair, gait) if simulated else _recorded(machine, wearer)
     page = exo_report(
         pair.with_stiffness(found[0].stiffness[0].clip(0.0)),
@@ -115,6 +132,7 @@ def exo(
         found,
         truth=truth if simulated else None,
         gait=checks,
+        whole=whole,
         assumptions=read_assumptions(),
         provenance=provenance(
             [bag], {'inertias': inertias, 'topics': topics}, seed if simulated else None
@@ -143,21 +161,29 @@ def exo(
             f'{row["joint"]} by its torque: at most {row["error_deg"]:.1e} deg off; '
             f'{row["error_softer_deg"]:.2f} deg with springs {100 * _SOFTER:.0f} % too soft'
         )
+    for row in document['cycle']:
+        say(
+            f'{row["joint"]} by its torque over a whole cycle: at most {row["error_deg"]:.2g} deg '
+            f'off (the source: {row["source_deg"]:g}); {row["error_softer_deg"]:.2f} deg with '
+            f'springs {100 * _SOFTER:.0f} % too soft'
+        )
     say(f'{out}: exo.json, report.html')
+
+
+def _times(duration: float) -> FloatArray:
+    return np.arange(0.0, duration, 1.0 / _RATE)
 
 
 def _record(
     path: Path,
     topics: list[str],
     pair: TiedPair,
-    gait: Gait,
-    duration: float,
+    motions: PairMotion,
     noise: tuple[float, float],
     rng: np.random.Generator,
 ) -> None:
-    """Let the pair step to and fro and record both as their sensors see them."""
-    t = np.arange(0.0, duration, 1.0 / _RATE)
-    motions = stepping(pair, gait, t)
+    """Record a motion of both as their sensors see it."""
+    t = motions.own.t
     tau = pair_torques(pair, *motions).tau
     tau = tau + noise[0] * rng.normal(size=tau.shape)
     stamps = 10**9 + np.rint(t * 1e9).astype(np.int64)
@@ -207,6 +233,24 @@ def _checks(pair: TiedPair, gait: Gait) -> GaitChecks:
     return GaitChecks(checks, _SOFTER, phase[::2], rate)
 
 
+def _whole_cycle(stiffness: float | None, gait: Gait) -> WholeCycle:
+    """Let the pair walk a cycle, and its hip and knee by their torques."""
+    pair = walking_pair(stiffness)
+    cycle = gait_cycle(pair, gait)
+    rate = read_assumptions()['cycle_torque_rate'].value
+    soft = pair.with_stiffness((1.0 - _SOFTER) * pair.stiffness)
+    shared = ground_by_shares(cycle)
+    driven = [
+        Driven(
+            check_cycle(cycle, joint, rate),
+            check_cycle(cycle, joint, rate, soft),
+            check_cycle(cycle, joint, rate, ground_forces=shared),
+        )
+        for joint in _DRIVEN_IN_CYCLE
+    ]
+    return WholeCycle(cycle, driven, _SOFTER, rate)
+
+
 def _recorded(machine: Recording, wearer: Recording) -> tuple[PairMotion, FloatArray, str]:
     """Return the recorded motion as it is, of which positions alone are shown."""
     shift = 1e-9 * (machine.start_ns - wearer.start_ns)
@@ -223,7 +267,11 @@ def _smooth(recording: Recording, t: FloatArray) -> Motion:
 
 
 def _document(
-    found: list[Interaction], truth: dict[str, float], checks: GaitChecks | None, source: str
+    found: list[Interaction],
+    truth: dict[str, float],
+    checks: GaitChecks | None,
+    whole: WholeCycle | None,
+    source: str,
 ) -> dict[str, Any]:
     rows = [
         {
@@ -246,4 +294,34 @@ def _document(
         }
         for right, wrong in (checks.checks if checks else ())
     ]
-    return {'schema': SCHEMA, 'recording': source, 'stiffness': rows, 'gait': gait}
+    cycle = [
+        dict(
+            zip(('error_deg', 'error_softer_deg', 'error_shared_deg'), d.errors, strict=True),
+            joint=d.joint,
+            source_deg=SOURCE[d.joint.split('_')[-1]],
+        )
+        for d in (whole.driven if whole else ())
+    ]
+    return {
+        'schema': SCHEMA,
+        'recording': source,
+        'stiffness': rows,
+        'gait': gait,
+        'cycle': cycle,
+        'feet': _feet(whole) if whole else [],
+    }
+
+
+def _feet(whole: WholeCycle) -> list[dict[str, Any]]:
+    """Return what the feet of both bear."""
+    pair = whole.cycle.pair
+    return [
+        {
+            'machine': robot.name,
+            'weight': weight(robot),
+            'most': float(whole.cycle.feet(other=other)[..., 1].max()),
+            'double_support': float(np.mean(whole.cycle.support(other=other) == 2)),
+            'unit': 'N',
+        }
+        for robot, other in ((pair.robot, False), (pair.other, True))
+    ]

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 
 from armid_ros.identification.interaction import Interaction
 from armid_ros.motion import FloatArray
+from armid_ros.pair.gait_cycle import GaitCycle
 from armid_ros.report.page import Page, Section
 from armid_ros.report.poses import draw_poses
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.exo import Assumptions, Forces, Gait, Poses, Stiffness
 from armid_ros.report.sections.origin import Origin
 from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.walk import CycleByTorque, Driven, FootForces, Walk
 from armid_ros.robots.assumptions import Assumption
 from armid_ros.simulation.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.simulation.torque_driven import GaitCheck
@@ -49,6 +51,30 @@ class GaitChecks:
     rate: float
 
 
+@dataclass(frozen=True)
+class WholeCycle:
+    """
+    A cycle of walking, and joints by their torque in it.
+
+    Attributes
+    ----------
+    cycle : GaitCycle
+        How both walk.
+    driven : sequence of Driven
+        Joints by their torque.
+    softer : float
+        By which share springs were taken too soft.
+    rate : float
+        Torque samples per second.
+
+    """
+
+    cycle: GaitCycle
+    driven: Sequence[Driven]
+    softer: float
+    rate: float
+
+
 def exo_report(
     pair: TiedPair,
     motions: PairMotion,
@@ -58,6 +84,7 @@ def exo_report(
     *,
     truth: Mapping[str, float] | None = None,
     gait: GaitChecks | None = None,
+    whole: WholeCycle | None = None,
     assumptions: Mapping[str, Assumption] | None = None,
     provenance: Provenance | None = None,
 ) -> str:
@@ -79,7 +106,9 @@ def exo_report(
     truth : mapping of str to float, optional
         True stiffnesses of simulated data [N/m].
     gait : GaitChecks, optional
-        Joints driven by torque.
+        Joints driven by torque in single support.
+    whole : WholeCycle, optional
+        The same over a whole cycle of walking.
     assumptions : mapping, optional
         What was assumed.
     provenance : Provenance, optional
@@ -90,7 +119,13 @@ def exo_report(
     alone = pair_torques(pair.with_stiffness(0.0), *motions)
     samples = np.linspace(0, len(abscissa) - 1, _POSES).astype(int).tolist()
     captions = [f'{abscissa[k]:.2f}' for k in samples]
-    sections: list[Section] = [_verdict(found, gait), Stiffness(found, truth or {})]
+    sections: list[Section] = [_verdict(found, gait, whole), Stiffness(found, truth or {})]
+    if whole is not None:
+        sections += [
+            Walk(whole.cycle, whole.driven),
+            CycleByTorque(whole.cycle, whole.driven, whole.softer, whole.rate),
+            FootForces(whole.cycle),
+        ]
     if gait is not None:
         sections.append(Gait(gait.checks, gait.softer, gait.phase, gait.rate))
     sections += [
@@ -112,7 +147,9 @@ def exo_report(
     return Page(title, f'{len(pair.ties)} springs · {len(abscissa)} samples', sections).html()
 
 
-def _verdict(found: Sequence[Interaction], gait: GaitChecks | None) -> Verdict:
+def _verdict(
+    found: Sequence[Interaction], gait: GaitChecks | None, whole: WholeCycle | None
+) -> Verdict:
     """Say what ties the two, how surely, and whether the torques walk."""
     overall = found[0]
     k, reach = overall.stiffness[0], 1.96 * overall.std[0]
@@ -128,7 +165,14 @@ def _verdict(found: Sequence[Interaction], gait: GaitChecks | None) -> Verdict:
             f'{right.joint} {np.degrees(np.abs(right.error).max()):.1e}°'
             for right, _ in gait.checks
         )
-        sentences.append(f'Driven by their torques, joints follow the gait: {each} at most.')
+        sentences.append(
+            f'Driven by their torques, joints follow the gait in single support: {each} at most.'
+        )
+    if whole is not None:
+        each = ', '.join(f'{d.joint} {d.errors[0]:.2g}°' for d in whole.driven)
+        sentences.append(
+            f'Over a whole cycle of walking, on either foot and on both: {each} at most.'
+        )
     beware = [f'{", ".join(weak)}: too slightly drawn out to know within 10 %.'] if weak else []
     if k - reach <= 0.0:
         return Verdict('no interaction', 'fair', ['No interaction is seen.'], beware)

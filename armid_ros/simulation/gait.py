@@ -46,13 +46,13 @@ class Gait:
         object.__setattr__(self, 'sine', read_only(self.sine))
 
     @classmethod
-    def fit(cls, phase: FloatArray, angles: FloatArray) -> Gait:
+    def fit(cls, phase: FloatArray, angles: FloatArray, harmonics: int = _HARMONICS) -> Gait:
         """Fit the series to angles [rad] of shape (N, 3) at phases of shape (N,) from 0 to 1."""
-        turn = 2.0 * np.pi * np.outer(phase, np.arange(_HARMONICS + 1))
+        turn = 2.0 * np.pi * np.outer(phase, np.arange(harmonics + 1))
         basis = np.hstack([np.cos(turn), np.sin(turn[:, 1:])])
         solution = np.linalg.lstsq(basis, angles, rcond=None)[0]
-        cosine = solution[: _HARMONICS + 1]
-        return cls(cosine, np.vstack([np.zeros((1, 3)), solution[_HARMONICS + 1 :]]))
+        cosine = solution[: harmonics + 1]
+        return cls(cosine, np.vstack([np.zeros((1, 3)), solution[harmonics + 1 :]]))
 
     def __call__(self, phase: FloatArray, derivative: int = 0) -> FloatArray:
         """Return angles or a derivative by the phase, shape (N, 3), at phases of shape (N,)."""

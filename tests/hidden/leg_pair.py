@@ -202,7 +202,8 @@ def side_by_side(*descriptions: str) -> str:
                 ElementTree.SubElement(root, 'parent', link='ground')
                 ElementTree.SubElement(root, 'child', link=link.get('name'))
         for joint in parts.findall('joint'):
-            joint.set('type', 'continuous')
+            if joint.get('type') == 'revolute':
+                joint.set('type', 'continuous')
             for limit in joint.findall('limit'):
                 joint.remove(limit)
         whole.extend(parts)

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from armid_ros.identification.two_inertia.names import unpack
+from armid_ros.identification.two_inertia.names import SIZE, unpack
 from armid_ros.motion import FloatArray
 from armid_ros.robots.two_link import TwoLinkParameters
 from armid_ros.simulation.elastic_run import ElasticRun, VelocityLoop
@@ -92,8 +92,9 @@ def sensitivities(
         The experiments.
     parameters : TwoLinkParameters
         Where to differentiate.
-    directions : ndarray, shape (D, 13)
-        Changes of the parameters of ``names.unpack``, which should be of their own size.
+    directions : ndarray, shape (D, 13) or (D, 15)
+        Changes of the parameters of ``names.unpack``, then of the motors' Coulomb torques; they
+        should be of the size of these.
 
     Returns
     -------
@@ -102,7 +103,8 @@ def sensitivities(
     derivatives : ndarray, shape (N, E, 4, D)
 
     """
-    values = unpack(parameters) + 1j * _STEP * directions
+    point = np.concatenate([unpack(parameters), parameters.coulomb])
+    values = point[: directions.shape[1]] + 1j * _STEP * directions
     found = _simulate(steps, values, parameters)
     return found[:, :, 0].real, np.moveaxis(found.imag / _STEP, 2, 3)
 
@@ -140,7 +142,8 @@ class _Arm:
         self.link_damping = values[:, 7:9]
         self.motor_damping = values[:, 9:11] * fixed.gear**2
         self.spring_damping = values[:, 11:13]
-        self.coulomb = fixed.joint_coulomb
+        free = values.shape[1] > SIZE
+        self.coulomb = values[:, SIZE:] * fixed.gear if free else fixed.joint_coulomb
         self.dt = dt
         batch, dtype = len(values), values.dtype
         self.a = np.zeros((batch, 6, 6), dtype)
@@ -212,7 +215,7 @@ class _Arm:
 
 
 def _friction(
-    response: DualArray, free: DualArray, level: FloatArray, modes: npt.NDArray[np.int_]
+    response: DualArray, free: DualArray, level: DualArray, modes: npt.NDArray[np.int_]
 ) -> tuple[DualArray, npt.NDArray[np.int_]]:
     """
     Find friction torques: bounds for what slips, whatever stops the rest.
@@ -223,7 +226,7 @@ def _friction(
         Change of velocity at the end of the step per torque.
     free : ndarray, shape (B, 2)
         Velocity at the end without friction.
-    level : ndarray, shape (2,)
+    level : ndarray, shape (2,) or (B, 2)
         Coulomb torque.
     modes : ndarray of int, shape (B, 2)
         First guess: 1 slips forwards, -1 backwards, 0 sticks.
@@ -240,7 +243,7 @@ def _friction(
         torque[:, 1] = system[:, 0, 0] * right[:, 1] - system[:, 1, 0] * right[:, 0]
         torque /= determinant[:, np.newaxis]
         speed = (free - np.einsum('bij,bj->bi', response, torque)).real
-        over = stuck & (np.abs(torque.real) > level * (1.0 + 1e-12))
+        over = stuck & (np.abs(torque.real) > level.real * (1.0 + 1e-12))
         against = ~stuck & (speed * modes < -1e-13)
         if not np.any(over | against):
             break

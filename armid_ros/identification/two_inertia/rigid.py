@@ -26,6 +26,8 @@ from scipy.signal import butter, sosfiltfilt
 CUTOFF = 2.5
 #: Ends that the filter has not settled in [s].
 _ENDS = 0.4
+#: Rows kept in the time of a period at the cutoff, and periods over which their errors last.
+_KEPT, _LASTING = 10, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +91,7 @@ def fit_rigid(runs: Sequence[ElasticRun], *, cutoff: float = CUTOFF) -> RigidFit
         if len(t) <= 2 * ends + 1:
             continue
         kept = sosfiltfilt(sections, whole, axis=0)[
-            ends : -ends : max(round(0.1 / cutoff / dt), 1)
+            ends : -ends : max(round(1.0 / (_KEPT * cutoff) / dt), 1)
         ]
         tables.append(kept[:, :, :-1])
         torques.append(kept[:, :, -1])
@@ -97,7 +99,7 @@ def fit_rigid(runs: Sequence[ElasticRun], *, cutoff: float = CUTOFF) -> RigidFit
         raise IdentificationError(
             f'the rigid fit needs experiments of more than {2 * _ENDS:g} s; there are none'
         )
-    return _solve(np.concatenate(tables), np.concatenate(torques), runs[0].motor.joints)
+    return _solve(tables, torques, runs[0].motor.joints)
 
 
 def _columns(run: ElasticRun) -> FloatArray:
@@ -118,9 +120,11 @@ def _columns(run: ElasticRun) -> FloatArray:
     return table
 
 
-def _solve(table: FloatArray, torque: FloatArray, joints: tuple[str, ...]) -> RigidFit:
+def _solve(
+    tables: Sequence[FloatArray], torques: Sequence[FloatArray], joints: tuple[str, ...]
+) -> RigidFit:
     """Solve both joints together, each weighted by its own noise."""
-    weight = np.ones(2)
+    table, torque, weight = np.concatenate(tables), np.concatenate(torques), np.ones(2)
     for _ in range(3):
         rows = (table / weight[:, np.newaxis]).reshape(-1, 8)
         scale = np.linalg.norm(rows, axis=0)
@@ -137,7 +141,10 @@ def _solve(table: FloatArray, torque: FloatArray, joints: tuple[str, ...]) -> Ri
         values = solution / scale
         left = torque - table @ values
         weight = np.sqrt(np.mean(left**2, axis=0)) + 1e-12
-    rows = (table / weight[:, np.newaxis]).reshape(-1, 8)
+    ends = np.cumsum([len(part) for part in tables])[:-1]
+    covariance = _covariance(
+        np.split(table / weight[:, np.newaxis], ends), np.split(left / weight, ends)
+    )
     names = (
         ParameterName('alpha + mm gear^2', joints[0], 'kg m^2'),
         ParameterName('beta', '', 'kg m^2'),
@@ -147,4 +154,26 @@ def _solve(table: FloatArray, torque: FloatArray, joints: tuple[str, ...]) -> Ri
         *(ParameterName('fm gear', joint, 'N m') for joint in joints),
     )
     error = 100.0 * float(np.linalg.norm(left) / np.linalg.norm(torque))
-    return RigidFit(Estimate(names, values, np.asarray(np.linalg.inv(rows.T @ rows))), error)
+    return RigidFit(Estimate(names, values, covariance), error)
+
+
+def _covariance(tables: Sequence[FloatArray], left: Sequence[FloatArray]) -> FloatArray:
+    """
+    Return the covariance of the parameters, shape (8, 8), from experiments and their residuals.
+
+    Rows are closer than the filter lets them change, so that errors last from row to row; scores
+    are added up over the time that they do (Newey and West 1987).
+
+    """
+    scores = [
+        np.einsum('njp,nj->np', table, rest) for table, rest in zip(tables, left, strict=True)
+    ]
+    information = sum(np.einsum('njp,njq->pq', table, table) for table in tables)
+    seen = np.asarray(sum(score.T @ score for score in scores))
+    lags = _LASTING * _KEPT
+    for lag in range(1, lags):
+        product = np.asarray(sum(score[:-lag].T @ score[lag:] for score in scores))
+        seen = seen + (1.0 - lag / lags) * (product + product.T)
+    rows = sum(rest.size for rest in left)
+    inverse = np.linalg.inv(information)
+    return np.asarray(rows / max(rows - len(inverse), 1) * inverse @ seen @ inverse)

@@ -4,18 +4,19 @@
 Step 3b: the parameters that make simulated velocity responses the measured ones.
 
 Nonlinear least squares in the logarithms of the parameters, which keeps them positive and makes
-every one a scale factor. The viscous frictions of motor and link of a joint are tied: a rigid
-motion shows their sum, dl + dm gear^2, alone, and what a vibration shows of their difference is
-far below its noise (free, their standard deviations are 10 to 40 % where that of the sum is 1 %;
-with ten times the noise the fit then runs away). They share one factor, so the split of the
-start stays.
+every one a scale factor. A rigid motion shows the sum of the viscous frictions of motor and link
+of a joint, dl + dm gear^2, alone, and what a vibration shows of their difference is far below its
+noise: free, the fit runs away with much noise; tied to the split of the start, which is not right,
+the error of the split goes into the stiffness, and no interval knows. So the split is believed to
+a factor of two, and the data decide how much of that is left. Coulomb torques begin where step 1
+has them and are free: taken for known, their error would go into all others.
 
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
@@ -27,8 +28,11 @@ from armid_ros.simulation.elastic_run import ElasticRun, VelocityLoop
 import numpy as np
 from scipy.optimize import least_squares
 
-#: Places of dl and dm of both joints in the parameter vector.
+#: Places of dl and dm of both joints in the parameter vector, and of the Coulomb torques after it.
 _LINK, _MOTOR = (7, 8), (9, 10)
+_COULOMB = (SIZE, SIZE + 1)
+#: How far the split of friction and the Coulomb torques are believed: logarithms, one deviation.
+_SPLIT, _BELIEVED = np.log(2.0), 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +45,7 @@ class Tuning:
     parameters : TwoLinkParameters
         The result.
     estimate : Estimate
-        The thirteen values, and their covariance as if none of them were tied: the split of
-        friction that tying keeps is not known any better for it.
+        The thirteen values and their covariance, Coulomb torques free beside them.
     steps : Steps
         The experiments.
     measured, before, after : ndarray, shape (N, E, 4)
@@ -70,14 +73,21 @@ class Tuning:
         )
 
 
-def tying(tied: bool = True) -> FloatArray:
-    """Return which factor each of the thirteen parameters has, as a matrix (13, factors)."""
-    ties = np.eye(SIZE)
-    if tied:
-        for link, motor in zip(_LINK, _MOTOR, strict=True):
-            ties[motor, link] = 1.0
-        ties = np.delete(ties, _MOTOR, axis=1)
-    return ties
+def believed(split: float = _SPLIT) -> FloatArray:
+    """
+    Return what is believed of the logarithms of factors, a row of unit deviation each, (4, 15).
+
+    Parameters
+    ----------
+    split : float
+        How far that of motor and link friction is, one deviation.
+
+    """
+    rows = np.zeros((4, SIZE + 2))
+    for row, (link, motor) in enumerate(zip(_LINK, _MOTOR, strict=True)):
+        rows[row, link], rows[row, motor] = 1.0 / split, -1.0 / split
+    rows[[2, 3], list(_COULOMB)] = 1.0 / _BELIEVED
+    return rows
 
 
 def tune(
@@ -85,7 +95,7 @@ def tune(
     start: TwoLinkParameters,
     loop: VelocityLoop,
     *,
-    tied: bool = True,
+    split: float = _SPLIT,
     links_only: bool = False,
 ) -> Tuning:
     """
@@ -96,11 +106,12 @@ def tune(
     runs : sequence of ElasticRun
         Measured responses to steps of the reference, from rest.
     start : TwoLinkParameters
-        Where to begin; its Coulomb friction and drives stay.
+        Where to begin; its drives stay.
     loop : VelocityLoop
         Gains of the loop.
-    tied : bool
-        Whether dl and dm of a joint share a factor.
+    split : float
+        How far the split of friction between motor and link of the start is believed: logarithm
+        of a factor, one standard deviation.
     links_only : bool
         Whether the velocities of the motors are left out.
 
@@ -118,38 +129,39 @@ def tune(
         [np.hstack([run.motor.dq[:count], run.link.dq[:count]]) for run in runs], axis=1
     )
     chosen = slice(2, 4) if links_only else slice(0, 4)
-    base, ties = unpack(start), tying(tied)
+    base = np.concatenate([unpack(start), start.coulomb])
+    prior = believed(split)
     weight = np.ones(measured[:, :, chosen].shape[-1])
 
-    def values(factors: FloatArray) -> FloatArray:
-        return np.asarray(base * np.exp(ties @ factors))
+    def arm(factors: FloatArray) -> TwoLinkParameters:
+        values = base * np.exp(factors)
+        return replace(pack(values[:SIZE], start), coulomb=values[SIZE:])
 
     def residual(factors: FloatArray) -> FloatArray:
-        simulated = velocities(steps, pack(values(factors), start))
-        return np.asarray(((simulated - measured)[:, :, chosen] / weight).ravel())
+        simulated = velocities(steps, arm(factors))
+        left = ((simulated - measured)[:, :, chosen] / weight).ravel()
+        return np.concatenate([left, prior @ factors])
 
     def jacobian(factors: FloatArray) -> FloatArray:
-        now = values(factors)
-        _, slopes = sensitivities(steps, pack(now, start), (ties * now[:, np.newaxis]).T)
+        now = base * np.exp(factors)
+        _, slopes = sensitivities(steps, arm(factors), np.diag(now))
         slopes = slopes[:, :, chosen] / weight[:, np.newaxis]
-        return np.asarray(slopes.reshape(-1, ties.shape[1]))
+        return np.vstack([slopes.reshape(-1, len(base)), prior])
 
-    factors, evaluations = np.zeros(ties.shape[1]), 0
+    factors, evaluations = np.zeros(len(base)), 0
     for _ in range(2):  # the second time every sensor counts by its own noise
         fit = least_squares(
             residual, factors, jac=jacobian, method='trf', x_scale='jac', xtol=1e-9
         )
         factors, evaluations = fit.x, evaluations + fit.njev
-        left = fit.fun.reshape(-1, len(weight)) * weight
+        left = fit.fun[: -len(prior)].reshape(-1, len(weight)) * weight
         weight = np.sqrt(np.mean(left**2, axis=0)) + 1e-12
-    found = values(factors)
-    free = sensitivities(steps, pack(found, start), np.diag(found))[1][:, :, chosen]
-    relative = _covariance((free / weight[:, np.newaxis]).reshape(-1, SIZE))
-    covariance = relative * np.outer(found, found)
-    after = pack(found, start)
+    after = arm(factors)
+    found = unpack(after)
+    relative = _covariance(jacobian(factors))[:SIZE, :SIZE]
     return Tuning(
         after,
-        Estimate(parameter_names(runs[0].motor.joints), found, covariance),
+        Estimate(parameter_names(runs[0].motor.joints), found, relative * np.outer(found, found)),
         steps,
         measured,
         velocities(steps, start),

@@ -21,6 +21,18 @@ def test_rigid_parameters(runs, truth) -> None:
     assert fit.relative_error < 3.0
 
 
+def test_deviations_hold_for_short_data(runs, truth) -> None:
+    """24 s: rows are closer than the filter lets errors change, which deviations have to know."""
+    true = [truth.alpha + truth.rotor[0], truth.beta, truth.gamma, truth.rotor[1]]
+    true = np.array([*true, *truth.total_damping, *truth.joint_coulomb])
+    off = [
+        (fit.values - true) / fit.std
+        for fit in (fit_rigid(part).estimate for part in (runs[:6], runs[6:]))
+    ]
+    assert np.sqrt(np.mean(np.square(off))) < 2.0
+    assert np.abs(off).max() < 4.0
+
+
 def test_short_experiments_are_refused(clean_steps) -> None:
     with pytest.raises(IdentificationError, match=r'more than 0\.8 s'):
         fit_rigid(clean_steps)

@@ -1,0 +1,120 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Motions that a person can give for an identification, one foot staying where it is.
+
+Each is a sum of a few sines of hip and knee of both legs; the stance foot is flat and the trunk
+upright, as in all of the pair's motions on one foot. The machine follows its wearer with less
+amplitude, late, and with joints that are not quite aligned, as assumed.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots.assumptions import read_assumptions
+from armid_ros.simulation.gait import Gait, read_gait
+from armid_ros.simulation.leg_pair import PairMotion, stepping, TiedPair
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """
+    One motion.
+
+    Attributes
+    ----------
+    what : str
+        What the person does.
+    middle, reach : tuple of float, length 4
+        Of stance hip and knee, swing hip and knee [deg].
+    period : float
+        [s].
+
+    """
+
+    what: str
+    middle: tuple[float, float, float, float]
+    reach: tuple[float, float, float, float]
+    period: float
+
+
+#: By name; steps are those of the gait, to and fro.
+EXERCISES = {
+    'step': Exercise('step forward and back', (0.0,) * 4, (0.0,) * 4, 1.8),
+    'quick_step': Exercise('the same, twice as quickly', (0.0,) * 4, (0.0,) * 4, 0.9),
+    'swing': Exercise('swing the free leg', (2.0, 5.0, 10.0, 25.0), (0.0, 0.0, 30.0, 20.0), 1.2),
+    'lift': Exercise('lift the free knee', (2.0, 5.0, 40.0, 50.0), (0.0, 0.0, 35.0, 45.0), 1.2),
+    'squat': Exercise(
+        'bend the knees, the second foot on a force plate',
+        (20.0, 35.0, 20.0, 35.0),
+        (18.0, 30.0, 18.0, 30.0),
+        1.6,
+    ),
+    'rock': Exercise(
+        'rock to and fro over the standing ankle',
+        (0.0, 8.0, 5.0, 15.0),
+        (12.0, 6.0, 12.0, 6.0),
+        0.9,
+    ),
+}
+
+
+def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None) -> PairMotion:
+    """
+    Let the shipped pair, on one foot, do an exercise.
+
+    Parameters
+    ----------
+    pair : TiedPair
+        The pair on one foot.
+    name : str
+        One of ``EXERCISES``.
+    t : ndarray, shape (N,)
+        Time [s].
+    gait : Gait, optional
+        Of steps; the shipped one by default.
+
+    Raises
+    ------
+    TrajectoryError
+        If there is no such exercise.
+
+    """
+    if name not in EXERCISES:
+        raise TrajectoryError(f"no exercise '{name}'; there are {', '.join(EXERCISES)}")
+    plan = EXERCISES[name]
+    if name.endswith('step'):
+        return stepping(pair, gait or read_gait(), t, plan.period)
+    known = read_assumptions()
+    other = _moving(plan, pair.other.joints, t)
+    own = _moving(plan, pair.robot.joints, t - known['exoskeleton_delay'].value)
+    scale = known['exoskeleton_scale'].value
+    offset = np.radians(known['exoskeleton_offset_deg'].value)
+    parts = (scale * own.q + offset, scale * own.dq, scale * own.ddq)
+    return PairMotion(replace(own, t=t, q=parts[0], dq=parts[1], ddq=parts[2]), other)
+
+
+def _moving(plan: Exercise, joints: tuple[str, ...], t: FloatArray) -> Motion:
+    """Return sines of hips and knees with a flat foot and an upright trunk."""
+    w = 2.0 * np.pi / plan.period
+    reach = np.radians(plan.reach)
+    middle = np.radians(plan.middle)
+    hip, knee, far_hip, far_knee = (
+        [
+            m - r * np.cos(w * t),
+            r * w * np.sin(w * t),
+            r * w**2 * np.cos(w * t),
+        ]
+        for m, r in zip(middle, reach, strict=True)
+    )
+    zero = np.zeros_like(t)
+    parts = [
+        np.column_stack([k - h, k, h, fh, fk, zero])
+        for h, k, fh, fk in zip(hip, knee, far_hip, far_knee, strict=True)
+    ]
+    return Motion(joints, t, *parts)

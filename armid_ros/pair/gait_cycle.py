@@ -1,0 +1,299 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The whole gait cycle: single and double support of both machines, and what the ground does.
+
+Joints move as a walkable gait prescribes and trunks keep their lean; where the hips are follows
+from what acts: weight, springs between the two, and the ground at both heels and toes, (27). So
+feet strike and leave the ground when they do, and nobody says which leg stands. The torques are
+those of Newton and Euler with all of these forces; what is left on the hips is nothing, and what
+is left on the trunk is what keeps it from falling over.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from armid_ros.model.kinematics import points_motion
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.pair.contact import Ground
+from armid_ros.pair.walkable import walkable, WalkableGait
+from armid_ros.pair.walkers import columns, contacts, floating, leg_length, SIDES
+from armid_ros.robots import Robot
+from armid_ros.robots.assumptions import read_assumptions
+from armid_ros.simulation.gait import Gait
+from armid_ros.simulation.leg_pair import pair_torques, PairMotion, PairTorques, TiedPair
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+#: Steps of the integration in a cycle, and cycles that go by before one is shown.
+_STEPS, _SETTLING = 2400, 2
+#: A foot bears weight beyond this share of the machine's [-].
+_BEARS = 0.01
+_PLANE = np.array([0, 2])
+
+
+@dataclass(frozen=True)
+class GaitCycle:
+    """
+    One cycle of a walking pair, from a right heel strike of the wearer as planned to the next.
+
+    Attributes
+    ----------
+    pair : TiedPair
+        The machines.
+    phase : ndarray, shape (N,)
+        Of the right leg, 0 to 1.
+    motions : PairMotion
+        Of both; of the floating joints, forward, up and lean, too.
+    ground, other_ground : ndarray, shape (N, 4, 2)
+        Force on right heel and toe and left heel and toe, forward and up [N].
+    torques : PairTorques
+        Of all joints; those of the floating joints are what is left over.
+    gaits : tuple of WalkableGait
+        Of the machine and of its wearer.
+    soil : Ground
+        What they walk on.
+
+    """
+
+    pair: TiedPair
+    phase: FloatArray
+    motions: PairMotion
+    ground: FloatArray
+    other_ground: FloatArray
+    torques: PairTorques
+    gaits: tuple[WalkableGait, WalkableGait]
+    soil: Ground
+
+    def feet(self, *, other: bool = False) -> FloatArray:
+        """Return the force on the right and on the left foot, shape (N, 2, 2) [N]."""
+        ground = self.other_ground if other else self.ground
+        return np.asarray(ground.reshape(-1, 2, 2, 2).sum(axis=2))
+
+    def support(self, *, other: bool = False) -> npt.NDArray[np.int_]:
+        """Return how many feet bear weight, shape (N,)."""
+        robot = self.pair.other if other else self.pair.robot
+        return np.asarray(np.sum(self.feet(other=other)[:, :, 1] > _BEARS * weight(robot), axis=1))
+
+
+@dataclass(frozen=True)
+class _Course:
+    """Points of one machine about its hips over a cycle, every half step of the integration."""
+
+    contact: FloatArray  # (2 K, 4, 2)
+    contact_speed: FloatArray
+    tied: FloatArray  # (2 K, S, 2)
+    tied_speed: FloatArray
+    pull: FloatArray  # (2 K, 2): weight and what accelerating limbs do [N]
+    mass: float
+
+
+def weight(robot: Robot) -> float:
+    """Return the weight of a machine [N]."""
+    return float(robot.rigid_parameters[::10].sum() * np.linalg.norm(robot.gravity))
+
+
+def gait_cycle(pair: TiedPair, gait: Gait, ground: Ground | None = None) -> GaitCycle:
+    """
+    Let a pair walk until it does the same every cycle, and return one.
+
+    Parameters
+    ----------
+    pair : TiedPair
+        A pair that is free to walk: ``walking_pair``.
+    gait : Gait
+        Of the wearer; the nearest one that can be walked is taken.
+    ground : Ground, optional
+        As the source has it by default.
+
+    """
+    known = read_assumptions()
+    ground = ground or Ground(creep=known['ground_creep'].value)
+    cycle, late = known['cycle_time'].value, known['exoskeleton_delay'].value
+    worn = walkable(gait, leg_length(pair.other), cycle)
+    phase = np.arange(100) / 100.0
+    offset = np.radians(known['walking_offset_deg'].value)
+    asked = known['exoskeleton_scale'].value * worn.gait(phase) + offset
+    own = walkable(
+        Gait.fit(phase, asked, harmonics=8),
+        leg_length(pair.robot),
+        cycle,
+        stride=worn.stride,
+        lean=worn.lean,
+    )
+    half = np.arange(2 * _STEPS) / (2.0 * _STEPS)
+    moves = [
+        _joint_motion(robot, plan, half * cycle, half - lag / cycle, cycle)
+        for robot, plan, lag in ((pair.robot, own, late), (pair.other, worn, 0.0))
+    ]
+    courses = (_course(pair, moves[0], False), _course(pair, moves[1], True))
+    states, rates = _walk(pair, courses, ground, _start((own, worn), late / cycle, cycle), cycle)
+    rows = np.append(np.arange(0, 2 * _STEPS, 2), 0)
+    motions = PairMotion(
+        _placed(pair.robot, moves[0], rows, states[:, :2], states[:, 4:6], rates[:, 4:6], cycle),
+        _placed(pair.other, moves[1], rows, states[:, 2:4], states[:, 6:], rates[:, 6:], cycle),
+    )
+    forces = [
+        ground_forces(robot, motion, ground)
+        for robot, motion in zip((pair.robot, pair.other), motions, strict=True)
+    ]
+    return GaitCycle(
+        pair,
+        read_only(np.linspace(0.0, 1.0, _STEPS + 1)),
+        motions,
+        read_only(forces[0]),
+        read_only(forces[1]),
+        walking_torques(pair, motions, forces[0], forces[1]),
+        (own, worn),
+        ground,
+    )
+
+
+def ground_forces(robot: Robot, motion: Motion, ground: Ground) -> FloatArray:
+    """Return what the ground does to heels and toes along a motion, shape (N, 4, 2) [N]."""
+    place, jacobian = points_motion(robot, *contacts(robot, leg_length(robot)), motion.q)
+    speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
+    return ground.force(place[..., 2], speed[..., 2], speed[..., 0])
+
+
+def walking_torques(
+    pair: TiedPair, motions: PairMotion, ground: FloatArray, other_ground: FloatArray
+) -> PairTorques:
+    """
+    Return the joint torques of both machines with springs and the forces at their feet, (27).
+
+    Parameters
+    ----------
+    pair : TiedPair
+        Free to walk.
+    motions : PairMotion
+        Of both.
+    ground, other_ground : ndarray, shape (N, 4, 2)
+        Forces on heels and toes, forward and up [N].
+
+    """
+    found = pair_torques(pair, *motions)
+    parts = [
+        tau - ground_torques(robot, motion.q, forces)
+        for robot, motion, forces, tau in (
+            (pair.robot, motions.own, ground, found.tau),
+            (pair.other, motions.other, other_ground, found.other_tau),
+        )
+    ]
+    return replace(found, tau=read_only(parts[0]), other_tau=read_only(parts[1]))
+
+
+def ground_torques(robot: Robot, q: FloatArray, forces: FloatArray) -> FloatArray:
+    """Return what forces on heels and toes, (N, 4, 2) [N], do to the joints, (N, n) [N m]."""
+    _, jacobian = points_motion(robot, *contacts(robot, leg_length(robot)), q)
+    return np.asarray(np.einsum('ncxj,ncx->nj', jacobian[:, :, _PLANE], forces))
+
+
+def _joint_motion(
+    robot: Robot, plan: WalkableGait, t: FloatArray, phase: FloatArray, cycle: float
+) -> Motion:
+    """Return the motion of the legs with hips that stay where they are."""
+    parts = np.zeros((3, len(t), robot.n_joints))
+    for order in range(3):
+        for side, shift in zip(SIDES, (0.0, 0.5), strict=True):
+            angles = plan.gait(phase + shift, order) / cycle**order
+            parts[order][:, columns(robot, side)] = angles
+    parts[0][:, floating(robot)[2]] = plan.lean
+    return Motion(robot.joints, t, *parts)
+
+
+def _course(pair: TiedPair, motion: Motion, other: bool) -> _Course:
+    robot = pair.other if other else pair.robot
+    joints, points = contacts(robot, leg_length(robot))
+    ties = [(t.other_joint, t.other_point) if other else (t.joint, t.point) for t in pair.ties]
+    joints = [*joints, *(joint for joint, _ in ties)]
+    place, jacobian = points_motion(
+        robot, joints, np.vstack([points, [point for _, point in ties]]), motion.q
+    )
+    speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)[..., _PLANE]
+    place = place[..., _PLANE]
+    data = robot.model.createData()
+    rows = zip(motion.q, motion.dq, motion.ddq, strict=True)
+    hurry = np.array([_hurry(robot, data, *map(np.array, row)) for row in rows])
+    mass = float(robot.rigid_parameters[::10].sum())
+    pull = mass * (robot.gravity[_PLANE] - hurry)
+    return _Course(place[:, :4], speed[:, :4], place[:, 4:], speed[:, 4:], pull, mass)
+
+
+def _hurry(
+    robot: Robot, data: pin.Data, q: FloatArray, dq: FloatArray, ddq: FloatArray
+) -> FloatArray:
+    """Return the acceleration of the centre of mass, forward and up [m/s^2]."""
+    pin.centerOfMass(robot.model, data, q, dq, ddq)
+    return np.asarray(np.asarray(data.acom[0])[_PLANE])
+
+
+def _start(gaits: tuple[WalkableGait, WalkableGait], late: float, cycle: float) -> FloatArray:
+    """Return where hips are and how fast as planned, shape (8,): machine, wearer."""
+    places, speeds = [], []
+    for plan, lag in zip(gaits, (late, 0.0), strict=True):
+        path = plan.hips + np.outer(np.arange(len(plan.hips)) / len(plan.hips), [plan.stride, 0.0])
+        slope = np.gradient(path, axis=0)[2] * len(path) / cycle
+        places.append(path[0] - slope * lag * cycle)
+        speeds.append(slope)
+    return np.concatenate([*places, *speeds])
+
+
+def _walk(
+    pair: TiedPair,
+    courses: tuple[_Course, _Course],
+    ground: Ground,
+    start: FloatArray,
+    cycle: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Integrate both hips (Runge-Kutta 4); returns states and their rates of the last cycle."""
+    own, far = courses
+    masses = np.array([own.mass, own.mass, far.mass, far.mass])
+
+    def rate(k: int, x: FloatArray) -> FloatArray:
+        pulls = []
+        for course, place, speed in ((own, x[:2], x[4:6]), (far, x[2:4], x[6:])):
+            points = course.contact[k] + place
+            moving = course.contact_speed[k] + speed
+            touch = ground.force(points[:, 1], moving[:, 1], moving[:, 0])
+            pulls.append(course.pull[k] + touch.sum(axis=0))
+        way = own.tied[k] - far.tied[k] + (x[:2] - x[2:4])
+        drift = own.tied_speed[k] - far.tied_speed[k] + (x[4:6] - x[6:])
+        spring = pair.law(way, drift).sum(axis=0)
+        force = np.concatenate([pulls[0] + spring, pulls[1] - spring])
+        return np.concatenate([x[4:], force / masses])
+
+    h, x, last = cycle / _STEPS, start, 2 * _STEPS
+    states, rates = np.empty((_STEPS + 1, 8)), np.empty((_STEPS + 1, 8))
+    for _ in range(1 + _SETTLING):
+        for step in range(_STEPS):
+            k = 2 * step
+            a = rate(k, x)
+            states[step], rates[step] = x, a
+            b = rate(k + 1, x + 0.5 * h * a)
+            c = rate(k + 1, x + 0.5 * h * b)
+            d = rate((k + 2) % last, x + h * c)
+            x = x + h / 6.0 * (a + 2.0 * (b + c) + d)
+        states[-1], rates[-1] = x, rate(0, x)
+    return states, rates
+
+
+def _placed(
+    robot: Robot,
+    legs: Motion,
+    rows: npt.NDArray[np.intp],
+    place: FloatArray,
+    speed: FloatArray,
+    rate: FloatArray,
+    cycle: float,
+) -> Motion:
+    """Return the motion of legs with the hips where they were found."""
+    parts = [np.array(part[rows]) for part in (legs.q, legs.dq, legs.ddq)]
+    hips = floating(robot)[:2]
+    for values, found in zip(parts, (place, speed, rate), strict=True):
+        values[:, hips] = found
+    t = np.linspace(0.0, cycle, len(rows))
+    return Motion(legs.joints, t, *parts)

@@ -1,0 +1,81 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What each foot bears by the source's rule: a leg, and the trunk's share by (20) to (22).
+
+Two feet on the ground leave open how much each bears. The source splits the trunk between the legs
+by the distances of the thighs from it; a foot then bears what its leg and its share of the trunk
+weigh and take to accelerate, less what the springs carry. While one foot stands it bears all.
+
+"""
+
+from __future__ import annotations
+
+from armid_ros.model.kinematics import points_motion
+from armid_ros.model.leg_kinematics import trunk_shares
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.pair.gait_cycle import GaitCycle
+from armid_ros.pair.walkers import columns, floating, SIDES
+from armid_ros.robots import Robot
+import numpy as np
+
+_PLANE = np.array([0, 2])
+
+
+def feet_by_shares(cycle: GaitCycle, *, other: bool = False) -> FloatArray:
+    """
+    Return what both feet bear by (20) to (22), right and left, shape (N, 2, 2) [N].
+
+    Parameters
+    ----------
+    cycle : GaitCycle
+        The motion, and which feet stand.
+    other : bool
+        Whether of the wearer.
+
+    """
+    robot, motion = (
+        (cycle.pair.other, cycle.motions.other) if other else (cycle.pair.robot, cycle.motions.own)
+    )
+    place, taken = _bodies(robot, motion)
+    trunk = floating(robot)[2]
+    legs = [columns(robot, side) for side in SIDES]
+    left, right = trunk_shares(place[:, trunk], place[:, legs[1][0]], place[:, legs[0][0]])
+    springs = cycle.torques.forces[..., _PLANE] * (1.0 if not other else -1.0)
+    feet = np.empty((len(motion), 2, 2))
+    for foot, (own, share) in enumerate(zip(legs, (right, left), strict=True)):
+        pulled = [k for k, tie in enumerate(cycle.pair.ties) if tie.name.startswith(SIDES[foot])]
+        feet[:, foot] = taken[:, own].sum(axis=1) + share[:, np.newaxis] * taken[:, trunk]
+        feet[:, foot] -= springs[:, pulled].sum(axis=1)
+    bearing = cycle.feet(other=other)[:, :, 1] > 0.0
+    for foot in range(2):
+        alone = bearing[:, foot] & ~bearing[:, 1 - foot]
+        feet[alone, foot] = feet[alone].sum(axis=1)
+        feet[alone, 1 - foot] = 0.0
+    return feet
+
+
+def ground_by_shares(cycle: GaitCycle) -> FloatArray:
+    """
+    Return the same on heels and toes of the machine, (N, 4, 2) [N].
+
+    The rule does not say where under a foot its force is; it is taken to be where the ground's is.
+
+    """
+    feet = feet_by_shares(cycle)
+    up = cycle.ground[..., 1].reshape(-1, 2, 2)
+    whole = up.sum(axis=2, keepdims=True)
+    part = np.where(whole > 0.0, up / np.where(whole > 0.0, whole, 1.0), 0.5)
+    return np.asarray((part[..., np.newaxis] * feet[:, :, np.newaxis]).reshape(-1, 4, 2))
+
+
+def _bodies(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Return centroids and m (c'' - g) of all bodies, both of shape (N, n, 2) [m, N]."""
+    bodies = list(robot.model.inertias)[1:]
+    levers = np.array([body.lever for body in bodies])
+    place, jacobian = points_motion(robot, list(robot.joints), levers, motion.q)
+    speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
+    hurry = np.gradient(speed, motion.t, axis=0)
+    mass = np.array([body.mass for body in bodies])
+    taken = mass[:, np.newaxis] * (hurry - robot.gravity)
+    return place[..., _PLANE], taken[..., _PLANE]

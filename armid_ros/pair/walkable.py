@@ -1,0 +1,197 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+A gait that walks: both feet stay where they stand, over the whole cycle.
+
+Curves of hip, knee and ankle, as they are drawn in books, belong to no body: put onto segments of
+given lengths, feet slide and sink by centimetres while both are on the ground. The nearest curves
+for which they do not are found by least squares, together with the path of the hips.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.motion import FloatArray
+from armid_ros.simulation.gait import Gait
+import numpy as np
+from scipy.optimize import least_squares
+
+#: Harmonics of the curves; the hips have the even ones, for both legs do the same.
+_HARMONICS = 8
+_SAMPLES = 100
+#: When heel and toe are on the ground, in cycles since heel strike.
+HEEL_DOWN, TOE_DOWN = (0.0, 0.42), (0.12, 0.62)
+#: How far curves of hip, knee and ankle may be from those asked for [rad], and a foot on the
+#: ground from where it stands [m]: one standard deviation of the least squares.
+_FREEDOM = np.radians([3.0, 3.0, 10.0])
+_PLACE = 0.3e-3
+#: How hard hips are pushed forward and up beside their weight [m/s^2]: people walk smoothly.
+_HURRY = np.array([1.0, 1.5])
+#: Height of the swing foot in the middle of its way [m], when, and how strictly.
+_CLEARANCE, _SWING, _CLEAR = 0.02, (0.68, 0.93), 3e-3
+
+
+@dataclass(frozen=True)
+class LegLength:
+    """
+    Lengths of a leg [m].
+
+    Attributes
+    ----------
+    thigh, shank, foot : float
+        Of the segments, the foot from heel to toe.
+
+    """
+
+    thigh: float
+    shank: float
+    foot: float
+
+
+@dataclass(frozen=True)
+class WalkableGait:
+    """
+    Curves of one leg, and how the hips move with them.
+
+    Attributes
+    ----------
+    gait : Gait
+        Hip flexion, knee flexion, ankle dorsiflexion.
+    lean : float
+        Of the trunk, forward [rad].
+    stride : float
+        Way of a cycle [m].
+    hips : ndarray, shape (N, 2)
+        Path of the hips forward and up over a cycle, evenly sampled, the way at even speed left
+        out [m].
+    sliding : float
+        How far a foot on the ground is from where it stands, root mean square [m].
+
+    """
+
+    gait: Gait
+    lean: float
+    stride: float
+    hips: FloatArray
+    sliding: float
+
+
+def foot_points(
+    angles: FloatArray, hips: FloatArray, lean: float, leg: LegLength
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Return heel and toe of a leg, both of shape (N, 2) [m].
+
+    Parameters
+    ----------
+    angles : ndarray, shape (N, 3)
+        Hip, knee and ankle [rad].
+    hips : ndarray, shape (N, 2)
+        Where the hips are, forward and up [m].
+    lean : float
+        Of the trunk, forward [rad].
+    leg : LegLength
+        Lengths.
+
+    """
+    thigh = angles[:, 0] - lean
+    shank = thigh - angles[:, 1]
+    foot = shank + angles[:, 2]
+    heel = hips + leg.thigh * _hanging(thigh) + leg.shank * _hanging(shank)
+    return heel, heel + leg.foot * np.column_stack([np.cos(foot), np.sin(foot)])
+
+
+def walkable(
+    gait: Gait,
+    leg: LegLength,
+    cycle: float,
+    *,
+    stride: float | None = None,
+    lean: float | None = None,
+) -> WalkableGait:
+    """
+    Find the nearest gait with feet that stay where they stand.
+
+    Parameters
+    ----------
+    gait : Gait
+        The curves that are asked for.
+    leg : LegLength
+        Lengths of the legs.
+    cycle : float
+        Time of a cycle [s].
+    stride, lean : float, optional
+        Way of a cycle [m] and lean of the trunk [rad]; by default whatever suits the curves.
+
+    """
+    phase = np.arange(_SAMPLES) / _SAMPLES
+    wanted = gait(phase)
+    turn = 2.0 * np.pi * np.outer(phase, np.arange(1, _HARMONICS + 1))
+    basis = np.hstack([np.ones((_SAMPLES, 1)), np.cos(turn), np.sin(turn)])
+    even = np.hstack([basis[:, :1], np.cos(turn[:, 1::2]), np.sin(turn[:, 1::2])])
+    waves = np.concatenate([[0.0], *2 * [np.arange(2, _HARMONICS + 1, 2)]])
+    bent = -((2.0 * np.pi * waves / cycle) ** 2) * even
+    count, paths = basis.shape[1], even.shape[1]
+    heel_down, toe_down = _inside(phase, HEEL_DOWN), _inside(phase, TOE_DOWN)
+    swing = _inside(phase, _SWING)
+
+    def taken(x: FloatArray) -> tuple[FloatArray, FloatArray, float, float]:
+        angles = basis @ x[: 3 * count].reshape(3, count).T
+        hips = even @ x[3 * count : 3 * count + 2 * paths].reshape(2, paths).T
+        own_lean, own_stride = x[-3:-1]
+        return (
+            angles,
+            hips,
+            float(own_lean if lean is None else lean),
+            float(own_stride if stride is None else stride),
+        )
+
+    def places(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return angles, heel and toe in the place where the foot stands, and the lowest."""
+        angles, hips, own_lean, own_stride = taken(x)
+        way = np.column_stack([own_stride * phase, np.zeros(_SAMPLES)])
+        heel, toe = foot_points(angles, hips + way, own_lean, leg)
+        stand = np.array([x[-1], 0.0])
+        far = np.array([leg.foot, 0.0])
+        return angles, heel - stand, toe - stand - far, np.minimum(heel[:, 1], toe[:, 1])
+
+    def residual(x: FloatArray) -> FloatArray:
+        angles, heel, toe, lowest = places(x)
+        hurry = bent @ x[3 * count : 3 * count + 2 * paths].reshape(2, paths).T
+        return np.concatenate(
+            [
+                ((angles - wanted) / _FREEDOM).ravel() / 10.0,
+                heel[heel_down].ravel() / _PLACE / 10.0,
+                toe[toe_down].ravel() / _PLACE / 10.0,
+                (hurry / _HURRY).ravel() / 10.0,
+                np.minimum(lowest[swing] - _CLEARANCE, 0.0) / _CLEAR,
+            ]
+        )
+
+    start = np.zeros(3 * count + 2 * paths + 3)
+    start[: 3 * count] = np.linalg.lstsq(basis, wanted, rcond=None)[0].T.ravel()
+    start[3 * count + paths] = 0.9 * (leg.thigh + leg.shank)
+    start[-3:] = 0.15 if lean is None else lean, 1.6 * (leg.thigh + leg.shank), 0.3
+    found = least_squares(residual, start, x_scale='jac').x
+    angles, hips, own_lean, own_stride = taken(found)
+    _, heel, toe, _ = places(found)
+    hips = hips - np.array([found[-1], 0.0])
+    far = np.vstack([heel[heel_down], toe[toe_down]])
+    return WalkableGait(
+        Gait.fit(phase, angles, harmonics=_HARMONICS),
+        own_lean,
+        own_stride,
+        hips,
+        float(np.sqrt(np.mean(np.sum(far**2, axis=1)))),
+    )
+
+
+def _hanging(angle: FloatArray) -> FloatArray:
+    """Return unit vectors down, turned forward, shape (N, 2)."""
+    return np.column_stack([np.sin(angle), -np.cos(angle)])
+
+
+def _inside(phase: FloatArray, ends: tuple[float, float]) -> np.typing.NDArray[np.bool_]:
+    return np.asarray((phase >= ends[0]) & (phase <= ends[1]))

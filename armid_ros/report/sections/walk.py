@@ -1,0 +1,308 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A pair that walks a whole cycle: both bodies moving, what the feet bear, joints by torque."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from armid_ros.model.kinematics import points_motion
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.pair.driven_cycle import DrivenCycle
+from armid_ros.pair.gait_cycle import GaitCycle, weight
+from armid_ros.pair.shares import feet_by_shares
+from armid_ros.pair.walkers import columns, contacts, floating, leg_length, SIDES
+from armid_ros.report.charts import Chart, Mark, script_json, Series
+from armid_ros.report.page import Section
+from armid_ros.robots import Robot
+from markupsafe import Markup
+import numpy as np
+
+_FRAMES = 72
+#: Size of the drawing [px], scale [px/m], and where hips are and ground is in it.
+_WIDTH, _HEIGHT, _SCALE, _HIPS, _GROUND = 640, 420, 260.0, 300.0, 385.0
+#: Springs are drawn so many times longer than they are; forces at so many px per newton.
+_MAGNIFIED, _FORCE = 4.0, 0.16
+_TRUNK = 0.55
+#: How far a joint may be off by the source, in degrees.
+SOURCE = {'hip': 1.5, 'knee': 2.5}
+
+
+@dataclass(frozen=True)
+class Driven:
+    """
+    A joint by its torque over the whole cycle.
+
+    Attributes
+    ----------
+    right, softer, shared : DrivenCycle
+        With the torque that is right, with that for springs that are too soft, and with that for
+        feet that bear what (20) to (22) say.
+
+    """
+
+    right: DrivenCycle
+    softer: DrivenCycle
+    shared: DrivenCycle
+
+    @property
+    def joint(self) -> str:
+        """Its name."""
+        return self.right.check.joint
+
+    @property
+    def errors(self) -> tuple[float, float, float]:
+        """How far it is off at most: right, springs too soft, feet by (20) to (22) [deg]."""
+        each = (self.right, self.softer, self.shared)
+        first, second, third = (float(np.degrees(np.abs(d.check.error).max())) for d in each)
+        return first, second, third
+
+
+@dataclass(frozen=True)
+class Walk(Section):
+    """
+    Both bodies over a cycle, moving.
+
+    Attributes
+    ----------
+    cycle : GaitCycle
+        How they walk.
+    driven : sequence of Driven
+        Joints by their torque, to choose from.
+
+    """
+
+    title: ClassVar[str] = 'Walking'
+    template: ClassVar[str] = 'exo_walk.html'
+
+    cycle: GaitCycle
+    driven: Sequence[Driven]
+
+    @property
+    def choices(self) -> list[str]:
+        """What can be shown."""
+        figure = {'hip': ' (figure 3)', 'knee': ' (figure 4)'}
+        return [
+            'as prescribed',
+            *(
+                f'{d.joint.removeprefix("exo_").replace("_", " ")} by its torque'
+                f'{figure.get(d.joint.split("_")[-1], "")}'
+                for d in self.driven
+            ),
+        ]
+
+    @property
+    def size(self) -> tuple[int, int, float]:
+        """Width and height of the drawing, and where the ground is [px]."""
+        return _WIDTH, _HEIGHT, _GROUND
+
+    @property
+    def data(self) -> Markup:
+        """Return what the script draws: a list of frames, each with its lines."""
+        cycle = self.cycle
+        rows = np.linspace(0, len(cycle.phase) - 1, _FRAMES + 1).astype(int)[:-1]
+        wearer = cycle.motions.other.select(rows)
+        ahead = wearer.q[:, floating(cycle.pair.other)[0]]
+        machines = [cycle.motions.own.select(rows)]
+        machines += [d.right.motion.select(rows // 2) for d in self.driven]
+        geometry = cycle.pair.geometry(machines[0], wearer)
+        start = geometry.other_position[..., [0, 2]]
+        end = start + _MAGNIFIED * geometry.way[..., [0, 2]]
+        return script_json(
+            {
+                'phase': np.round(cycle.phase[rows], 3).tolist(),
+                'ground': _whole(_SCALE * ahead),
+                'wearer': _bodies(cycle.pair.other, wearer, ahead),
+                'machine': [_bodies(cycle.pair.robot, m, ahead) for m in machines],
+                'springs': _whole(_placed(np.stack([start, end], axis=2), ahead)),
+                'feet': self._feet(rows, ahead),
+                'error': [
+                    np.round(np.degrees(d.right.check.error[rows // 2]), 4).tolist()
+                    for d in self.driven
+                ],
+            }
+        )
+
+    def _feet(self, rows: FloatArray, ahead: FloatArray) -> list[Any]:
+        """Return where the ground pushes and how: feet of wearer, then of machine."""
+        arrows = []
+        for other in (True, False):
+            robot = self.cycle.pair.other if other else self.cycle.pair.robot
+            motion = self.cycle.motions.other if other else self.cycle.motions.own
+            ground = self.cycle.other_ground if other else self.cycle.ground
+            force = ground[rows].reshape(len(rows), 2, 2, 2)
+            place = points_motion(robot, *contacts(robot, leg_length(robot)), motion.q[rows])[0]
+            place = place[..., [0, 2]].reshape(len(rows), 2, 2, 2)
+            up = force[..., 1:]
+            middle = (place * up).sum(axis=2) / np.maximum(up.sum(axis=2), 1e-9)
+            foot = np.where(up.sum(axis=2) > 0.0, middle, place[:, :, 0])
+            total = force.sum(axis=2)
+            drawn = _placed(foot, ahead)
+            tip = drawn + _FORCE * total * np.array([1.0, -1.0])
+            arrows.append(np.stack([drawn, tip], axis=2))
+        return _whole(np.concatenate(arrows, axis=1))
+
+
+@dataclass(frozen=True)
+class FootForces(Section):
+    """
+    What feet bear over a cycle: by the ground, and by the source's rule.
+
+    Attributes
+    ----------
+    cycle : GaitCycle
+        How they walk.
+
+    """
+
+    title: ClassVar[str] = 'Feet'
+    template: ClassVar[str] = 'exo_feet.html'
+
+    cycle: GaitCycle
+
+    @property
+    def panels(self) -> list[tuple[str, Chart]]:
+        """Name and chart of both machines."""
+        pair = self.cycle.pair
+        return [
+            (robot.name, self._chart(robot is pair.other)) for robot in (pair.robot, pair.other)
+        ]
+
+    def _chart(self, other: bool) -> Chart:
+        feet = self.cycle.feet(other=other)[..., 1]
+        rule = feet_by_shares(self.cycle, other=other)[..., 1]
+        two = self.cycle.support(other=other) == 2
+        series = [
+            Series('right foot', feet[:, 0], 'residual'),
+            Series('left foot', feet[:, 1], 'predicted'),
+            Series('right, by (20) to (22)', np.where(two, rule[:, 0], np.nan), 'measured'),
+            Series('left, by (20) to (22)', np.where(two, rule[:, 1], np.nan), 'before'),
+        ]
+        marks = [Mark(float(self.cycle.phase[k])) for k in np.flatnonzero(np.diff(two)) + 1]
+        return Chart(
+            self.cycle.phase,
+            series,
+            'gait cycle of the right leg',
+            'force up [N]',
+            height=240,
+            link='feet',
+            marks=marks,
+        )
+
+    @property
+    def rows(self) -> list[tuple[str, str, str, str, str]]:
+        """Machine, weight, largest force on a foot, time on both feet, error of the rule."""
+        pair = self.cycle.pair
+        return [
+            self._row(robot, other) for robot, other in ((pair.robot, False), (pair.other, True))
+        ]
+
+    def _row(self, robot: Robot, other: bool) -> tuple[str, str, str, str, str]:
+        feet = self.cycle.feet(other=other)[..., 1]
+        two = self.cycle.support(other=other) == 2
+        off = (feet_by_shares(self.cycle, other=other)[..., 1] - feet)[two]
+        return (
+            robot.name,
+            f'{weight(robot):.0f}',
+            f'{feet.max():.0f}',
+            f'{100.0 * np.mean(two):.0f} %',
+            f'{np.sqrt(np.mean(off**2)):.0f}',
+        )
+
+
+@dataclass(frozen=True)
+class CycleByTorque(Section):
+    """
+    Hip and knee over the whole cycle, each by its torque.
+
+    Attributes
+    ----------
+    cycle : GaitCycle
+        What was prescribed.
+    driven : sequence of Driven
+        Joints by their torque.
+    softer : float
+        By which share springs were taken too soft.
+    rate : float
+        Torque samples per second.
+
+    """
+
+    title: ClassVar[str] = 'Whole cycle by torque'
+    template: ClassVar[str] = 'exo_cycle.html'
+
+    cycle: GaitCycle
+    driven: Sequence[Driven]
+    softer: float
+    rate: float
+
+    @property
+    def rows(self) -> list[tuple[str, str, str, str, str]]:
+        """Joint, error of the source, and ours: right, springs too soft, feet by the rule."""
+        rows = []
+        for d in self.driven:
+            source = SOURCE.get(d.joint.split('_')[-1])
+            shown = '' if source is None else f'{source:g}'
+            right, soft, shared = d.errors
+            rows.append((d.joint, shown, f'{right:.2g}', f'{soft:.2f}', f'{shared:.2f}'))
+        return rows
+
+    @property
+    def panels(self) -> list[tuple[str, Chart, Chart]]:
+        """Name, angle and error of every joint."""
+        return [self._panel(d) for d in self.driven]
+
+    def _panel(self, d: Driven) -> tuple[str, Chart, Chart]:
+        phase = self.cycle.phase[::2]
+        angle = Chart(
+            phase,
+            [
+                Series('prescribed', np.degrees(d.right.check.prescribed), 'measured'),
+                Series('by its torque', np.degrees(d.right.check.followed), 'residual'),
+                Series('springs too soft', np.degrees(d.softer.check.followed), 'predicted'),
+            ],
+            '',
+            'angle [°]',
+            link=d.joint,
+        )
+        error = Chart(
+            phase,
+            [
+                Series('by its torque', np.degrees(d.right.check.error), 'residual'),
+                Series('springs too soft', np.degrees(d.softer.check.error), 'predicted'),
+            ],
+            'gait cycle of the right leg',
+            'error [°]',
+            height=150,
+            link=d.joint,
+            symmetric=True,
+            legend=False,
+        )
+        return d.joint, angle, error
+
+
+def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
+    """Return lines of trunk, right and left leg in every frame, in px."""
+    leg = leg_length(robot)
+    lean = robot.joints[floating(robot)[2]]
+    joints, points = [lean, lean], [[0.0, 0.0, _TRUNK], [0.0, 0.0, 0.0]]
+    for side in SIDES:
+        names = [robot.joints[k] for k in columns(robot, side)]
+        joints += [*names, names[-1]]
+        points += [[0.0, 0.0, 0.0]] * 3 + [[leg.foot, 0.0, 0.0]]
+    place, _ = points_motion(robot, joints, np.array(points), motion.q)
+    drawn = _placed(place[..., [0, 2]], ahead)
+    return [_whole(drawn[:, part]) for part in (slice(0, 2), slice(2, 6), slice(6, 10))]
+
+
+def _placed(points: FloatArray, ahead: FloatArray) -> FloatArray:
+    """Return points forward and up [m] in px, as seen by one who walks beside the wearer."""
+    shape = (-1,) + (1,) * (points.ndim - 2)
+    x = _HIPS + _SCALE * (points[..., 0] - ahead.reshape(shape))
+    return np.stack([x, _GROUND - _SCALE * points[..., 1]], axis=-1)
+
+
+def _whole(values: FloatArray) -> list[Any]:
+    return list(np.round(values, 1).tolist())

@@ -1,0 +1,15 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The shipped pair, walking."""
+
+from __future__ import annotations
+
+from armid_ros.pair.gait_cycle import gait_cycle, GaitCycle
+from armid_ros.pair.walkers import walking_pair
+from armid_ros.simulation.gait import read_gait
+import pytest
+
+
+@pytest.fixture(scope='session')
+def cycle() -> GaitCycle:
+    return gait_cycle(walking_pair(), read_gait())

@@ -1,0 +1,107 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A whole cycle: momentum, periodicity, supports, and the same in MuJoCo."""
+
+from __future__ import annotations
+
+from armid_ros.pair.driven_cycle import check_cycle, driving_torque
+from armid_ros.pair.gait_cycle import weight
+from armid_ros.pair.shares import feet_by_shares, ground_by_shares
+from armid_ros.pair.walkers import floating
+import numpy as np
+import pytest
+
+from benchmarks.walking_in_mujoco import walk_in_mujoco
+
+#: Reach of the errors over a cycle [deg]; the source has 1.5 and 2.5.
+REACH = {'exo_right_hip': 0.05, 'exo_right_knee': 0.1}
+RATE = 200.0
+
+
+def test_nothing_holds_the_hips(cycle) -> None:
+    """Newton: weight, springs and ground leave no force that a joint would have to give."""
+    for robot, tau in (
+        (cycle.pair.robot, cycle.torques.tau),
+        (cycle.pair.other, cycle.torques.other_tau),
+    ):
+        assert np.abs(tau[:, floating(robot)[:2]]).max() < 1e-6 * weight(robot)
+
+
+def test_on_average_the_ground_carries_the_weight_of_both(cycle) -> None:
+    both = cycle.ground.sum(axis=1) + cycle.other_ground.sum(axis=1)
+    ahead, up = both[:-1].mean(axis=0)
+    carried = weight(cycle.pair.robot) + weight(cycle.pair.other)
+    assert up == pytest.approx(carried, rel=5e-3)
+    assert abs(ahead) < 5e-3 * carried
+
+
+def test_both_walk_on_and_do_the_same_every_cycle(cycle) -> None:
+    for robot, motion in zip((cycle.pair.robot, cycle.pair.other), cycle.motions, strict=True):
+        ahead, up, _ = floating(robot)
+        moved = motion.q[-1] - motion.q[0]
+        assert moved[ahead] == pytest.approx(cycle.gaits[1].stride, rel=0.03)
+        np.testing.assert_allclose(np.delete(moved, ahead), 0.0, atol=1e-5)
+        half = len(motion) // 2
+        np.testing.assert_allclose(motion.q[half, up], motion.q[0, up], atol=1e-5)
+
+
+@pytest.mark.parametrize('other', [False, True])
+def test_feet_take_turns_and_nobody_flies(cycle, other) -> None:
+    support = cycle.support(other=other)
+    assert support.min() >= 1
+    assert 0.15 < np.mean(support == 2) < 0.35
+    feet = cycle.feet(other=other)[..., 1]
+    for foot in feet.T:
+        assert 0.55 < np.mean(foot > 0.0) < 0.7
+
+
+def test_friction_holds_what_stands(cycle) -> None:
+    ahead, up = cycle.ground[..., 0], cycle.ground[..., 1]
+    assert np.all(np.abs(ahead) <= 0.3 * up + 1e-9)
+
+
+@pytest.mark.parametrize('other', [False, True])
+def test_the_rule_of_shares_adds_up_to_what_the_ground_does(cycle, other) -> None:
+    """(20) to (22) split the same whole; strikes, where velocities bend, are left out."""
+    off = np.abs(feet_by_shares(cycle, other=other) - cycle.feet(other=other))
+    whole = feet_by_shares(cycle, other=other).sum(axis=1) - cycle.feet(other=other).sum(axis=1)
+    carried = weight(cycle.pair.other if other else cycle.pair.robot)
+    assert np.median(np.abs(whole)) < 1e-3 * carried
+    alone = cycle.support(other=other) == 1
+    assert np.median(off[alone]) < 1e-2 * carried
+
+
+def test_mujoco_walks_the_same_cycle(cycle) -> None:
+    walked = walk_in_mujoco(cycle)
+    feet = np.stack([cycle.feet(), cycle.feet(other=True)], axis=1)
+    np.testing.assert_allclose(walked.feet, feet, atol=0.2)
+    hips = np.stack([cycle.motions.own.q[:, :2], cycle.motions.other.q[:, :2]], axis=1)
+    np.testing.assert_allclose(walked.hips, hips, atol=1e-5)
+
+
+@pytest.mark.parametrize('joint', REACH)
+def test_a_joint_walks_the_cycle_by_its_torque_in_both_engines(cycle, joint) -> None:
+    torque = driving_torque(cycle, joint, RATE)
+    path = walk_in_mujoco(cycle, joint, lambda t: torque(t)[2]).driven
+    check = check_cycle(cycle, joint, RATE).check
+    column = cycle.pair.robot.index(joint)
+    errors = np.degrees(path - cycle.motions.own.q[:, column])
+    assert np.abs(errors).max() < REACH[joint]
+    assert np.abs(np.degrees(check.error)).max() < REACH[joint]
+    np.testing.assert_allclose(np.degrees(check.error), errors[::2], atol=0.03)
+
+
+def test_springs_too_soft_have_errors_of_the_size_of_the_source(cycle) -> None:
+    soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
+    hip, knee = (
+        np.degrees(np.abs(check_cycle(cycle, joint, RATE, soft).check.error)).max()
+        for joint in REACH
+    )
+    assert 0.4 < hip < 1.5
+    assert 1.0 < knee < 2.5
+
+
+def test_the_rule_of_shares_is_no_foot_force_to_walk_by(cycle) -> None:
+    shared = ground_by_shares(cycle)
+    check = check_cycle(cycle, 'exo_right_knee', RATE, ground_forces=shared).check
+    assert np.degrees(np.abs(check.error)).max() > 2.5
