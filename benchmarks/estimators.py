@@ -40,6 +40,8 @@ CASES = (
     (3e-4, SignalSettings(20.0, 4)),
 )
 TORQUE_NOISE = 0.05
+#: Samples at the beginning that the published errors of the EMPS leave out.
+EMPS_BORDER = 49
 RATE = 200.0
 VALUES = {
     'viscous_friction': 0.08,
@@ -87,7 +89,13 @@ def compared(title, arm, training, held_out):
 
 
 class EmpsController(Controller):
-    """nu = kp kv (q_r - q) - kv dq, at most 10 V; the velocity from two positions."""
+    """
+    nu = kp kv (q_r - q) - kv dq, at most 10 V, with dq = (q[k] - q[k - 2]) / (2 T).
+
+    The mean of two differences is the filter of the published model; with it the recorded
+    positions give the recorded voltage within 0.24 % (3.3 % with a single difference).
+
+    """
 
     kp, kv, volts, period = 160.18, 243.45, 10.0, 1e-3
 
@@ -97,14 +105,21 @@ class EmpsController(Controller):
 
     def torque(self, q, dq, desired, feedforward):
         """Return the force of the drive [N]."""
-        before = q if self._before is None else self._before
-        self._before = q
-        nu = self.kp * self.kv * (desired[0] - q) - self.kv * (q - before) / self.period
+        last, one_before = self._before or (q, q)
+        self._before = q, last
+        nu = self.kp * self.kv * (desired[0] - q) - self.kv * (q - one_before) / (2 * self.period)
         return real_recordings.EMPS_GAIN * np.clip(nu, -self.volts, self.volts)
 
 
 def emps_closed_loop(data, arm):
-    """Simulate the EMPS as controlled; return errors [%]: position, force, smooth force."""
+    """
+    Simulate the EMPS as controlled; return errors [%] of position and force.
+
+    As published (Simulation_EMPS.m of the data set): 100 |measured - simulated| / |measured| over
+    all samples but the first 49, the position behind a Butterworth filter of 100 Hz and order 4
+    forwards and backwards, the force as it is.
+
+    """
     raw = loadmat(data / 'emps' / 'DATA_EMPS.mat')
     t, q, qg, vir = (raw[key].ravel().astype(float) for key in ('t', 'qm', 'qg', 'vir'))
     dq = np.gradient(qg, t)
@@ -115,14 +130,10 @@ def emps_closed_loop(data, arm):
         rng=np.random.default_rng(0),
         controller=EmpsController(),
     )
-    n = min(len(q), len(run.t))
-    force, made = real_recordings.EMPS_GAIN * vir[:n], run.tau[:n, 0]
-    smooth = signal.butter(4, 0.04, output='sos')  # 20 Hz: without the steps of the encoder
-    pairs = (
-        (q[:n], run.truth.q[:n, 0]),
-        (force, made),
-        tuple(signal.sosfiltfilt(smooth, f) for f in (force, made)),
-    )
+    rows = slice(EMPS_BORDER, min(len(q), len(run.t)))
+    smooth = signal.filtfilt(*signal.butter(4, 0.2), q)
+    force = real_recordings.EMPS_GAIN * vir
+    pairs = (smooth[rows], run.truth.q[rows, 0]), (force[rows], run.tau[rows, 0])
     return [100.0 * np.linalg.norm(a - b) / np.linalg.norm(a) for a, b in pairs]
 
 
@@ -139,11 +150,8 @@ def machines(data):
             found = identify(
                 arm, [first], IdentificationSettings(method), rng=np.random.default_rng(0)
             )
-            position, force, smooth = emps_closed_loop(data, found.arm)
-            print(
-                f'    {method:5s} position {position:.4f} %, force {force:.2f} %, '
-                f'{smooth:.2f} % below 20 Hz'
-            )
+            position, force = emps_closed_loop(data, found.arm)
+            print(f'    {method:5s} position {position:.4f} %, force {force:.2f} %')
         tx40 = real_recordings.tx40(data, out)
         arm = ArmModel.of(tx40.robot, effects=f'{FRICTION},rotor_inertia,coupled_joint_friction')
         recording = read_recording(tx40.bags[0], joints=arm.robot.joints)

@@ -4,8 +4,10 @@
 An extended Kalman filter of positions, velocities and parameters.
 
 State x = (q, dq, theta), input the recorded torque, output the recorded position; theta is
-constant. The arm is integrated from sample to sample with the parameters as believed so far, and
-each position corrects all three. Nothing is filtered or differentiated beforehand.
+constant and begins at the values of least squares, with deviations widened. The arm is integrated
+from sample to sample with the parameters as believed so far, and each position corrects all
+three. Positions and torques are as recorded; only where the model is differentiated by its
+parameters, the acceleration is that of the smooth motion.
 Source: Gautier and Poignet 2001; Jazwinski 1970, section 8.3.
 
 """
@@ -20,23 +22,31 @@ from armid_ros.errors import IdentificationError
 from armid_ros.identification.excited import bounds
 from armid_ros.identification.nonlinear import FittedValues, moved, torques
 from armid_ros.identification.regression import REST_SPEED
-from armid_ros.identification.signals import Conditioning, decimate, segments
+from armid_ros.identification.signals import (
+    Conditioning,
+    conditioning,
+    decimate,
+    decimated_samples,
+    segments,
+    SignalSettings,
+)
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve, LinAlgError
 
 #: Samples per second that are enough to integrate an arm between them [Hz].
 _RATE = 500.0
-#: Share of the sampling rate below which positions are taken as they are.
-_BAND = 0.4
 #: Steps of differences of position [rad or m] and velocity.
 _STEP = 1e-6
-#: What a parameter may be off by before any data: this share of its value ...
+#: What a parameter may be off by at most: this share of its value ...
 _PRIOR_SHARE = 0.3
-#: ... or what makes this share of the torque that is recorded, whichever is more: of effects, of
-#: which a description says nothing, and of the body.
+#: ... or what makes this share of the torque that is recorded, whichever is more: of effects, and
+#: of the body.
 _PRIOR_TORQUE = 0.1, 0.01
+#: Deviations of least squares are widened so many times, as the noise of encoders biases them.
+_DOUBT = 10.0
 #: A filter that leaves so many times the torque of least squares has not converged.
 _CONVERGED = 1.5
 #: Least position noise [rad or m]: below it rounding of the integration counts.
@@ -56,7 +66,7 @@ def fit_by_kalman_filter(
     Parameters
     ----------
     start : ArmModel
-        Where it begins: the description, or an arm that can be simulated.
+        Where it begins: least squares, or the nearest arm that can be simulated.
     fit : FittedValues
         Weighted least squares: which parameters, and how large the torque noise is.
     recordings : sequence of Recording
@@ -80,10 +90,12 @@ def fit_by_kalman_filter(
         )
     limits = bounds(start, fit.base)
     values = fit.base.values(start.theta)
-    covariance = np.diag(_prior(fit, values) ** 2)
+    covariance = _prior(fit, values)
+    clear = conditioning(list(recordings), SignalSettings())
+    smooth = replace(used, cutoff_hz=min(used.cutoff_hz, clear.cutoff_hz))
     for recording in recordings:
-        for motion in segments(recording, _raw(used)):
-            kalman = _Filter(start, fit, _thinned(motion, used), used)
+        for motion in segments(recording, smooth):
+            kalman = _Filter(start, fit, _thinned(recording, motion, used), used)
             values, covariance = kalman.run(values, covariance, limits)
     arm = moved(fit.arm, fit.base, values, free)
     found = replace(
@@ -108,28 +120,39 @@ def _left(fit: FittedValues) -> float:
 
 
 def _prior(fit: FittedValues, values: FloatArray) -> FloatArray:
-    """Return the standard deviations of the parameters before any data, shape (r,)."""
+    """Return the covariance of the parameters before the filter sees the data, shape (r, r)."""
     size = np.sqrt(np.mean(np.concatenate([part.tau for part in fit.problem]) ** 2, axis=0))
     columns = np.concatenate([part.columns for part in fit.problem])
     reach = np.max(np.sqrt(np.mean(columns**2, axis=0)) / size[:, np.newaxis], axis=0)
     body = [parameter.rigid for parameter in fit.base.parameters]
     least = np.where(body, _PRIOR_TORQUE[1], _PRIOR_TORQUE[0])
-    return np.asarray(np.maximum(_PRIOR_SHARE * np.abs(values), least / reach))
+    alone = np.maximum(_PRIOR_SHARE * np.abs(values), least / reach)
+    scaled = fit.solution.covariance / np.outer(alone, alone) * _DOUBT**2
+    return np.asarray(
+        np.outer(alone, alone) * np.linalg.solve(scaled + np.eye(len(alone)), scaled)
+    )
 
 
-def _raw(used: Conditioning) -> Conditioning:
+def _thinned(recording: Recording, motion: Motion, used: Conditioning) -> Motion:
+    """
+    Return positions and torques as recorded, at the rate of the Kalman filter.
+
+    Velocity and acceleration are those of the smooth motion: they say where the model is
+    differentiated. The filter's own acceleration has the noise of the torques in it, as large as
+    the motion of light joints, and columns that go with the noise bias the parameters.
+
+    """
     factor = max(1, round(used.rate_hz / _RATE))
-    return Conditioning(used.rate_hz, _BAND * used.rate_hz, factor)
-
-
-def _thinned(motion: Motion, used: Conditioning) -> Motion:
-    """Return positions and torques at the rate of the Kalman filter."""
-    raw = _raw(used)
+    raw = Conditioning(used.rate_hz, used.rate_hz, factor)
     assert motion.tau is not None
-    q, tau = decimate(motion.q, raw), decimate(motion.tau, raw)
-    t = raw.decimation / raw.rate_hz * np.arange(len(q), dtype=float)
-    dq = np.gradient(q, t, axis=0)
-    return Motion(motion.joints, t, q, dq, np.zeros_like(q), tau)
+    q = CubicSpline(recording.t, recording.q)(motion.t)
+    rows = np.arange(len(motion))
+    if factor > 1:
+        rows = np.array(decimated_samples(len(motion), raw), dtype=np.intp)
+        q, tau = decimate(q, raw), decimate(motion.tau, raw)
+    else:
+        tau = motion.tau
+    return replace(motion.select(rows), q=q, tau=tau, beside=None)
 
 
 @dataclass(frozen=True)
@@ -199,10 +222,9 @@ class _Filter:
         p[:n, :n] = np.diag(self._noise)
         p[n : 2 * n, n : 2 * n] = np.diag(2.0 * self._noise / self._dt**2)
         p[2 * n :, 2 * n :] = covariance
-        ddq = np.zeros(n)
         for k in range(1, len(self._motion)):
             tau = 0.5 * (self._motion.tau[k - 1] + self._motion.tau[k])
-            x, p, ddq = self._predict(x, p, ddq, tau)
+            x, p = self._predict(x, p, self._motion.ddq[k - 1], tau)
             x, p = self._correct(x, p, self._motion.q[k])
             x[2 * n :] = np.clip(x[2 * n :], *limits)
             if not np.all(np.isfinite(x)):
@@ -210,16 +232,16 @@ class _Filter:
         return x[2 * n :], p[2 * n :, 2 * n :]
 
     def _predict(
-        self, x: FloatArray, p: FloatArray, ddq: FloatArray, tau: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        self, x: FloatArray, p: FloatArray, along: FloatArray, tau: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         n, dt = self._motion.n_joints, self._dt
         q, dq, theta = x[:n], x[n : 2 * n], x[2 * n :]
-        here = self._slopes(q + 0.5 * dt * dq, dq, ddq, theta)
+        here = self._slopes(q + 0.5 * dt * dq, dq, along, theta)
         try:
             factor = cho_factor(here.inertia)
         except (LinAlgError, ValueError):
             raise IdentificationError(_diverged(self._motion.t[-1])) from None
-        implicit = here.inertia + dt * here.by_dq  # stiff friction damps, and does not ring
+        implicit = here.inertia + 0.5 * dt * here.by_dq  # velocity terms at the middle of the step
         ddq = np.asarray(np.linalg.solve(implicit, tau - here.torque), dtype=np.float64)
         after = np.concatenate([q + dt * dq + 0.5 * dt**2 * ddq, dq + dt * ddq, theta])
         slopes = -np.linalg.solve(implicit, np.hstack([here.by_q, here.by_dq, here.columns]))
@@ -231,7 +253,7 @@ class _Filter:
         gain = cho_solve(factor, np.diag(np.sqrt(self._torque_noise + here.step**2)))
         noise = np.vstack([0.5 * dt**2 * gain, dt * gain])
         p[: 2 * n, : 2 * n] += noise @ noise.T
-        return after, p, ddq
+        return after, p
 
     def _correct(
         self, x: FloatArray, p: FloatArray, q: FloatArray

@@ -69,15 +69,12 @@ def refined(
     free = ungrouped(fit.arm, fit.base)
     if estimator == 'iv':
         return fit_by_instruments(fit, recordings, used, free)
-    wanted = arm if estimator == 'ekf' else fit.arm
     begin, notes = fit, tuple[str, ...]()
-    if not _moves(wanted):
+    if not _moves(fit.arm):
         begin, _ = fit_to_bodies(arm, fit, recordings, used, 'wls', PhysicalSettings(), rng)
-        what = 'the description' if estimator == 'ekf' else 'that of wls'
-        notes = (f'{estimator} began from a fit among bodies: {what} cannot be simulated',)
-        wanted = begin.arm
+        notes = (f'{estimator} began from a fit among bodies: that of wls cannot be simulated',)
     if estimator == 'ekf':
-        found, said = fit_by_kalman_filter(wanted, fit, recordings, used, free)
+        found, said = fit_by_kalman_filter(begin.arm, fit, recordings, used, free)
     else:
         found, said = fit_output_error(begin, recordings, used, free)
     return found, (*notes, *said)
