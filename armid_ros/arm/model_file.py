@@ -174,10 +174,44 @@ def load_model(path: str | Path, robot: Robot | None = None) -> ArmModel:
     path = Path(path)
     text = read_text(path, ModelError)
     with reading(path, ModelError):
-        document = parsed_yaml(text, ModelError)
-        if not isinstance(document, dict) or document.get('schema') != SCHEMA:
-            raise ModelError(f"not an arm model; its 'schema' has to be {SCHEMA}")
+        document = _document(text)
         return _arm(document, robot or _described(path, str(document['robot'])))
+
+
+def read_model(text: str, robot: Robot, source: str) -> ArmModel:
+    """
+    Return the arm model that the text of a model.yaml describes.
+
+    Parameters
+    ----------
+    text : str
+        As `model_text` makes it.
+    robot : Robot
+        The description; its inertial parameters and gravity are replaced by the text's.
+    source : str
+        Where it came from, for messages.
+
+    Raises
+    ------
+    ModelError
+        Naming the source and what is wrong in it.
+
+    """
+    with reading(source, ModelError):
+        return _arm(_document(text), robot)
+
+
+def model_text(arm: ArmModel, robot: str, estimate: Estimate | None = None) -> str:
+    """Return what model.yaml holds; arguments as of `model_document`."""
+    document = model_document(arm, robot, estimate)
+    return str(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=99))
+
+
+def _document(text: str) -> dict[str, Any]:
+    document = parsed_yaml(text, ModelError)
+    if not isinstance(document, dict) or document.get('schema') != SCHEMA:
+        raise ModelError(f"not an arm model; its 'schema' has to be {SCHEMA}")
+    return document
 
 
 def _described(path: Path, source: str) -> Robot:

@@ -29,7 +29,7 @@ SCHEMA = 'armid/excitation/1'
 def save_excitation(excitation: Excitation, path: str | Path) -> None:
     """Write an excitation; the suffix, .yaml, .yml or .csv, says how."""
     path = Path(path)
-    writer = {'.yaml': _to_yaml, '.yml': _to_yaml, '.csv': _to_csv}.get(path.suffix)
+    writer = {'.yaml': excitation_text, '.yml': excitation_text, '.csv': _to_csv}.get(path.suffix)
     if writer is None:
         raise TrajectoryError(f'{path}: an excitation is written as .yaml or .csv')
     write_file(path, writer(excitation))
@@ -54,7 +54,29 @@ def load_excitation(path: str | Path) -> Excitation:
         return reader(text)
 
 
-def _to_yaml(excitation: Excitation) -> str:
+def read_excitation(text: str, source: str) -> Excitation:
+    """
+    Return the excitation that a text in YAML holds.
+
+    Parameters
+    ----------
+    text : str
+        As `excitation_text` makes it.
+    source : str
+        Where it came from, for messages.
+
+    Raises
+    ------
+    TrajectoryError
+        If it is no excitation; names the source and what is wrong.
+
+    """
+    with reading(source, TrajectoryError):
+        return _from_yaml(text)
+
+
+def excitation_text(excitation: Excitation) -> str:
+    """Return an excitation as YAML."""
     trajectory = excitation.trajectory
     joints = [
         {

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -38,7 +38,11 @@ ARM_PARAMETERS = (
     ),
     NodeParameter('model', '', 'Path of a model.yaml; empty: the description and the effects.'),
     NodeParameter(
-        'effects', [''], 'Effects, each as NAME[@joint+joint]:quantity=value,quantity=value.'
+        'effects',
+        [''],
+        'Effects, each as NAME[@joint+joint]:quantity=value,quantity=value; set on the running '
+        'node, the arm goes on with them from where it is.',
+        read_only=False,
     ),
     NodeParameter('start', '', 'Where it stands, as q1,q2,...; empty: in mid-range [rad or m].'),
     NodeParameter(
@@ -122,7 +126,39 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm | Ela
     return SimulatedArm(plant, rng=rng, controller=controller, sensors=sensors, start=start)
 
 
+def bare_arm(value: Values) -> ArmModel:
+    """Return the arm that parameters describe, but for the parameter `effects`."""
+    return _described(value)[0]
+
+
+def with_effects(arm: ArmModel, texts: Iterable[str]) -> ArmModel:
+    """
+    Return an arm with effects.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Without them.
+    texts : iterable of str
+        Each NAME[@joint+joint]:quantity=value,quantity=value; empty ones stand for none.
+
+    Raises
+    ------
+    ArmidError
+        If there is no such effect or joint.
+
+    """
+    for text in filter(None, texts):
+        arm = arm.with_effect(*parse_effect(text, arm.robot))
+    return arm
+
+
 def _model(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:
+    arm, drives = _described(value)
+    return with_effects(arm, value('effects')), drives
+
+
+def _described(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:
     gravity, drives = value('gravity'), None
     if value('model'):
         arm = load_model(value('model'))
@@ -130,9 +166,6 @@ def _model(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:
             arm = replace(arm, robot=arm.robot.with_gravity(parse_gravity(gravity)))
     else:
         arm, drives = shipped_arm(load_robot(value('robot'), gravity=gravity or 'earth'))
-    for text in filter(None, value('effects')):
-        effect, values = parse_effect(text, arm.robot)
-        arm = arm.with_effect(effect, values)
     return arm, drives
 
 

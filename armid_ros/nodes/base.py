@@ -52,6 +52,8 @@ class ArmidNode(Node):
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
         declare(self, self.parameters())
+        self.add_on_set_parameters_callback(self._validate)
+        self.add_post_set_parameters_callback(self._apply)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(1.0, self.publish_diagnostics)
 
@@ -110,6 +112,29 @@ class ArmidNode(Node):
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
         """Return what else to say on /diagnostics."""
         return ()
+
+    def objection(self, values: Mapping[str, Any]) -> str:
+        """
+        Say why parameters cannot have new values while the node runs; empty when they can.
+
+        Parameters
+        ----------
+        values : mapping of str to value
+            What is to be set, all at once; each is of the right type and range.
+
+        """
+        return ''
+
+    def changed(self, names: frozenset[str]) -> None:
+        """
+        Act on parameters that were set while the node runs.
+
+        Parameters
+        ----------
+        names : frozenset of str
+            What was set.
+
+        """
 
     def close(self) -> None:
         """Finish what must not be lost."""
@@ -175,6 +200,16 @@ class ArmidNode(Node):
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
         self.complaints.settle()
+
+    def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
+        reason = self.objection({p.name: p.value for p in parameters})
+        return SetParametersResult(successful=not reason, reason=reason)
+
+    def _apply(self, parameters: list[Parameter]) -> None:
+        try:
+            self.changed(frozenset(p.name for p in parameters))
+        except ArmidError as error:
+            self.complaints.say('parameter', str(error))
 
     def _surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
         return surviving(callback, what, lambda: self.complaints, lambda: self.context.ok())

@@ -140,7 +140,7 @@ def run_lockstep(
         If the bag exists, the arm refuses the excitation, or a node does not get its messages.
 
     """
-    with _Stage(domain) as stage:
+    with Stage(domain) as stage:
         plant = stage.add(
             SimulatedArmNode, arm, start_ns, rate=rate, real_time_factor=0.0, use_sim_time=False
         )
@@ -201,7 +201,7 @@ def replay_lockstep(
         At the end.
 
     """
-    with _Stage(domain) as stage:
+    with Stage(domain) as stage:
         player = stage.add(
             BagPlayerNode, bag=str(bag), topics=[topic], subscriber_timeout=PATIENCE
         )
@@ -226,7 +226,7 @@ def replay_lockstep(
         return watch.progress()
 
 
-class _Stage:
+class Stage:
     """Nodes in one process, and the executor that runs them."""
 
     def __init__(self, domain: int | None) -> None:
@@ -235,7 +235,7 @@ class _Stage:
         self._scope = _scope(domain)
         self._nodes: list[ArmidNode] = []
 
-    def __enter__(self) -> _Stage:
+    def __enter__(self) -> Stage:
         self._context, self._executor = self._scope.__enter__()
         return self
 

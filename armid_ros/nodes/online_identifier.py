@@ -12,6 +12,7 @@ import time
 from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
+from armid_ros.arm.model_file import read_model
 from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.identification.change import Change
 from armid_ros.identification.learning_progress import LearningProgress, too_little_motion
@@ -104,6 +105,7 @@ class OnlineIdentifierNode(ArmidNode):
             self._adopt(identifier)
         else:
             self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
+        self.create_subscription(String, 'model', self._on_model, LATCHED)
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
         self._changes = self.create_publisher(ParameterEstimate, '~/change', LATCHED)
         self._predictions = self.create_publisher(JointState, '~/predicted_joint_states', STREAM)
@@ -248,6 +250,14 @@ class OnlineIdentifierNode(ArmidNode):
             return
         self._description = message.data
         self._adopt(identifier)
+
+    def _on_model(self, message: String) -> None:
+        """Estimate the effects of a model from its values on, if it has others."""
+        before = self._require()
+        arm = read_model(message.data, before.arm.robot, 'model')
+        if arm.effects != before.arm.effects:
+            rng = np.random.default_rng(0)
+            self._adopt(OnlineIdentifier(arm, before.settings, rng=rng))
 
     def _on_joint_states(self, message: JointState) -> None:
         self.received += 1

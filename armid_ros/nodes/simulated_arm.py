@@ -8,8 +8,10 @@ from collections.abc import Mapping, Sequence
 import time
 from typing import Any
 
-from armid_ros.errors import TrajectoryError
-from armid_ros.nodes.arm_parameters import ARM_PARAMETERS, make_arm
+from armid_ros.arm import ArmModel
+from armid_ros.arm.model_file import read_model
+from armid_ros.errors import ArmidError, ModelError, TrajectoryError
+from armid_ros.nodes.arm_parameters import ARM_PARAMETERS, bare_arm, make_arm, with_effects
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.elastic_topics import ElasticTopics
 from armid_ros.nodes.parameters import NodeParameter
@@ -46,8 +48,9 @@ class SimulatedArmNode(ArmidNode):
     A simulated arm on topics.
 
     In real time its stamps are those of the system clock. At another real_time_factor it also
-    publishes /clock. With use_sim_time it moves as far as /clock does, and no further. An arm
-    with elastic joints is read on both sides: joint_states are its motors', link/joint_states its
+    publishes /clock. With use_sim_time it moves as far as /clock does, and no further. A model on
+    the topic `model`, and effects that are set, make it another arm where it is and as it moves.
+    An arm with elastic joints is read on both sides: joint_states are its motors', link/joint_states its
     links', reference/joint_states what its drives are asked for, and <link>/imu accelerometers.
 
     """
@@ -94,6 +97,7 @@ class SimulatedArmNode(ArmidNode):
         """
         super().__init__('simulated_arm', **kwargs)
         self._arm = arm or make_arm(self.value, self.get_logger().warn)
+        self._bare = bare_arm(self.value) if arm is None else None
         rate = self.value('rate')
         self._dt_ns = round(self._arm.plant.dt * 1e9)
         self._stride = whole_steps(1.0 / rate, self._arm.plant.dt, f'a rate of {rate:g} Hz')
@@ -121,6 +125,7 @@ class SimulatedArmNode(ArmidNode):
         description = self.create_publisher(String, 'robot_description', LATCHED)
         description.publish(String(data=self._arm.plant.robot.urdf))
         self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, LATCHED)
+        self.create_subscription(String, 'model', self._on_model, LATCHED)
         self.offer('~/reset', self.reset)
         if self._follows:
             self.create_timer(1.0 / rate, self.follow)
@@ -191,6 +196,18 @@ class SimulatedArmNode(ArmidNode):
         if (due - self._elapsed()) / self._factor > _BACKLOG:
             self._anchor = (time.monotonic(), self._elapsed())
 
+    def follow_reference(self, reference: Reference) -> None:
+        """
+        Begin a trajectory now, as if it had come on joint_trajectory.
+
+        Raises
+        ------
+        TrajectoryError
+            If the arm cannot follow it.
+
+        """
+        self._arm.set_trajectory(reference.for_robot(self._arm.plant.robot))
+
     def reset(self) -> str:
         """Put the arm back to where it stood first; time goes on."""
         self._arm.reset(self._arm.state.steps)
@@ -200,6 +217,42 @@ class SimulatedArmNode(ArmidNode):
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say how far the simulation is."""
         return '', {'simulated_time': self._arm.state.t, 'moving': int(self.moving)}
+
+    def objection(self, values: Mapping[str, Any]) -> str:
+        """Refuse effects that the arm cannot have."""
+        if 'effects' not in values:
+            return ''
+        try:
+            self._check(self._with_effects(values['effects']))
+        except ArmidError as error:
+            return f"parameter 'effects': {error}"
+        return ''
+
+    def changed(self, names: frozenset[str]) -> None:
+        """Go on from where the arm is with the effects that were set."""
+        if 'effects' in names:
+            self._become(self._with_effects(self.value('effects')))
+
+    def _with_effects(self, texts: Sequence[str]) -> ArmModel:
+        """Return the arm as it was before any effects of the parameter, with others."""
+        if self._bare is None:
+            raise ModelError('this arm was made in a program; the parameter describes none')
+        return with_effects(self._bare, texts)
+
+    def _check(self, arm: ArmModel) -> None:
+        """Raise a ModelError for an arm that this one cannot become."""
+        if not isinstance(self._arm, SimulatedArm):
+            raise ModelError('an arm with elastic joints keeps its effects; start it with others')
+        self._arm.successor(arm)
+
+    def _become(self, arm: ArmModel) -> None:
+        self._check(arm)
+        self._arm.become(arm)
+        named = ', '.join(effect.name for effect in arm.effects) or 'no effect'
+        self.get_logger().info(f'goes on with {named}')
+
+    def _on_model(self, message: String) -> None:
+        self._become(read_model(message.data, self._arm.plant.arm.robot, 'model'))
 
     def _elapsed(self) -> float:
         return float(self._arm.state.t)

@@ -139,17 +139,29 @@ class SimulatedArm:
             If it is another robot.
 
         """
+        now = self._state
+        self.plant = self.successor(arm)
+        self._state = self.plant.state(now.q, now.dq, now.ddq, now.steps)
+        self._past = RecentPast.of(
+            self.plant, self._state, self._torque, self.sensors.torque_delay
+        )
+
+    def successor(self, arm: ArmModel) -> Plant:
+        """
+        Return the plant that this arm would have as another one.
+
+        Raises
+        ------
+        ModelError
+            If it is another robot, or no body.
+
+        """
         if arm.robot.joints != self.joints:
             raise ModelError(
                 f'{arm.robot.name}: an arm with the joints {", ".join(self.joints)} cannot become '
                 f'one with {", ".join(arm.robot.joints)}'
             )
-        now = self._state
-        self.plant = replace(self.plant, arm=arm)
-        self._state = self.plant.state(now.q, now.dq, now.ddq, now.steps)
-        self._past = RecentPast.of(
-            self.plant, self._state, self._torque, self.sensors.torque_delay
-        )
+        return replace(self.plant, arm=arm)
 
     def set_trajectory(self, reference: Reference) -> None:
         """

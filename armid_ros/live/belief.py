@@ -1,0 +1,306 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+When to ask what is wrong with a moving arm, and what to believe of the answers.
+
+A name counts when questions in a row agree on it, for a window may hold the moment of the change.
+What counts is proposed; a person accepts or rejects it.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel, Misfit
+from armid_ros.errors import IdentificationError
+from armid_ros.live.question import Answer, Question, WAITING
+from armid_ros.live.window import SampleWindow
+from armid_ros.recording import Recording
+import numpy.typing as npt
+
+Named = tuple[str, tuple[str, ...]]
+
+#: Verdicts that put a name forward.
+NAMING = ('named', 'ambiguous', 'partial')
+
+
+@dataclass(frozen=True)
+class LiveSettings:
+    """
+    What a user chooses.
+
+    Attributes
+    ----------
+    window : float
+        Motion that is looked at, at most [s].
+    shortest : float
+        ... and at least [s].
+    every : float
+        Motion between two questions [s].
+    rate : float
+        Samples per second that are kept [Hz].
+    confirmations : int
+        Questions in a row that have to agree on a name.
+    learning : float
+        Motion in which nothing is wrong yet, from which the model's own misfit is taken where
+        neither a baseline nor a misfit is known [s]; 0: the model is asked for all that it lacks.
+    material : float
+        Share of a joint's torque below which a cause does not matter.
+
+    """
+
+    window: float = 20.0
+    shortest: float = 8.0
+    every: float = 4.0
+    rate: float = 200.0
+    confirmations: int = 2
+    learning: float = 20.0
+    material: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Refuse what never comes to a question."""
+        if not 0.0 < self.shortest <= self.window:
+            raise IdentificationError(
+                f'a window of {self.window:g} s is never as long as the shortest one that is '
+                f'looked at, {self.shortest:g} s'
+            )
+
+
+@dataclass(frozen=True)
+class Belief:
+    """
+    What is believed of the arm.
+
+    Attributes
+    ----------
+    accepted : ArmModel
+        What everybody agrees on.
+    proposed : ArmModel or None
+        The same with what was named last; None where nothing is.
+    named : tuple of (str, tuple of str)
+        Names and joints of what is proposed.
+    rejected : frozenset of (str, tuple of str)
+        What is not to be proposed again.
+
+    """
+
+    accepted: ArmModel
+    proposed: ArmModel | None = None
+    named: tuple[Named, ...] = ()
+    rejected: frozenset[Named] = frozenset()
+
+    @property
+    def model(self) -> ArmModel:
+        """The best model there is."""
+        return self.accepted if self.proposed is None else self.proposed
+
+    def proposing(self, answer: Answer) -> Belief:
+        """Return the belief after a name that counts, unless it was rejected."""
+        if answer.named[0] in self.rejected:
+            return self.without_proposal()
+        return replace(self, proposed=answer.arm, named=answer.named)
+
+    def without_proposal(self) -> Belief:
+        """Return the belief where nothing is wrong."""
+        return replace(self, proposed=None, named=())
+
+    def accepting(self) -> Belief:
+        """
+        Return the belief where what is proposed is so.
+
+        Raises
+        ------
+        IdentificationError
+            If nothing is proposed.
+
+        """
+        if self.proposed is None:
+            raise IdentificationError('nothing is proposed')
+        return Belief(self.proposed, rejected=self.rejected)
+
+    def rejecting(self) -> Belief:
+        """
+        Return the belief where what is proposed is not so, and is not to be proposed again.
+
+        Raises
+        ------
+        IdentificationError
+            If nothing is proposed.
+
+        """
+        if self.proposed is None:
+            raise IdentificationError('nothing is proposed')
+        return Belief(self.accepted, rejected=self.rejected | {self.named[0]})
+
+
+class LiveDiagnosis:
+    """
+    Decides when to ask, and what to make of the answers.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The model as it is believed to be.
+    settings : LiveSettings, optional
+        When to ask.
+    baseline : tuple of Recording
+        From when nothing was wrong.
+    misfit : Misfit, optional
+        What the model left when it was identified.
+    seed : int
+        Of the diagnoses.
+
+    Attributes
+    ----------
+    settings : LiveSettings
+        When to ask; may be replaced.
+    belief : Belief
+        What is believed of the arm.
+    window : SampleWindow
+        What came.
+    latest : Answer or None
+        The last answer that was a verdict.
+    asked : int
+        Questions so far.
+
+    """
+
+    def __init__(
+        self,
+        arm: ArmModel,
+        settings: LiveSettings | None = None,
+        *,
+        baseline: tuple[Recording, ...] = (),
+        misfit: Misfit | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.settings = settings or LiveSettings()
+        self._given = arm, baseline, misfit
+        self._seed = seed
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew with the model as it was given."""
+        arm, self._baseline, self._misfit = self._given
+        self.belief = Belief(arm)
+        self.latest: Answer | None = None
+        self.asked = 0
+        self.use(self.settings)
+        known = self._baseline or self._misfit is not None
+        self._learned = bool(known) or not self.settings.learning
+
+    def use(self, settings: LiveSettings) -> None:
+        """Ask as other settings have it; the window begins anew."""
+        self.settings = settings
+        joints, period = self.belief.accepted.robot.joints, 1.0 / settings.rate
+        self.window = SampleWindow(joints, max(settings.window, settings.learning), period)
+        self._asked_at = 0.0
+        self._agreed: list[Named] = []
+
+    @property
+    def learning(self) -> bool:
+        """Whether the motion is still one in which nothing is wrong."""
+        return not self._learned
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the last questions agree on a name."""
+        return bool(self._agreed) and len(self._agreed) >= self.settings.confirmations
+
+    @property
+    def due(self) -> bool:
+        """Whether enough motion came since the last question."""
+        wanted = self.settings.learning if self.learning else self.settings.shortest
+        if self.window.moved < wanted or self.window.end - self.window.begin < wanted:
+            return False
+        return self.window.moved - self._asked_at >= self.settings.every
+
+    def add(
+        self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
+    ) -> bool:
+        """Take a sample; arguments and result as of `SampleWindow.add`."""
+        held = len(self.window)
+        kept = self.window.add(t, q, dq, tau)
+        if kept and held and len(self.window) == 1:
+            self._asked_at, self.window.moved = 0.0, 0.0  # a gap: the stretch is another one
+        return kept
+
+    def question(self) -> Question:
+        """Return what to ask now."""
+        self._asked_at = self.window.moved
+        self.asked += 1
+        longest = self.settings.learning if self.learning else self.settings.window
+        return Question(
+            self.belief.accepted,
+            self.window.recording(self.window.end - longest, f'window {self.asked}'),
+            self._baseline,
+            self._misfit,
+            self.settings.shortest,
+            self.settings.material,
+            self._seed,
+            self.window.end,
+            self.learning,
+        )
+
+    def take(self, answer: Answer) -> bool:
+        """
+        Take an answer into account.
+
+        Returns
+        -------
+        bool
+            Whether another model is believed now.
+
+        """
+        if answer.misfit is not None:
+            self._misfit, self._learned = answer.misfit, True
+            return False
+        if answer.verdict == WAITING:
+            self._agreed = []
+            return False
+        self.latest = answer
+        before = self.belief.model
+        if answer.verdict in NAMING and answer.named:
+            self._agree(answer.named[0])
+            if self.confirmed:
+                self.belief = self.belief.proposing(answer)
+        else:
+            self._agreed = []
+            if answer.verdict == 'consistent':
+                self.belief = self.belief.without_proposal()
+        return self.belief.model is not before
+
+    def accept(self) -> None:
+        """
+        Take what is proposed for the model; a baseline is none of the arm as it is now.
+
+        Raises
+        ------
+        IdentificationError
+            If nothing is proposed.
+
+        """
+        self.belief = self.belief.accepting()
+        if self._baseline and self.latest is not None:
+            self._baseline = (self.latest.window,)
+        self._agreed = []
+
+    def reject(self) -> None:
+        """
+        Drop what is proposed, and do not propose it again.
+
+        Raises
+        ------
+        IdentificationError
+            If nothing is proposed.
+
+        """
+        self.belief = self.belief.rejecting()
+        self._agreed = []
+
+    def _agree(self, named: Named) -> None:
+        """Count the questions in a row that put a name first."""
+        if self._agreed and self._agreed[-1] != named:
+            self._agreed = []
+        self._agreed.append(named)

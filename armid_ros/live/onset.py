@@ -1,0 +1,92 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""When the model began to miss more, or less, than before: what came earlier is of another arm."""
+
+from __future__ import annotations
+
+from armid_ros.arm import ArmModel
+from armid_ros.identification.signals import (
+    conditioning,
+    decimate,
+    decimated_samples,
+    segments,
+    SignalSettings,
+)
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+import numpy as np
+import scipy.stats
+
+#: Stretches whose residual power is compared [s]: longer than what the residual remembers.
+_BLOCK = 0.5
+#: Blocks on either side of a change at least, for a mean to be one.
+_FEWEST = 4
+#: Probability of a change where nothing changes, over all times and joints that are tried.
+_ERROR_RATE = 0.01
+
+
+def onset(arm: ArmModel, recording: Recording) -> float | None:
+    """
+    Find when the residual of a model changed.
+
+    The logarithm of the residual power of short blocks has one mean before a change and another
+    one after it; the time of the largest F ratio is tested against chance, corrected for all
+    times and joints (change of a mean: Hinkley 1970).
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The model as it is believed to be.
+    recording : Recording
+        Motion with torques, without a gap.
+
+    Returns
+    -------
+    float or None
+        Time since the begin of the recording [s]; None where nothing changed.
+
+    """
+    power = block_powers(arm, recording)
+    times, logs = power[:, 0], np.log(np.maximum(power[:, 1:], 1e-300))
+    count = len(logs)
+    splits = range(_FEWEST, count - _FEWEST + 1)
+    if not splits:
+        return None
+    ratios = np.array([_ratio(logs, split) for split in splits])
+    tried = len(splits) * logs.shape[1]
+    limit = scipy.stats.f.isf(_ERROR_RATE / tried, 1, count - 2)
+    best = int(np.argmax(ratios.max(axis=1)))
+    return float(times[splits[best]]) if ratios[best].max() > limit else None
+
+
+def block_powers(arm: ArmModel, recording: Recording) -> FloatArray:
+    """
+    Return the mean squares of the residual of short blocks.
+
+    Returns
+    -------
+    ndarray, shape (B, 1 + n)
+        Begin of each block [s], and the power of each joint [N^2 m^2].
+
+    """
+    used = conditioning([recording], SignalSettings())
+    rows = [np.empty((0, 1 + len(arm.robot.joints)))]
+    for motion in segments(recording, used):
+        assert motion.tau is not None
+        squares = decimate(motion.tau - arm.torque(motion), used) ** 2
+        t = motion.t[decimated_samples(len(motion.t), used)]
+        block = ((t - t[0]) // _BLOCK).astype(int) if len(t) else np.empty(0, dtype=int)
+        for number in range(int(block.max(initial=-1))):  # the last one is not whole
+            own = squares[block == number]
+            rows.append(np.r_[t[0] + number * _BLOCK, own.mean(axis=0)][np.newaxis])
+    return np.concatenate(rows)
+
+
+def _ratio(logs: FloatArray, split: int) -> FloatArray:
+    """Return the F ratio of two means against one for every joint, shape (n,)."""
+    before, after = logs[:split], logs[split:]
+    within = ((before - before.mean(axis=0)) ** 2).sum(axis=0)
+    within += ((after - after.mean(axis=0)) ** 2).sum(axis=0)
+    between = (before.mean(axis=0) - after.mean(axis=0)) ** 2
+    between *= len(before) * len(after) / len(logs)
+    return np.asarray(between * (len(logs) - 2) / np.maximum(within, 1e-300))

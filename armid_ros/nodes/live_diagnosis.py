@@ -1,0 +1,301 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The live diagnosis node: says what the model lacks of an arm while it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from armid_msgs.msg import Diagnosis
+from armid_ros.api.arguments import source_of
+from armid_ros.arm.model_file import model_text
+from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.live import Answer, Assistant, LiveDiagnosis
+from armid_ros.live.assistant import Done, Helper, Plan, Save
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.diagnoses import diagnosis_message, diagnosis_status
+from armid_ros.nodes.freshness import Freshness
+from armid_ros.nodes.joint_states import JointStateReader
+from armid_ros.nodes.live_parameters import (
+    LIVE_PARAMETERS,
+    LIVE_SETTINGS,
+    make_diagnosis,
+    settings_of,
+)
+from armid_ros.nodes.process import run
+from armid_ros.nodes.qos import LATCHED, MatchedSubscription
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.clock import Clock, ClockType
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+#: How often publishers and answers are looked for [s].
+_LOOK_PERIOD = 0.1
+
+
+class LiveDiagnosisNode(ArmidNode):
+    """
+    Diagnoses an arm while it moves.
+
+    Whenever enough new motion came, a process of its own is asked what the model lacks. What it
+    says is on ~/diagnosis; when diagnoses agree on a name, the model with it is on ~/model, which
+    a simulated arm and the online identifier take over. ~/accept makes it the model that is asked
+    about from then on, ~/reject takes it back.
+
+    Attributes
+    ----------
+    live : LiveDiagnosis, or None
+        None until a robot is known.
+    received : int
+        Joint states received.
+    last_stamp_ns : int
+        Stamp of the last one [ns].
+    freshness : Freshness
+        Whether joint states still come.
+
+    """
+
+    table = LIVE_PARAMETERS
+
+    def __init__(
+        self, live: LiveDiagnosis | None = None, helper: Helper | None = None, **kwargs: Any
+    ) -> None:
+        """
+        Make the node.
+
+        Parameters
+        ----------
+        live : LiveDiagnosis, optional
+            Decides when to ask; by default made from the parameters, once the robot is known.
+        helper : Helper, optional
+            Answers; by default a process of its own.
+        **kwargs
+            For rclpy's Node.
+
+        """
+        super().__init__('live_diagnosis', **kwargs)
+        self.live: LiveDiagnosis | None = None
+        self.received = 0
+        self.last_stamp_ns = 0
+        self.freshness = Freshness('joint states')
+        self._description: str | None = None
+        self._said: object = ()
+        self._waiting: Save | Plan | None = None
+        self._helper = helper or Assistant()
+        self._diagnoses = self.create_publisher(Diagnosis, '~/diagnosis', LATCHED)
+        self._models = self.create_publisher(String, '~/model', LATCHED)
+        self._runs = self.create_publisher(String, '~/experiment', LATCHED)
+        if live is None and (self.value('robot') or self.value('model')):
+            live = make_diagnosis(self.value)
+        if live is not None:
+            self._adopt(live)
+        else:
+            self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
+        self.joint_states = MatchedSubscription(
+            self, JointState, 'joint_states', self._on_joint_states
+        )
+        for service in (self.accept, self.reject, self.save, self.next_run, self.reset):
+            self.offer(f'~/{service.__name__}', service)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_LOOK_PERIOD, self.look, clock=steady)
+
+    @property
+    def hardware(self) -> str:
+        """Name of the robot."""
+        return str(self.live.belief.accepted.robot.name) if self.live else ''
+
+    @property
+    def busy(self) -> bool:
+        """Whether a diagnosis is under way."""
+        return self._helper.busy
+
+    def accept(self) -> str:
+        """Take what is proposed for the model."""
+        live = self._require()
+        named = _in_words(live)
+        live.accept()
+        self._publish_model()
+        return self._tell(f'accepted: {named}')
+
+    def reject(self) -> str:
+        """Take back what is proposed, and do not propose it again."""
+        live = self._require()
+        named = _in_words(live)
+        live.reject()
+        self._publish_model()
+        return self._tell(f'rejected: {named}')
+
+    def reset(self) -> str:
+        """Begin anew with the model as it was given."""
+        self._require().reset()
+        self._publish_model()
+        return 'the diagnosis begins anew, with the model as it was given'
+
+    def save(self) -> str:
+        """Have the last diagnosis written; the log says when it is."""
+        folder = Path(self.value('save_to')).expanduser()
+        self._begin(Save(folder))
+        return f'writing diagnosis.json, model.yaml and report.html to {folder}'
+
+    def next_run(self) -> str:
+        """Have the motion planned that separates the names; it goes out on ~/experiment."""
+        self._begin(Plan(self.value('seed')))
+        return f'planning; the motion goes out on {self._runs.topic_name}'
+
+    def look(self) -> None:
+        """Look at who publishes joint states, and what has been answered."""
+        self.joint_states.match()
+        self.take_answer()
+
+    def take_answer(self) -> bool:
+        """Take what was answered, if anything; return whether something was."""
+        result = self._helper.poll()
+        if result is None:
+            return False
+        if isinstance(result, Answer):
+            self._take(result)
+        else:
+            self._note(result)
+        if self._waiting is not None and not self._helper.busy:
+            job, self._waiting = self._waiting, None
+            self._helper.ask(job)
+        return True
+
+    def condition(self) -> tuple[str, Mapping[str, object]]:
+        """Say how far it is."""
+        live = self.live
+        if live is None:
+            return 'waiting for robot_description', {'received': self.received}
+        values = {
+            'received': self.received,
+            'kept samples': len(live.window),
+            'memory [bytes]': live.window.nbytes,
+            'motion [s]': live.window.moved,
+            'diagnoses': live.asked,
+            'busy': int(self.busy),
+            'proposed': int(live.belief.proposed is not None),
+        }
+        if not self.received:
+            return 'no joint states so far', values
+        if not self.freshness.stopped and live.learning:
+            return 'learning the misfit of the model: nothing may be wrong yet', values
+        return self.freshness.trouble(), values
+
+    def further_statuses(self) -> Sequence[DiagnosticStatus]:
+        """Say what the last diagnosis was."""
+        if self.live is None:
+            return ()
+        name = f'{self.get_fully_qualified_name()[1:]}: diagnosis'
+        return (diagnosis_status(name, self.hardware, self.live.latest),)
+
+    def level(self, troubled: bool) -> bytes:
+        """Return STALE when joint states have stopped."""
+        return DiagnosticStatus.STALE if self.freshness.stopped else super().level(troubled)
+
+    def objection(self, values: Mapping[str, Any]) -> str:
+        """Refuse settings that do not fit each other."""
+        try:
+            settings_of(lambda name: values.get(name, self.value(name)))
+        except ArmidError as error:
+            return str(error)
+        return ''
+
+    def changed(self, names: frozenset[str]) -> None:
+        """Use settings that were changed."""
+        if self.live is not None and names & {entry.name for entry in LIVE_SETTINGS}:
+            self.live.use(settings_of(self.value))
+
+    def close(self) -> None:
+        """End the process that diagnoses."""
+        self._helper.close()
+
+    def _on_description(self, message: String) -> None:
+        if message.data == self._description:
+            return
+        self._adopt(make_diagnosis(self.value, message.data))
+        self._description = message.data
+
+    def _on_joint_states(self, message: JointState) -> None:
+        self.received += 1
+        self.freshness.heard()
+        stamp = message.header.stamp
+        self.last_stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+        if self.live is None:
+            return
+        for sample in self._reader.read(message):
+            self.live.add(*sample)
+        if self.live.due and not self._helper.busy:
+            self._helper.ask(self.live.question())
+
+    def _take(self, answer: Answer) -> None:
+        """Publish a diagnosis, and the model if it is another one."""
+        live = self._require()
+        asked, latest = live.learning, live.latest
+        changed = live.take(answer)
+        if asked and not live.learning:
+            self._tell('the misfit of the model is measured; from now on it is diagnosed')
+        if changed:
+            self._publish_model()
+        if live.latest is latest:
+            return
+        message = diagnosis_message(answer, self.hardware, live.confirmed)
+        message.header.stamp = self._reader.stamp(answer.end).to_msg()
+        self._diagnoses.publish(message)
+        said = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
+        if answer.named != self._said:
+            self._said = answer.named
+            self.get_logger().warning(said) if answer.named else self.get_logger().info(said)
+
+    def _note(self, done: Done) -> None:
+        """Say what became of saving or planning."""
+        if not done.success:
+            self.complaints.say('diagnosis', done.text)
+            return
+        self._tell(done.text)
+        if done.excitation:
+            self._runs.publish(String(data=done.excitation))
+
+    def _begin(self, job: Save | Plan) -> None:
+        if self._require().latest is None:
+            raise IdentificationError('nothing has been diagnosed so far')
+        if self._helper.busy:
+            self._waiting = job
+        else:
+            self._helper.ask(job)
+
+    def _publish_model(self) -> None:
+        model = self._require().belief.model
+        self._models.publish(String(data=model_text(model, source_of(model.robot))))
+
+    def _adopt(self, live: LiveDiagnosis) -> None:
+        robot = live.belief.accepted.robot
+        self.live = live
+        self._reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
+        self._publish_model()
+
+    def _require(self) -> LiveDiagnosis:
+        if self.live is None:
+            raise IdentificationError('there is no robot yet: robot_description has not come')
+        return self.live
+
+    def _tell(self, text: str) -> str:
+        self.get_logger().info(text)
+        return text
+
+
+def _in_words(live: LiveDiagnosis) -> str:
+    return '; '.join(
+        ' of '.join(filter(None, (name.replace('_', ' '), ', '.join(joints))))
+        for name, joints in live.belief.named
+    )
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    run(LiveDiagnosisNode, args)
+
+
+if __name__ == '__main__':
+    main()

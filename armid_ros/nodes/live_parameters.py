@@ -1,0 +1,179 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the parameters of the live diagnosis say, as the diagnosis they describe."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from armid_ros.api.arguments import read_recording
+from armid_ros.arm import ArmModel, load_misfit, load_model
+from armid_ros.effects import parse_effect
+from armid_ros.live import LiveDiagnosis, LiveSettings
+from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
+
+Values = Callable[[str], Any]
+
+#: Parameters that are fields of LiveSettings; they can be set while the node runs.
+LIVE_SETTINGS = (
+    NodeParameter(
+        'window',
+        20.0,
+        'Motion that is looked at, at most; the window begins anew when it is set.',
+        's',
+        lower=4.0,
+        upper=600.0,
+        read_only=False,
+    ),
+    NodeParameter(
+        'shortest',
+        8.0,
+        'Motion since the arm changed that is looked at, at least.',
+        's',
+        lower=2.0,
+        upper=600.0,
+        read_only=False,
+    ),
+    NodeParameter(
+        'every',
+        4.0,
+        'Motion between two diagnoses.',
+        's',
+        lower=0.5,
+        upper=3600.0,
+        read_only=False,
+    ),
+    NodeParameter(
+        'rate',
+        200.0,
+        'Samples per second that are kept of the joint states.',
+        'Hz',
+        lower=10.0,
+        upper=2000.0,
+        read_only=False,
+    ),
+    NodeParameter(
+        'confirmations',
+        2,
+        'Diagnoses in a row that have to agree on a name before it is proposed.',
+        lower=1,
+        upper=100,
+        read_only=False,
+    ),
+    NodeParameter(
+        'material',
+        0.01,
+        "Share of a joint's torque (rms) below which an effect does not matter.",
+        lower=0.0,
+        upper=1.0,
+        read_only=False,
+    ),
+)
+
+LIVE_PARAMETERS = (
+    NodeParameter(
+        'robot', '', 'A shipped robot, or a path; empty: what comes on robot_description.'
+    ),
+    NodeParameter(
+        'gravity',
+        'earth',
+        'earth, moon, or x,y,z in the base frame [m/s^2]; that of the model where there is one.',
+        check=parse_gravity,
+    ),
+    NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
+    NodeParameter(
+        'model',
+        '',
+        'model.yaml with what is known of the arm; empty: the description and the effects.',
+    ),
+    NodeParameter(
+        'effects',
+        [''],
+        'Effects that are known beside it, each as NAME[@joint+joint]:quantity=value.',
+    ),
+    NodeParameter('baseline', [''], 'Bags from when nothing was wrong.'),
+    NodeParameter(
+        'learning',
+        20.0,
+        'Motion at the beginning in which nothing is wrong, from which the misfit of the model '
+        'is measured where neither a baseline nor the model file says it; 0: all that the model '
+        'lacks is asked for, not what changes.',
+        's',
+        lower=0.0,
+        upper=600.0,
+    ),
+    *LIVE_SETTINGS,
+    NodeParameter(
+        'save_to',
+        'live_diagnosis',
+        'Folder that ~/save writes to: diagnosis.json, model.yaml, report.html.',
+        read_only=False,
+    ),
+    NodeParameter('seed', 0, 'Of the diagnoses.', lower=0, upper=2**62),
+)
+
+
+def settings_of(value: Values) -> LiveSettings:
+    """
+    Return the settings that parameters describe.
+
+    Raises
+    ------
+    IdentificationError
+        If they do not fit each other.
+
+    """
+    fields = {entry.name: value(entry.name) for entry in LIVE_SETTINGS}
+    return LiveSettings(**fields, learning=value('learning'))
+
+
+def make_diagnosis(value: Values, description: str | None = None) -> LiveDiagnosis:
+    """
+    Make the live diagnosis that parameters describe.
+
+    Parameters
+    ----------
+    value : callable
+        Returns the value of a parameter of `LIVE_PARAMETERS`.
+    description : str, optional
+        URDF, in place of the robot that the parameters name.
+
+    Raises
+    ------
+    ArmidError
+        If robot, model, effects, bags or settings are not valid or do not fit each other.
+
+    """
+    arm = _arm(value, description)
+    bags = [read_recording(bag, arm) for bag in filter(None, value('baseline'))]
+    misfit = load_misfit(value('model')) if value('model') and not bags else None
+    return LiveDiagnosis(
+        arm, settings_of(value), baseline=tuple(bags), misfit=misfit, seed=value('seed')
+    )
+
+
+def _arm(value: Values, description: str | None) -> ArmModel:
+    robot: Robot | None = None
+    joints = tuple(filter(None, value('joints'))) or None
+    if description is not None:
+        robot = robot_from_urdf(description, gravity=value('gravity'), joints=joints)
+    elif value('robot'):
+        robot = load_robot(value('robot'), gravity=value('gravity'), joints=joints)
+    if value('model'):
+        arm = load_model(Path(value('model')).expanduser(), robot)
+    else:
+        assert robot is not None  # the node waits for robot_description
+        arm = ArmModel(robot)
+    for text in filter(None, value('effects')):
+        effect, values = parse_effect(text, arm.robot)
+        if effect in arm.effects:
+            values_before = list(arm.values)
+            values_before[arm.effects.index(effect)] = values
+            arm = replace(arm, values=tuple(values_before))
+        else:
+            arm = arm.with_effect(effect, values)
+    return arm

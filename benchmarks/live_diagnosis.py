@@ -1,0 +1,244 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Effects that appear in a running arm: how soon, and how rightly, the live diagnosis names them.
+
+The simulated humanoid arm and the node `live_diagnosis` in one process over real topics, in lock
+step; joint states at 200 Hz with torque noise of 0.05 N m and encoders of 18 bits. The arm moves
+along random harmonics. From the first 16 s the node measures the
+misfit of the model. Then one effect of the catalogue is set on the parameter `effects`
+of the running arm; the node knows nothing of it. A draw is right when the effect is the first name
+of a diagnosis that the node proposes within 30 s, the processor time of the diagnosis included, on
+the right joint; a name before the effect appears, or another first name that is proposed, is
+wrong. Sizes are such that the effect makes up a tenth of the torque of its joint. Then the arm
+moves for half an hour and nothing changes.
+
+    python -m benchmarks.live_diagnosis [--draws 40] [--minutes 30] [--out live_diagnosis.json]
+
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+import json
+from pathlib import Path
+import time
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import parse_effect
+from armid_ros.live import InProcess, LiveDiagnosis, LiveSettings
+from armid_ros.motion import Motion
+from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
+from armid_ros.nodes.lockstep import EPOCH_NS, Stage
+from armid_ros.nodes.simulated_arm import SimulatedArmNode
+from armid_ros.robots import load_robot
+from armid_ros.simulation import Reference
+import numpy as np
+from rclpy.parameter import Parameter
+
+from benchmarks.changes import working_motion
+
+ROBOT = load_robot('humanoid_arm')
+RATE = 200.0
+KNOWN = (
+    'viscous_friction:viscous_coefficient=0.3',
+    'coulomb_friction:coulomb_torque=0.2',
+    'torque_offset:torque_offset=0.05',
+)
+#: How long the arm moves before the effect appears, and how soon it has to be named [s].
+BEFORE, WANTED = 20.0, 30.0
+#: Motion from which the node measures the misfit of the model [s].
+LEARNING = 16.0
+#: Share of the torque of its joint that an effect takes, root mean square.
+SHARE = 0.1
+#: What may appear: name and the quantity that its size is, or none of a joint.
+KINDS = (
+    ('viscous_friction', 'viscous_coefficient'),
+    ('coulomb_friction', 'coulomb_torque'),
+    ('torque_offset', 'torque_offset'),
+    ('torque_gain', 'torque_gain'),
+    ('joint_spring', 'stiffness'),
+    ('rotor_inertia', 'rotor_inertia'),
+    ('encoder_offset', 'encoder_offset'),
+    ('quadratic_friction', 'quadratic_coefficient'),
+)
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One effect that appeared, and what was said of it."""
+
+    effect: str
+    delay: float | None
+    named: list[list[str]]
+    right: bool
+    early: bool
+    diagnoses: int
+    seconds: float
+
+
+def known_arm() -> ArmModel:
+    """Return what is known of the arm."""
+    arm = ArmModel(ROBOT)
+    for text in KNOWN:
+        arm = arm.with_effect(*parse_effect(text, ROBOT))
+    return arm
+
+
+def motion(duration: float, rng: np.random.Generator) -> Motion:
+    """Return a motion of random harmonics."""
+    reference = working_motion(duration, rng.uniform(1.0, 2.0), rng)
+    assert reference.dq is not None and reference.ddq is not None
+    return Motion(reference.joints, reference.t, reference.q, reference.dq, reference.ddq)
+
+
+def drawn(arm: ArmModel, along: Motion, kind: tuple[str, str], rng: np.random.Generator) -> str:
+    """Return an effect on a joint that it takes a share of the torque of."""
+    name, quantity = kind
+    joint = str(rng.choice(ROBOT.joints))
+    column = ROBOT.joints.index(joint)
+    torque = arm.torque(along)
+    scale = float(np.sqrt(np.mean(torque[:, column] ** 2)))
+    unit = 1e-3
+    more = arm.with_effect(*parse_effect(f'{name}@{joint}:{quantity}={unit}', ROBOT))
+    change = (more.torque(along) - torque)[:, column] / unit
+    size = SHARE * scale / float(np.sqrt(np.mean(change**2)))
+    return f'{name}@{joint}:{quantity}={size:.6g}'
+
+
+class Bench:
+    """The two nodes, in lock step."""
+
+    def __init__(self, stage: Stage, along: Motion) -> None:
+        self.plant = stage.add(
+            SimulatedArmNode,
+            None,
+            EPOCH_NS,
+            rate=RATE,
+            real_time_factor=0.0,
+            use_sim_time=False,
+            effects=list(KNOWN),
+            torque_noise=[0.05],
+            resolution=[2.4e-5],
+            start=','.join(repr(float(q)) for q in along.q[0]),
+        )
+        self.live = LiveDiagnosis(known_arm(), LiveSettings(learning=LEARNING))
+        self.node = stage.add(LiveDiagnosisNode, self.live, InProcess())
+        self._stage = stage
+        stage.spin_until(self._connected, 'discovery')
+        self.plant.follow_reference(Reference(along.joints, along.t, along.q, along.dq, along.ddq))
+
+    def _connected(self) -> bool:
+        self.plant.publish_clock()
+        self.node.joint_states.match()
+        return bool(self.plant.readers and self.node.get_clock().now().nanoseconds)
+
+    def run(self, seconds: float) -> Iterator[float]:
+        """Go on; yield the time since then whenever a diagnosis came [s]."""
+        for count in range(round(seconds * RATE)):
+            stamp = self.plant.step()
+            self._stage.spin_until(
+                lambda stamp=stamp: self.node.last_stamp_ns == stamp, 'joint_states'
+            )
+            if self.node.take_answer():
+                yield count / RATE
+
+    def set_effect(self, text: str) -> None:
+        """Let an effect appear."""
+        wanted = Parameter('effects', value=[*KNOWN, text])
+        result = self.plant.set_parameters([wanted])[0]
+        assert result.successful, result.reason
+
+    @property
+    def proposed(self) -> list[list[str]]:
+        """Names that the node proposes, and their joints."""
+        return [[name, *joints] for name, joints in self.live.belief.named]
+
+
+@contextmanager
+def bench(along: Motion) -> Iterator[Bench]:
+    """Make the nodes."""
+    with Stage(None) as stage:
+        yield Bench(stage, along)
+
+
+def draw(number: int) -> Draw:
+    """Let one effect appear in a running arm."""
+    rng = np.random.default_rng(number)
+    along = motion(BEFORE + WANTED + 6.0, rng)
+    arm = known_arm()
+    effect = drawn(arm, along, KINDS[number % len(KINDS)], rng)
+    name, _, place = effect.partition(':')[0].partition('@')
+    with bench(along) as nodes:
+        early = any(nodes.proposed for _ in nodes.run(BEFORE))
+        nodes.set_effect(effect)
+        delay, seconds = None, 0.0
+        for t in nodes.run(WANTED):
+            latest = nodes.live.latest
+            seconds = 0.0 if latest is None else latest.seconds
+            if nodes.proposed and t + seconds <= WANTED:
+                delay = t + seconds
+                break
+        first = nodes.proposed[0] if nodes.proposed else []
+        right = delay is not None and not early and first == [name, place]
+        return Draw(effect, delay, nodes.proposed, right, early, nodes.live.asked, seconds)
+
+
+def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
+    """Return diagnoses, names that were said, and what was proposed while nothing changed."""
+    rng = np.random.default_rng(seed)
+    asked, said, proposed = 0, 0, []
+    for _ in range(max(1, round(minutes / 5.0))):
+        with bench(motion(304.0, rng)) as nodes:
+            for _ in nodes.run(min(300.0, 60.0 * minutes)):
+                latest = nodes.live.latest
+                said += bool(latest is not None and latest.named)
+                if nodes.proposed:
+                    proposed.append(nodes.proposed)
+            asked += nodes.live.asked
+    return asked, said, proposed
+
+
+def main() -> None:
+    """Print every draw, and write all of them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--draws', type=int, default=40)
+    parser.add_argument('--first', type=int, default=0, help='number of the first draw')
+    parser.add_argument('--minutes', type=float, default=30.0)
+    parser.add_argument('--out', type=Path, default=Path('live_diagnosis.json'))
+    chosen = parser.parse_args()
+    begun, draws = time.process_time(), []
+    for number in range(chosen.first, chosen.first + chosen.draws):
+        one = draw(number)
+        draws.append(one)
+        delay = '     -' if one.delay is None else f'{one.delay:5.1f} s'
+        print(
+            f'{"right" if one.right else "WRONG":5} {delay}  {one.effect}  {one.named}', flush=True
+        )
+        _write(chosen.out, draws, None)
+    if draws:
+        right = sum(one.right for one in draws)
+        print(f'named rightly within {WANTED:g} s: {right} of {len(draws)}')
+    still = None
+    if chosen.minutes:
+        still = quiet(chosen.minutes, 1000)
+        print(
+            f'{chosen.minutes:g} min without a change: {still[0]} diagnoses, {still[1]} with a '
+            f'name, proposed: {still[2]}'
+        )
+    _write(chosen.out, draws, still)
+    print(f'{time.process_time() - begun:.0f} s of processor time')
+
+
+def _write(
+    out: Path, draws: list[Draw], still: tuple[int, int, list[list[list[str]]]] | None
+) -> None:
+    document = {'draws': [asdict(one) for one in draws], 'without_change': still}
+    out.write_text(json.dumps(document, indent=1), encoding='utf-8')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,143 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Names count when questions agree on them; a person has the last word."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.errors import IdentificationError
+from armid_ros.live import Answer, LiveDiagnosis, LiveSettings
+from armid_ros.live.question import WAITING
+import numpy as np
+import pytest
+
+
+class Named:
+    """As much of a finding as a belief looks at."""
+
+    def __init__(self, name, *joints):
+        self.name, self.joints = name, joints
+
+
+def said(arm, verdict, *findings):
+    return Answer(verdict, verdict, findings, (), arm, None, 0.0, 0.0)
+
+
+@pytest.fixture
+def live(known_arm):
+    return LiveDiagnosis(known_arm, LiveSettings(learning=0.0))
+
+
+@pytest.fixture
+def patched(known_arm):
+    return known_arm.with_theta(known_arm.theta)
+
+
+FRICTION, SPRING = Named('viscous_friction', 'elbow'), Named('joint_spring', 'elbow')
+
+
+def test_a_name_counts_the_second_time(live, known_arm, patched):
+    assert not live.take(said(patched, 'named', FRICTION))
+    assert live.belief.model is known_arm
+    assert live.take(said(patched, 'named', FRICTION))
+    assert live.belief.model is patched
+
+
+def test_names_that_do_not_agree_do_not_count(live, known_arm, patched):
+    for finding in (FRICTION, SPRING, FRICTION, SPRING):
+        live.take(said(patched, 'named', finding))
+    assert live.belief.model is known_arm
+
+
+@pytest.mark.parametrize('between', ['consistent', 'unknown', 'bad_data', WAITING])
+def test_what_names_nothing_begins_the_count_anew(live, known_arm, patched, between):
+    for answer in (
+        said(patched, 'named', FRICTION),
+        said(known_arm, between),
+        said(patched, 'named', FRICTION),
+    ):
+        live.take(answer)
+    assert live.belief.proposed is None
+
+
+def test_what_is_gone_is_proposed_no_more(live, known_arm, patched):
+    live.take(said(patched, 'named', FRICTION))
+    live.take(said(patched, 'named', FRICTION))
+    assert live.take(said(known_arm, 'consistent'))
+    assert live.belief.model is known_arm
+
+
+def test_what_was_accepted_is_what_is_asked_about(live, patched):
+    for _ in range(2):
+        live.take(said(patched, 'named', FRICTION))
+    live.accept()
+    assert live.belief.accepted is patched
+    assert live.question().arm is patched
+
+
+def test_what_was_rejected_is_not_proposed_again(live, known_arm, patched):
+    for _ in range(2):
+        live.take(said(patched, 'named', FRICTION))
+    live.reject()
+    assert live.belief.model is known_arm
+    for _ in range(3):
+        live.take(said(patched, 'named', FRICTION))
+    assert live.belief.model is known_arm
+    for _ in range(2):
+        live.take(said(patched, 'named', SPRING))
+    assert live.belief.model is patched
+
+
+def test_with_nothing_proposed_there_is_nothing_to_accept_or_reject(live):
+    for service in (live.accept, live.reject):
+        with pytest.raises(IdentificationError, match='nothing is proposed'):
+            service()
+
+
+def stream(live, duration, moving=True, begin=0.0):
+    asked = []
+    for t in np.arange(begin, begin + duration, 0.005):
+        q = np.full(6, np.sin(t) if moving else 0.0)
+        live.add(t, q, np.zeros(6), np.zeros(6))
+        if live.due:
+            asked.append(round(t, 1))
+            live.question()
+    return asked
+
+
+def test_it_asks_after_every_so_many_seconds_of_motion(live):
+    asked = stream(live, 30.0)
+    assert asked[0] == pytest.approx(8.0, abs=0.5)
+    np.testing.assert_allclose(np.diff(asked), 4.0, atol=0.5)
+
+
+def test_an_arm_at_rest_is_not_asked_about(live):
+    assert stream(live, 60.0, moving=False) == []
+
+
+def test_windows_are_as_long_as_is_set(known_arm):
+    live = LiveDiagnosis(known_arm, LiveSettings(window=10.0, learning=0.0))
+    stream(live, 30.0)
+    assert live.question().window.duration == pytest.approx(10.0, abs=0.1)
+
+
+def test_after_a_gap_the_motion_counts_anew(live):
+    stream(live, 7.0)
+    assert stream(live, 7.0, begin=20.0) == []
+
+
+def test_the_misfit_is_learned_first(known_arm):
+    live = LiveDiagnosis(known_arm, LiveSettings(learning=10.0))
+    asked = stream(live, 10.5)
+    assert len(asked) == 1
+    assert live.learning
+    measured = replace(said(known_arm, 'consistent'), misfit=object())
+    assert not live.take(measured)
+    assert not live.learning
+    assert live.question().misfit is measured.misfit
+
+
+def test_settings_that_never_ask_are_refused():
+    with pytest.raises(IdentificationError, match='never as long'):
+        LiveSettings(window=5.0, shortest=8.0)

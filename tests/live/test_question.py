@@ -1,0 +1,53 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A window is diagnosed from when the arm changed on."""
+
+from __future__ import annotations
+
+from armid_ros.live import Question
+from armid_ros.live.question import answer, own_misfit, since, WAITING
+import numpy as np
+
+
+def test_what_changed_is_named_from_what_came_since(known_arm, changed):
+    said, _ = answer(Question(known_arm, changed))
+    assert said.named[0] == ('viscous_friction', ('elbow_pitch',))
+    assert abs(said.findings[0].values[0] - 0.3) < 0.05
+    assert 11.0 < said.window.duration < 13.0
+    elbow = next(row for row in said.gap if row.joint == 'elbow_pitch')
+    assert elbow.after < elbow.before
+    before = known_arm.torque
+    assert before is not said.arm.torque
+
+
+def test_a_healthy_arm_is_consistent(known_arm, healthy):
+    said, _ = answer(Question(known_arm, healthy))
+    assert (said.verdict, said.named) == ('consistent', ())
+    assert said.arm is known_arm
+
+
+def test_too_little_motion_since_a_change_waits_for_more(known_arm, changed):
+    early = since(changed, 0.0)
+    kept = early.t < 13.0
+    early = type(early)(
+        joints=early.joints, t=early.t[kept], q=early.q[kept], dq=early.dq[kept],
+        tau=early.tau[kept], source='early',
+    )  # fmt: skip
+    said, diagnosis = answer(Question(known_arm, early, shortest=8.0))
+    assert (said.verdict, diagnosis) == (WAITING, None)
+
+
+def test_a_window_that_cannot_be_diagnosed_is_bad_data(known_arm, healthy):
+    still = type(healthy)(
+        joints=healthy.joints, t=healthy.t, q=np.ones_like(healthy.q) * healthy.q[0],
+        dq=np.zeros_like(healthy.q), tau=healthy.tau, source='still',
+    )  # fmt: skip
+    said, _ = answer(Question(known_arm, still))
+    assert said.verdict == 'bad_data'
+    assert said.summary
+
+
+def test_the_misfit_of_a_right_model_is_the_noise_of_the_torque(known_arm, healthy):
+    misfit = own_misfit(known_arm, healthy)
+    assert set(misfit.rms) == set(healthy.joints)
+    assert all(0.005 < rms < 0.1 for rms in misfit.rms.values())

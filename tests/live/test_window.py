@@ -1,0 +1,59 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The window keeps the latest motion in memory that does not grow."""
+
+from __future__ import annotations
+
+from armid_ros.live import SampleWindow
+import numpy as np
+
+JOINTS = ('a', 'b')
+
+
+def filled(rate, duration, window=None):
+    window = window or SampleWindow(JOINTS, 2.0, 0.01)
+    for t in np.arange(0.0, duration, 1.0 / rate):
+        window.add(t, np.array([np.sin(t), 0.0]), np.zeros(2), np.array([t, -t]))
+    return window
+
+
+def test_streams_of_any_rate_are_kept_at_the_rate_of_the_window():
+    for rate in (100.0, 333.0, 1000.0):
+        kept = filled(rate, 5.0).recording()
+        assert np.diff(kept.t).min() >= 0.0075
+        assert kept.duration >= 1.98
+
+
+def test_memory_is_that_of_the_beginning_after_any_time():
+    window = SampleWindow(JOINTS, 2.0, 0.01)
+    before = window.nbytes
+    filled(200.0, 60.0, window)
+    assert window.nbytes == before
+
+
+def test_the_latest_samples_are_kept_as_they_came():
+    kept = filled(100.0, 5.0).recording()
+    np.testing.assert_allclose(kept.tau[:, 0], kept.t + kept.tau[0, 0], atol=1e-12)
+    np.testing.assert_allclose(kept.q[:, 0], np.sin(kept.tau[:, 0]))
+    assert kept.tau[-1, 0] > 4.98
+
+
+def test_a_gap_and_a_jump_back_begin_a_window_anew():
+    for t in (5.0, 1.0):
+        window = filled(100.0, 2.0)
+        window.add(t, np.zeros(2), np.zeros(2), np.zeros(2))
+        assert len(window) == 1
+
+
+def test_rest_is_no_motion():
+    window = SampleWindow(JOINTS, 2.0, 0.01)
+    for t in np.arange(0.0, 3.0, 0.01):
+        window.add(t, np.array([max(t - 2.0, 0.0), 0.0]), None, np.zeros(2))
+    assert abs(window.moved - 1.0) < 0.03
+
+
+def test_without_velocity_a_recording_has_none():
+    window = SampleWindow(JOINTS, 1.0, 0.01)
+    for t in (0.0, 0.01, 0.02):
+        window.add(t, np.zeros(2), None, np.zeros(2))
+    assert window.recording().dq is None

@@ -1,0 +1,197 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""An effect that appears in a moving arm is named, and a twin of the arm takes it over."""
+
+from __future__ import annotations
+
+from armid_msgs.msg import Diagnosis
+from armid_ros.arm import ArmModel
+from armid_ros.arm.model_file import model_text, read_model
+from armid_ros.effects import parse_effect
+from armid_ros.live import InProcess, LiveDiagnosis, LiveSettings
+from armid_ros.motion import Motion
+from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
+from armid_ros.nodes.qos import LATCHED
+from armid_ros.nodes.simulated_arm import SimulatedArmNode
+from armid_ros.nodes.trajectories import write_trajectory
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from trajectory_msgs.msg import JointTrajectory
+
+from tests.live.conftest import KNOWN, MORE_FRICTION, moving
+
+ROBOT = load_robot('humanoid_arm')
+RATE = 100.0
+
+
+class Silent:
+    """Answers nothing; keeps what it is asked."""
+
+    def __init__(self):
+        self.jobs, self.results, self.busy = [], [], False
+
+    def ask(self, job):
+        self.jobs.append(job)
+        self.busy = True
+
+    def poll(self):
+        if not self.results:
+            return None
+        self.busy = False
+        return self.results.pop(0)
+
+    def close(self):
+        pass
+
+
+def arm_with(*effects):
+    arm = ArmModel(ROBOT)
+    for text in effects:
+        arm = arm.with_effect(*parse_effect(text, ROBOT))
+    return arm
+
+
+def set_effects(arm, *effects):
+    return arm.set_parameters([Parameter('effects', value=list(effects) or [''])])[0]
+
+
+def simulated(bench, *effects, **parameters):
+    values = {'rate': RATE, 'real_time_factor': 0.0, 'torque_noise': [0.05], **parameters}
+    return bench.add(
+        lambda **kw: SimulatedArmNode(start_ns=10**11, **kw),
+        effects=list(effects) or [''],
+        **values,
+    )
+
+
+def move(bench, arm, duration):
+    motion = moving(ROBOT, duration, np.random.default_rng(3))
+    message = write_trajectory(
+        Motion(ROBOT.joints, motion.t, motion.q, motion.dq, motion.ddq), 0.05
+    )
+    bench.matched_publisher(JointTrajectory, 'joint_trajectory', LATCHED).publish(message)
+    bench.settle()
+
+
+def run(bench, arm, node, seconds):
+    """Let time go on in lock step, and let every question be answered when it is asked."""
+    for _ in range(round(seconds * RATE)):
+        stamp = arm.step()
+        bench.spin_until(lambda stamp=stamp: node.last_stamp_ns == stamp, 'joint_states')
+        node.take_answer()
+
+
+@pytest.fixture
+def idle(bench):
+    helper = Silent()
+    return bench.add(
+        LiveDiagnosisNode, LiveDiagnosis(arm_with(*KNOWN), LiveSettings(learning=0.0)), helper
+    ), helper
+
+
+def test_friction_that_rises_is_named_and_taken_over(bench):
+    arm = simulated(bench, *KNOWN)
+    live = LiveDiagnosis(arm_with(*KNOWN), LiveSettings(learning=8.0))
+    node = bench.add(LiveDiagnosisNode, live, InProcess())
+    diagnoses = bench.listen(Diagnosis, 'live_diagnosis/diagnosis', LATCHED)
+    models = bench.listen(String, 'live_diagnosis/model', LATCHED)
+    bench.spin_until(lambda: models and arm.readers, 'discovery')
+    move(bench, arm, 60.0)
+    run(bench, arm, node, 14.0)
+    assert node.live.latest.verdict == 'consistent'
+    assert set_effects(arm, *KNOWN, MORE_FRICTION).successful
+    run(bench, arm, node, 24.0)
+    bench.spin_until(lambda: diagnoses and diagnoses[-1].confirmed, '~/diagnosis')
+    last = diagnoses[-1]
+    assert (last.effect[0], last.effect_joints[0]) == ('viscous_friction', 'elbow_pitch')
+    elbow = last.gap_joint.index('elbow_pitch')
+    assert last.gap_after[elbow] < 0.5 * last.gap_before[elbow]
+    bench.settle()
+    twin = read_model(models[-1].data, ROBOT, 'model')
+    assert twin.theta.tolist() == node.live.belief.proposed.theta.tolist()
+    assert bench.call('live_diagnosis/accept').message == (
+        'accepted: viscous friction of elbow_pitch'
+    )
+    assert node.live.belief.accepted.theta.tolist() == twin.theta.tolist()
+
+
+def test_a_simulated_arm_becomes_what_a_model_describes(bench):
+    twin = simulated(bench)
+    description = arm_with('torque_offset:torque_offset=0.7')
+    publisher = bench.matched_publisher(String, 'model', LATCHED)
+    states = bench.listen(JointState, 'joint_states')
+    twin.step()
+    publisher.publish(String(data=model_text(description, 'humanoid_arm')))
+    bench.settle()
+    twin.step()
+    bench.settle()
+    change = np.subtract(states[-1].effort, states[-2].effort)
+    np.testing.assert_allclose(change, 0.7, atol=0.35)
+
+
+def test_what_is_no_model_is_said_and_changes_nothing(bench):
+    twin = simulated(bench)
+    bench.matched_publisher(String, 'model', LATCHED).publish(String(data='schema: other'))
+    bench.settle()
+    assert 'not an arm model' in twin.complaints.latest
+
+
+@pytest.mark.parametrize(
+    ('effect', 'said'),
+    [
+        ('glue', 'glue'),
+        ('viscous_friction@knee:viscous_coefficient=1', 'knee'),
+    ],
+)
+def test_effects_that_an_arm_cannot_have_are_refused(bench, effect, said):
+    arm = simulated(bench)
+    result = set_effects(arm, effect)
+    assert not result.successful
+    assert said in result.reason
+    assert arm.value('effects') == ['']
+
+
+def test_questions_wait_until_the_one_before_is_answered(bench, idle):
+    node, helper = idle
+    for t in np.arange(0.0, 40.0, 0.01):
+        message = JointState(
+            name=list(ROBOT.joints),
+            position=[float(np.sin(t))] * 6,
+            velocity=[0.0] * 6,
+            effort=[0.0] * 6,
+        )
+        message.header.stamp.sec, message.header.stamp.nanosec = 100 + int(t), int(t % 1 * 1e9)
+        node._on_joint_states(message)
+    assert len(helper.jobs) == 1
+    assert node.received == 4000
+
+
+def test_before_a_diagnosis_nothing_can_be_saved_or_planned(bench, idle):
+    for service in ('save', 'next_run'):
+        answer = bench.call(f'live_diagnosis/{service}')
+        assert not answer.success
+        assert answer.message == 'nothing has been diagnosed so far'
+    for service in ('accept', 'reject'):
+        assert bench.call(f'live_diagnosis/{service}').message == 'nothing is proposed'
+
+
+def test_settings_can_be_changed_and_those_that_do_not_fit_are_refused(bench, idle):
+    node, _ = idle
+    assert node.set_parameters([Parameter('window', value=30.0)])[0].successful
+    assert node.live.settings.window == 30.0
+    result = node.set_parameters([Parameter('shortest', value=40.0)])[0]
+    assert not result.successful
+    assert 'never as long' in result.reason
+    assert node.live.settings.shortest == 8.0
+
+
+def test_a_robot_is_taken_from_robot_description(bench):
+    node = bench.add(LiveDiagnosisNode, None, Silent())
+    assert node.condition()[0] == 'waiting for robot_description'
+    bench.matched_publisher(String, 'robot_description', LATCHED).publish(String(data=ROBOT.urdf))
+    bench.spin_until(lambda: node.live, 'the robot')
+    assert node.hardware == ROBOT.name
