@@ -33,8 +33,6 @@ class Thresholds:
         Lead over its own share that excludes another one however few blocks show it.
     misfit_share : float
         Power of a cause over that of the model's own misfit, below which it is small print.
-    beyond : float
-        Factor on that in a joint whose gap is more than the misfit can be.
     headline : float
         Share that a cause takes of a gap beside the misfit that a model had before, below which it
         is small print.
@@ -61,7 +59,6 @@ class Thresholds:
     tie: float = 0.02
     far: float = 0.25
     misfit_share: float = 1.0
-    beyond: float = 0.25
     headline: float = 0.1
     same_fit: float = 1.5
     least_visible: float = 0.02

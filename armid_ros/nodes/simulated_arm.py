@@ -50,8 +50,9 @@ class SimulatedArmNode(ArmidNode):
     In real time its stamps are those of the system clock. At another real_time_factor it also
     publishes /clock. With use_sim_time it moves as far as /clock does, and no further. A model on
     the topic `model`, and effects that are set, make it another arm where it is and as it moves.
-    An arm with elastic joints is read on both sides: joint_states are its motors', link/joint_states its
-    links', reference/joint_states what its drives are asked for, and <link>/imu accelerometers.
+    An arm with elastic joints is read on both sides: joint_states are its motors',
+    link/joint_states its links', reference/joint_states what its drives are asked for, and
+    <link>/imu accelerometers.
 
     """
 

@@ -122,8 +122,6 @@ class Evidence:
         Its noise [N m].
     varies : ndarray, shape (n,), or None
         By how much the squares of a misfit vary from motion to motion; None: as a rule.
-    beyond : ndarray of bool, shape (n,), or None
-        Joints whose gap is more than the misfit can be; None: none.
 
     """
 
@@ -131,7 +129,6 @@ class Evidence:
     sigma: tuple[FloatArray, ...]
     noise: tuple[FloatArray, ...]
     varies: FloatArray | None = None
-    beyond: npt.NDArray[np.bool_] | None = None
 
     @cached_property
     def count(self) -> FloatArray:
@@ -201,16 +198,8 @@ class Evidence:
         return np.asarray(1.0 + 2.0 * np.sum(correlation**2, axis=0))
 
     def least_squares(self, settings: DiagnosisSettings) -> FloatArray:
-        """
-        Return the squares over the unit that a cause takes of a joint if it matters, (n,).
-
-        Where the gap is more than the misfit can be something is there, and less of it matters.
-
-        """
-        thresholds = settings.thresholds
-        share = np.full_like(self.count, thresholds.misfit_share)
-        if self.beyond is not None:
-            share[self.beyond] *= thresholds.beyond
+        """Return the squares over the unit that a cause takes of a joint if it matters, (n,)."""
+        share = settings.thresholds.misfit_share
         wanted = (settings.material * self.torque_rms) ** 2
         total = np.zeros_like(self.count)
         for part, sigma, noise in zip(self.data, self.sigma, self.noise, strict=True):

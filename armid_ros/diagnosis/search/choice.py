@@ -163,9 +163,6 @@ def _since(
     misfit = baseline.misfit * _louder(prepared, baseline)
     sigma = tuple(np.maximum(one, misfit) for one in noise)
     evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
-    left = [part.residual(arm) for part in prepared.data]
-    beyond = evidence.losses(left) > evidence.limits(left, settings)
-    evidence = replace(evidence, beyond=beyond)
     most = 2 * settings.thresholds.few_causes
     free = fitted_anew(arm, [*prepared.data, *baseline.data], most, settings.library, rng)
     assert free.base is not None and free.beside_base is not None
