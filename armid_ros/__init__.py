@@ -24,6 +24,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, TYPE_CHECKING
 
+from armid_ros.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from armid_ros.api.arguments import read_recording
     from armid_ros.api.comparison import compare, ComparisonResult
@@ -40,8 +42,6 @@ if TYPE_CHECKING:
     from armid_ros.motion import Motion
     from armid_ros.recording import Recording, write_recording
     from armid_ros.robots import load_robot, Robot, shipped_robots
-
-__version__ = '0.1.0'
 
 #: Public names, and the modules they live in.
 _HOMES = {

@@ -9,9 +9,9 @@ from importlib import import_module
 import sys
 from typing import Any
 
-from armid_ros import __version__
 from armid_ros.cli.node import lacking
 from armid_ros.errors import ArmidError, visible
+from armid_ros.version import __version__
 import click
 from click.shell_completion import CompletionItem
 

@@ -10,8 +10,8 @@ import logging
 import os
 import tempfile
 
-from armid_ros import __version__
 from armid_ros.errors import FleetError
+from armid_ros.version import __version__
 import dask
 from distributed import Client, LocalCluster
 
@@ -102,6 +102,6 @@ def _check_versions(client: Client, scheduler: str) -> None:
 
 
 def _version() -> str:
-    from armid_ros import __version__
+    from armid_ros.version import __version__
 
     return __version__

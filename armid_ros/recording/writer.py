@@ -17,7 +17,6 @@ import time
 from types import TracebackType
 from typing import NamedTuple, Self
 
-from armid_ros import __version__
 from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.recording.mcap_records import MESSAGE, RECORD_HEADER
 from armid_ros.recording.mcap_writer import Compression, McapWriter, message_record
@@ -25,6 +24,7 @@ from armid_ros.recording.message_types import message_type, MessageType
 from armid_ros.recording.metadata import bag_information, dump, write_metadata
 from armid_ros.recording.qos import dump_qos_text, QosProfile
 from armid_ros.recording.source import IntArray, Topic
+from armid_ros.version import __version__
 from mcap.opcode import Opcode
 import numpy as np
 import numpy.typing as npt
