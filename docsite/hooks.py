@@ -14,6 +14,7 @@ from docsite.effects import effects_page
 from docsite.examples import examples_page
 from docsite.nodes import nodes_page
 from docsite.notebooks import executed
+from docsite.numbers import numbers_page
 from docsite.schemas import schemas_page
 
 ROOT = Path(__file__).parents[1]
@@ -27,6 +28,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         'reference/commands.md': commands_page(),
         'reference/effects.md': effects_page(),
         'reference/examples.md': examples_page(ROOT / 'examples'),
+        'reference/numbers.md': numbers_page(
+            ROOT / 'armid_ros' / 'diagnosis',
+            (ROOT / 'benchmarks' / 'thresholds.txt').read_text(encoding='utf-8'),
+        ),
         'reference/nodes.md': nodes_page(_taken(files, reference / 'nodes.md')),
         'reference/files.md': schemas_page(_taken(files, reference / 'files.md')),
     }

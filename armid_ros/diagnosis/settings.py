@@ -22,7 +22,8 @@ class Thresholds:
         Share that each value or shape of a cause has to take before it counts: 50 values of a
         rigid body, a tenth.
     outside : float
-        Values that a cause from outside the arm counts for beside its own.
+        Values that a cause from outside the arm counts for beside its own: a person or a strap can
+        pull in any way.
     error_rate : float
         Probability of a name where nothing is, over all groups that were tried.
     rival_z : float
@@ -32,13 +33,14 @@ class Thresholds:
     far : float
         Lead over its own share that excludes another one however few blocks show it.
     misfit_share : float
-        Power of a cause over that of the model's own misfit, below which it is small print.
+        Power of a cause over that of the model's own misfit, below which it is small print in that
+        joint: a quarter of it names a change in one of five arms to which nothing happened.
     headline : float
         Share that a cause takes of a gap beside the misfit that a model had before, below which it
         is small print.
     same_fit : float
         Factor between losses of two explanations that are as good as each other where the unit is
-        a misfit of other data.
+        a misfit of other data, which varies so from motion to motion as a rule.
     least_visible : float
         A group of which what is free leaves less than this share of its columns is not visible.
     confidence : float

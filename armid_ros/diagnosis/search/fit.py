@@ -30,6 +30,7 @@ import numpy as np
 
 #: Free columns of which the others leave less than this share of their length are grouped.
 _EXCITED = 1e-4
+#: Steps of Gauss and Newton; shapes are near already.
 _MOST_ROUNDS = 4
 #: Squares of a column that are this share of those of the largest one are rounding.
 _ROUNDING = 1e-20

@@ -21,6 +21,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import stats
 
+#: One side of a 95 % interval.
 _LEVEL = 0.975
 #: Directions of scaled columns with less than this share of the largest are not told.
 _UNTOLD = 1e-10

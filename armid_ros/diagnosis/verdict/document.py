@@ -17,6 +17,7 @@ import numpy as np
 
 SCHEMA = 'armid/diagnosis/1'
 
+#: Candidates that are listed.
 _MOST_CANDIDATES = 20
 #: Standard deviations to either side of a 95 % interval.
 _NORMAL = 1.96

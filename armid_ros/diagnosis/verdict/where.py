@@ -12,6 +12,7 @@ from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
+#: Bins of a signal that says where the gap is.
 _BINS = 16
 #: An axis is worth a word if its bins hold this share of the residual's power.
 _TELLING = 0.15

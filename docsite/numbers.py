@@ -1,0 +1,113 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The page of all numbers of the diagnosis: what decides, and what is numerical, from the code."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import fields
+import inspect
+from pathlib import Path
+import re
+
+from armid_ros.diagnosis.settings import Thresholds
+
+from docsite.markdown import cell, table
+
+_ENTRY = re.compile(r'^(?P<names>\w+(?:, \w+)*) : (?P<type>.+)$')
+_MEASURED = re.compile(r'^(?P<name>[\w ]+?) +(?P<factor>\d\.\d)  (?P<score>.+)$')
+
+
+def numbers_page(package: Path, sensitivity: str) -> str:
+    """
+    Return the page.
+
+    Parameters
+    ----------
+    package : Path
+        Folder of the diagnosis.
+    sensitivity : str
+        What the benchmark of the thresholds printed.
+
+    """
+    measured = {
+        (found['name'], found['factor']): found['score']
+        for found in map(_MEASURED.match, sensitivity.splitlines())
+        if found
+    }
+    meaning = _meanings(inspect.cleandoc(Thresholds.__doc__ or ''))
+    rows = [
+        (
+            f'`{field.name}`',
+            f'{field.default:g}',
+            cell(meaning.get(field.name, '')),
+            cell(measured.get((field.name, '0.7'), 'not measured')),
+            cell(measured.get((field.name, '1.3'), 'not measured')),
+        )
+        for field in fields(Thresholds)
+        if isinstance(field.default, int | float)
+    ]
+    others = [
+        (f'`{name}`', cell(value), cell(why), f'`{path.relative_to(package).as_posix()}`')
+        for path in sorted(package.rglob('*.py'))
+        for name, value, why in _constants(path.read_text(encoding='utf-8'))
+    ]
+    return '\n'.join(
+        [
+            '# Numbers of the diagnosis',
+            '',
+            'Made from the code, so that none is left out.',
+            '',
+            f'## {len(rows)} that decide a name',
+            '',
+            'Shares are of the held-out squares over the unit of the gap. The last two columns '
+            'are what `make bench BENCH=thresholds` printed for each number 30 % smaller and '
+            f'larger; as it is: {measured.get(("as it is", "1.0"), "not measured")}.',
+            '',
+            *table(('number', 'value', 'what it is', '30 % smaller', '30 % larger'), rows),
+            '',
+            f'## {len(others)} of data, numerics and words',
+            '',
+            'What a row is, when data are at fault, how finely shapes are searched, what a '
+            'sentence says. Their sensitivity is not measured.',
+            '',
+            *table(('number', 'value', 'what it is, and why', 'where'), others),
+            '',
+        ]
+    )
+
+
+def _meanings(docstring: str) -> dict[str, str]:
+    """Return what a numpydoc section says of each attribute."""
+    found: dict[str, str] = {}
+    names: list[str] = []
+    for line in docstring.splitlines():
+        entry = _ENTRY.match(line)
+        if entry:
+            names = entry['names'].split(', ')
+            found.update(dict.fromkeys(names, ''))
+        elif names and line.startswith('    '):
+            found.update({name: f'{found[name]} {line.strip()}'.strip() for name in names})
+    return found
+
+
+def _constants(source: str) -> Iterator[tuple[str, str, str]]:
+    """Yield names, values and the comment above of constants of a module that are numbers."""
+    lines = source.splitlines()
+    for node in ast.parse(source).body:
+        if not isinstance(node, ast.Assign) or not _is_numbers(node.value):
+            continue
+        above, first = [], node.lineno - 2
+        while first >= 0 and lines[first].startswith('#:'):
+            above.insert(0, lines[first].removeprefix('#:').strip())
+            first -= 1
+        yield ast.unparse(node.targets[0]).strip('()'), ast.unparse(node.value), ' '.join(above)
+
+
+def _is_numbers(node: ast.expr) -> bool:
+    if isinstance(node, ast.Tuple):
+        return all(map(_is_numbers, node.elts))
+    if isinstance(node, ast.UnaryOp):
+        return _is_numbers(node.operand)
+    return isinstance(node, ast.Constant) and isinstance(node.value, int | float)

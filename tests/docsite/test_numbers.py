@@ -1,0 +1,45 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every number of the diagnosis is on one page, with what it is."""
+
+from dataclasses import fields
+from pathlib import Path
+
+from armid_ros.diagnosis.settings import Thresholds
+
+from docsite.numbers import numbers_page
+
+PACKAGE = Path(__file__).parents[2] / 'armid_ros' / 'diagnosis'
+MEASURED = 'as it is        1.0  9 of 10 first\nprice           0.7  8 of 10 first\n'
+
+
+def rows(page):
+    """Return the cells of all rows of all tables."""
+    lines = [line for line in page.splitlines() if line.startswith('| `')]
+    return [[cell.strip() for cell in line.strip('|').split(' | ')] for line in lines]
+
+
+def test_each_has_a_value_and_a_reason():
+    page = numbers_page(PACKAGE, MEASURED)
+    told = {row[0].strip('`'): row for row in rows(page)}
+    assert {field.name for field in fields(Thresholds)} <= set(told)
+    assert not [name for name, row in told.items() if not (row[1] and row[2])]
+
+
+def test_what_decides_is_few():
+    assert len(fields(Thresholds)) <= 45
+
+
+def test_what_was_measured_stands_beside_it():
+    (price,) = (row for row in rows(numbers_page(PACKAGE, MEASURED)) if row[0] == '`price`')
+    assert price[3:] == ['8 of 10 first', 'not measured']
+
+
+def test_a_number_without_a_comment_is_noticed(tmp_path):
+    (tmp_path / 'module.py').write_text(
+        '#: Why.\n_GOOD, _ALSO = 1.0, -2\n_BAD = 0.3\n_TEXT = "a"\n'
+    )
+    page = numbers_page(tmp_path, '')
+    assert '| `_GOOD, _ALSO` | (1.0, -2) | Why. | `module.py` |' in page
+    assert '| `_BAD` | 0.3 |  | `module.py` |' in page
+    assert '_TEXT' not in page
