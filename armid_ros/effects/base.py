@@ -18,20 +18,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Protocol, Self, TYPE_CHECKING
+from typing import Any, ClassVar, Protocol, Self
 
-from armid_ros.effects.action import Action
+from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.quantities import joint_unit, Quantity, Shape
 from armid_ros.effects.smooth import SmoothColumns
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
+from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 
 @dataclass(frozen=True)
@@ -167,7 +165,7 @@ class Effect(ABC):
         """Return what model.yaml holds of it beside joints, parameters and shapes."""
         return {}
 
-    def named_as(self, values: FloatArray, arm: ArmModel) -> tuple[tuple[Effect, FloatArray], ...]:
+    def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
         """Return the effects, with values, that say the same in the words of the catalogue."""
         return ((self, values),)
 
@@ -224,7 +222,7 @@ class Effect(ABC):
             for s in self.shapes
         )
 
-    def shape_grids(self, motion: Motion, arm: ArmModel) -> tuple[FloatArray, ...]:
+    def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
         """
         Return where a search for the shape should start.
 
@@ -232,7 +230,7 @@ class Effect(ABC):
         ----------
         motion : Motion
             The data that the shape is to explain.
-        arm : ArmModel
+        arm : Arm
             The arm without the effect.
 
         Returns
@@ -296,7 +294,7 @@ class Effect(ABC):
         return self
 
     @abstractmethod
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
         Differentiate the torques by the parameters, at the arm as it is.
 
@@ -304,7 +302,7 @@ class Effect(ABC):
         ----------
         motion : Motion
             As recorded; of a whole unbroken stretch, unless the effect is instantaneous.
-        arm : ArmModel
+        arm : Arm
             The arm as it is, with or without this effect.
 
         Returns
@@ -316,7 +314,7 @@ class Effect(ABC):
         """
 
     @abstractmethod
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """
         Say how the effect acts on the plant with given parameter values.
 
@@ -324,12 +322,12 @@ class Effect(ABC):
         ----------
         values : ndarray, shape (P,)
             Parameter values.
-        arm : ArmModel
+        arm : Arm
             The arm it acts on, with the effects before it applied.
 
         """
 
-    def plausible(self, values: FloatArray, std: FloatArray, arm: ArmModel) -> bool:
+    def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
         Return whether values within the bounds are what one would call by this name.
 
@@ -337,7 +335,7 @@ class Effect(ABC):
         ----------
         values, std : ndarray, shape (P,)
             Parameter values and their deviations, as far as white noise goes.
-        arm : ArmModel
+        arm : Arm
             The arm without them.
 
         """
@@ -364,3 +362,51 @@ class Kind(Protocol):
 
     def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
         """Return the sets of joints on which it is one cause."""
+
+
+class Arm(Protocol):
+    """A rigid body with effects; `armid_ros.arm.ArmModel` is one."""
+
+    @property
+    def robot(self) -> Robot:
+        """Its description."""
+
+    @property
+    def middle_frames(self) -> LinkFrames:
+        """Where all links are in the middle of the range of motion."""
+
+    def values_of(self, effect: Effect) -> FloatArray:
+        """Return the values of an effect, shape (P_e,)."""
+
+    def link_motion(self, motion: Motion) -> Motion:
+        """Return the true motion of the links where another one was recorded."""
+
+    def link_frames(self, motion: Motion) -> LinkFrames:
+        """Return where all links are along a recorded motion."""
+
+    def smoothed(self, motion: Motion) -> Motion:
+        """Return a recorded motion without what is beyond its band."""
+
+    def load(self, motion: Motion) -> FloatArray:
+        """Return what the rigid body takes along a motion of the links, (N, n) [N m]."""
+
+    def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
+
+    def body_columns(self, motion: Motion) -> FloatArray:
+        """Return the regressor of the load along a recorded motion, (N, n, 10 n)."""
+
+    def gravity_columns(self, motion: Motion) -> FloatArray:
+        """Differentiate the load along a recorded motion by gravity, (N, n, 3)."""
+
+    def joint_torque(self, motion: Motion) -> FloatArray:
+        """Return the true torques of a recorded motion, (N, n) [N m]."""
+
+    def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
+        """Return the torque that an effect of the sensors is given to read, (N, n) [N m]."""
+
+    def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
+        """Differentiate the true torque by changes of the links' motion."""
+
+    def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
+        """Return the sensitivities of what is read to the parameters of an effect."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Effect
+from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import TorqueReading
@@ -17,7 +17,6 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
 if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
     from armid_ros.robots import Robot
 
 #: A drive that gives nothing beyond its level cannot be asked for more than it gives: without a
@@ -41,7 +40,7 @@ class RotorInertia(Effect):
     mjcf_attribute = 'armature'
     quantities = (Quantity('rotor_inertia', 'kg m^2', lower=0.0, typical=(0.001, 1.1)),)
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dIa = ddq [rad/s^2], shape (N, n, P)."""
         return joint_columns(self, motion, motion.ddq)
 
@@ -49,7 +48,7 @@ class RotorInertia(Effect):
         """Return the same with its gradient."""
         return smooth_joint_columns(self, motion, (motion.ddq, 2, np.ones_like(motion.ddq)))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the inertia on the diagonal."""
         (inertia,) = scatter(self, values, arm.robot)
         return Action(inertia=np.diag(inertia))
@@ -78,13 +77,13 @@ class TorqueRipple(Effect):
         Shape('ripple_order', '1/rev', 0.1, 1e5, 20.0, (4.0, 6.0, 8.0, 12.0, 20.0, 50.0, 100.0)),
     )
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(A, B) = (sin(n q), cos(n q)) [-], shape (N, n, P)."""
         (order,) = self.shape_over_joints(arm.robot)
         angle = order * motion.q
         return joint_columns(self, motion, np.sin(angle), np.cos(angle))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the torque."""
         (order,) = self.shape_over_joints(arm.robot)
         sine, cosine = scatter(self, values, arm.robot)
@@ -127,13 +126,13 @@ class ActuatorSaturation(TorqueReading):
         known = np.isfinite(limits) & (limits > 0.0)
         return np.where(known, 0.8 * limits, self.shape_values)
 
-    def shape_grids(self, motion: Motion, arm: ArmModel) -> tuple[FloatArray, ...]:
+    def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
         """Return shares of the highest torque that was measured."""
         tau = arm.joint_torque(motion) if motion.tau is None else motion.tau
         highest = np.maximum(np.max(np.abs(tau[:, self.indices(motion.joints)]), axis=0), 1e-3)
         return (np.outer(highest, [0.3, 0.4, *np.linspace(0.5, 0.95, 10)]),)
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return what the drives give of what they are asked for, and the reading."""
         lost = scatter(self, values, arm.robot)[0]
         (level,) = self.shape_over_joints(arm.robot)

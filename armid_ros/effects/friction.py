@@ -5,18 +5,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, DryFriction
-from armid_ros.effects.base import Effect
+from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.smooth import smooth_direction, SmoothColumns
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 
 @dataclass(frozen=True)
@@ -39,7 +35,7 @@ class ViscousFriction(Effect):
     everywhere = True
     quantities = (Quantity('viscous_coefficient', 'N m s/rad', lower=0.0, typical=(0.004, 10.0)),)
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dFv = dq [rad/s], shape (N, n, P)."""
         return joint_columns(self, motion, motion.dq)
 
@@ -47,7 +43,7 @@ class ViscousFriction(Effect):
         """Return the same with its gradient."""
         return smooth_joint_columns(self, motion, (motion.dq, 1, np.ones_like(motion.dq)))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the damping matrix."""
         (viscous,) = scatter(self, values, arm.robot)
         return Action(damping=np.diag(viscous))
@@ -76,7 +72,7 @@ class CoulombFriction(Effect):
     quantities = (Quantity('coulomb_torque', 'N m', lower=0.0, typical=(0.005, 10.0)),)
     holds_at_rest = True
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dFc = sign(dq) [-], shape (N, n, P)."""
         return joint_columns(self, motion, np.sign(motion.dq))
 
@@ -84,7 +80,7 @@ class CoulombFriction(Effect):
         """Return the same with a smooth direction."""
         return smooth_joint_columns(self, motion, smooth_direction(motion.dq, width))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return dry friction between -Fc and Fc."""
         (coulomb,) = scatter(self, values, arm.robot)
         return Action(dry_friction=DryFriction(np.eye(len(coulomb)), -coulomb, coulomb))
@@ -110,7 +106,7 @@ class AsymmetricFriction(Effect):
     )
     holds_at_rest = True
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(dFc, dFv) = (|sign(dq)|, |dq|), shape (N, n, P)."""
         return joint_columns(self, motion, np.abs(np.sign(motion.dq)), np.abs(motion.dq))
 
@@ -124,7 +120,7 @@ class AsymmetricFriction(Effect):
             (sign * motion.dq, 1, sign + motion.dq * slope),
         )
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the shift of the dry friction's levels, and the torque that grows with |dq|."""
         coulomb, viscous = scatter(self, values, arm.robot)
 
@@ -154,11 +150,11 @@ class QuadraticFriction(Effect):
     familiar = True
     quantities = (Quantity('quadratic_coefficient', 'N m s^2/rad^2', typical=(0.0004, 1.0)),)
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dFq = dq |dq| [rad^2/s^2], shape (N, n, P)."""
         return joint_columns(self, motion, motion.dq * np.abs(motion.dq))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the torque."""
         (quadratic,) = scatter(self, values, arm.robot)
 
@@ -193,11 +189,11 @@ class StribeckFriction(Effect):
     )
     holds_at_rest = True
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/ddFs = exp(-|dq / vs|^d) sign(dq) [-], shape (N, n, P)."""
         return joint_columns(self, motion, self._left(motion.dq, arm) * np.sign(motion.dq))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return dry friction of the breakaway torque, and what motion takes away of it."""
         (breakaway,) = scatter(self, values, arm.robot)
 
@@ -207,7 +203,7 @@ class StribeckFriction(Effect):
         dry = DryFriction(np.eye(len(breakaway)), -breakaway, breakaway)
         return Action(dry_friction=dry, torque=torque)
 
-    def _left(self, dq: FloatArray, arm: ArmModel) -> FloatArray:
+    def _left(self, dq: FloatArray, arm: Arm) -> FloatArray:
         """Return which share of the breakaway torque is left at a velocity."""
         velocity, exponent = self.shape_over_joints(arm.robot)
         return np.asarray(np.exp(-(np.abs(dq / velocity) ** exponent)))
@@ -232,11 +228,11 @@ class ThermalFriction(Effect):
     quantities = (Quantity('viscous_change', 'N m s/rad', typical=(0.001, 6.0)),)
     shapes = (Shape('warm_up_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/ddFv = (1 - exp(-t / T)) dq [rad/s], shape (N, n, P)."""
         return joint_columns(self, motion, self._warm(motion.t, arm) * motion.dq)
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the torque."""
         (change,) = scatter(self, values, arm.robot)
 
@@ -245,6 +241,6 @@ class ThermalFriction(Effect):
 
         return Action(torque=torque)
 
-    def _warm(self, t: FloatArray, arm: ArmModel) -> FloatArray:
+    def _warm(self, t: FloatArray, arm: Arm) -> FloatArray:
         (constant,) = self.shape_over_joints(arm.robot)
         return np.asarray(-np.expm1(-np.asarray(t)[..., np.newaxis] / constant))

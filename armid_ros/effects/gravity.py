@@ -11,19 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Effect, Kind
+from armid_ros.effects.base import Arm, Effect, Kind
 from armid_ros.effects.quantities import Quantity
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 from scipy.spatial.transform import Rotation
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 #: Step of the differences of a rotation [rad].
 _STEP = 1e-5
@@ -59,16 +55,16 @@ class GravityMagnitude(_GravityEffect):
     summary = 'gravity stronger or weaker than in the model'
     quantities = (Quantity('gravity_difference', 'm/s^2', typical=(0.05, 10.0)),)
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dg along gravity [N m per m/s^2], shape (N, n, 1)."""
         direction = _unit(arm.robot.gravity)[:, np.newaxis]
         return np.asarray(arm.gravity_columns(motion) @ direction)
 
-    def plausible(self, values: FloatArray, std: FloatArray, arm: ArmModel) -> bool:
+    def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether gravity keeps its direction; else the base is upside down."""
         return bool(values[0] > -np.linalg.norm(arm.robot.gravity))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the robot under the changed gravity."""
         gravity = arm.robot.gravity
         return Action(robot=arm.robot.with_gravity(gravity + values[0] * _unit(gravity)))
@@ -93,7 +89,7 @@ class BaseTilt(_GravityEffect):
     )
     linear = False
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dtilt [N m/rad], shape (N, n, 2), at the tilt that the arm has."""
         values = arm.values_of(self)
         turned = [
@@ -103,7 +99,7 @@ class BaseTilt(_GravityEffect):
         ]
         return np.asarray(arm.gravity_columns(motion) @ np.transpose(turned))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the robot under gravity as the tilted base sees it."""
         return Action(robot=arm.robot.with_gravity(_turned(arm.robot.gravity, values)))
 
@@ -127,15 +123,15 @@ class GravityVector(_GravityEffect):
         """Return the tilt, which is what it is beyond gravity_magnitude."""
         return BaseTilt.name
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dg of the base's axes [N m per m/s^2], shape (N, n, 3)."""
         return arm.gravity_columns(motion)
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the robot under the other gravity."""
         return Action(robot=arm.robot.with_gravity(arm.robot.gravity + values))
 
-    def named_as(self, values: FloatArray, arm: ArmModel) -> tuple[tuple[Effect, FloatArray], ...]:
+    def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
         """Return the tilt of the base, and the magnitude of gravity."""
         before = np.array(arm.robot.gravity)
         after = before + values

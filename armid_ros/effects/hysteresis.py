@@ -5,18 +5,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, DryFriction
-from armid_ros.effects.base import Effect
+from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.slipping import Hysteresis
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 
 @dataclass(frozen=True)
@@ -38,12 +34,12 @@ class LoadDependentFriction(Effect):
     quantities = (Quantity('load_coefficient', '', lower=0.0, upper=1.0, typical=(0.01, 0.4)),)
     holds_at_rest = True
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dKl = |tau_load| sign(dq) [N m], shape (N, n, P)."""
         load = arm.load(arm.link_motion(motion))
         return joint_columns(self, motion, np.abs(load) * np.sign(motion.dq))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return dry friction whose levels move apart with the load."""
         (share,) = scatter(self, values, arm.robot)
         zero = np.zeros_like(share)
@@ -72,7 +68,7 @@ class PreslidingHysteresis(Effect):
     )
     instantaneous = False
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dF = h [-] from the whole motion, shape (N, n, P)."""
         columns = np.zeros((*motion.q.shape, len(self.joints)))
         states = self._elements(np.ones(len(self.joints)), motion.joints).along(
@@ -82,7 +78,7 @@ class PreslidingHysteresis(Effect):
             columns[:, joint, position] = states[:, position]
         return columns
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the friction with its state."""
         return Action(hysteresis=self._elements(values, arm.robot.joints))
 

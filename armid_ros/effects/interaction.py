@@ -14,10 +14,9 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Effect
+from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.model import LinkFrames, point_motion
 from armid_ros.motion import FloatArray, Motion
@@ -25,9 +24,6 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 #: Position and velocity [m, m/s] at times of shape (N,): (N, 3) for one anchor of all k springs,
 #: (N, k, 3) for one of each.
@@ -84,7 +80,7 @@ class Attached(Effect):
             row[:3] = robot.model.inertias[robot.model.getJointId(joint)].lever
         return values
 
-    def shape_grids(self, motion: Motion, arm: ArmModel) -> tuple[FloatArray, ...]:
+    def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
         """Return the geometry as it is; other shapes have their grids."""
         return tuple(
             self.shape_values[:, [index]]
@@ -114,7 +110,7 @@ class Attached(Effect):
         """Return the fixed points that the anchors are taken from, shape (k, 3) [m]."""
         return np.zeros((len(self.joints), 3))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the torque against the springs."""
         robot, reference = arm.robot, self._reference(arm.middle_frames)
 
@@ -127,7 +123,7 @@ class Attached(Effect):
 
         return Action(link_torque=torque if np.any(values) else None)
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the torque per quantity of every spring, shape (N, n, P)."""
         link = arm.link_motion(motion)
         anchors = self._anchors(self._reference(arm.middle_frames), link.t)

@@ -5,18 +5,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Effect
+from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import Quantity
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 #: How far from its joint a link's mass may be without a word in the description [m].
 _REACH = 0.1
@@ -31,11 +27,11 @@ class _LinkBody(Effect):
 
     changes_body = True
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the links' own columns of the regressor, shape (N, n, P)."""
         return arm.body_columns(motion)[:, :, self._rows(arm.robot)]
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the robot with the parameters added to its links."""
         parameters = arm.robot.rigid_parameters.copy()
         parameters[self._rows(arm.robot)] += values
@@ -95,7 +91,7 @@ class Payload(_LinkBody):
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         return robot.joints[-1:]
 
-    def plausible(self, values: FloatArray, std: FloatArray, arm: ArmModel) -> bool:
+    def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether it surely weighs something, not farther away than the arm is long."""
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
         length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH

@@ -7,10 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations, pairwise, permutations
-from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, DryFriction
-from armid_ros.effects.base import Effect
+from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import joint_unit, Quantity
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.effects.smooth import Gradient, smooth_direction, SmoothColumns
@@ -19,9 +18,6 @@ from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 
 @dataclass(frozen=True)
@@ -99,7 +95,7 @@ class CoupledJointFriction(_Pairs):
     )
     holds_at_rest = True
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(Ia, Fv, Fc) of every pair, shape (N, n, P)."""
         columns = np.zeros((len(motion), motion.n_joints, 3 * len(self.owners)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
@@ -137,7 +133,7 @@ class CoupledJointFriction(_Pairs):
 
         return SmoothColumns(columns, pullback)
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return inertia and damping between the joints, and dry friction of the shaft."""
         n = arm.robot.n_joints
         inertia, damping = np.zeros((n, n)), np.zeros((n, n))
@@ -188,7 +184,7 @@ class JointCoupling(_Pairs):
     def _likely_pairs(joints: tuple[str, ...]) -> Iterable[tuple[str, str]]:
         return combinations(joints, 2)
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dK [rad], shape (N, n, P)."""
         q = arm.link_motion(motion).q
         columns = np.zeros((*q.shape, len(self.owners)))
@@ -197,7 +193,7 @@ class JointCoupling(_Pairs):
             columns[:, k, position] = -q[:, i]
         return columns
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the torque of the cables."""
         n = arm.robot.n_joints
         stiffness = np.zeros((n, n))

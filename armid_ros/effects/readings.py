@@ -16,15 +16,11 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, Displacement
-from armid_ros.effects.base import Effect
+from armid_ros.effects.base import Arm, Effect
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 
 @dataclass(frozen=True)
@@ -32,7 +28,7 @@ class Displacing(Effect):
     """An effect that makes the true motion of the links differ from the recorded one."""
 
     @abstractmethod
-    def displacements(self, motion: Motion, arm: ArmModel) -> Displacement:
+    def displacements(self, motion: Motion, arm: Arm) -> Displacement:
         """
         Return true minus recorded motion per unit of each parameter.
 
@@ -43,11 +39,11 @@ class Displacing(Effect):
 
         """
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dtheta along the displacements, shape (N, n, P)."""
         return arm.torque_change(motion, self.displacements(motion, arm))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the displacement in proportion to the values."""
 
         def displacement(motion: Motion) -> Displacement:
@@ -91,11 +87,11 @@ class TorqueReading(Effect):
         """Return how far back in time the reading depends on the torque [s]."""
         return 0.0
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the derivative of the reading, at the torque that it is given (N, n, P)."""
         return self.sensitivity(arm.values_of(self), motion, arm.torque_before(self, motion))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the reading."""
         if not np.any(values):
             return Action()

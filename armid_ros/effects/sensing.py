@@ -5,19 +5,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, Displacement
-from armid_ros.effects.base import Effect
+from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
 from armid_ros.effects.smooth import SmoothColumns
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 
 @dataclass(frozen=True)
@@ -38,7 +34,7 @@ class TorqueOffset(Effect):
     everywhere = True
     quantities = (Quantity('torque_offset', 'N m', typical=(0.004, 2.0)),)
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/doffset = 1 [-], shape (N, n, P)."""
         return joint_columns(self, motion, np.ones_like(motion.q))
 
@@ -47,7 +43,7 @@ class TorqueOffset(Effect):
         one = np.ones_like(motion.q)
         return smooth_joint_columns(self, motion, (one, 0, 0.0 * one))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the constant torque."""
         (offset,) = scatter(self, values, arm.robot)
 
@@ -144,7 +140,7 @@ class EncoderOffset(Displacing):
     quantities = (Quantity('encoder_offset', 'rad', typical=(0.001, 0.1)),)
     linear = False
 
-    def displacements(self, motion: Motion, arm: ArmModel) -> Displacement:
+    def displacements(self, motion: Motion, arm: Arm) -> Displacement:
         """Return 1 in the position of each joint and 0 in velocity and acceleration."""
         shift = joint_columns(self, motion, np.ones_like(motion.q))
         return Displacement(shift, np.zeros_like(shift), np.zeros_like(shift))

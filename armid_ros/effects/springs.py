@@ -5,18 +5,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Effect
+from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 #: Where bumpers begin by default: this share of the range of motion from either end ...
 _BUMPER = 0.15
@@ -47,11 +43,11 @@ class JointSpring(Effect):
         Quantity('spring_preload', 'N m', typical=(0.01, 50.0)),
     )
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(k, preload) = (q, 1), shape (N, n, P)."""
         return joint_columns(self, motion, arm.link_motion(motion).q, np.ones_like(motion.q))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the torque of the springs."""
         stiffness, preload = scatter(self, values, arm.robot)
 
@@ -60,7 +56,7 @@ class JointSpring(Effect):
 
         return Action(link_torque=torque)
 
-    def plausible(self, values: FloatArray, std: FloatArray, arm: ArmModel) -> bool:
+    def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether there is surely a stiffness; a preload alone is an offset."""
         return bool(abs(values[0]) > _SURELY * std[0])
 
@@ -95,18 +91,18 @@ class SoftLimit(Effect):
         edges = np.stack([lower + margin, upper - margin], axis=1)
         return np.where(known[:, np.newaxis], edges, self.shape_values)
 
-    def shape_grids(self, motion: Motion, arm: ArmModel) -> tuple[FloatArray, ...]:
+    def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
         """Return positions near the ends of what was moved through."""
         q = arm.link_motion(motion).q[:, self.indices(motion.joints)]
         lowest, highest = q.min(axis=0)[:, np.newaxis], q.max(axis=0)[:, np.newaxis]
         depth = (highest - lowest) * np.array(_EDGES)
         return lowest + depth, highest - depth
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return how deep each bumper is pressed, with its sign [rad], shape (N, n, P)."""
         return joint_columns(self, motion, *self._pressed(arm.link_motion(motion).q, arm))
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the torque of the bumpers."""
         at_lower, at_upper = scatter(self, values, arm.robot)
 
@@ -116,6 +112,6 @@ class SoftLimit(Effect):
 
         return Action(link_torque=torque)
 
-    def _pressed(self, q: FloatArray, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
+    def _pressed(self, q: FloatArray, arm: Arm) -> tuple[FloatArray, FloatArray]:
         lower, upper = self.shape_over_joints(arm.robot)
         return -np.maximum(lower - q, 0.0), np.maximum(q - upper, 0.0)

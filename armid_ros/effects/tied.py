@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self, TYPE_CHECKING
+from typing import Any, ClassVar, Self
 
-from armid_ros.effects.base import Effect
+from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.interaction import Attached, HumanInteraction, InterfaceSlack
 from armid_ros.errors import ModelError
 from armid_ros.files import finite
@@ -24,10 +24,6 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
-
 
 #: Slacks that a search starts from [m]: straps are drawn out by millimetres.
 _SLACKS = (0.001, 0.002, 0.004, 0.008)
@@ -82,7 +78,7 @@ class Tied(Attached):
         """Whether it is known where the springs end: it is, along a motion."""
         return True
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the torque per quantity of every spring, shape (N, n, P)."""
         return Attached.columns(self.along(motion), motion, arm)
 

@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
+from armid_ros.effects.base import Arm
 from armid_ros.effects.layout import joint_columns
 from armid_ros.effects.quantities import Quantity
 from armid_ros.effects.readings import TorqueReading
@@ -16,9 +16,6 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.signal import butter, lfilter, sosfiltfilt
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 #: Time constants after which a low-pass has forgotten what went in.
 _FORGOTTEN = 20.0
@@ -30,7 +27,7 @@ _MORE = 1.0001
 class Late(TorqueReading):
     """A reading that comes late, which shows in how fast the torque changes."""
 
-    def columns(self, motion: Motion, arm: ArmModel) -> FloatArray:
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
         Return the derivative of the reading, shape (N, n, P).
 

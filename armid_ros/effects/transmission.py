@@ -13,9 +13,9 @@ inertia) acts on the side of the motors.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action, Displacement, Transmission
+from armid_ros.effects.base import Arm
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing
@@ -23,9 +23,6 @@ from armid_ros.effects.timing import low_pass, rate_of_change, within_band
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
-
-if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
 
 #: Inertia about a joint that is taken as some, of a link whose description gives none [kg m^2].
 _LIGHTEST = 1e-9
@@ -54,7 +51,7 @@ class JointElasticity(Displacing):
     linear = False
     instantaneous = False
 
-    def displacements(self, motion: Motion, arm: ArmModel) -> Displacement:
+    def displacements(self, motion: Motion, arm: Arm) -> Displacement:
         """Return minus the torque that twists the transmission, and its derivatives."""
         load = within_band(motion, arm.load(motion))
         (retardation,) = self.shape_over_joints(arm.robot)
@@ -62,7 +59,7 @@ class JointElasticity(Displacing):
             load[:, joint] = low_pass(motion.t, load[:, joint], float(retardation[joint]))
         return _twist(self, motion, load)
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return springs and dampers, and what encoders at the motors make of them."""
         (compliance,) = scatter(self, values, arm.robot)
         (retardation,) = self.shape_over_joints(arm.robot)
@@ -99,7 +96,7 @@ class Backlash(Displacing):
     linear = False
     instantaneous = False
 
-    def displacements(self, motion: Motion, arm: ArmModel) -> Displacement:
+    def displacements(self, motion: Motion, arm: Arm) -> Displacement:
         """Return minus the place of the motor in the gap, and its derivatives, over the gap."""
         (width,) = self.shape_over_joints(arm.robot)
         load = arm.load(motion)
@@ -110,7 +107,7 @@ class Backlash(Displacing):
             place[:, joint] = place_in_gap(motion.t, pull, float(width[joint]))
         return _twist(self, motion, place / width)
 
-    def action(self, values: FloatArray, arm: ArmModel) -> Action:
+    def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the gaps, and what encoders at the motors make of them."""
         (gap,) = scatter(self, values, arm.robot)
         if not np.any(values):
