@@ -155,8 +155,8 @@ class SpikeGate:
         early, self._early, tail = self._early, None, self._tail
         good: list[StreamSample] = []
         if early is not None and tail is not None:
-            if tail.t < t < early.t:  # what goes on from before shows whose stamp is off
-                self.rejected['stamp'] += 1
+            if tail.t < t < early.t:  # what goes on from before is kept, for there is more of it
+                self.rejected['out_of_order'] += 1
             else:
                 good = self._take(early, floor)
         if self._leaps(t):
