@@ -20,7 +20,8 @@ from armid_ros.pair.exercises import exercise, EXERCISES
 from armid_ros.pair.gait_cycle import gait_cycle, weight
 from armid_ros.pair.shares import ground_by_shares
 from armid_ros.pair.walkers import walking_pair
-from armid_ros.recording import BagWriter, read_recording, Recording, write_joint_states
+from armid_ros.recording import read_recording, Recording, write_joint_states
+from armid_ros.recording.writer import whole_bag
 from armid_ros.report.exo_report import exo_report, GaitChecks, WholeCycle
 from armid_ros.report.sections.walk import Driven, SOURCE
 from armid_ros.robots.assumptions import read_assumptions
@@ -187,7 +188,7 @@ def _record(
     tau = pair_torques(pair, *motions).tau
     tau = tau + noise[0] * rng.normal(size=tau.shape)
     stamps = 10**9 + np.rint(t * 1e9).astype(np.int64)
-    with BagWriter(path) as writer:
+    with whole_bag(path) as writer:
         for topic, motion, torque in zip(topics, motions, (tau, None), strict=True):
             q = motion.q + noise[1] * rng.normal(size=motion.q.shape)
             write_joint_states(writer, topic, motion.joints, stamps, q, None, torque)

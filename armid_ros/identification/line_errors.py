@@ -108,7 +108,7 @@ def line_errors(
     error = moves[1:] - ratio[:, np.newaxis] * moves[:-1]
     error[gap[1:] | gap[:-1]] = 0.0
     usual = _usual(period, error / np.maximum(noise, bend)[:, np.newaxis], window, share)
-    smallest = _smallest_steps(np.abs(moves), seen)
+    smallest = np.minimum(_smallest_steps(np.abs(moves), seen), np.abs(error).max(axis=0))
     usual = usual._replace(size=np.maximum(usual.size, smallest))
     bent = error / bend[:, np.newaxis]
     error[1:] -= usual.smoothness * bent[:-1] * bend[1:, np.newaxis]

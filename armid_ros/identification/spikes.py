@@ -129,7 +129,7 @@ class SpikeGate:
         self.left_out: list[Excursion] = []
         self._early: StreamSample | None = None
         count = len(self._turn)
-        self._steps = np.full((_SEEN, count), np.inf)
+        self._steps, self._most = np.full((_SEEN, count), np.inf), np.zeros(count)
         self._usual: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=_REMEMBERED)
         self._lowest, self._highest = np.full(count, np.inf), np.full(count, -np.inf)
         self._errors: list[FloatArray] = []
@@ -155,8 +155,8 @@ class SpikeGate:
         early, self._early, tail = self._early, None, self._tail
         good: list[StreamSample] = []
         if early is not None and tail is not None:
-            if tail.t < t < early.t:  # what goes on from before shows whose stamp is off
-                self.rejected['stamp'] += 1
+            if tail.t < t < early.t:  # what goes on from before is kept, for there is more of it
+                self.rejected['out_of_order'] += 1
             else:
                 good = self._take(early, floor)
         if self._leaps(t):
@@ -288,6 +288,7 @@ class SpikeGate:
             missed_by(first[k : k + 2], first[k + 2], self._period) for k in range(FIRST - 2)
         ]
         self._see_steps(np.abs(np.diff([s.x for s in first], axis=0)))
+        self._most = np.maximum(self._most, np.max(np.abs([m.error for m in missed]), axis=0))
         if not self._usual:
             errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
             size = np.maximum(usual_size(errors, _USUAL_FIRST), self._resolution)
@@ -417,6 +418,7 @@ class SpikeGate:
     def _learn(self) -> None:
         """Learn what is usual from a window of errors."""
         errors = np.array(self._errors)
+        self._most = np.maximum(self._most, np.abs(errors).max(axis=0))
         size = usual_size(errors, _USUAL)
         self._usual.append((size, share_of_noise(errors, size)))
         self._see_steps(np.abs(self._moves))
@@ -433,5 +435,10 @@ class SpikeGate:
 
     @property
     def _resolution(self) -> FloatArray:
-        """The smallest step of every signal, 0 where it is not known."""
-        return np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
+        """
+        The smallest step of every signal, 0 where it is not known.
+
+        A signal that moves fast makes no small steps; but by its resolution it leaves any line.
+
+        """
+        return np.minimum(self._most, np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0))

@@ -16,7 +16,7 @@ from armid_ros.recording.message_types import JOINT_STATE, STRING
 from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.string_message import string_cdr
-from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE
+from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
 import numpy as np
 import numpy.typing as npt
 
@@ -171,7 +171,7 @@ def write_recording(
         raise RecordingError(
             f'{path}: the first stamp is {stamps.min() * 1e-9:g} s; ROS time cannot be negative'
         )
-    with BagWriter(path, compression=compression, chunk_size=chunk_size) as writer:
+    with whole_bag(path, compression=compression, chunk_size=chunk_size) as writer:
         if robot_description is not None:
             first = int(stamps[0]) if len(stamps) else start_ns
             writer.add_topic('/robot_description', STRING, qos=[LATCHED])

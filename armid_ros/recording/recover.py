@@ -13,7 +13,7 @@ from armid_ros.files import reading
 from armid_ros.recording.mcap_source import McapSource
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Topic
-from armid_ros.recording.writer import BagWriter
+from armid_ros.recording.writer import BagWriter, whole_bag
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def _copied(path: Path, out: str | Path, settings: ReadSettings) -> RecoveryRepo
                 f'{path}: there is no message to recover; {source.damage or "the file is whole"}'
             )
         types = {topic.name: topic.message_type for topic in source.topics()}
-        with BagWriter(out) as writer:
+        with whole_bag(out) as writer:
             for topic in source.topics():
                 described = types[topic.name]
                 writer.add_topic(

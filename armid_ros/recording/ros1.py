@@ -16,7 +16,7 @@ from armid_ros.recording.bag import Bag
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.tables.settings import renamed
-from armid_ros.recording.writer import BagWriter
+from armid_ros.recording.writer import whole_bag
 from rosbags.convert.converter import is_same_wireformat, migrate_bytes
 from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.serde import SerdeError
@@ -99,7 +99,7 @@ def copy_renamed(
     store = get_typestore(Stores.ROS2_JAZZY)
     names: dict[str, str] = {}
     counts: dict[str, int] = {}
-    with Bag(path, settings) as bag, BagWriter(out) as writer:
+    with Bag(path, settings) as bag, whole_bag(out) as writer:
         topics = {topic.name: topic for topic in bag.topics()}
         for topic in topics.values():
             described = topic.message_type
@@ -149,7 +149,7 @@ def _copy_ros1(path: Path, reader: Reader, out: Path, rename: Sequence[tuple[str
             f'{path}: nothing in it has a type that ROS 2 has; left out: '
             f'{"; ".join(left_out.values()) or "it is empty"}'
         )
-    with BagWriter(out) as writer:
+    with whole_bag(out) as writer:
         for connection, stamp, raw in reader.messages(usable):
             topic, kind = connection.topic, connection.msgtype
             try:

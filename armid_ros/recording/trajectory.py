@@ -19,7 +19,7 @@ from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Topic
 from armid_ros.recording.string_message import string_cdr
-from armid_ros.recording.writer import BagWriter
+from armid_ros.recording.writer import whole_bag
 import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
@@ -122,7 +122,7 @@ def write_joint_trajectory(
 
     """
     cdr = joint_trajectory_cdr(motion)
-    with BagWriter(path) as writer:
+    with whole_bag(path) as writer:
         if robot_description is not None:
             writer.add_topic('/robot_description', STRING, qos=[LATCHED])
             writer.write('/robot_description', string_cdr(robot_description), log_time_ns)

@@ -10,9 +10,11 @@ closed early, by size or by age.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
+import shutil
 import time
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -33,6 +35,44 @@ import numpy.typing as npt
 DEFAULT_CHUNK_SIZE = 512 * 1024
 # Together with the time to write it out this keeps what a kill can lose below 0.3 s.
 DEFAULT_CHUNK_AGE = 0.2
+
+
+@contextmanager
+def whole_bag(
+    path: str | Path,
+    *,
+    compression: Compression = 'zstd',
+    chunk_size: int = DEFAULT_CHUNK_SIZE,
+) -> Iterator[BagWriter]:
+    """
+    Write a bag of which all is known: it is whole, or absent when something ends the writing.
+
+    A recorder keeps what it has; but half of a result would pass for all of it.
+
+    Parameters
+    ----------
+    path, compression, chunk_size
+        As for `BagWriter`.
+
+    Yields
+    ------
+    BagWriter
+
+    Raises
+    ------
+    RecordingError
+        The directory exists, or cannot be made or written to.
+
+    """
+    writer = BagWriter(path, compression=compression, chunk_size=chunk_size)
+    try:
+        yield writer
+        writer.close()
+    except BaseException:
+        with suppress(ArmidError, OSError):
+            writer.close()
+        shutil.rmtree(writer.path, ignore_errors=True)
+        raise
 
 
 class _OpenChunk(NamedTuple):

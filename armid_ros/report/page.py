@@ -81,7 +81,12 @@ class Page:
             'script': asset('report.js'),
             'style': asset('report.css'),
         }
-        return str(render('page.html', {'page': self, **assets}))
+        return _visible(str(render('page.html', {'page': self, **assets})))
+
+
+def _visible(text: str) -> str:
+    """Return a text with control characters spelled out, which names of files may have."""
+    return re.sub(r'[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]', lambda c: repr(c[0])[1:-1], text)
 
 
 def render(template: str, values: Mapping[str, Any]) -> Markup:

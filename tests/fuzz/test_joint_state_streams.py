@@ -180,6 +180,7 @@ def test_the_undamaged_stream_gives_the_truth(velocity):
 @example(damage={149: ('lost',), 150: ('number', 'effort', 1, 4.0)}, velocity=False)
 @example(damage={127: ('scale', 'position', 1, 1.03125)}, velocity=False)
 @example(damage={392: ('stamp', 1004, 0)}, velocity=True)
+@example(damage={57: ('number', 'position', 0, -232.0)}, velocity=False)
 @example(damage={150: ('names', ['shoulder']), 151: ('length', 'effort', 0)}, velocity=True)
 def test_damaged_messages_change_nothing(damage, velocity):
     online = learned(damage, velocity)
@@ -190,3 +191,9 @@ def test_damaged_messages_change_nothing(damage, velocity):
     assert np.max(shift) < SHIFTED
     assert np.max(estimate.std / whole.std) < INFLATED
     assert not online.changes
+
+
+@pytest.mark.xfail(strict=True, reason='a glitch smaller than what acceleration does hides in it')
+def test_a_small_glitch_of_an_encoder_in_the_first_second_does_not_widen_the_estimate():
+    online = learned({57: ('number', 'position', 0, Q[57, 0] - 0.01)})
+    assert np.max(online.estimate().std / UNDAMAGED[False].std) < INFLATED

@@ -24,7 +24,7 @@ from armid_ros.recording import (
 )
 from armid_ros.recording.mcap_writer import McapWriter
 from armid_ros.recording.message_types import JOINT_STATE, message_type, store_for, STRING
-from armid_ros.recording.writer import DEFAULT_CHUNK_AGE
+from armid_ros.recording.writer import DEFAULT_CHUNK_AGE, whole_bag
 from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, MessageIndex, Metadata, Schema
 from mcap.stream_reader import StreamReader
@@ -441,3 +441,15 @@ def test_the_estimate_message_of_this_project_is_described(tmp_path):
     assert topic.message_type.type_hash == (
         'RIHS01_f0994942518e1871f75ba0cc8c2fe4fd00c589eaf366df042f690fdd672127b7'
     )
+
+
+@pytest.mark.parametrize('end', [RecordingError('disk full'), KeyboardInterrupt()])
+def test_a_bag_of_which_all_is_known_is_whole_or_absent(tmp_path, end):
+    with pytest.raises(type(end)):
+        with whole_bag(tmp_path / 'bag') as writer:
+            writer.add_topic('/chatter', STRING)
+            raise end
+    assert not (tmp_path / 'bag').exists()
+    with whole_bag(tmp_path / 'bag') as writer:
+        writer.add_topic('/chatter', STRING)
+    assert (tmp_path / 'bag' / 'metadata.yaml').exists()

@@ -21,7 +21,6 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import (
-    BagWriter,
     LATCHED,
     read_recording,
     Recording,
@@ -33,6 +32,7 @@ from armid_ros.recording.elastic_topics import imu_topic, LINK, MOTOR, REFERENCE
 from armid_ros.recording.imu import read_accelerations, write_accelerations
 from armid_ros.recording.message_types import STRING
 from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.writer import whole_bag
 from armid_ros.robots import Robot
 from armid_ros.simulation.accelerometers import LinkAccelerometers
 from armid_ros.simulation.elastic_run import ElasticRun
@@ -107,7 +107,7 @@ def write_runs(
 
     """
     joints = robot.joints
-    with BagWriter(path) as writer:
+    with whole_bag(path) as writer:
         writer.add_topic('/robot_description', STRING, qos=[LATCHED])
         writer.write('/robot_description', string_cdr(robot.urdf), _PAUSE_NS)
         start = _PAUSE_NS
