@@ -196,32 +196,9 @@ def fit(
     aim = np.zeros(len(pull))
     if told is not None and base is not None:
         pull, aim = pull + told.precision, told.aim
-    residual = _residuals(state, data)
-
-    def loss_of(patch: Patch, left: Sequence[FloatArray]) -> float:
-        held = patch.change @ pull @ patch.change - 2.0 * aim @ patch.change
-        return _loss(left, data, sigma) + float(held)
-
-    loss = loss_of(state, residual)
     rounds = _MOST_ROUNDS if named else int(base is not None and told is None)
     rounds = 0 if known is not None else rounds
-    columns = [patch_columns(state, part, base) for part in data]
-    for _ in range(rounds):
-        step = _step(columns, residual, data, sigma, pull, aim - pull @ state.change)
-        moved, after = state, residual
-        for share in (1.0, 0.5, 0.2):
-            trial = state.moved(share * step, base)
-            left = _residuals(trial, data)
-            if loss_of(trial, left) < loss:
-                moved, after = trial, left
-                break
-        new = loss_of(moved, after)
-        settled = loss - new < 1e-4 * max(abs(new), 1e-12)
-        if moved is not state:
-            columns = [patch_columns(moved, part, base) for part in data]
-        state, residual, loss = moved, after, new
-        if settled:
-            break
+    state, residual, columns = _settled(state, (data, sigma), base, (pull, aim), rounds)
     size = 0 if base is None else base.rank
     names, numbers = state.parameters()
     estimate = known
@@ -246,6 +223,66 @@ def fit(
         held_to,
         state.change,
     )
+
+
+def _settled(
+    state: Patch,
+    rows: tuple[Sequence[Trajectory], Sequence[FloatArray]],
+    base: BaseParameters | None,
+    held: tuple[FloatArray, FloatArray],
+    rounds: int,
+) -> tuple[Patch, list[FloatArray], list[FloatArray]]:
+    """
+    Take steps of Gauss and Newton until one changes nothing.
+
+    Parameters
+    ----------
+    state : Patch
+        Where to begin.
+    rows : tuple
+        The data, and their noise [N m].
+    base : BaseParameters or None
+        What is free of the arm.
+    held : tuple of ndarray
+        Precision that it is held with, and what to, times that.
+    rounds : int
+        Steps at the most.
+
+    Returns
+    -------
+    state : Patch
+    residual : list of ndarray, each (M, n)
+        What it leaves [N m].
+    columns : list of ndarray, each (M, n, f)
+        Columns of all that is free, where it is.
+
+    """
+    (data, sigma), (pull, aim) = rows, held
+
+    def loss_of(patch: Patch, left: Sequence[FloatArray]) -> float:
+        known = patch.change @ pull @ patch.change - 2.0 * aim @ patch.change
+        return _loss(left, data, sigma) + float(known)
+
+    residual = _residuals(state, data)
+    loss = loss_of(state, residual)
+    columns = [patch_columns(state, part, base) for part in data]
+    for _ in range(rounds):
+        step = _step(columns, residual, data, sigma, pull, aim - pull @ state.change)
+        moved, after = state, residual
+        for share in (1.0, 0.5, 0.2):
+            trial = state.moved(share * step, base)
+            left = _residuals(trial, data)
+            if loss_of(trial, left) < loss:
+                moved, after = trial, left
+                break
+        new = loss_of(moved, after)
+        settled = loss - new < 1e-4 * max(abs(new), 1e-12)
+        if moved is not state:
+            columns = [patch_columns(moved, part, base) for part in data]
+        state, residual, loss = moved, after, new
+        if settled:
+            break
+    return state, residual, columns
 
 
 def _residuals(state: Patch, data: Sequence[Trajectory]) -> list[FloatArray]:
