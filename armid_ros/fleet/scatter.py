@@ -27,6 +27,7 @@ from functools import cache
 
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 from scipy import optimize, special, stats
 
 #: Bags below which a series is not tested.
@@ -219,7 +220,7 @@ def _polished(group: Sequence[Series]) -> list[FloatArray]:
     return np.split(rest, np.cumsum([len(one.days) for one in group])[:-1])
 
 
-def _medians(values: FloatArray, label: FloatArray) -> FloatArray:
+def _medians(values: FloatArray, label: npt.NDArray[np.intp]) -> FloatArray:
     """Return the median of the values of every label 0, 1, ..."""
     order = np.lexsort((values, label))
     counts = np.bincount(label)
@@ -319,10 +320,11 @@ def _lasting(group: Sequence[Series], found: dict[tuple[str, str], Spread]) -> t
     if not steps:
         return 1.0, 1.0
     weight = len(steps) / (len(steps) + _EXPECTED)
-    return tuple(  # type: ignore[return-value]
+    step, trend = (
         max(1.0, float(np.median(squares)) / _MEDIAN) ** (0.5 * weight)
         for squares in (steps, trends)
     )
+    return step, trend
 
 
 def _bounded(x: FloatArray, std: FloatArray) -> FloatArray:
