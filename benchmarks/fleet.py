@@ -231,7 +231,7 @@ def loop_seconds(bags):
     """Return processor seconds of identify for a bag, in one process."""
     from armid_ros.fleet.identify import FleetSettings
     from armid_ros.fleet.kinds import choose_filters
-    from armid_ros.identification import identify, IdentificationSettings, SignalSettings
+    from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 
     arm = ArmModel.of(str(ROBOT), effects=EFFECTS)
     asked = FleetSettings(EFFECTS)
