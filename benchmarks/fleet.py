@@ -229,16 +229,23 @@ def run_cost(bags, workers):
 
 def loop_seconds(bags):
     """Return processor seconds of identify for a bag, in one process."""
-    from armid_ros.identification import identify
+    from armid_ros.fleet.identify import FleetSettings
+    from armid_ros.fleet.kinds import choose_filters
+    from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 
     arm = ArmModel.of(str(ROBOT), effects=EFFECTS)
+    asked = FleetSettings(EFFECTS)
+    theory = arm.base_parameters(np.random.default_rng(0))
+    chosen = choose_filters(arm, theory, bags, asked.signals, None, asked.reading)
+    filters = SignalSettings(chosen.cutoff_hz, chosen.decimation)
+    settings = IdentificationSettings('wls', filters)  # as the fleet: chosen once for all bags
     done, start = 0, time.process_time()
     for bag in bags:
         try:
             recording = read_recording(bag.url, joints=arm.robot.joints)
         except Exception:
             continue
-        identify(arm, [recording], rng=np.random.default_rng(0))
+        identify(arm, [recording], settings, rng=np.random.default_rng(0))
         done += 1
     return (time.process_time() - start) / done
 

@@ -96,8 +96,8 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
         bags = list(_bags(filesystem, listed))
         if not bags:
             raise FleetError(
-                f'{pattern}: no bag there; name .mcap or .db3 files or rosbag2 directories, as in '
-                f'"{pattern.rstrip("/")}/*/*"'
+                f'{pattern}: no bag there; a bag is a .mcap or .db3 file or a rosbag2 directory'
+                + ('' if _WILD.search(pattern) else f', as in "{pattern.rstrip("/")}/*/*"')
             )
         for at, size, version in bags:
             url = filesystem.unstrip_protocol(at)

@@ -192,8 +192,10 @@ def _jobs(
     for arm in dict.fromkeys(bag.arm for bag in bags):
         entry = Entry(robots) if isinstance(robots, str) else robots.get(arm)
         if entry is None:
-            known = ', '.join(list(robots)[:5])
-            raise FleetError(f"arm '{arm}' is not in the table of robots; it has {known} ...")
+            some = ', '.join(list(robots)[:5]) + (' ...' if len(robots) > 5 else '')
+            raise FleetError(
+                f"--robots: arm '{arm}' is not in the table, which has {some}; add a line for it"
+            )
         entries[arm] = entry
     known_kinds = known_filters(store)
     run = uuid.uuid4().hex[:12]

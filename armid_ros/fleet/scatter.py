@@ -27,6 +27,7 @@ from functools import cache
 
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 from scipy import optimize, special, stats
 
 #: Bags below which a series is not tested.
@@ -41,6 +42,8 @@ _EFFICIENCY = 0.37
 _DRAWN = 4000
 #: Siblings with a bag on a day, of which the day's effect is taken.
 _SIBLINGS = 8
+#: Standard error of a variance by the median of n absolute deviations, over it and times sqrt(n).
+_ERROR = 2.33
 #: Rounds of the median polish.
 _ROUNDS = 4
 #: Series that count as much as the expectation that scatter does not last.
@@ -219,7 +222,7 @@ def _polished(group: Sequence[Series]) -> list[FloatArray]:
     return np.split(rest, np.cumsum([len(one.days) for one in group])[:-1])
 
 
-def _medians(values: FloatArray, label: FloatArray) -> FloatArray:
+def _medians(values: FloatArray, label: npt.NDArray[np.intp]) -> FloatArray:
     """Return the median of the values of every label 0, 1, ..."""
     order = np.lexsort((values, label))
     counts = np.bincount(label)
@@ -252,7 +255,8 @@ def _alike(group: Sequence[Series], found: Mapping[tuple[str, str], Spread]) -> 
     Return the degrees of freedom of what the variances of arms have in common.
 
     The logarithms of their ratios scatter by trigamma(d_a / 2) + trigamma(d_0 / 2); the former is
-    that of one series, the latter is solved for d_0.
+    that of one series, the latter is solved for d_0. Arms are taken to differ by what exceeds one
+    standard error of the scatter.
 
     """
     tested = [one for one in group if len(one.values) >= FEWEST]
@@ -260,7 +264,8 @@ def _alike(group: Sequence[Series], found: Mapping[tuple[str, str], Spread]) -> 
         return _ALIKE
     logs = np.log([_ratio(one, found[one.parameter]) for one in tested])
     own = [_trigamma(0.5 * _freedom(len(one.values))) for one in tested]
-    beyond = _usual_size(logs) ** 2 - float(np.mean(own))
+    sure = 1.0 - _ERROR / np.sqrt(len(logs))
+    beyond = sure * _usual_size(logs) ** 2 - float(np.mean(own))
     return _inverse_trigamma(beyond)
 
 
@@ -319,10 +324,11 @@ def _lasting(group: Sequence[Series], found: dict[tuple[str, str], Spread]) -> t
     if not steps:
         return 1.0, 1.0
     weight = len(steps) / (len(steps) + _EXPECTED)
-    return tuple(  # type: ignore[return-value]
+    step, trend = (
         max(1.0, float(np.median(squares)) / _MEDIAN) ** (0.5 * weight)
         for squares in (steps, trends)
     )
+    return step, trend
 
 
 def _bounded(x: FloatArray, std: FloatArray) -> FloatArray:
