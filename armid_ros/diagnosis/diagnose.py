@@ -31,7 +31,7 @@ from armid_ros.diagnosis.search.explain import Explanation
 from armid_ros.diagnosis.search.unharmed import harmed
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.explain_ties import diagnose_ties
-from armid_ros.diagnosis.verdict.attribution import attribute
+from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, findings, small_print
 from armid_ros.diagnosis.verdict.gap import Gap, measure_gap
 from armid_ros.diagnosis.verdict.headline import headline, shares_of
@@ -170,19 +170,17 @@ def diagnose(
     settings = settings or DiagnosisSettings()
     tell = progress or _silent
     if settings.everything:
-        least = settings.thresholds.headline
         result = diagnose(
             arm,
             recordings,
             validate=validate,
             baseline=baseline,
+            misfit=misfit,
             settings=settings.without_small_print(),
             rng=rng,
             progress=tell,
         )
-        large = tuple(one for one in result.findings if one.share >= least)
-        small = tuple(one for one in result.findings if one.share < least)
-        return replace(result, findings=large, minor=(*small, *result.minor))
+        return _with_small_print(result, settings.thresholds.headline)
     tell(0.02, 'filtering')
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
@@ -220,6 +218,13 @@ def diagnose(
         replace(chosen, explanation=explanation, notes=(*notes, *remarks)),
         (arm, gate, prepared, validate, settings, rng, tell),
     )
+
+
+def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
+    """Return a result in which all was named, with names of a small share in the small print."""
+    large = tuple(one for one in result.findings if one.share >= least)
+    small = tuple(one for one in result.findings if one.share < least)
+    return replace(result, findings=large, minor=(*small, *result.minor))
 
 
 def _helps(explanation: Explanation, unseen: Evidence | None) -> bool:
@@ -270,26 +275,19 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     unseen = _unseen(validate, explanation, prepared, chosen)
     measured = chosen.floor_in_words in (NOISE, ESTIMATED)
     least = 0.0 if measured else settings.thresholds.headline
-    explanation, shares = headline(chosen.rest or explanation, unseen, least)
-    rest = explanation
-    if chosen.rest is not None and explanation.steps:
-        as_told = in_model_as_given(explanation)
-        told = shares_of(as_told, unseen)[0]
-        if told.share(range(len(as_told.steps))) >= least:
-            explanation, shares = as_told, told
-        else:
-            explanation, remarks = as_bodies(explanation, arm)
-            notes += [_COMMON, *remarks]
+    rest, shares = headline(chosen.rest or explanation, unseen, least)
+    explanation = rest
+    if chosen.rest is not None and rest.steps:
+        explanation, shares, remarks = _as_stated(rest, shares, unseen, arm, least)
+        notes += remarks
     found = findings(explanation, shares, arm, rng)
     worse = _harmed(chosen, explanation, unseen, settings)
-    patched = explanation.fitted.arm
     if worse:
         names = ', '.join(one.name.replace('_', ' ') for one in found)
         notes.append(
             f'{names} would make the model worse in {", ".join(worse)}, where it is off as well: '
             'not patched'
         )
-        patched = arm
     pattern = None
     if not explanation.steps and explanation.base is not None:
         pattern = find_pattern(explanation, arm, evidence.data, evidence.sigma)
@@ -324,7 +322,7 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
         left=locate(arm, evidence, explanation.fitted.residual, limits),
         gap=gap,
         explanation=explanation,
-        arm=patched if found else arm,
+        arm=explanation.fitted.arm if found and not worse else arm,
         gate=gate,
         data=tuple(data),
         floors=floors,
@@ -334,6 +332,18 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
     )
+
+
+def _as_stated(
+    rest: Explanation, shares: Attribution, unseen: Evidence | None, arm: ArmModel, least: float
+) -> tuple[Explanation, Attribution, list[str]]:
+    """Return names in the model as given, or beside a body common to both days, and a note."""
+    as_told = in_model_as_given(rest)
+    told = shares_of(as_told, unseen)[0]
+    if told.share(range(len(as_told.steps))) >= least:
+        return as_told, told, []
+    bodily, remarks = as_bodies(rest, arm)
+    return bodily, shares, [_COMMON, *remarks]
 
 
 def _unseen(
