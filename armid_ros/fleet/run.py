@@ -276,7 +276,7 @@ def _ended(
             outcome: ArmOutcome = future.result()
             outcomes.append(replace(outcome, refused=(*known, *outcome.refused)))
             continue
-        left, failed = _without_failed(tasks)
+        left, failed = _without_failed(tasks, client, jobs[job_of[tasks.arm.arm].digest])
         for one in failed:
             write_refused(Store(job_of[tasks.arm.arm].out), one, job_of[tasks.arm.arm])
         if left.groups and left != tasks.arm:
@@ -314,12 +314,15 @@ def _tree(
     return level
 
 
-def _without_failed(tasks: _UnderWay) -> tuple[_Waiting, list[Refused]]:
+def _without_failed(
+    tasks: _UnderWay, client: Client, job: Future
+) -> tuple[_Waiting, list[Refused]]:
     """
     Return what is left of an arm whose tasks have failed, and the bags that are given up.
 
     A group that has failed is shared out, bag by bag, to find the one to blame. What waits for a
-    task fails with it, so noise is asked of only where all bags were read.
+    task fails with it, so noise is asked of only where all bags were read. What was on a worker
+    that another bag ended is held to have ended it as well, and is read once more by itself.
 
     """
     arm = tasks.arm
@@ -335,9 +338,18 @@ def _without_failed(tasks: _UnderWay) -> tuple[_Waiting, list[Refused]]:
             groups.append(group)
         elif len(group) > 1:
             groups.extend((bag,) for bag in group)
+        elif isinstance(future.exception(), KilledWorker) and _read(client, group, job):
+            groups.append(group)
         else:
             failed.append(Refused(group[0], _said(future.exception()), failed=True))
     return _Waiting(arm.arm, tuple(groups), (*arm.refused, *failed)), failed
+
+
+def _read(client: Client, group: Group, job: Future) -> bool:
+    """Return whether a group can be read while nothing else of its arm is, as far as is known."""
+    future = client.submit(take, group, job, 1, pure=False, retries=RETRIES)
+    ended: Future = next(as_completed([future], raise_errors=False))
+    return bool(ended.status != 'error')
 
 
 def _taken(bag: BagFile, job: Job, bags_of_arm: int) -> Prepared:

@@ -10,6 +10,7 @@ from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.signals import conditioning
 import numpy as np
+import pytest
 
 
 def coulomb_of(bench, hide):
@@ -28,7 +29,7 @@ def on_elbow(torque):
 
 def test_a_value_that_every_part_tells_alike_is_as_sure_as_noise_has_it(bench):
     fitted, evidence = coulomb_of(bench, lambda m, tau: on_elbow(0.2 * np.sign(m.dq[:, 1])))
-    wide = widened(fitted, evidence, None)
+    wide = widened(fitted, evidence, None, 0.0)
     assert fitted.estimate.std[0] <= wide.estimate.std[0] < 3.0 * fitted.estimate.std[0]
 
 
@@ -38,9 +39,20 @@ def test_a_value_that_parts_tell_otherwise_is_as_unsure_as_they_differ(bench):
         return on_elbow((0.1 + 0.2 * half) * np.sign(motion.dq[:, 1]))
 
     fitted, evidence = coulomb_of(bench, later)
-    wide = widened(fitted, evidence, None)
+    wide = widened(fitted, evidence, None, 0.0)
     np.testing.assert_array_equal(wide.estimate.values, fitted.estimate.values)
     assert wide.estimate.std[0] > 2.0 * fitted.estimate.std[0]
+
+
+def test_a_value_is_as_unsure_as_what_the_rest_has_along_any_cause(bench):
+    fitted, evidence = coulomb_of(bench, lambda m, tau: on_elbow(0.2 * np.sign(m.dq[:, 1])))
+    rows = np.concatenate([columns[:, 1, 0] for columns in fitted.columns])
+    told = np.concatenate([part.told[:, 1] for part in evidence.data])
+    white = 0.03 / np.sqrt(np.sum(rows[told] ** 2))
+    noise = widened(fitted, evidence, None, 1.0)
+    wide = widened(fitted, evidence, None, 101.0)
+    assert noise.estimate.std[0] == widened(fitted, evidence, None, 0.0).estimate.std[0]
+    assert wide.estimate.std[0] == pytest.approx(10.0 * white, rel=0.2)
 
 
 def test_nothing_named_is_nothing_to_widen(bench):
@@ -49,4 +61,4 @@ def test_nothing_named_is_nothing_to_widen(bench):
     data = tuple(trajectories(recordings, used, bench.arm))
     sigma = tuple(np.full(2, 0.03) for _ in data)
     fitted = fit(bench.arm, (), data, sigma, None)
-    assert widened(fitted, Evidence(data, sigma, sigma), None) is fitted
+    assert widened(fitted, Evidence(data, sigma, sigma), None, 9.0) is fitted

@@ -109,13 +109,14 @@ def explain(
 ) -> Explanation:
     """Take causes as long as any passes, then name the friction that matters, and prune."""
     taken = _forward(question, evidence, settings, start, baseline)
-    width = max((trial.gain for trial in taken.last.ranking), default=0.0) if taken.last else 0.0
+    width = 0.0 if taken.last is None else taken.last.most
     here = Round(evidence, Workspace(memoized_arm(question.arm), evidence.data), settings, None)
     here = replace(here, width=width)
     if any(undecided(step.trial, step.ranking, here) for step in taken.steps[len(start) :]):
         taken = _forward(question, evidence, settings, start, baseline, width)
     named, steps, values, survey = taken.named, taken.steps, taken.values, taken.first
-    minor = () if taken.last is None else taken.last.there
+    last = taken.last
+    minor = () if last is None else last.there
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
     kept = _friction(question, named, values, evidence, settings, whole)
     named = [*named, *(own for own, _, _ in kept)]
@@ -125,7 +126,7 @@ def explain(
         question.arm, (), evidence.data, evidence.sigma, question.base, (), question.told
     )
     named, steps, fitted = _pruned(question, named, steps, values, evidence, settings)
-    fitted = widened(fitted, evidence, question.told)
+    fitted = widened(fitted, evidence, question.told, 0.0 if last is None else last.by_chance)
     said = {own.effect.name for own in named}
     small = tuple(trial for trial in minor if trial.group.effect.name not in said)
     return Explanation(

@@ -4,7 +4,8 @@
 How sure values are where a model gets motions wrong: what they vary by from part to part of data.
 
 What a model gets wrong of a motion is no noise. A value follows it, and another motion would give
-another value, whichever of the two days it is from.
+another value, whichever of the two days it is from. And what it gets wrong of all motions lies
+along a cause by chance, as it does along the other causes that were tried.
 
 """
 
@@ -27,12 +28,24 @@ _LEVEL = 0.975
 _UNTOLD = 1e-10
 
 
-def widened(fitted: Fitted, evidence: Evidence, told: Told | None) -> Fitted:
+def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float) -> Fitted:
     """
     Widen deviations to what the values vary by when parts of the data are left out (jackknife).
 
     Few parts tell a spread badly: deviations are such that twice them has 95 % of Student's
     distribution.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        The arm with all names.
+    evidence : Evidence
+        The data.
+    told : Told or None
+        What other data tell of what is free.
+    chance : float
+        Squares over the unit that a value of any cause takes of what the names leave; noise alone
+        gives one.
 
     """
     size = len(fitted.estimate.values)
@@ -43,10 +56,20 @@ def widened(fitted: Fitted, evidence: Evidence, told: Told | None) -> Fitted:
         variance += (len(changes) - 1) * np.var(changes, axis=0)
         freedom += len(changes) - 1
     few = float(stats.t.ppf(_LEVEL, freedom) / stats.norm.ppf(_LEVEL))
-    spread = few * np.sqrt(variance)
+    along = max(chance - 1.0, 0.0) * _white(fitted, evidence)
+    spread = np.sqrt(few**2 * variance + along)
     factor = np.maximum(spread / np.maximum(fitted.estimate.std, 1e-300), 1.0)
     covariance = fitted.estimate.covariance * np.outer(factor, factor)
     return replace(fitted, estimate=replace(fitted.estimate, covariance=covariance))
+
+
+def _white(fitted: Fitted, evidence: Evidence) -> FloatArray:
+    """Return the variances that white noise of the unit gives the values, (p,)."""
+    size = len(fitted.estimate.values)
+    rows = make_problem(evidence.data, evidence.sigma, fitted.residual, list(fitted.columns)).x
+    flat = rows.reshape(-1, rows.shape[2])
+    basis = told_basis(flat.T @ flat + fitted.hold, _UNTOLD)
+    return np.asarray(np.sum(basis[-size:] ** 2, axis=1))
 
 
 def _left_out(fitted: Fitted, evidence: Evidence, told: Told | None) -> Iterator[FloatArray]:
