@@ -16,6 +16,10 @@ import sys
 from tempfile import TemporaryDirectory
 
 import armid_ros as ar
+from armid_ros.pair.driven_cycle import check_cycle
+from armid_ros.pair.gait_cycle import gait_cycle
+from armid_ros.pair.walkers import walking_pair
+from armid_ros.simulation.gait import read_gait
 from matplotlib.figure import Figure
 import numpy as np
 from scipy import signal, stats
@@ -84,7 +88,51 @@ def _noise(run: ar.Recording, seed: int) -> np.ndarray:
     return np.asarray(signal.lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], white, axis=0))
 
 
-PICTURES = {'candidates.png': candidates, 'deviations.png': deviations}
+def exo_cycle() -> Figure:
+    """Draw hip, knee and feet of the leg pair over a cycle, errors with those of the source."""
+    cycle = gait_cycle(walking_pair(), read_gait())
+    soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
+    figure = Figure(figsize=(WIDTH, 6.2), layout='constrained')
+    panels = figure.subplots(3, 2, height_ratios=(2, 1.2, 2))
+    for column, (joint, most) in enumerate((('hip', 1.5), ('knee', 2.5))):
+        name = f'exo_right_{joint}'
+        right, wrong = (check_cycle(cycle, name, 200.0, k).check for k in (None, soft))
+        phase = cycle.phase[::2]
+        angle, error = panels[0, column], panels[1, column]
+        angle.plot(phase, np.degrees(right.prescribed), color=GREY, lw=4, label='prescribed')
+        angle.plot(phase, np.degrees(right.followed), color=BLUE, label='by its torque')
+        angle.set(title=joint, ylabel='angle [°]')
+        error.axhspan(-most, most, color=GREY, alpha=0.2, label=f'source: {most:g}°')
+        error.plot(phase, np.degrees(right.error), color=BLUE)
+        error.plot(
+            phase, np.degrees(wrong.error), color=ORANGE, label='torques for springs 20 % too soft'
+        )
+        error.set(ylabel='error [°]', ylim=(-1.15 * most, 1.15 * most))
+    for column, other in enumerate((False, True)):
+        axes = panels[2, column]
+        feet = cycle.feet(other=other)[..., 1]
+        for foot, side in enumerate(('right', 'left')):
+            axes.plot(cycle.phase, feet[:, foot], color=(BLUE, ORANGE)[foot], label=f'{side} foot')
+        two = cycle.support(other=other) == 2
+        axes.fill_between(
+            cycle.phase, 0.0, feet.max(), where=two, color=GREY, alpha=0.2, label='both feet'
+        )
+        axes.set(title=('exoskeleton', 'wearer')[column], ylabel='ground, up [N]')
+        axes.set_xlabel('gait cycle of the right leg')
+    for axes in panels.ravel():
+        axes.spines[['top', 'right']].set_visible(False)
+    for axes in (panels[0, 0], panels[1, 1], panels[2, 0]):
+        axes.legend(
+            frameon=False, fontsize=7, loc='best' if axes is not panels[2, 0] else 'upper left'
+        )
+    return figure
+
+
+PICTURES = {
+    'candidates.png': candidates,
+    'deviations.png': deviations,
+    'exo_cycle.png': exo_cycle,
+}
 
 
 def main() -> None:

@@ -126,66 +126,86 @@ def walkable(
         Way of a cycle [m] and lean of the trunk [rad]; by default whatever suits the curves.
 
     """
-    phase = np.arange(_SAMPLES) / _SAMPLES
+    curves = _Curves(cycle, stride, lean)
+    phase, count, paths = curves.phase, curves.basis.shape[1], curves.even.shape[1]
     wanted = gait(phase)
-    turn = 2.0 * np.pi * np.outer(phase, np.arange(1, _HARMONICS + 1))
-    basis = np.hstack([np.ones((_SAMPLES, 1)), np.cos(turn), np.sin(turn)])
-    even = np.hstack([basis[:, :1], np.cos(turn[:, 1::2]), np.sin(turn[:, 1::2])])
-    waves = np.concatenate([[0.0], *2 * [np.arange(2, _HARMONICS + 1, 2)]])
-    bent = -((2.0 * np.pi * waves / cycle) ** 2) * even
-    count, paths = basis.shape[1], even.shape[1]
     heel_down, toe_down = _inside(phase, HEEL_DOWN), _inside(phase, TOE_DOWN)
     swing = _inside(phase, _SWING)
 
-    def taken(x: FloatArray) -> tuple[FloatArray, FloatArray, float, float]:
-        angles = basis @ x[: 3 * count].reshape(3, count).T
-        hips = even @ x[3 * count : 3 * count + 2 * paths].reshape(2, paths).T
-        own_lean, own_stride = x[-3:-1]
-        return (
-            angles,
-            hips,
-            float(own_lean if lean is None else lean),
-            float(own_stride if stride is None else stride),
-        )
-
-    def places(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return angles, heel and toe in the place where the foot stands, and the lowest."""
-        angles, hips, own_lean, own_stride = taken(x)
+    def feet(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return how far heel and toe are from where the foot stands, and the lower's height."""
+        angles, hips, own_lean, own_stride = curves.of(x)
         way = np.column_stack([own_stride * phase, np.zeros(_SAMPLES)])
         heel, toe = foot_points(angles, hips + way, own_lean, leg)
-        stand = np.array([x[-1], 0.0])
-        far = np.array([leg.foot, 0.0])
-        return angles, heel - stand, toe - stand - far, np.minimum(heel[:, 1], toe[:, 1])
+        stand, far = np.array([x[-1], 0.0]), np.array([leg.foot, 0.0])
+        return heel - stand, toe - stand - far, np.minimum(heel[:, 1], toe[:, 1])
 
     def residual(x: FloatArray) -> FloatArray:
-        angles, heel, toe, lowest = places(x)
-        hurry = bent @ x[3 * count : 3 * count + 2 * paths].reshape(2, paths).T
+        heel, toe, lowest = feet(x)
         return np.concatenate(
             [
-                ((angles - wanted) / _FREEDOM).ravel() / 10.0,
+                ((curves.of(x)[0] - wanted) / _FREEDOM).ravel() / 10.0,
                 heel[heel_down].ravel() / _PLACE / 10.0,
                 toe[toe_down].ravel() / _PLACE / 10.0,
-                (hurry / _HURRY).ravel() / 10.0,
+                (curves.hurry(x) / _HURRY).ravel() / 10.0,
                 np.minimum(lowest[swing] - _CLEARANCE, 0.0) / _CLEAR,
             ]
         )
 
     start = np.zeros(3 * count + 2 * paths + 3)
-    start[: 3 * count] = np.linalg.lstsq(basis, wanted, rcond=None)[0].T.ravel()
+    start[: 3 * count] = np.linalg.lstsq(curves.basis, wanted, rcond=None)[0].T.ravel()
     start[3 * count + paths] = 0.9 * (leg.thigh + leg.shank)
     start[-3:] = 0.15 if lean is None else lean, 1.6 * (leg.thigh + leg.shank), 0.3
     found = least_squares(residual, start, x_scale='jac').x
-    angles, hips, own_lean, own_stride = taken(found)
-    _, heel, toe, _ = places(found)
-    hips = hips - np.array([found[-1], 0.0])
-    far = np.vstack([heel[heel_down], toe[toe_down]])
+    angles, hips, own_lean, own_stride = curves.of(found)
+    heel, toe, _ = feet(found)
+    away = np.vstack([heel[heel_down], toe[toe_down]])
     return WalkableGait(
         Gait.fit(phase, angles, harmonics=_HARMONICS),
         own_lean,
         own_stride,
-        hips,
-        float(np.sqrt(np.mean(np.sum(far**2, axis=1)))),
+        hips - np.array([found[-1], 0.0]),
+        float(np.sqrt(np.mean(np.sum(away**2, axis=1)))),
     )
+
+
+class _Curves:
+    """
+    Curves of a leg and a path of the hips, by the coefficients of their series.
+
+    The vector has those of hip, knee and ankle, of the hips forward and up, then lean, stride and
+    the place where the foot stands.
+
+    """
+
+    def __init__(self, cycle: float, stride: float | None, lean: float | None):
+        self.phase = np.arange(_SAMPLES) / _SAMPLES
+        turn = 2.0 * np.pi * np.outer(self.phase, np.arange(1, _HARMONICS + 1))
+        self.basis = np.hstack([np.ones((_SAMPLES, 1)), np.cos(turn), np.sin(turn)])
+        self.even = np.hstack([self.basis[:, :1], np.cos(turn[:, 1::2]), np.sin(turn[:, 1::2])])
+        waves = np.concatenate([[0.0], *2 * [np.arange(2, _HARMONICS + 1, 2)]])
+        self._bent = -((2.0 * np.pi * waves / cycle) ** 2) * self.even
+        self._stride, self._lean = stride, lean
+
+    def of(self, x: FloatArray) -> tuple[FloatArray, FloatArray, float, float]:
+        """Return angles, path of the hips, lean and stride."""
+        count = self.basis.shape[1]
+        angles = self.basis @ x[: 3 * count].reshape(3, count).T
+        lean, stride = x[-3:-1].tolist()
+        return (
+            angles,
+            self.even @ self._path(x),
+            lean if self._lean is None else self._lean,
+            stride if self._stride is None else self._stride,
+        )
+
+    def hurry(self, x: FloatArray) -> FloatArray:
+        """Return the acceleration of the hips, shape (N, 2) [m/s^2]."""
+        return np.asarray(self._bent @ self._path(x))
+
+    def _path(self, x: FloatArray) -> FloatArray:
+        paths = self.even.shape[1]
+        return x[3 * self.basis.shape[1] : -3].reshape(2, paths).T
 
 
 def _hanging(angle: FloatArray) -> FloatArray:

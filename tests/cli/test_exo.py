@@ -31,9 +31,31 @@ def test_the_springs_that_were_simulated_are_found(result) -> None:
     }
 
 
+def test_hip_and_knee_walk_a_whole_cycle_by_their_torque(result) -> None:
+    _, document = result
+    off = {row['joint']: row['error_deg'] for row in document['cycle']}
+    assert off['exo_right_hip'] < 0.05
+    assert off['exo_right_knee'] < 0.1
+    for row in document['cycle']:
+        assert 10.0 * row['error_deg'] < row['error_softer_deg'] < row['source_deg']
+    assert all(0.15 < row['double_support'] < 0.35 for row in document['feet'])
+
+
+def test_the_animation_has_a_frame_for_every_step_of_its_slider(result) -> None:
+    page = (result[0] / 'report.html').read_text(encoding='utf-8')
+    data = json.loads(page.split('id="walk-data">')[1].split('</script>')[0])
+    frames = int(page.split('id="walk-at"')[1].split('max="')[1].split('"')[0]) + 1
+    assert len(data['phase']) == len(data['springs']) == len(data['feet']) == frames
+    assert [len(part) for part in data['wearer']] == [frames] * 3
+    assert len(data['machine']) == 1 + len(data['error']) == 3
+
+
 def test_the_report_loads_nothing_and_has_all_parts(result) -> None:
     page = (result[0] / 'report.html').read_text(encoding='utf-8')
-    for title in ('Stiffness', 'Gait by torque', 'Interaction', 'Poses', 'Assumptions'):
+    for title in (
+        *('Stiffness', 'Walking', 'Whole cycle by torque', 'Feet', 'Gait by torque'),
+        *('Interaction', 'Poses', 'Assumptions'),
+    ):
         assert f'<h2>{title}</h2>' in page
     assert '<polyline' in page
     assert 'src="http' not in page
@@ -49,7 +71,7 @@ def test_a_recording_gives_the_same_again(result, tmp_path) -> None:
     assert [row['value'] for row in found['stiffness']] == [
         row['value'] for row in document['stiffness']
     ]
-    assert found['gait'] == []
+    assert found['gait'] == found['cycle'] == found['feet'] == []
 
 
 def test_one_topic_is_not_enough(tmp_path) -> None:

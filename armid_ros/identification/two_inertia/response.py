@@ -109,14 +109,34 @@ def sensitivities(
     return found[:, :, 0].real, np.moveaxis(found.imag / _STEP, 2, 3)
 
 
-def _simulate(steps: Steps, values: DualArray, fixed: TwoLinkParameters) -> DualArray:
-    """Run E experiments with D parameter vectors each; returns (N, E, D, 4)."""
+def ringing(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
+    """
+    Return derivatives of the velocities by what an arm at rest may still do.
+
+    Returns
+    -------
+    ndarray, shape (N, E, 4, 4)
+        Of velocities of motors and links, by the twist of both springs [rad] and the velocities of
+        both links [rad/s] at first.
+
+    """
+    values = np.tile(unpack(parameters).astype(complex), (4, 1))
+    found = _simulate(steps, values, parameters, 1j * _STEP * np.eye(4))
+    return np.moveaxis(found.imag / _STEP, 2, 3)
+
+
+def _simulate(
+    steps: Steps, values: DualArray, fixed: TwoLinkParameters, rest: DualArray | None = None
+) -> DualArray:
+    """Run E experiments with D parameter vectors and initial states each; (N, E, D, 4)."""
     experiments, sets = len(steps.q), len(values)
     arm = _Arm(np.tile(values, (experiments, 1)), fixed, steps.dt / steps.substeps)
     size = experiments * sets
     dtype = values.dtype
     q2 = np.repeat(steps.q[:, 1], sets).astype(dtype)
     x = np.zeros((size, 6), dtype)
+    if rest is not None:
+        x[:, [0, 1, 4, 5]] = np.tile(rest, (experiments, 1))
     dv = np.zeros((size, 4), dtype)
     modes = np.zeros((size, 2), int)
     integral = np.repeat(steps.integral, sets, axis=0).astype(dtype)

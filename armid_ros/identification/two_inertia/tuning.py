@@ -9,7 +9,8 @@ of a joint, dl + dm gear^2, alone, and what a vibration shows of their differenc
 noise: free, the fit runs away with much noise; tied to the split of the start, which is not right,
 the error of the split goes into the stiffness, and no interval knows. So the split is believed to
 a factor of two, and the data decide how much of that is left. Coulomb torques begin where step 1
-has them and are free: taken for known, their error would go into all others.
+has them and are free: taken for known, their error would go into all others. Nor does an arm that
+stands stand still: what its springs still ring with is noise of a known course in the velocities.
 
 """
 
@@ -21,7 +22,12 @@ from dataclasses import dataclass, replace
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.two_inertia.names import pack, parameter_names, SIZE, unpack
-from armid_ros.identification.two_inertia.response import sensitivities, Steps, velocities
+from armid_ros.identification.two_inertia.response import (
+    ringing,
+    sensitivities,
+    Steps,
+    velocities,
+)
 from armid_ros.motion import FloatArray
 from armid_ros.robots.two_link import TwoLinkParameters
 from armid_ros.simulation.elastic_run import ElasticRun, VelocityLoop
@@ -33,6 +39,12 @@ _LINK, _MOTOR = (7, 8), (9, 10)
 _COULOMB = (SIZE, SIZE + 1)
 #: How far the split of friction and the Coulomb torques are believed: logarithms, one deviation.
 _SPLIT, _BELIEVED = np.log(2.0), 0.1
+#: What an arm that stands may still do, one deviation: twist of the springs [rad], velocity of the
+#: links [rad/s]. Some tenths of a second after a step of 1 rad/s that is left.
+_RINGING = np.array([1e-5, 1e-5, 1e-3, 1e-3])
+_ROUNDS = 3
+#: Residuals are looked at for this share of an experiment for whether they last (1 / share).
+_LASTING = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +144,7 @@ def tune(
     base = np.concatenate([unpack(start), start.coulomb])
     prior = believed(split)
     weight = np.ones(measured[:, :, chosen].shape[-1])
+    white = _Whitener.of(steps, start, chosen, weight)
 
     def arm(factors: FloatArray) -> TwoLinkParameters:
         values = base * np.exp(factors)
@@ -139,26 +152,29 @@ def tune(
 
     def residual(factors: FloatArray) -> FloatArray:
         simulated = velocities(steps, arm(factors))
-        left = ((simulated - measured)[:, :, chosen] / weight).ravel()
-        return np.concatenate([left, prior @ factors])
+        left = white((simulated - measured)[:, :, chosen, np.newaxis] / weight[:, np.newaxis])
+        return np.concatenate([left.ravel(), prior @ factors])
 
     def jacobian(factors: FloatArray) -> FloatArray:
         now = base * np.exp(factors)
         _, slopes = sensitivities(steps, arm(factors), np.diag(now))
-        slopes = slopes[:, :, chosen] / weight[:, np.newaxis]
+        slopes = white(slopes[:, :, chosen] / weight[:, np.newaxis])
         return np.vstack([slopes.reshape(-1, len(base)), prior])
 
     factors, evaluations = np.zeros(len(base)), 0
-    for _ in range(2):  # the second time every sensor counts by its own noise
+    for _ in range(_ROUNDS):  # from the second on every sensor counts by its own noise
         fit = least_squares(
             residual, factors, jac=jacobian, method='trf', x_scale='jac', xtol=1e-9
         )
         factors, evaluations = fit.x, evaluations + fit.njev
         left = fit.fun[: -len(prior)].reshape(-1, len(weight)) * weight
         weight = np.sqrt(np.mean(left**2, axis=0)) + 1e-12
+        white = _Whitener.of(steps, arm(factors), chosen, weight)
     after = arm(factors)
     found = unpack(after)
-    relative = _covariance(jacobian(factors))[:SIZE, :SIZE]
+    rows, left = jacobian(factors), residual(factors)
+    relative = _covariance(rows) * _lasting(rows, left, measured.shape[:2])
+    relative = relative[:SIZE, :SIZE]
     return Tuning(
         after,
         Estimate(parameter_names(runs[0].motor.joints), found, relative * np.outer(found, found)),
@@ -168,6 +184,59 @@ def tune(
         velocities(steps, after),
         evaluations,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Whitener:
+    """What arms that ring at first put into velocities is taken from them."""
+
+    shapes: FloatArray  # (E, 4, N C): how ringing looks, orthonormal
+    shares: FloatArray  # (E, 4): what of each is taken away
+
+    @classmethod
+    def of(
+        cls, steps: Steps, parameters: TwoLinkParameters, chosen: slice, weight: FloatArray
+    ) -> _Whitener:
+        slopes = ringing(steps, parameters)[:, :, chosen] * _RINGING / weight[:, np.newaxis]
+        flat = np.moveaxis(slopes, 1, 0).reshape(slopes.shape[1], -1, slopes.shape[3])
+        shapes, sizes, _ = np.linalg.svd(flat, full_matrices=False)
+        return cls(shapes.transpose(0, 2, 1), 1.0 - 1.0 / np.sqrt(1.0 + sizes**2))
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """Whiten values of shape (N, E, C, D)."""
+        flat = np.moveaxis(values, 1, 0).reshape(values.shape[1], -1, values.shape[3])
+        part = self.shares[..., np.newaxis] * (self.shapes @ flat)
+        clean = flat - self.shapes.transpose(0, 2, 1) @ part
+        count, experiments, channels, columns = values.shape
+        clean = clean.reshape(experiments, count, channels, columns)
+        return np.asarray(np.moveaxis(clean, 0, 1))
+
+
+def _lasting(jacobian: FloatArray, residual: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """
+    Return how much wider covariances are where residuals last, shape (F, F), 1 for white noise.
+
+    Parameters
+    ----------
+    jacobian, residual : ndarray, shapes (K, F) and (K,)
+        Of samples, experiments and channels, in this order, and what is believed after them.
+    shape : tuple of int
+        Samples and experiments.
+
+    """
+    count, experiments = shape
+    data = len(residual) - len(believed())
+    scores = (jacobian * residual[:, np.newaxis])[:data]
+    scores = scores.reshape(count, experiments, -1, jacobian.shape[1]).sum(axis=2)
+    seen = jacobian[data:].T @ jacobian[data:]
+    lags = max(1, count // _LASTING)
+    for lag in range(lags):
+        product = np.einsum('nep,neq->pq', scores[: count - lag], scores[lag:])
+        seen = seen + (1.0 - lag / lags) * (product if lag == 0 else product + product.T)
+    white = _covariance(jacobian)
+    ratio = np.diag(white @ seen @ white) / np.diag(white)
+    factor = np.sqrt(np.maximum(ratio, 1.0))
+    return np.outer(factor, factor)
 
 
 def _covariance(jacobian: FloatArray) -> FloatArray:

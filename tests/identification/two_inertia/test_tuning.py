@@ -9,7 +9,12 @@ from dataclasses import replace
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.two_inertia import tune, Tuning
 from armid_ros.identification.two_inertia.names import pack, unpack
-from armid_ros.identification.two_inertia.response import sensitivities, Steps, velocities
+from armid_ros.identification.two_inertia.response import (
+    ringing,
+    sensitivities,
+    Steps,
+    velocities,
+)
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation.elastic_run import ElasticSensors, run_elastic
 from armid_ros.simulation.elastic_two_link import two_link_loop, two_link_plant
@@ -92,6 +97,29 @@ def test_a_coulomb_torque_that_is_a_little_off_is_found(clean_steps, truth) -> N
     wrong = replace(START, coulomb=truth.coulomb * np.array([1.05, 0.96]))
     found = tune(measured, wrong, LOOP)
     np.testing.assert_allclose(found.parameters.coulomb, truth.coulomb, rtol=0.015)
+    off = np.abs(found.estimate.values - unpack(truth)) / found.estimate.std
+    assert np.all(off < 4.0)
+
+
+def test_an_arm_that_still_rings_has_no_other_springs_for_it(
+    clean_steps, experiments, truth
+) -> None:
+    """Without noise deviations are tiny, and what a stand leaves is far beyond them."""
+    rng = np.random.default_rng(7)
+    rest = rng.normal(size=(len(clean_steps), 4)) * [1e-6, 1e-6, 1e-4, 1e-4]
+    seen = velocities(experiments, truth)
+    seen = seen + np.einsum('necr,er->nec', ringing(experiments, truth), rest)
+    seen = seen + 1e-6 * rng.normal(size=seen.shape)
+    runs = [
+        replace(
+            run,
+            motor=replace(run.motor, dq=seen[:, number, :2]),
+            link=replace(run.link, dq=seen[:, number, 2:]),
+        )
+        for number, run in enumerate(clean_steps)
+    ]
+    found = tune(runs, replace(truth, stiffness=1.01 * truth.stiffness), LOOP)
+    np.testing.assert_allclose(found.parameters.stiffness, truth.stiffness, rtol=1e-5)
     off = np.abs(found.estimate.values - unpack(truth)) / found.estimate.std
     assert np.all(off < 4.0)
 
