@@ -25,8 +25,8 @@ import numpy as np
 _TERMS = 3
 #: Places in the range of a joint where something may begin to pull, as shares of it.
 _PLACES = (0.2, 0.35, 0.5, 0.65, 0.8)
-#: A law that predicts less than this share of the squares is none.
-_LEAST_SHARE = 0.1
+#: A law that predicts less than half of the squares is none.
+_LEAST_SHARE = 0.5
 
 
 @dataclass(frozen=True)
