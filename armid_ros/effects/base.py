@@ -379,6 +379,10 @@ class Arm(Protocol):
         """Its description."""
 
     @property
+    def body(self) -> Robot:
+        """The rigid body as the effects make it: with payload, under the gravity that is there."""
+
+    @property
     def middle_frames(self) -> LinkFrames:
         """Where all links are in the middle of the range of motion."""
 
