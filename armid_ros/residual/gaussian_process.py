@@ -26,6 +26,8 @@ import numpy.typing as npt
 
 #: Inducing points of a joint at most, and rows for each at least.
 _POINTS, _ROWS = 200, 2
+#: As many of them are enough to find length scales and noise.
+_FOR_SCALES = 100
 #: Knees that are looked at, over the largest velocity.
 _KNEES = (0.02, 1.0)
 #: Length scales that are looked at, over the span of an input; one at the end does not matter.
@@ -144,15 +146,16 @@ def _fitted(cells: Cells, knee: float) -> tuple[float, _Scales]:
     regressor = process.GaussianProcessRegressor(smooth + kernels.WhiteKernel(0.1, _NOISES))
     points = counted(cells.points, knee)
     span = _span(points)
+    some = slice(None, None, max(1, len(points) // _FOR_SCALES))  # cells are in no order
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')  # a length scale at its bound: an input is irrelevant
-        regressor.fit(points / span, cells.torque / size)
+        regressor.fit((points / span)[some], cells.torque[some] / size)
     found, white = regressor.kernel_.k1, regressor.kernel_.k2
     lengths = np.asarray(found.k2.length_scale, dtype=float)
     lengths = np.where(lengths > 0.9 * _LENGTHS[1], np.inf, lengths * span)
     amplitude = float(size * np.sqrt(found.k1.constant_value))
     # each cell in units of its own size: comparable between cells of different knees
-    evidence = float(regressor.log_marginal_likelihood_value_) / len(cells.torque)
+    evidence = float(regressor.log_marginal_likelihood_value_) / len(cells.torque[some])
     noise = float(size * np.sqrt(white.noise_level))
     return evidence - float(np.log(size)), _Scales(noise, lengths, amplitude, knee)
 
