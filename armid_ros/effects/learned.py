@@ -258,6 +258,11 @@ class LearnedTorque(Effect):
         return Action(link_torque=torque)
 
 
+def as_effect(maps: Mapping[str, TorqueMap]) -> Effect:
+    """Return the effect of maps by joint."""
+    return LearnedTorque(tuple(maps), maps=tuple(maps.values()))
+
+
 def counted(inputs: FloatArray, knee: float) -> FloatArray:
     """Return inputs (..., 3) with velocities as they count beyond a knee."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)

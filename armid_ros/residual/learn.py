@@ -11,7 +11,8 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.data.evidence import Trajectory
-from armid_ros.effects.learned import LearnedTorque, TorqueMap
+from armid_ros.effects import Effect
+from armid_ros.effects.learned import as_effect, TorqueMap
 from armid_ros.motion import FloatArray
 from armid_ros.residual.gaussian_process import learn_map
 from armid_ros.residual.law import Law, share_of, suggest_law
@@ -87,11 +88,9 @@ class Residual:
     joints: tuple[JointResidual, ...]
 
     @property
-    def effect(self) -> LearnedTorque:
+    def effect(self) -> Effect:
         """The maps as an effect."""
-        effect = self.arm.effects[-1]
-        assert isinstance(effect, LearnedTorque)
-        return effect
+        return self.arm.effects[-1]
 
     def sentences(self) -> tuple[str, ...]:
         """Say what was learned, a joint a line."""
@@ -190,9 +189,7 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
         return None
     found.sort(key=lambda one: -one.before)
     order = sorted(found, key=lambda one: base.robot.joints.index(one.joint))
-    effect = LearnedTorque(
-        tuple(one.joint for one in order), maps=tuple(one.learned for one in order)
-    )
+    effect = as_effect({one.joint: one.learned for one in order})
     arm = base.with_effect(effect, np.ones(len(order)))
     return Residual(base, arm, tuple(found))
 
