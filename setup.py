@@ -72,6 +72,7 @@ setup(
         'view': requirements('view'),
         'notebook': requirements('notebook'),
         'fleet': requirements('fleet'),
+        'residual': requirements('residual'),
         'test': requirements('test'),
         'bench': requirements('bench'),
     },

@@ -29,8 +29,11 @@ from armid_ros.robots import load_robot
 import numpy as np
 
 from benchmarks import real_recordings
+from benchmarks.estimators import multisine
 from benchmarks.offline_speed import CUTOFF_HZ, DECIMATION, motion, panda
 
+#: Shipped arms that are simulated.
+SIMULATED = ('humanoid_arm',)
 FRICTION = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 
 
@@ -72,13 +75,48 @@ def speed(minutes):
     )
 
 
+def masses(robot, result):
+    """Return the smallest and the largest mass of a link over the described one."""
+    found, described = result.arm.robot.rigid_parameters[::10], robot.rigid_parameters[::10]
+    ratio = found[described > 0.0] / described[described > 0.0]
+    return ratio.min(), ratio.max()
+
+
 def held_out(name, data, effects):
-    """Print the error on the last third of a recording."""
+    """Print the error on the last third of a recording of a real machine."""
     robot = load_robot(str(data.robot))
     arm = ArmModel(robot)
     for effect in effects:
         arm = arm.with_effect(make_effect(effect, robot))
-    recording = read_recording(data.bags[0], joints=robot.joints)
+    compared(name, arm, read_recording(data.bags[0], joints=robot.joints))
+
+
+def simulated(name):
+    """Print the same of a simulated arm whose links are not as described, in masses by 20 %."""
+    robot, rng = load_robot(name), np.random.default_rng(0)
+    factors = np.repeat(rng.uniform(0.8, 1.2, robot.n_joints), 10)
+    arm = ArmModel(robot)
+    for effect in FRICTION:
+        arm = arm.with_effect(make_effect(effect, robot))
+    size = [0.1 * np.abs(robot.rigid_parameters[::10]).mean()] * robot.n_joints
+    true = replace(arm, robot=robot.with_inertias(factors * robot.rigid_parameters))
+    true = replace(true, values=tuple(np.array(size) for _ in arm.values))
+    motion = multisine(robot.joints, 45.0, rng, 0.4)
+    tau = true.torque(motion)
+    noise = 0.02 * np.sqrt(np.mean(tau**2, axis=0))
+    recording = Recording(
+        joints=motion.joints,
+        t=motion.t,
+        q=motion.q + 1e-5 * rng.normal(size=motion.q.shape),
+        tau=tau + noise * rng.normal(size=tau.shape),
+        source=name,
+    )
+    compared(name, arm, recording)
+
+
+def compared(name, arm, recording):
+    """Print the error on the last third of a recording, and the masses."""
+    robot = arm.robot
     cut = 2 * len(recording.t) // 3
     results, seconds = fits(arm, part(recording, slice(None, cut)))
     rest = part(recording, slice(cut, None))
@@ -89,13 +127,24 @@ def held_out(name, data, effects):
         f'({100 * (bodies / free - 1):+.1f} %, wanted +3 % or less), least eigenvalue '
         f'{least:.2g}, {seconds[1] - seconds[0]:+.1f} s'
     )
+    low, high = masses(robot, results[1])
+    held = ', '.join(results[1].physical.active) or 'none'
+    print(
+        f'{"":8s} masses over described ones from {low:.2f} to {high:.2f}; weight of the prior '
+        f'{results[1].physical.weight:.0e}; at the limit of a body: {held}',
+        flush=True,
+    )
 
 
 def main():
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--minutes', type=float, default=10.0)
-    speed(parser.parse_args().minutes)
+    minutes = parser.parse_args().minutes
+    for name in SIMULATED:
+        simulated(name)
+    if minutes > 0.0:
+        speed(minutes)
     if not os.environ.get('ARMID_DATA'):
         print('ARMID_DATA names no recordings of real machines')
         return

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import json
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import Any, Literal, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
     arm_of,
@@ -29,6 +29,13 @@ from armid_ros.files import write_file
 from armid_ros.identification import SignalSettings
 from armid_ros.recording import Recording
 from armid_ros.report.notation import with_interval
+from armid_ros.residual import (
+    learn_residual,
+    lookup_table,
+    require_libraries,
+    Residual,
+    TABLE_FILE,
+)
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
@@ -48,6 +55,8 @@ class DiagnosisResult(Shown):
         The model before.
     recordings, held_out : tuple of Recording
         What was looked at, and what was only predicted.
+    residual : Residual or None
+        What is left without a name, learned, where that was asked for.
 
     Examples
     --------
@@ -65,6 +74,7 @@ class DiagnosisResult(Shown):
     description: ArmModel
     recordings: tuple[Recording, ...]
     held_out: tuple[Recording, ...]
+    residual: Residual | None = None
 
     @property
     def verdict(self) -> str:
@@ -83,8 +93,8 @@ class DiagnosisResult(Shown):
 
     @property
     def arm(self) -> ArmModel:
-        """The model with what was found added."""
-        return self.core.arm
+        """The model with what was found added, and with what was learned."""
+        return self.core.arm if self.residual is None else self.residual.arm
 
     def urdf(self, path: str | Path | None = None) -> str:
         """Return the description with what was found; write it where a path is given."""
@@ -105,7 +115,8 @@ class DiagnosisResult(Shown):
 
     def document(self) -> dict[str, Any]:
         """Return what diagnosis.json holds."""
-        return diagnosis_document(self.core)
+        learned = None if self.residual is None else self.residual.document(TABLE_FILE)
+        return {**diagnosis_document(self.core), 'residual': learned}
 
     def report(self, path: str | Path = 'report.html') -> Path:
         """Write the page with the verdict and the evidence; return where it is."""
@@ -116,6 +127,7 @@ class DiagnosisResult(Shown):
             robot=self._robot,
             recordings=self.recordings,
             validation=self.held_out,
+            residual=self.residual,
         )
         write_file(Path(path), page)
         return Path(path)
@@ -127,6 +139,8 @@ class DiagnosisResult(Shown):
         text = json.dumps(self.document(), indent=1)
         write_file(out / 'diagnosis.json', text)
         save_model(out / 'model.yaml', self.arm, self._robot)
+        if self.residual is not None:
+            write_file(out / TABLE_FILE, lookup_table(self.residual))
         self.report(out / 'report.html')
         return out
 
@@ -144,6 +158,8 @@ class DiagnosisResult(Shown):
         below = []
         if gap is not None and rows:
             below.append(f'{100 * gap.closed:.0f} % of the gap closed on data not used to fit')
+        if self.residual is not None:
+            below += self.residual.sentences()
         return Summary(
             self.core.summary.replace('+-', '±'),
             self.core.verdict.replace('_', ' '),
@@ -179,6 +195,7 @@ def diagnose(
     validate: RecordingLike | Sequence[RecordingLike] = (),
     baseline: RecordingLike | Sequence[RecordingLike] = (),
     effects: str = '',
+    residual: Literal['gp'] | None = None,
     cutoff: float | None = None,
     decimation: int | None = None,
     rng: Rng = 0,
@@ -198,6 +215,8 @@ def diagnose(
         From when the model was right: what it left then is no cause.
     effects : str
         Catalogue names with commas, for a robot without a model.
+    residual : {'gp'}, optional
+        Learn what is left without a name, where the verdict is partial or unknown.
     cutoff : float, optional
         Of the position filter [Hz]; from the noise by default.
     decimation : int, optional
@@ -224,6 +243,8 @@ def diagnose(
     'named'
 
     """
+    if residual is not None:
+        require_libraries()
     model = arm_of(arm, effects)
     looked_at, held_out, before = told_apart(
         *(recordings_of(group, model.robot) for group in (recordings, validate, baseline))
@@ -233,4 +254,5 @@ def diagnose(
     result = run(
         model, looked_at, validate=held_out, settings=settings, rng=generator(rng), **more
     )
-    return DiagnosisResult(result, model, tuple(looked_at), tuple(held_out))
+    learned = None if residual is None else learn_residual(result, generator(rng))
+    return DiagnosisResult(result, model, tuple(looked_at), tuple(held_out), learned)

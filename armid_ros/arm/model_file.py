@@ -226,7 +226,7 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
         kind: Kind = CATALOGUE.find(str(entry['name']))
         if 'ties' in entry:
             kind = tied_kind(kind.name, entry)
-        effect = kind.on(robot, tuple(entry['joints']))
+        effect = kind.on(robot, tuple(entry['joints'])).with_particulars(entry)
         if 'shapes' in entry:
             shape = _values(entry['shapes'], effect.shape_parameters(robot))
             effect = effect.with_shape(shape.reshape(effect.shape_values.shape))

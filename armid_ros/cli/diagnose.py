@@ -19,6 +19,7 @@ from armid_ros.files import json_text
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.identifiability import told_from_zero
 from armid_ros.report.notation import percent, probability, with_interval
+from armid_ros.residual import require_libraries, TABLE_FILE
 import click
 import numpy as np
 
@@ -84,6 +85,12 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
     metavar='E,...',
     help="Effects that the model has already, fitted anew; 'E@joint+joint' for some joints only.",
 )
+@click.option(
+    '--residual',
+    type=click.Choice(['gp']),
+    help='Learn what is left without a name, where the verdict is partial or unknown, as a map '
+    'with its uncertainty (gp: a Gaussian process of each joint), and suggest a law.',
+)
 @click.option('--cutoff', type=float, help='Of the position filter [Hz]; from the data if none.')
 @click.option('--decimation', type=int, help='Keep one sample of this many.')
 @columns.options
@@ -104,6 +111,7 @@ def diagnose(
     material: float,
     everything: bool,
     effects: str,
+    residual: str | None,
     cutoff: float | None,
     decimation: int | None,
     topic: str | None,
@@ -116,6 +124,8 @@ def diagnose(
     as_json: bool,
 ) -> None:
     """Find which effect a model lacks, and add it."""
+    if residual is not None:
+        require_libraries()
     options.hold(out, SCHEMA, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = ArmModel(robot) if model is None else load_model(model, robot)
@@ -160,6 +170,7 @@ def diagnose(
             settings,
             misfit,
             provenance([*bags, *validate, *baseline], seed=seed),
+            residual is not None,
         )
         write_results(out, result, case, Extras())
         extras = make_extras(result, case, seed, tick)
@@ -221,11 +232,16 @@ def _minor(finding: Finding) -> dict[str, str]:
 
 
 def _show_extras(out: Path, extras: Extras) -> None:
+    if extras.residual is not None:
+        for sentence in extras.residual.sentences():
+            say(sentence)
     for pair in extras.forward:
         say(pair.sentence())
     for note in extras.notes:
         say(f'note: {note}')
     files = ['diagnosis.json', 'model.yaml', 'report.html']
+    if extras.residual is not None:
+        files.append(TABLE_FILE)
     if extras.next_run is not None:
         say(extras.next_run.sentence)
         files.append(EXPERIMENT_FILE)

@@ -31,6 +31,13 @@ from armid_ros.identification.verification import ForwardValidation, simulate_he
 from armid_ros.recording import Recording
 from armid_ros.report.diagnosis_report import diagnosis_report
 from armid_ros.report.provenance import Provenance
+from armid_ros.residual import (
+    learn_residual,
+    lookup_table,
+    Residual,
+    TABLE_FILE,
+    WORTH_A_MAP,
+)
 import numpy as np
 
 Tick = Callable[[float, str], None]
@@ -56,6 +63,8 @@ class Case:
         What the model left when it was identified.
     provenance : Provenance
         Files, versions, settings, seed.
+    learns : bool
+        Whether what is left without a name is to be learned.
 
     """
 
@@ -68,6 +77,7 @@ class Case:
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
     misfit: Misfit | None = None
     provenance: Provenance = field(default_factory=Provenance)
+    learns: bool = False
 
 
 @dataclass(frozen=True)
@@ -83,23 +93,31 @@ class Extras:
         A motion that separates names in doubt.
     notes : tuple of str
         Why there is not more.
+    residual : Residual or None
+        What is left without a name, learned.
 
     """
 
     forward: tuple[ForwardValidation, ...] = ()
     next_run: NextRun | None = None
     notes: tuple[str, ...] = ()
+    residual: Residual | None = None
 
 
 def write_results(out: Path, result: Diagnosis, case: Case, extras: Extras) -> dict[str, Any]:
     """Fill a folder, numbers before pictures; return what diagnosis.json holds."""
     out.mkdir(parents=True, exist_ok=True)
     estimate = None if result.explanation is None else result.explanation.fitted.estimate
-    save_model(out / 'model.yaml', result.arm, case.source, estimate, case.misfit)
+    learned = extras.residual
+    arm = result.arm if learned is None else learned.arm
+    save_model(out / 'model.yaml', arm, case.source, estimate, case.misfit)
     document = diagnosis_document(result)
+    document['residual'] = None if learned is None else learned.document(TABLE_FILE)
     document['forward'] = [pair.document() for pair in extras.forward]
     document['next_run'] = None if extras.next_run is None else extras.next_run.document()
     write_file(out / 'diagnosis.json', json_text(document, indent=1))
+    if learned is not None:
+        write_file(out / TABLE_FILE, lookup_table(learned))
     if extras.next_run is not None:
         save_excitation(extras.next_run.excitation, out / EXPERIMENT_FILE)
     page = diagnosis_report(
@@ -111,6 +129,7 @@ def write_results(out: Path, result: Diagnosis, case: Case, extras: Extras) -> d
         settings=case.settings,
         forward=extras.forward,
         next_run=extras.next_run,
+        residual=learned,
         patch=(out / 'model.yaml').read_text(encoding='utf-8'),
         provenance=case.provenance,
     )
@@ -121,21 +140,38 @@ def write_results(out: Path, result: Diagnosis, case: Case, extras: Extras) -> d
 def make_extras(result: Diagnosis, case: Case, seed: int, tick: Tick) -> Extras:
     """Simulate the held-out recordings and plan a next run, as far as that can be done."""
     extras = Extras()
+    if case.learns:
+        tick(1.0, 'learning what is left')
+        extras = _learned(result, seed)
+    arm = result.arm if extras.residual is None else extras.residual.arm
     if case.held_out and result.gap is not None:
-        found, why = _tried('a simulation', lambda: _simulated(result, case, tick))
+        found, why = _tried('a simulation', lambda: _simulated(arm, case, tick))
         simulated, left_out = found or ((), ())
-        extras = Extras(simulated, None, (*left_out, *why))
+        extras = replace(extras, forward=simulated, notes=(*extras.notes, *left_out, *why))
     tick(1.0, 'next run')
     run, why = _tried('a next run', lambda: next_run(result, np.random.default_rng(seed)))
     return replace(extras, next_run=run, notes=(*extras.notes, *why))
 
 
+def _learned(result: Diagnosis, seed: int) -> Extras:
+    """Learn what has no name, or say why there is nothing to learn."""
+    if result.verdict not in WORTH_A_MAP:
+        said = result.verdict.replace('_', ' ')
+        return Extras(notes=(f'nothing is learned where the verdict is {said}',))
+    found, why = _tried('a map', lambda: learn_residual(result, np.random.default_rng(seed)))
+    if why:
+        return Extras(notes=why)
+    if found is None:
+        return Extras(notes=('nothing was learned: what is left goes with no state of a joint',))
+    return Extras(residual=found)
+
+
 def _simulated(
-    result: Diagnosis, case: Case, tick: Tick
+    arm: ArmModel, case: Case, tick: Tick
 ) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
     used = conditioning(list(case.recordings), case.settings.signals)
     return simulate_held_out(
-        case.arm, result.arm, used, case.held_out, progress=lambda _, what: tick(1.0, what)
+        case.arm, arm, used, case.held_out, progress=lambda _, what: tick(1.0, what)
     )
 
 

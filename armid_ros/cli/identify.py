@@ -90,6 +90,12 @@ OUTPUTS = (
 )
 @click.option('--total-mass', type=float, help='Of all moving links [kg], with --physical.')
 @click.option(
+    '--mass-range',
+    type=float,
+    metavar='FACTOR',
+    help='By which a link is lighter or heavier than described at most, with --physical.',
+)
+@click.option(
     '--box',
     'boxes',
     multiple=True,
@@ -125,6 +131,7 @@ def identify(
     quasi_static: bool,
     physical: bool,
     total_mass: float | None,
+    mass_range: float | None,
     boxes: tuple[str, ...],
     verifies: bool,
     strict: bool,
@@ -139,10 +146,12 @@ def identify(
     options.require_own(out, OUTPUTS, 'identify')
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
-    if not physical and (total_mass is not None or boxes):
-        raise IdentificationError('--total-mass and --box go with --physical')
+    if not physical and (total_mass is not None or mass_range is not None or boxes):
+        raise IdentificationError('--total-mass, --mass-range and --box go with --physical')
     known = PhysicalSettings(
-        total_mass=total_mass, boxes=dict(options.box(text, robot) for text in boxes)
+        total_mass=total_mass,
+        boxes=dict(options.box(text, robot) for text in boxes),
+        mass_range=mass_range,
     )
     settings = IdentificationSettings(
         method, SignalSettings(cutoff, decimation), known if physical else None

@@ -95,7 +95,9 @@ class DiagnosisSettings:
 
     """
 
-    library: tuple[str, ...] = field(default_factory=lambda: tuple(CATALOGUE))
+    library: tuple[str, ...] = field(
+        default_factory=lambda: tuple(name for name, kind in CATALOGUE.items() if not kind.learned)
+    )
     own: tuple[Kind, ...] = ()
     partner: Partner | None = None
     signals: SignalSettings = field(default_factory=SignalSettings)

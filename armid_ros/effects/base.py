@@ -17,6 +17,7 @@ acts with the shape that it has.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol, Self
 
@@ -99,6 +100,8 @@ class Effect(ABC):
     mjcf_attribute: ClassVar[str] = ''
     #: Whether it comes from outside the arm: a person, another machine.
     external: ClassVar[bool] = False
+    #: Whether it is learned from what is left: nothing that a cause can be called by.
+    learned: ClassVar[bool] = False
     #: Whether its torque changes smoothly with position and velocity.
     smooth: ClassVar[bool] = False
     #: Quantities that stand for causes of their own, if not all of them stand for one together.
@@ -164,6 +167,10 @@ class Effect(ABC):
     def particulars(self) -> dict[str, Any]:
         """Return what model.yaml holds of it beside joints, parameters and shapes."""
         return {}
+
+    def with_particulars(self, entry: Mapping[str, Any]) -> Self:
+        """Return the effect with what an entry of model.yaml has of `particulars`."""
+        return self
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
         """Return the effects, with values, that say the same in the words of the catalogue."""
@@ -370,6 +377,10 @@ class Arm(Protocol):
     @property
     def robot(self) -> Robot:
         """Its description."""
+
+    @property
+    def body(self) -> Robot:
+        """The rigid body as the effects make it: with payload, under the gravity that is there."""
 
     @property
     def middle_frames(self) -> LinkFrames:

@@ -24,6 +24,7 @@ from armid_ros.effects.friction import (
 from armid_ros.effects.gravity import BaseTilt, GravityMagnitude
 from armid_ros.effects.hysteresis import LoadDependentFriction, PreslidingHysteresis
 from armid_ros.effects.interaction import HumanInteraction, InterfaceSlack
+from armid_ros.effects.learned import LearnedTorque
 from armid_ros.effects.load import LinkInertia, Payload
 from armid_ros.effects.pairs import CoupledJointFriction, JointCoupling, TorqueCrosstalk
 from armid_ros.effects.registry import Catalogue
@@ -67,6 +68,7 @@ _EFFECTS: tuple[type[Effect], ...] = (
     ActuatorSaturation,
     HumanInteraction,
     InterfaceSlack,
+    LearnedTorque,
 )
 
 CATALOGUE = Catalogue(_EFFECTS)

@@ -41,6 +41,8 @@ HEAVY = 3.0
 WEIGHTS = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
 #: The heaviest weight is taken whose held-out error is within this share of the least one.
 TOLERANCE = 1e-3
+#: A mass within this share of its range, in logarithms, is at its bound.
+_AT_MASS = 1e-3
 #: Smallest radius of gyration of a prior [m], for descriptions that give points for links.
 SMALLEST_RADIUS = 0.005
 #: Radius of gyration of a prior for a link of which the description says nothing [m].
@@ -58,6 +60,8 @@ class PhysicalSettings:
         Mass of everything that the driven joints move [kg], as of a scale.
     boxes : mapping of str to (sequence of float, sequence of float)
         Joint, and two corners [m] of a box in its frame that contains the link.
+    mass_range : float or None
+        Factor above 1 by which a link is lighter or heavier than described at most.
     blocks : int
         Blocks of the training data that are left out in turn to choose the weight of the prior.
     weights : tuple of float
@@ -67,6 +71,7 @@ class PhysicalSettings:
 
     total_mass: float | None = None
     boxes: Mapping[str, tuple[Sequence[float], Sequence[float]]] = field(default_factory=dict)
+    mass_range: float | None = None
     blocks: int = 5
     weights: tuple[float, ...] = WEIGHTS
 
@@ -74,6 +79,10 @@ class PhysicalSettings:
         """Refuse what cannot be."""
         if self.total_mass is not None and not 0.0 < self.total_mass < np.inf:
             raise IdentificationError(f'total mass {self.total_mass} kg: it has to be positive')
+        if self.mass_range is not None and not 1.0 < self.mass_range < np.inf:
+            raise IdentificationError(
+                f'a mass range of {self.mass_range:g}: it has to be a factor above 1'
+            )
         for joint, (lower, upper) in self.boxes.items():
             if len(lower) != 3 or len(upper) != 3 or not np.all(np.less(lower, upper)):
                 raise IdentificationError(
@@ -161,7 +170,18 @@ def fit_bodies(
         unconstrained=unconstrained,
         misfit_ratio=max(misfit / least, 1.0),
         notes=(*notes, *_heavy(arm.robot, rigid)),
+        at_mass=_at_mass(arm.robot.links, rigid[:, 0], prior[: rigid.size : PER_LINK], settings),
     )
+
+
+def _at_mass(
+    links: Sequence[str], masses: FloatArray, prior: FloatArray, settings: PhysicalSettings
+) -> tuple[str, ...]:
+    """Return the links that are as light or as heavy as they may be."""
+    if settings.mass_range is None:
+        return ()
+    off = np.abs(np.log(masses / prior)) > (1.0 - _AT_MASS) * np.log(settings.mass_range)
+    return tuple(link for link, at in zip(links, off, strict=True) if at)
 
 
 def _heavy(robot: Robot, rigid: FloatArray) -> tuple[str, ...]:
@@ -193,7 +213,10 @@ def physical_program(
     }
     rigid = len(prior) - len(lower)
     prior[rigid:] = np.clip(prior[rigid:], lower, upper)
-    return PhysicalProgram(base, prior, lower, upper, settings.total_mass, boxes), notes
+    program = PhysicalProgram(
+        base, prior, lower, upper, settings.total_mass, boxes, settings.mass_range
+    )
+    return program, notes
 
 
 def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:

@@ -49,6 +49,8 @@ class PhysicalCertificate:
         Weighted error on the training data, relative to the unconstrained fit's.
     notes : tuple of str
         What was assumed of links of which the description has no body.
+    at_mass : tuple of str
+        Links that are as light or as heavy as they may be.
 
     """
 
@@ -62,6 +64,7 @@ class PhysicalCertificate:
     unconstrained: Estimate
     misfit_ratio: float
     notes: tuple[str, ...]
+    at_mass: tuple[str, ...] = ()
 
     @property
     def consistent(self) -> bool:
@@ -96,6 +99,8 @@ class PhysicalCertificate:
             )
         if self.at_wall:
             said.append(f'at the limit of the box: {", ".join(self.at_wall)}')
+        if self.at_mass:
+            said.append(f'as light or heavy as they may be: {", ".join(self.at_mass)}')
         if self.total_mass is not None:
             said.append(f'the masses add up to {self.total_mass:g} kg, as given')
         if self.at_bound:
@@ -135,6 +140,7 @@ class PhysicalCertificate:
             ],
             'at_bound': [{'name': p.name, 'joint': p.joint} for p in self.at_bound],
             'at_wall': list(self.at_wall),
+            'at_mass': list(self.at_mass),
             'total_mass': self.total_mass,
             'prior_weight': self.weight,
             'tried': [{'weight': w, 'held_out_ratio': ratio} for w, ratio in self.tried],

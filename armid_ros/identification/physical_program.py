@@ -61,6 +61,8 @@ class PhysicalProgram:
         Mass of all links together [kg].
     boxes : mapping of int to (ndarray, ndarray)
         Link (0 is the first), and two corners, in the joint frame, of a box that contains it [m].
+    mass_range : float or None
+        Factor by which a mass is below or above that of the prior at most.
 
     """
 
@@ -70,6 +72,7 @@ class PhysicalProgram:
     upper: FloatArray
     total_mass: float | None
     boxes: Mapping[int, Box]
+    mass_range: float | None = None
 
     @property
     def n_links(self) -> int:
@@ -186,6 +189,11 @@ class PhysicalProgram:
         for sign, bound in ((1.0, self.lower), (-1.0, self.upper)):
             finite = np.isfinite(bound)
             linear(clarabel.NonnegativeConeT, sign * unit[finite], -sign * bound[finite])
+        if self.mass_range is not None:
+            mass = np.eye(len(self.prior))[: self._rigid : PER_LINK]
+            described = self.prior[: self._rigid : PER_LINK]
+            linear(clarabel.NonnegativeConeT, mass, -described / self.mass_range)
+            linear(clarabel.NonnegativeConeT, -mass, described * self.mass_range)
         for link, box in self.boxes.items():
             normal = np.zeros((9, len(self.prior)))
             normal[:, PER_LINK * link : PER_LINK * (link + 1)] = box_conditions(box)

@@ -24,11 +24,13 @@ from armid_ros.report.sections.named import NamedParameters
 from armid_ros.report.sections.next_steps import NextSteps
 from armid_ros.report.sections.origin import Origin
 from armid_ros.report.sections.patch import Patch
+from armid_ros.report.sections.residual_map import ResidualMap
 from armid_ros.report.sections.shares import Shares
 from armid_ros.report.sections.small_print import SmallPrint
 from armid_ros.report.sections.story import Story
 from armid_ros.report.sections.verdict import Verdict
 from armid_ros.report.sources import short_names, with_names
+from armid_ros.residual import Residual
 
 #: Colour of each verdict; the others are bad.
 TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
@@ -44,6 +46,7 @@ def diagnosis_report(
     settings: DiagnosisSettings | None = None,
     forward: Sequence[ForwardValidation] = (),
     next_run: NextRun | None = None,
+    residual: Residual | None = None,
     patch: str = '',
     provenance: Provenance | None = None,
 ) -> str:
@@ -68,6 +71,8 @@ def diagnosis_report(
         Those data simulated, with the model as it was and as it is patched.
     next_run : NextRun, optional
         The motion that was written to separate names.
+    residual : Residual, optional
+        What is left without a name, learned.
     patch : str
         model.yaml of the patched model.
     provenance : Provenance, optional
@@ -85,6 +90,7 @@ def diagnosis_report(
     sections: list[Section] = [
         _verdict(diagnosis, names),
         *_story(diagnosis, names),
+        *([] if residual is None else [ResidualMap(residual)]),
         NextSteps(_next_steps(diagnosis, next_run)),
         *_small_print(diagnosis, settings),
     ]

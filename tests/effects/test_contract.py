@@ -16,7 +16,7 @@ DESIGNED = """
     torque_offset torque_drift torque_gain torque_crosstalk torque_lag time_delay encoder_offset
     rotor_inertia payload link_inertia gravity_magnitude base_tilt joint_elasticity backlash
     torque_ripple joint_spring joint_coupling soft_limit actuator_saturation human_interaction
-    interface_slack
+    interface_slack learned_torque
 """.split()
 #: These twist transmissions by the load of the arm as it is, which counts as given.
 LOADED = {'joint_elasticity', 'backlash'}

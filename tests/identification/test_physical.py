@@ -102,6 +102,28 @@ def test_total_mass_is_kept_and_improves_what_torques_do_not_say(arm, drawing, r
     assert np.linalg.norm(found - true) < np.linalg.norm(plain - true)
 
 
+def test_no_mass_is_beyond_its_range_and_held_out_torques_hardly_suffer(
+    drawing, recording, bodies
+):
+    described = drawing.robot.rigid_parameters[::10]
+    free = bodies.arm.robot.rigid_parameters[::10] / described
+    factor = 1.0 + 0.5 * float(np.max(np.maximum(free, 1.0 / free)) - 1.0)
+    held = run(drawing, recording, PhysicalSettings(mass_range=factor))
+    ratio = held.arm.robot.rigid_parameters[::10] / described
+    assert np.all(ratio > (1.0 - 1e-6) / factor)
+    assert np.all(ratio < (1.0 + 1e-6) * factor)
+    assert held.physical.at_mass
+    assert held.physical.consistent
+    assert not bodies.physical.at_mass
+    assert held.physical.held_out_ratio < 1.03
+
+
+@pytest.mark.parametrize('factor', [1.0, 0.5, np.inf, np.nan])
+def test_a_mass_range_is_a_factor_above_one(factor):
+    with pytest.raises(IdentificationError, match='a factor above 1'):
+        PhysicalSettings(mass_range=factor)
+
+
 def test_a_mass_that_is_not_the_arms_is_said_to_cost(drawing, recording, bodies):
     """A tenth of what it weighs."""
     assert not any('constraints cost' in line for line in bodies.physical.activity)

@@ -14,10 +14,13 @@ import pytest
 LAYERS = (
     ('cli',),
     ('fleet',),
-    ('api', 'nodes'),
+    ('nodes',),
+    ('live',),
+    ('api',),
     ('report', 'view'),
+    ('residual',),
     ('diagnosis', 'inspection'),
-    ('identification',),
+    ('identification', 'pair'),
     ('recording', 'simulation', 'excitation'),
     ('arm',),
     ('effects',),
@@ -26,7 +29,7 @@ LAYERS = (
     ('estimate',),
     ('motion',),
     ('files',),
-    ('errors',),
+    ('errors', 'version'),
 )
 
 

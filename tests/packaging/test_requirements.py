@@ -13,8 +13,8 @@ import pytest
 LOCKS = {
     'build': ['build'],
     'run': ['run', 'ros'],
-    'test': ['test', 'convert', 'docs', 'fleet', 'view', 'run', 'ros'],
-    'bench': ['bench', 'test', 'convert', 'docs', 'fleet', 'view', 'run', 'ros'],
+    'test': ['test', 'convert', 'docs', 'fleet', 'residual', 'view', 'run', 'ros'],
+    'bench': ['bench', 'test', 'convert', 'docs', 'fleet', 'residual', 'view', 'run', 'ros'],
 }
 
 

@@ -127,10 +127,28 @@ def _prior(fit: FittedValues, values: FloatArray) -> FloatArray:
     body = [parameter.rigid for parameter in fit.base.parameters]
     least = np.where(body, _PRIOR_TORQUE[1], _PRIOR_TORQUE[0])
     alone = np.maximum(_PRIOR_SHARE * np.abs(values), least / reach)
-    scaled = fit.solution.covariance / np.outer(alone, alone) * _DOUBT**2
+    moved_by = np.diag((values - fit.values) ** 2)  # to an arm that can be simulated
+    wide = _DOUBT**2 * fit.solution.covariance + moved_by
+    scaled = wide / np.outer(alone, alone)
     return np.asarray(
         np.outer(alone, alone) * np.linalg.solve(scaled + np.eye(len(alone)), scaled)
     )
+
+
+def _colour(fit: FittedValues) -> float:
+    """
+    Return how many times the variance of white noise has to be to blur parameters as much.
+
+    What a model lacks comes back for many samples; the deviations of least squares have that in
+    them, and a filter that takes it for white follows it with its parameters.
+
+    """
+    columns = np.concatenate([part.columns for part in fit.problem])
+    rows = fit.solution.weights[:, :, np.newaxis] * columns
+    flat = rows.reshape(-1, rows.shape[2])
+    size = np.sqrt(np.diag(fit.solution.covariance))
+    white = np.linalg.pinv((flat * size).T @ (flat * size), hermitian=True)
+    return max(1.0, float(np.median(1.0 / np.diag(white))))
 
 
 def _thinned(recording: Recording, motion: Motion, used: Conditioning) -> Motion:
@@ -209,7 +227,8 @@ class _Filter:
         self._noise = np.maximum(_position_noise(motion), _LEAST_NOISE) ** 2
         # the residual of the least squares is white at its own rate; the same spectrum here
         rows = used.rate_hz / used.decimation
-        self._torque_noise = fit.solution.joint_std**2 * max(1.0, 1.0 / (self._dt * rows))
+        white = fit.solution.joint_std**2 * max(1.0, 1.0 / (self._dt * rows))
+        self._torque_noise = white * _colour(fit)
 
     def run(
         self, values: FloatArray, covariance: FloatArray, limits: tuple[FloatArray, FloatArray]

@@ -173,6 +173,12 @@ def lived_case(kind: str, index: int) -> LivedCase:
     return replace(case, urdf=_path_of(load_arm(spec.arm)))
 
 
+def case_with(kind: str, index: int, cause: str, size: tuple[float, float]) -> LivedCase:
+    """Make a case with another cause, of a gap in the middle of a range."""
+    wanted = float(np.sqrt(size[0] * size[1]))
+    return _record_case(draw_case(replace(specify(kind, index), cause=cause, wanted=wanted)))
+
+
 def _record_case(draft: Draft) -> LivedCase:
     """Record all runs of a case."""
     spec, robot, arm, paths = draft.spec, draft.robot, draft.arm, draft.paths

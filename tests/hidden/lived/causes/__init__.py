@@ -19,12 +19,14 @@ from tests.hidden.lived.causes.drive import (
     Stribeck,
     Viscous,
 )
+from tests.hidden.lived.causes.nameless import CableSnag, PositionFriction
 from tests.hidden.lived.causes.rigid import Link, Mounting, Payload, Tilt, Wall
 from tests.hidden.lived.causes.sensing import Delay, Encoder, Gain, Offset
 
 __all__ = [
     'CAUSES',
     'Bumps',
+    'CableSnag',
     'Cause',
     'Coulomb',
     'CubicDrag',
@@ -38,6 +40,7 @@ __all__ = [
     'Mounting',
     'Offset',
     'Payload',
+    'PositionFriction',
     'Pulling',
     'Rotor',
     'Scene',
@@ -70,5 +73,7 @@ CAUSES: Mapping[str, type[Cause]] = MappingProxyType(
         'knocks': Knocks,
         'bumps': Bumps,
         'cubic_drag': CubicDrag,
+        'position_friction': PositionFriction,
+        'cable_snag': CableSnag,
     }
 )

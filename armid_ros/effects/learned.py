@@ -1,0 +1,277 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Torque that was learned from recordings and has no name.
+
+Of each joint a map from its position, its velocity and its load to a torque: the mean of a
+Gaussian process on inducing points. Far from all points it is zero, and its deviation is that of
+the prior. It says where a model is off and by how much; a law it is not.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self
+
+from armid_ros.effects.action import Action
+from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects.quantities import Quantity
+from armid_ros.errors import ModelError
+from armid_ros.files import finite
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.robots import Robot
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+#: Inputs of a map, in the order of its columns.
+INPUTS = ('position', 'velocity', 'load')
+#: Digits of the points in files: a map is known to three.
+_DIGITS = '.9g'
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueMap:
+    """
+    The posterior of a Gaussian process over position, velocity and load of one joint.
+
+    k(x, x') = s^2 exp(-sum of ((u_i - u_i') / l_i)^2 / 2); the mean is the sum of
+    a_m k(x, x_m) / s^2. The velocity counts as u = v asinh(dq / v): below the knee v it is
+    proportional, beyond it logarithmic, as friction changes most where a joint turns round.
+    Source: Rasmussen and Williams 2006, eqs. 2.25 and 2.26.
+
+    Attributes
+    ----------
+    points : ndarray, shape (M, 3)
+        Inducing points x_m: position [rad or m], velocity, load [N m or N].
+    weights : ndarray, shape (M,)
+        a_m [N m or N].
+    noise : ndarray, shape (M,)
+        Standard deviation of the torque at each point [N m or N].
+    lengths : ndarray, shape (3,)
+        Length scales l; infinite for an input that does not matter.
+    amplitude : float
+        Standard deviation s of the prior [N m or N].
+    knee : float
+        Velocity v from which on velocities count by their ratio [rad/s or m/s].
+
+    """
+
+    points: FloatArray
+    weights: FloatArray
+    noise: FloatArray
+    lengths: FloatArray
+    amplitude: float
+    knee: float
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check them."""
+        for name in ('points', 'weights', 'noise', 'lengths'):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        count = len(self.weights)
+        shapes = self.points.shape, self.noise.shape, self.lengths.shape
+        if shapes != ((count, len(INPUTS)), (count,), (len(INPUTS),)):
+            raise ModelError(f'a torque map of {count} weights has arrays of shapes {shapes}')
+        sizes = (*self.lengths, *self.noise, self.amplitude, self.knee)
+        if not min(sizes) > 0.0:
+            raise ModelError(
+                'a torque map needs positive length scales, deviations, amplitude and knee'
+            )
+
+    def __eq__(self, other: object) -> bool:
+        """Compare all numbers."""
+        return isinstance(other, TorqueMap) and self._numbers == other._numbers
+
+    def __hash__(self) -> int:
+        """Hash all numbers."""
+        return hash(self._numbers)
+
+    @property
+    def _numbers(self) -> tuple[bytes, ...]:
+        arrays = (self.points, self.weights, self.noise, self.lengths)
+        return tuple(np.asarray(a).tobytes() for a in (*arrays, self.amplitude, self.knee))
+
+    @property
+    def takes_load(self) -> bool:
+        """Whether the torque depends on the load."""
+        return bool(np.isfinite(self.lengths[2]))
+
+    def given(self, torque: FloatArray) -> TorqueMap:
+        """Return the map with the weights that torques at its points give it, shape (M,) [N m]."""
+        return replace(self, weights=cho_solve(self._factor, torque))
+
+    def torque(self, inputs: FloatArray) -> FloatArray:
+        """Return the torque at inputs of shape (..., 3) [N m]."""
+        return np.asarray(self._nearness(inputs) @ self.weights)
+
+    def std(self, inputs: FloatArray) -> FloatArray:
+        """Return the standard deviation of the torque at inputs of shape (..., 3) [N m]."""
+        near = self._nearness(inputs)
+        solved = cho_solve(self._factor, near.reshape(-1, len(self.weights)).T).T
+        explained = np.sum(near * solved.reshape(near.shape), axis=-1)
+        return np.asarray(self.amplitude * np.sqrt(np.clip(1.0 - explained, 0.0, 1.0)))
+
+    @cached_property
+    def _factor(self) -> Any:
+        share = (self.noise / self.amplitude) ** 2
+        return cho_factor(self._nearness(self.points) + np.diag(share))
+
+    def _nearness(self, inputs: FloatArray) -> FloatArray:
+        """Return the kernel over s^2 between inputs and points, shape (..., M)."""
+        own, others = counted(inputs, self.knee), counted(self.points, self.knee)
+        difference = (own[..., np.newaxis, :] - others) / self.lengths
+        return np.asarray(np.exp(-0.5 * np.sum(difference**2, axis=-1)))
+
+    def document(self) -> dict[str, Any]:
+        """Return what model.yaml holds: a line a point."""
+        rows = np.column_stack([self.points, self.weights, self.noise])
+        return {
+            'amplitude': float(self.amplitude),
+            'knee': float(self.knee),
+            'length_scales': [float(x) if np.isfinite(x) else None for x in self.lengths],
+            'points': [' '.join(format(x, _DIGITS) for x in row) for row in rows],
+        }
+
+    @classmethod
+    def of_document(cls, entry: Mapping[str, Any], joint: str) -> TorqueMap:
+        """
+        Read what `document` wrote.
+
+        Raises
+        ------
+        ModelError
+            Naming the joint and what is wrong.
+
+        """
+        what = f"torque map of joint '{joint}'"
+        try:
+            rows = [[float(x) for x in str(line).split()] for line in entry['points']]
+            lengths = [np.inf if x is None else float(x) for x in entry['length_scales']]
+            table = np.array(rows, dtype=float).reshape(len(rows), len(INPUTS) + 2)
+        except (TypeError, ValueError) as error:
+            raise ModelError(f'{what}: {error}') from None
+        if not np.all(np.isfinite(table)) or np.any(np.isnan(lengths)):
+            raise ModelError(f'{what}: a number is not finite')
+        size, knee = (finite(entry[key], f'{key} of the {what}') for key in ('amplitude', 'knee'))
+        return cls(table[:, :3], table[:, 3], table[:, 4], np.array(lengths), size, knee)
+
+
+@dataclass(frozen=True)
+class LearnedTorque(Effect):
+    """
+    Torque of joints over position, velocity and load, learned where no name was found.
+
+    The load is what holds the arm where it is. Nothing is known of it far from the motions that
+    it was learned from: there it is zero. It is confounded with everything, and so never named.
+    Source: Nguyen-Tuong and Peters 2010 (semiparametric models); Quinonero-Candela and
+    Rasmussen 2005 (inducing points).
+
+    Attributes
+    ----------
+    maps : tuple of TorqueMap
+        One for each of the joints; none: no torque.
+
+    """
+
+    maps: tuple[TorqueMap, ...] = ()
+
+    name = 'learned_torque'
+    summary = 'torque without a name, learned over position, velocity and load'
+    quantities = (Quantity('learned_share', '', typical=(0.5, 1.0)),)
+    learned = True
+
+    def __post_init__(self) -> None:
+        """Check that each joint has a map."""
+        super().__post_init__()
+        if self.maps and len(self.maps) != len(self.joints):
+            raise ModelError(
+                f'{self.name}: {len(self.maps)} maps for {len(self.joints)} joints '
+                f'({", ".join(self.joints)})'
+            )
+
+    @classmethod
+    def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
+        return robot.joints
+
+    def particulars(self) -> dict[str, Any]:
+        """Return the maps."""
+        rows = zip(self.joints, self.maps, strict=bool(self.maps))
+        return {'maps': [{'joint': joint, **own.document()} for joint, own in rows]}
+
+    def with_particulars(self, entry: Mapping[str, Any]) -> Self:
+        """Return the effect with the maps that a file has."""
+        found = {str(row['joint']): row for row in entry.get('maps', ())}
+        if not found:
+            return self
+        lost = [joint for joint in self.joints if joint not in found]
+        if lost:
+            raise ModelError(f"{self.name}: joint '{lost[0]}' has no map")
+        maps = tuple(TorqueMap.of_document(found[joint], joint) for joint in self.joints)
+        return replace(self, maps=maps)
+
+    def inputs(self, robot: Robot, q: FloatArray, dq: FloatArray) -> FloatArray:
+        """
+        Return what the maps take, of all joints.
+
+        Parameters
+        ----------
+        robot : Robot
+            Gives the load.
+        q, dq : ndarray, shape (..., n)
+            Position and velocity of the links.
+
+        Returns
+        -------
+        ndarray, shape (..., n, 3)
+
+        """
+        loads = any(own.takes_load for own in self.maps)
+        load = weight(robot, q) if loads else np.zeros(np.shape(q))
+        return np.stack([q, dq, load], axis=-1)
+
+    def torque(self, robot: Robot, q: FloatArray, dq: FloatArray) -> FloatArray:
+        """Return the torque of the maps, zero for other joints, shape (..., n) [N m]."""
+        tau = np.zeros(np.shape(q))
+        if self.maps:
+            inputs = self.inputs(robot, q, dq)
+            for joint, own in zip(self.indices(robot.joints), self.maps, strict=True):
+                tau[..., joint] = own.torque(inputs[..., joint, :])
+        return tau
+
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
+        """Return the torque of each map in the row of its joint, shape (N, n, P) [N m]."""
+        link = arm.link_motion(motion)
+        return joint_columns(self, motion, self.torque(arm.body, link.q, link.dq))
+
+    def action(self, values: FloatArray, arm: Arm) -> Action:
+        """Return the torque of the maps."""
+        (share,) = scatter(self, values, arm.robot)
+        robot = arm.robot
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            return np.asarray(share * self.torque(robot, q, dq))
+
+        return Action(link_torque=torque)
+
+
+def as_effect(maps: Mapping[str, TorqueMap]) -> Effect:
+    """Return the effect of maps by joint."""
+    return LearnedTorque(tuple(maps), maps=tuple(maps.values()))
+
+
+def counted(inputs: FloatArray, knee: float) -> FloatArray:
+    """Return inputs (..., 3) with velocities as they count beyond a knee."""
+    velocity = knee * np.arcsinh(inputs[..., 1] / knee)
+    return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
+
+
+def weight(robot: Robot, q: FloatArray) -> FloatArray:
+    """Return the torque that holds the rigid body where it is, shape (..., n) [N m]."""
+    flat = np.reshape(q, (-1, robot.n_joints))
+    still = np.zeros_like(flat)
+    there = Motion(robot.joints, np.arange(len(flat), dtype=float), flat, still, still)
+    return np.asarray(inverse_dynamics(robot, there)).reshape(np.shape(q))

@@ -1,0 +1,26 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a diagnosis leaves without a name: learned as a map, and the law that it looks like.
+
+``learn_residual`` learns; what it returns is an arm with the map as an effect, how much of the
+residual the map and the law predict, and a table for other programs.
+
+"""
+
+from armid_ros.residual.law import Law, Term
+from armid_ros.residual.learn import JointResidual, learn_residual, Residual, WORTH_A_MAP
+from armid_ros.residual.libraries import require_libraries
+from armid_ros.residual.table import lookup_table, TABLE_FILE
+
+__all__ = [
+    'TABLE_FILE',
+    'WORTH_A_MAP',
+    'JointResidual',
+    'Law',
+    'Residual',
+    'Term',
+    'learn_residual',
+    'lookup_table',
+    'require_libraries',
+]

@@ -1,0 +1,217 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The law that a residual looks like: few terms of a library, by sparse regression.
+
+Terms are taken one by one, each the one most like what the others leave (orthogonal matching
+pursuit); as many as predict blocks of the data best that were not fitted, or fewer if they do so
+to one deviation. A suggestion, for a person to make an effect of.
+Source: Brunton, Proctor and Kutz 2016; Pati, Rezaiifar and Krishnaprasad 1993.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import warnings
+
+from armid_ros.motion import FloatArray
+from armid_ros.residual.libraries import imported
+from armid_ros.residual.rows import BLOCKS, JointRows
+import numpy as np
+
+#: Terms of a law at most: what takes more is a map.
+_TERMS = 3
+#: Places in the range of a joint where something may begin to pull, as shares of it.
+_PLACES = (0.2, 0.35, 0.5, 0.65, 0.8)
+#: A law that predicts less than half of the squares is none.
+_LEAST_SHARE = 0.5
+
+
+@dataclass(frozen=True)
+class Term:
+    """
+    One term of a law.
+
+    Attributes
+    ----------
+    text : str
+        Its function of q, dq and the load w, such as 'dq^3'.
+    coefficient : float
+        Its factor.
+    unit : str
+        Unit of the factor.
+
+    """
+
+    text: str
+    coefficient: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Law:
+    """
+    A suggestion.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+        The largest first.
+    share : float
+        Share of the squares of the residual that it predicts of blocks that were left out.
+
+    """
+
+    terms: tuple[Term, ...]
+    share: float
+
+    @property
+    def text(self) -> str:
+        """The law in a line, such as '0.31 dq^3 - 0.02 q'."""
+        said = ''
+        for number, term in enumerate(self.terms):
+            sign = '-' if term.coefficient < 0.0 else ('' if number == 0 else '+')
+            factor = f'{abs(term.coefficient):.3g}'
+            body = factor if term.text == '1' else f'{factor} {term.text}'
+            said += f' {sign} {body}' if number else f'{sign}{body}'
+        return said
+
+
+@dataclass(frozen=True)
+class Column:
+    """
+    A term of the library along data.
+
+    Attributes
+    ----------
+    text, unit : str
+        What it is, and the unit of its factor.
+    values : ndarray, shape (N,)
+        Its values.
+
+    """
+
+    text: str
+    unit: str
+    values: FloatArray
+
+
+def library(inputs: FloatArray, low: float, high: float, prismatic: bool) -> tuple[Column, ...]:
+    """
+    Return the terms that are tried.
+
+    Parameters
+    ----------
+    inputs : ndarray, shape (N, 3)
+        Position, velocity, load.
+    low, high : float
+        Range of the position in which hinges may be [rad or m].
+    prismatic : bool
+        Whether the joint slides: it has no sines.
+
+    """
+    q, dq, w = inputs.T
+    sign = np.sign(dq)
+    force, x = ('N', 'm') if prismatic else ('N m', 'rad')
+    terms = [
+        ('1', force, np.ones_like(q)),
+        ('q', f'{force}/{x}', q),
+        ('q^2', f'{force}/{x}^2', q**2),
+        ('q^3', f'{force}/{x}^3', q**3),
+        ('dq', f'{force} s/{x}', dq),
+        ('dq |dq|', f'{force} s^2/{x}^2', dq * np.abs(dq)),
+        ('dq^3', f'{force} s^3/{x}^3', dq**3),
+        ('q dq', f'{force} s/{x}^2', q * dq),
+        ('q^2 dq', f'{force} s/{x}^3', q**2 * dq),
+        ('sign(dq)', force, sign),
+        ('q sign(dq)', f'{force}/{x}', q * sign),
+        ('q^2 sign(dq)', f'{force}/{x}^2', q**2 * sign),
+        ('w', '', w),
+        ('w^2', f'1/({force})', w**2),
+        ('|w| sign(dq)', '', np.abs(w) * sign),
+        ('w dq', f's/{x}', w * dq),
+    ]
+    if not prismatic:
+        for k in (1, 2, 3):
+            angle = 'q' if k == 1 else f'{k} q'
+            for name, function in (('sin', np.sin), ('cos', np.cos)):
+                terms.append((f'{name}({angle})', force, function(k * q)))
+                terms.append((f'{name}({angle}) sign(dq)', force, function(k * q) * sign))
+    for place in low + np.array(_PLACES) * (high - low):
+        terms.append((f'max(q - {place:.3g}, 0)', f'{force}/{x}', np.maximum(q - place, 0.0)))
+        terms.append((f'max({place:.3g} - q, 0)', f'{force}/{x}', np.maximum(place - q, 0.0)))
+    return tuple(Column(*term) for term in terms)
+
+
+def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
+    """
+    Return the law that a residual looks like, None if it is like none of the library.
+
+    Parameters
+    ----------
+    rows : JointRows
+        What is left of a joint.
+    prismatic : bool
+        Whether the joint slides.
+
+    Raises
+    ------
+    IdentificationError
+        If the library is not installed.
+
+    """
+    ends = float(rows.inputs[:, 0].min()), float(rows.inputs[:, 0].max())
+    columns = library(rows.inputs, *ends, prismatic)
+    x = np.column_stack([column.values for column in columns])
+    losses = np.array([_losses(x, rows, count) for count in range(1, _TERMS + 1)])
+    best = int(np.argmin(losses.sum(axis=1)))
+    count = next(k for k in range(best + 1) if _as_good(losses[k], losses[best])) + 1
+    factors = _fit(x, rows.left, count)
+    chosen = np.flatnonzero(factors)
+    share = 1.0 - float(losses[count - 1].sum()) / max(float(np.sum(rows.left**2)), 1e-300)
+    if share < _LEAST_SHARE:
+        return None
+    size = np.abs(factors) * np.sqrt(np.mean(x**2, axis=0))
+    order = sorted(chosen, key=lambda k: -size[k])
+    terms = tuple(Term(columns[k].text, float(factors[k]), columns[k].unit) for k in order)
+    return Law(terms, share)
+
+
+def share_of(left: FloatArray, torque: FloatArray) -> float:
+    """Return the share of the squares of a residual that a torque takes."""
+    return 1.0 - float(np.sum((left - torque) ** 2)) / max(float(np.sum(left**2)), 1e-300)
+
+
+def _fit(x: FloatArray, left: FloatArray, count: int) -> FloatArray:
+    """Return factors, all but so many of them zero, shape (L,)."""
+    size = np.sqrt(np.mean(x**2, axis=0))
+    scale = np.where(size > 0.0, size, 1.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')  # terms that depend on each other: the first one is taken
+        found = imported('sklearn.linear_model').orthogonal_mp(
+            x / scale, left, n_nonzero_coefs=count
+        )
+    chosen = np.flatnonzero(found)
+    factors = np.zeros(x.shape[1])
+    factors[chosen] = np.linalg.lstsq(x[:, chosen], left, rcond=None)[0]
+    return factors
+
+
+def _losses(x: FloatArray, rows: JointRows, count: int) -> FloatArray:
+    """Return the squares that are left of each block by a law of the others, shape (BLOCKS,)."""
+    result = np.zeros(BLOCKS)
+    for block in range(BLOCKS):
+        others = rows.outside(block)
+        if others.all() or not others.any():
+            continue
+        factors = _fit(x[others], rows.left[others], count)
+        result[block] = float(np.sum((rows.left[~others] - x[~others] @ factors) ** 2))
+    return result
+
+
+def _as_good(losses: Sequence[float] | FloatArray, best: Sequence[float] | FloatArray) -> bool:
+    """Tell whether blocks are predicted as well as in the best way, to one deviation."""
+    worse = np.asarray(losses) - np.asarray(best)
+    return bool(worse.sum() <= np.std(worse, ddof=1) * np.sqrt(len(worse)))

@@ -1,0 +1,236 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From a diagnosis to what it leaves, learned: a map of each joint, and a law it looks like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis import Diagnosis
+from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.effects import Effect
+from armid_ros.effects.learned import as_effect, TorqueMap
+from armid_ros.motion import FloatArray
+from armid_ros.residual.gaussian_process import learn_map
+from armid_ros.residual.law import Law, share_of, suggest_law
+from armid_ros.residual.rows import BLOCKS, joint_rows, JointRows
+import numpy as np
+import numpy.typing as npt
+
+#: Verdicts that leave something without a name.
+WORTH_A_MAP = ('partial', 'unknown')
+#: A joint with fewer rows says too little for a map.
+_FEW = 100
+#: A map knows something where its deviation is less than this share of the prior's.
+_KNOWN = 0.5
+
+
+@dataclass(frozen=True)
+class JointResidual:
+    """
+    What was learned of one joint.
+
+    Attributes
+    ----------
+    joint : str
+        The joint.
+    learned : TorqueMap
+        The map.
+    ranges : ndarray, shape (3, 2)
+        Smallest and largest position, velocity and load in the data.
+    before, after : float
+        Root mean square of what is left without and with the map [N m].
+    gain : float
+        Share of the squares that the map predicts of data it was not learned from: blocks left
+        out in turn, and held-out recordings where they come near the data.
+    held_out : float or None
+        The same of held-out recordings alone; None where none comes near the data.
+    law : Law or None
+        What it looks like.
+
+    """
+
+    joint: str
+    learned: TorqueMap
+    ranges: FloatArray
+    before: float
+    after: float
+    gain: float
+    held_out: float | None
+    law: Law | None
+
+    def axis(self, number: int, count: int) -> FloatArray:
+        """Return even values over the range of an input, shape (count,)."""
+        return np.linspace(float(self.ranges[number, 0]), float(self.ranges[number, 1]), count)
+
+
+@dataclass(frozen=True)
+class Residual:
+    """
+    What a diagnosis leaves, learned.
+
+    Attributes
+    ----------
+    base : ArmModel
+        The model without the maps.
+    arm : ArmModel
+        The model with them.
+    joints : tuple of JointResidual
+        Joints of which something can be predicted; the largest residual first.
+
+    """
+
+    base: ArmModel
+    arm: ArmModel
+    joints: tuple[JointResidual, ...]
+
+    @property
+    def effect(self) -> Effect:
+        """The maps as an effect."""
+        return self.arm.effects[-1]
+
+    def sentences(self) -> tuple[str, ...]:
+        """Say what was learned, a joint a line."""
+        return tuple(_sentence(one) for one in self.joints)
+
+    def document(self, table: str) -> dict[str, Any]:
+        """Return what diagnosis.json holds; the table is a file's name."""
+        return {
+            'method': 'gp',
+            'table': table,
+            'joints': [
+                {
+                    'joint': one.joint,
+                    'rms_before': one.before,
+                    'rms_after': one.after,
+                    'gain': one.gain,
+                    'held_out_gain': one.held_out,
+                    'amplitude': float(one.learned.amplitude),
+                    'length_scales': [
+                        float(x) if np.isfinite(x) else None for x in one.learned.lengths
+                    ],
+                    'law': None if one.law is None else _law(one.law),
+                }
+                for one in self.joints
+            ],
+        }
+
+
+def _sentence(one: JointResidual) -> str:
+    alone = '' if one.held_out is None else f' ({percent_of(one.held_out)} of held-out recordings)'
+    like = 'no law of few terms'
+    if one.law is not None:
+        like = f'{one.law.text} ({percent_of(one.law.share)})'
+    return (
+        f'{one.joint}: a map without a name predicts {percent_of(one.gain)} of what is left'
+        f'{alone}; it looks like {like}'
+    )
+
+
+def percent_of(share: float) -> str:
+    """Return a share in whole per cent."""
+    return f'{100.0 * share:.0f} %'
+
+
+def _law(law: Law) -> dict[str, Any]:
+    return {
+        'text': law.text,
+        'terms': [
+            {'term': term.text, 'coefficient': term.coefficient, 'unit': term.unit}
+            for term in law.terms
+        ],
+        'held_out_share': law.share,
+    }
+
+
+def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual | None:
+    """
+    Learn what a diagnosis leaves without a name.
+
+    The maps stand beside the patched model or, where nothing was named, beside the one in which
+    nothing was found: with its rigid body fitted anew, if it was.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Its verdict, model and data.
+    rng : numpy.random.Generator
+        Draws the first cells.
+
+    Returns
+    -------
+    Residual or None
+        None where everything has a name, or nothing of the rest can be predicted.
+
+    Raises
+    ------
+    IdentificationError
+        If a library is not installed.
+
+    """
+    if diagnosis.verdict not in WORTH_A_MAP or diagnosis.explanation is None:
+        return None
+    base = diagnosis.arm if diagnosis.findings else diagnosis.explanation.fitted.arm
+    gap = diagnosis.gap
+    validation: Sequence[Trajectory] = ()
+    if gap is not None and gap.predicted:
+        validation = [overlay.trajectory for overlay in gap.overlays]
+    every = joint_rows(base, diagnosis.data)
+    unseen = joint_rows(base, validation) if validation else [None] * len(every)
+    found = []
+    for joint, rows, other in zip(base.robot.joints, every, unseen, strict=True):
+        one = _learned(joint, rows, other, base, rng)
+        if one is not None:
+            found.append(one)
+    if not found:
+        return None
+    found.sort(key=lambda one: -one.before)
+    order = sorted(found, key=lambda one: base.robot.joints.index(one.joint))
+    effect = as_effect({one.joint: one.learned for one in order})
+    arm = base.with_effect(effect, np.ones(len(order)))
+    return Residual(base, arm, tuple(found))
+
+
+def _learned(
+    joint: str, rows: JointRows, unseen: JointRows | None, base: ArmModel, rng: np.random.Generator
+) -> JointResidual | None:
+    """Learn one joint; None where blocks that were left out are not predicted beyond chance."""
+    if len(rows) < _FEW:
+        return None
+    learned, predicted = learn_map(rows, rng)
+    if not _predicts(rows, predicted):
+        return None
+    parts = [(rows.left, predicted)]
+    near = None if unseen is None else unseen.select(near_data(learned, unseen))
+    if near is not None and len(near) >= _FEW:
+        parts.append((near.left, learned.torque(near.inputs)))
+    left, torque = (np.concatenate(one) for one in zip(*parts, strict=True))
+    gain = share_of(left, torque)
+    if gain <= 0.0:
+        return None
+    prismatic = bool(base.robot.prismatic[base.robot.joints.index(joint)])
+    return JointResidual(
+        joint,
+        learned,
+        np.array([rows.inputs.min(axis=0), rows.inputs.max(axis=0)]).T,
+        float(np.sqrt(np.mean(left**2))),
+        float(np.sqrt(np.mean((left - torque) ** 2))),
+        gain,
+        share_of(*parts[1]) if len(parts) > 1 else None,
+        suggest_law(rows, prismatic),
+    )
+
+
+def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
+    """Return which rows a map knows something of: they lie near those it was learned from."""
+    return np.asarray(learned.std(rows.inputs) < _KNOWN * learned.amplitude)
+
+
+def _predicts(rows: JointRows, predicted: FloatArray) -> bool:
+    """Tell whether a map gains on blocks it has not seen, even without the best of them."""
+    gain = rows.left**2 - (rows.left - predicted) ** 2
+    blocks = np.bincount(rows.block, gain, BLOCKS)
+    return bool(blocks.sum() - blocks.max() > 0.0)

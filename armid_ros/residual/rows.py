@@ -1,0 +1,82 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is left of recordings, beside the state in which it was left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.effects.learned import weight
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+
+#: Parts of the data that are predicted from the others in turn.
+BLOCKS = 10
+
+
+@dataclass(frozen=True)
+class JointRows:
+    """
+    Rows in which a joint moves.
+
+    Attributes
+    ----------
+    inputs : ndarray, shape (N, 3)
+        Position, velocity, load.
+    left : ndarray, shape (N,)
+        Measured torque minus that of the model [N m].
+    block : ndarray of int, shape (N,)
+        Part of the data, 0 to BLOCKS - 1.
+
+    """
+
+    inputs: FloatArray
+    left: FloatArray
+    block: npt.NDArray[np.intp]
+
+    def __len__(self) -> int:
+        """Return the number of rows N."""
+        return len(self.left)
+
+    def select(self, chosen: npt.NDArray[np.bool_]) -> JointRows:
+        """Return some of the rows, shape (N,) of bool."""
+        return JointRows(self.inputs[chosen], self.left[chosen], self.block[chosen])
+
+    def outside(self, block: int) -> npt.NDArray[np.bool_]:
+        """Return which rows are in other blocks, shape (N,)."""
+        return np.asarray(self.block != block)
+
+
+def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:
+    """
+    Return what a model leaves of recordings, joint by joint.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The model.
+    data : sequence of Trajectory
+        Recordings.
+
+    Returns
+    -------
+    list of JointRows
+        One a joint.
+
+    """
+    links = [arm.link_motion(part.at_rows) for part in data]
+    q, dq = (np.concatenate([getattr(link, name) for link in links]) for name in ('q', 'dq'))
+    inputs = np.stack([q, dq, weight(arm.body, q)], axis=-1)
+    left = np.concatenate([part.residual(arm) for part in data])
+    told = np.concatenate([part.told for part in data])
+    result = []
+    for joint in range(left.shape[1]):
+        use = told[:, joint]
+        count = int(use.sum())
+        block = np.arange(count) * BLOCKS // max(count, 1)
+        result.append(JointRows(inputs[use, joint], left[use, joint], block))
+    return result
