@@ -13,7 +13,7 @@ the right joint; a name before the effect appears, or another first name that is
 wrong. Sizes are such that the effect makes up a tenth of the torque of its joint. Then the arm
 moves for half an hour and nothing changes.
 
-    python -m benchmarks.live_diagnosis [--draws 40] [--minutes 30] [--out live_diagnosis.json]
+    python -m benchmarks.live_diagnosis [--draws 40] [--minutes 30] [--out FILE] [--direct]
 
 """
 
@@ -112,7 +112,8 @@ def drawn(arm: ArmModel, along: Motion, kind: tuple[str, str], rng: np.random.Ge
 class Bench:
     """The two nodes, in lock step."""
 
-    def __init__(self, stage: Stage, along: Motion) -> None:
+    def __init__(self, stage: Stage, along: Motion, direct: bool) -> None:
+        self._direct = direct
         self.plant = stage.add(
             SimulatedArmNode,
             None,
@@ -140,6 +141,8 @@ class Bench:
         """Go on; yield the time since then whenever a diagnosis came [s]."""
         for count in range(round(seconds * RATE)):
             stamp = self.plant.step()
+            if self._direct:
+                self.node.take_joint_states(self.plant.joint_state)
             self._stage.spin_until(
                 lambda stamp=stamp: self.node.last_stamp_ns == stamp, 'joint_states'
             )
@@ -159,20 +162,20 @@ class Bench:
 
 
 @contextmanager
-def bench(along: Motion) -> Iterator[Bench]:
+def bench(along: Motion, direct: bool) -> Iterator[Bench]:
     """Make the nodes."""
     with Stage(None) as stage:
-        yield Bench(stage, along)
+        yield Bench(stage, along, direct)
 
 
-def draw(number: int) -> Draw:
+def draw(number: int, direct: bool) -> Draw:
     """Let one effect appear in a running arm."""
     rng = np.random.default_rng(number)
     along = motion(BEFORE + WANTED + 6.0, rng)
     arm = known_arm()
     effect = drawn(arm, along, KINDS[number % len(KINDS)], rng)
     name, _, place = effect.partition(':')[0].partition('@')
-    with bench(along) as nodes:
+    with bench(along, direct) as nodes:
         early = any(nodes.proposed for _ in nodes.run(BEFORE))
         nodes.set_effect(effect)
         delay, seconds = None, 0.0
@@ -187,12 +190,12 @@ def draw(number: int) -> Draw:
         return Draw(effect, delay, nodes.proposed, right, early, nodes.live.asked, seconds)
 
 
-def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
+def quiet(minutes: float, seed: int, direct: bool) -> tuple[int, int, list[list[list[str]]]]:
     """Return diagnoses, names that were said, and what was proposed while nothing changed."""
     rng = np.random.default_rng(seed)
     asked, said, proposed = 0, 0, []
     for _ in range(max(1, round(minutes / 5.0))):
-        with bench(motion(304.0, rng)) as nodes:
+        with bench(motion(304.0, rng), direct) as nodes:
             for _ in nodes.run(min(300.0, 60.0 * minutes)):
                 latest = nodes.live.latest
                 said += bool(latest is not None and latest.named)
@@ -208,11 +211,17 @@ def main() -> None:
     parser.add_argument('--draws', type=int, default=40)
     parser.add_argument('--first', type=int, default=0, help='number of the first draw')
     parser.add_argument('--minutes', type=float, default=30.0)
+    parser.add_argument(
+        '--direct',
+        action='store_true',
+        help='hand joint states over without topics: on a busy '
+        'machine each topic waits for its turn',
+    )
     parser.add_argument('--out', type=Path, default=Path('live_diagnosis.json'))
     chosen = parser.parse_args()
     begun, draws = time.process_time(), []
     for number in range(chosen.first, chosen.first + chosen.draws):
-        one = draw(number)
+        one = draw(number, chosen.direct)
         draws.append(one)
         delay = '     -' if one.delay is None else f'{one.delay:5.1f} s'
         print(
@@ -224,7 +233,7 @@ def main() -> None:
         print(f'named rightly within {WANTED:g} s: {right} of {len(draws)}')
     still = None
     if chosen.minutes:
-        still = quiet(chosen.minutes, 1000)
+        still = quiet(chosen.minutes, 1000, chosen.direct)
         print(
             f'{chosen.minutes:g} min without a change: {still[0]} diagnoses, {still[1]} with a '
             f'name, proposed: {still[2]}'

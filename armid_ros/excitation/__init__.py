@@ -34,11 +34,14 @@ from armid_ros.excitation.limits import (
 )
 from armid_ros.excitation.problem import Problem
 from armid_ros.excitation.random_trajectory import random_feasible
+from armid_ros.excitation.rehearsal import Rehearsal, RehearsalReport
 from armid_ros.excitation.run import plan_run, Run
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
 from armid_ros.excitation.supervision import (
     brought_back,
+    Halt,
+    held,
     jump_fault,
     MeasuredPose,
     slowed,
@@ -47,6 +50,10 @@ from armid_ros.excitation.supervision import (
 from armid_ros.excitation.transfer import Transfer, transfer_limits, TransferPlanner
 
 __all__ = [
+    'Halt',
+    'Rehearsal',
+    'RehearsalReport',
+    'held',
     'Approach',
     'CRITERIA',
     'ClearanceModel',

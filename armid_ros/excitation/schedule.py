@@ -115,6 +115,30 @@ class Excitation:
         start = None if self.start is None else self.start[order]
         return Excitation(path, self.n_periods, self.run_in, start)
 
+    def at_speed(self, share: float, rate: float) -> Excitation:
+        """
+        Return the same path run through more slowly.
+
+        Parameters
+        ----------
+        share : float
+            Of the speed; the next smaller one at which a period is a whole number of samples.
+        rate : float
+            Samples per second [Hz].
+
+        Raises
+        ------
+        TrajectoryError
+            If the share is not above 0 and at most 1, or the run would last longer than a day.
+
+        """
+        if not 0.0 < share <= 1.0:
+            raise TrajectoryError(f'a share of {share:g} of the speed; it is above 0, at most 1')
+        samples = self._period_samples(rate)
+        longer = float(np.ceil(samples / share - _WHOLE_SAMPLES)) / samples
+        path = self.trajectory.stretched(self.trajectory.period * longer)
+        return Excitation(path, self.n_periods, self.run_in * longer, self.start)
+
     def motion(self, rate: float) -> Motion:
         """
         Sample the run.

@@ -13,6 +13,8 @@ from armid_ros.motion import FloatArray, Motion, read_only
 import numpy as np
 import numpy.typing as npt
 
+#: A joint that is slower is at rest [rad/s or m/s], and for how long it is looked at [s].
+AT_REST, LOOK = 0.02, 0.1
 #: How long a controller may take to begin with a trajectory that slows the arm down [s].
 HANDOVER = 0.05
 #: Factor by which coming to rest is made longer where it would be too fast, and how often.
@@ -197,6 +199,68 @@ def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
         speed * motion.dq,
         speed**2 * motion.ddq + change * motion.dq,
     )
+
+
+def held(joints: tuple[str, ...], q: FloatArray, duration: float) -> Motion:
+    """
+    Return the motion of an arm that stays where it is.
+
+    Parameters
+    ----------
+    joints : tuple of str
+        n joint names.
+    q : ndarray, shape (n,)
+        Where it is [rad or m].
+    duration : float
+        How long [s].
+
+    """
+    t = np.array([min(HANDOVER, duration / 2.0), duration])
+    still = np.zeros((2, len(joints)))
+    return Motion(joints, t, np.vstack([q, q]), still, still)
+
+
+@dataclass(frozen=True)
+class Halt:
+    """
+    An arm that was told to stop, and by when it has to be at rest.
+
+    Attributes
+    ----------
+    by : float
+        When it has to be at rest [s].
+    asked : int
+        How often it was told to stop.
+    seen : float
+        When it was looked at last [s]; minus infinity before.
+    q : ndarray, shape (n,)
+        Where it was then [rad or m].
+
+    """
+
+    by: float
+    asked: int
+    seen: float
+    q: FloatArray
+
+    def looked(self, now: float, q: FloatArray) -> tuple[Halt, bool | None]:
+        """
+        Look at the arm.
+
+        Returns
+        -------
+        Halt
+            To look at next time.
+        bool or None
+            Whether it is at rest; None where it is too early to say.
+
+        """
+        if now < self.by or now - self.seen < LOOK:
+            return self, None
+        if not np.isfinite(self.seen):
+            return replace(self, seen=now, q=q), None
+        speed = np.abs(q - self.q).max() / (now - self.seen)
+        return replace(self, seen=now, q=q), bool(speed < AT_REST)
 
 
 def brought_back(

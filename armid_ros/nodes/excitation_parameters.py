@@ -43,7 +43,13 @@ _SAMPLES, _PER_HARMONIC = 100, 8
 EXCITATION_PARAMETERS = (
     NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
     NodeParameter('gravity', 'earth', 'earth, moon, or x,y,z in the base frame [m/s^2].'),
-    NodeParameter('file', '', 'Excitation to use (.yaml or .csv); empty: design one.'),
+    NodeParameter(
+        'file',
+        '',
+        'Excitation to use (.yaml or .csv); empty: design one. Set on the running node it is what '
+        '~/start runs next.',
+        read_only=False,
+    ),
     NodeParameter('duration', 44.0, 'From rest to rest.', 's', lower=1.0, upper=3600.0),
     NodeParameter('n_periods', 2, 'Identical periods in it.', lower=1, upper=100),
     NodeParameter('run_in', 2.0, 'Of the run-in, and the run-out.', 's', lower=0.1, upper=60.0),
@@ -186,11 +192,32 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
 
 
 def _loaded(path: str, surroundings: Surroundings) -> Excitation:
-    robot, planner = surroundings.robot, surroundings.planner
-    excitation = load_excitation(path)
+    return checked(load_excitation(path), surroundings.planner, path)
+
+
+def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Excitation:
+    """
+    Return an excitation with the joints in the order of the arm.
+
+    Parameters
+    ----------
+    excitation : Excitation
+        From a file or a topic.
+    planner : TransferPlanner
+        Knows the arm, and what it must not hit.
+    source : str
+        Where it came from, for messages.
+
+    Raises
+    ------
+    TrajectoryError
+        If it is of other joints, does not keep the limits or hits something.
+
+    """
+    robot = planner.arm.robot
     if set(excitation.joints) != set(robot.joints):
         raise TrajectoryError(
-            f'{path}: moves {", ".join(excitation.joints)}, but {robot.name} has '
+            f'{source}: moves {", ".join(excitation.joints)}, but {robot.name} has '
             f'{", ".join(robot.joints)}'
         )
     excitation = excitation.for_joints(robot.joints)
@@ -205,5 +232,5 @@ def _loaded(path: str, surroundings: Surroundings) -> Excitation:
     faults = trajectory_faults(planner.arm, limits, excitation.trajectory, *rules)
     faults = faults or excitation_faults(planner.arm, limits, excitation, *rules)
     if faults:
-        raise TrajectoryError(f'{path}: {faults}')
+        raise TrajectoryError(f'{source}: {faults}')
     return excitation

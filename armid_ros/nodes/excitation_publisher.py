@@ -10,33 +10,41 @@ import math
 import time
 from typing import Any
 
-from armid_ros.errors import TrajectoryError
+from armid_ros.errors import ArmidError, TrajectoryError
 from armid_ros.excitation import (
     brought_back,
     Excitation,
+    Halt,
+    held,
     MeasuredPose,
     plan_run,
+    Rehearsal,
     Run,
     slowed,
     tracking_fault,
     TransferPlanner,
 )
+from armid_ros.excitation.files import load_excitation, read_excitation
 from armid_ros.excitation.supervision import HANDOVER
-from armid_ros.motion import Motion
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.excitation_parameters import (
+    checked,
     EXCITATION_PARAMETERS,
     make_excitation,
     make_surroundings,
 )
 from armid_ros.nodes.parameters import declare, NodeParameter
 from armid_ros.nodes.process import run
-from armid_ros.nodes.qos import LATCHED
+from armid_ros.nodes.qos import LATCHED, STREAM
+from armid_ros.nodes.run_parameters import RUN_PARAMETERS, SIMULATION
 from armid_ros.nodes.trajectories import write_trajectory
+import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
 #: How often a subscriber is looked for, and whether the arm is still heard of [s].
@@ -45,18 +53,6 @@ _LOOK_PERIOD = 0.05
 _TRACKING_PERIOD = 0.02
 #: How long the last message may take to arrive when the node ends [s].
 _FAREWELL = 1.0
-
-SIMULATION = NodeParameter(
-    'simulation',
-    False,
-    'The arm is simulated: by default it begins by itself, and fast. So it is with use_sim_time.',
-)
-START = NodeParameter(
-    'start',
-    False,
-    'Begin without ~/start, as soon as there is a subscriber and the arm is heard of; true by '
-    'default in a simulation only.',
-)
 
 
 class ExcitationPublisherNode(ArmidNode):
@@ -70,53 +66,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     """
 
-    table = (
-        *EXCITATION_PARAMETERS,
-        NodeParameter('rate', 100.0, 'Waypoints per second.', 'Hz', lower=1.0, upper=1000.0),
-        NodeParameter(
-            'approach',
-            3.0,
-            'Shortest time to get to the first point; more where distance and limits ask for it.',
-            's',
-            lower=0.1,
-            upper=60.0,
-        ),
-        NodeParameter(
-            'stopping',
-            0.5,
-            'Time in which the arm is brought to rest.',
-            's',
-            lower=0.1,
-            upper=10.0,
-        ),
-        SIMULATION,
-        START,
-        NodeParameter(
-            'tracking_tolerance',
-            0.2,
-            'The arm is stopped when a joint is further from where it should be.',
-            'rad or m',
-            lower=0.001,
-            upper=10.0,
-        ),
-        NodeParameter(
-            'state_timeout',
-            0.5,
-            'The arm is stopped, and not started, without a joint state for so long; 5 s by '
-            'default in a simulation.',
-            's',
-            lower=0.01,
-            upper=10.0,
-        ),
-        NodeParameter(
-            'subscriber_timeout',
-            10.0,
-            'How long to wait for a subscriber and joint states; then only ~/start begins.',
-            's',
-            lower=0.0,
-            upper=3600.0,
-        ),
-    )
+    table = (*EXCITATION_PARAMETERS, *RUN_PARAMETERS)
 
     def __init__(
         self,
@@ -155,14 +105,21 @@ class ExcitationPublisherNode(ArmidNode):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._run: Run | None = None
         self._begun_ns, self._sent_at, self._tracked = 0, -math.inf, -math.inf
-        self._trouble = ''
+        self._trouble = self._rehearsed = ''
+        self._rehearsal: Rehearsal | None = None
+        self._halt: Halt | None = None
         self._waiting = bool(self.value('start'))
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
-        self._publisher = self.create_publisher(JointTrajectory, 'joint_trajectory', LATCHED)
+        quality = STREAM if self.value('zero_stamp') else LATCHED  # a late one must not begin then
+        self._publisher = self.create_publisher(JointTrajectory, 'joint_trajectory', quality)
         self._states = self.create_subscription(
             JointState, 'joint_states', self._on_joint_states, 10
         )
+        self._experiments = self.create_subscription(
+            String, 'experiment', self._on_experiment, LATCHED
+        )
         self.offer('~/start', self.start)
+        self.offer('~/rehearse', self.rehearse)
         self.offer('~/stop', self.stop)
         self._timer = self.create_timer(_LOOK_PERIOD, self.look, clock=self._steady)
 
@@ -210,20 +167,34 @@ class ExcitationPublisherNode(ArmidNode):
             lost = self._staleness() if listened else ''
             if lost:
                 self._give_up(lost)
+        elif self._rehearsal is not None:
+            self._end_rehearsal(self._rehearsal)
         elif self._waiting:
             self._look_for_partners()
 
     def start(self) -> str:
         """Plan the way from where the arm is, and publish the run."""
+        return self._start(self.value('speed_scaling'))
+
+    def rehearse(self) -> str:
+        """Run the excitation slowly; afterwards the status says how the arm followed."""
+        speed = min(self.value('rehearsal_speed'), self.value('speed_scaling'))
+        text = self._start(speed)
+        assert self._run is not None
+        self._rehearsal = Rehearsal(self._run, self._planner.arm)
+        return f'rehearsal at {100.0 * speed:.0f} % of the speed: {text}'
+
+    def _start(self, speed: float) -> str:
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
         lost = self._staleness()
         if lost:
             raise TrajectoryError(f'{self._states.topic_name}: {lost}; the arm is not started')
-        self._trouble = ''
+        self._trouble, self._rehearsed = '', ''
+        self._halt, self._rehearsal = None, None
         planned = plan_run(
-            self._excitation,
+            self._excitation.at_speed(speed, self._rate),
             self._planner,
             self._pose.q,
             self._rate,
@@ -258,7 +229,29 @@ class ExcitationPublisherNode(ArmidNode):
             'duration': self.duration,
         }
         waiting = 'waiting for a subscriber and joint states' if self._waiting else ''
-        return self._trouble or waiting, values
+        return self._trouble or waiting or self._rehearsed, values
+
+    def objection(self, values: Mapping[str, Any]) -> str:
+        """Refuse files that are no excitation of this arm, and any while the arm runs."""
+        if 'file' not in values:
+            return ''
+        if self.elapsed is not None:
+            return "parameter 'file': an excitation is under way; ~/stop ends it"
+        try:
+            self._loaded(values['file'])
+        except ArmidError as error:
+            return f"parameter 'file': {error}"
+        return ''
+
+    def changed(self, names: frozenset[str]) -> None:
+        """Take the excitation of a file that was set."""
+        if 'file' in names:
+            self._excitation = self._loaded(self.value('file'))
+
+    def _loaded(self, path: str) -> Excitation:
+        if not path:
+            raise TrajectoryError('a running node designs none; name a file')
+        return checked(load_excitation(path), self._planner, path)
 
     def close(self) -> None:
         """Stop the arm, and see to it that the message arrives."""
@@ -277,6 +270,8 @@ class ExcitationPublisherNode(ArmidNode):
         self._pose = self._pose.updated(message.name, message.position, stamp, self._now())
         now = self._now()
         elapsed = self.elapsed
+        if self._halt is not None:
+            self._watch_halt(self._halt, now)
         if elapsed is None or self._run is None or now - self._tracked < _TRACKING_PERIOD:
             return
         self._tracked = now
@@ -284,6 +279,8 @@ class ExcitationPublisherNode(ArmidNode):
         strange = abs(phase - elapsed) > self.value('state_timeout')
         if not stamp or (strange and not self._simulated):
             phase = elapsed  # the stamp is of another clock; a simulation may just be slow
+        if self._rehearsal is not None:
+            self._rehearsal.add(phase, self._pose.q, self._efforts(message))
         fault = tracking_fault(
             self._pose.joints,
             self._planner.arm.robot.position_units,
@@ -325,7 +322,52 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _end_run(self, motion: Motion) -> None:
         self._send(motion, HANDOVER)
-        self._run = None
+        self._run = self._rehearsal = None
+        self._expect_rest(float(motion.t[-1] - motion.t[0]) + HANDOVER, 1)
+
+    def _expect_rest(self, duration: float, asked: int) -> None:
+        """Look from then on whether the arm is at rest that was told to stop."""
+        by = self._now() + duration + self.value('state_timeout')
+        self._halt = Halt(by, asked, -math.inf, self._pose.q)
+
+    def _watch_halt(self, halt: Halt, now: float) -> None:
+        """Tell an arm that goes on to stay where it is, again and again, and say so."""
+        self._halt, at_rest = halt.looked(now, self._pose.q)
+        if at_rest:
+            self._halt = None
+        elif at_rest is False:
+            stopping = self.value('stopping')
+            self._send(held(self._pose.joints, self._pose.q, stopping), HANDOVER)
+            self._expect_rest(stopping, halt.asked + 1)
+            times = 'once' if halt.asked == 1 else f'{halt.asked} times'
+            self._say_trouble(
+                f'the arm goes on moving though it was stopped {times}: its controller does not '
+                'take trajectories any more; use the emergency stop'
+            )
+
+    def _end_rehearsal(self, rehearsal: Rehearsal) -> None:
+        """Say how the rehearsal went, and what to do next."""
+        self._rehearsal = None
+        report = rehearsal.report()
+        speed = 100.0 * self.value('speed_scaling')
+        advice = f'~/start runs it at {speed:.0f} % of its speed'
+        if report.surprises:
+            self._say_trouble(f'rehearsed: {report}; look into it before ~/start')
+        else:
+            self._rehearsed = self._tell(f'rehearsed: {report}; {advice}')
+
+    def _efforts(self, message: JointState) -> FloatArray:
+        """Return the torques of a message in the order of the joints, NaN where there is none."""
+        known = dict(zip(message.name, message.effort, strict=False))
+        return np.array([known.get(joint, math.nan) for joint in self._pose.joints])
+
+    def _on_experiment(self, message: String) -> None:
+        """Take an excitation that somebody planned; ~/start runs it, and nothing else does."""
+        if self.elapsed is not None:
+            raise TrajectoryError('an excitation is under way; the new one is not taken')
+        excitation = read_excitation(message.data, self._experiments.topic_name)
+        self._excitation = checked(excitation, self._planner, self._experiments.topic_name)
+        self._tell(f'took an excitation of {self._excitation.duration:g} s; ~/start runs it')
 
     def _say_trouble(self, text: str) -> None:
         self._trouble = text
@@ -342,7 +384,8 @@ class ExcitationPublisherNode(ArmidNode):
     def _send(self, motion: Motion, lead: float) -> None:
         message = write_trajectory(motion, lead)
         now = self.get_clock().now()
-        message.header.stamp = now.to_msg()
+        if not self.value('zero_stamp'):
+            message.header.stamp = now.to_msg()
         self._begun_ns, self._sent_at = now.nanoseconds, self._now()
         self._publisher.publish(message)
 

@@ -94,7 +94,7 @@ class LiveDiagnosisNode(ArmidNode):
         else:
             self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
         self.joint_states = MatchedSubscription(
-            self, JointState, 'joint_states', self._on_joint_states
+            self, JointState, 'joint_states', self.take_joint_states
         )
         for service in (self.accept, self.reject, self.save, self.next_run, self.reset):
             self.offer(f'~/{service.__name__}', service)
@@ -148,6 +148,19 @@ class LiveDiagnosisNode(ArmidNode):
         """Look at who publishes joint states, and what has been answered."""
         self.joint_states.match()
         self.take_answer()
+
+    def take_joint_states(self, message: JointState) -> None:
+        """Take a joint state, and ask when enough new motion came."""
+        self.received += 1
+        self.freshness.heard()
+        stamp = message.header.stamp
+        self.last_stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+        if self.live is None:
+            return
+        for sample in self._reader.read(message):
+            self.live.add(*sample)
+        if self.live.due and not self._helper.busy:
+            self._helper.ask(self.live.question())
 
     def take_answer(self) -> bool:
         """Take what was answered, if anything; return whether something was."""
@@ -216,18 +229,6 @@ class LiveDiagnosisNode(ArmidNode):
             return
         self._adopt(make_diagnosis(self.value, message.data))
         self._description = message.data
-
-    def _on_joint_states(self, message: JointState) -> None:
-        self.received += 1
-        self.freshness.heard()
-        stamp = message.header.stamp
-        self.last_stamp_ns = stamp.sec * 10**9 + stamp.nanosec
-        if self.live is None:
-            return
-        for sample in self._reader.read(message):
-            self.live.add(*sample)
-        if self.live.due and not self._helper.busy:
-            self._helper.ask(self.live.question())
 
     def _take(self, answer: Answer) -> None:
         """Publish a diagnosis, and the model if it is another one."""

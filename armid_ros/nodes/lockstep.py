@@ -264,12 +264,12 @@ class Stage:
             return
         deadline = time.monotonic() + PATIENCE
         while not done():
-            self._executor.spin_once(timeout_sec=0.1)
-            if time.monotonic() > deadline:
+            if time.monotonic() > deadline:  # a callback that took long may have brought it
                 raise ArmidError(
                     f'{what}: no message for {PATIENCE:g} s; is UDP on the loopback interface '
                     'blocked?'
                 )
+            self._executor.spin_once(timeout_sec=0.1)
 
     def connect(
         self,

@@ -140,6 +140,11 @@ class SimulatedArmNode(ArmidNode):
         return (self._origin_ns or 0) + self._arm.state.steps * self._dt_ns
 
     @property
+    def joint_state(self) -> JointState:
+        """The joint state that was published last."""
+        return self._message
+
+    @property
     def moving(self) -> bool:
         """Whether a trajectory is under way or about to begin."""
         return self._pending is not None or self._arm.state.t < self._arm.ends_at
@@ -192,7 +197,8 @@ class SimulatedArmNode(ArmidNode):
         """Move as far as real time has, times the factor; what cannot be made up is given up."""
         begun, now = self._anchor, time.monotonic()
         due = begun[1] + (now - begun[0]) * self._factor
-        while self._elapsed() < due and time.monotonic() - now < _BURST:
+        period = self._stride * self._arm.plant.dt
+        while self._elapsed() + period <= due and time.monotonic() - now < _BURST:
             self.step()
         if (due - self._elapsed()) / self._factor > _BACKLOG:
             self._anchor = (time.monotonic(), self._elapsed())

@@ -165,7 +165,7 @@ def test_questions_wait_until_the_one_before_is_answered(bench, idle):
             effort=[0.0] * 6,
         )
         message.header.stamp.sec, message.header.stamp.nanosec = 100 + int(t), int(t % 1 * 1e9)
-        node._on_joint_states(message)
+        node.take_joint_states(message)
     assert len(helper.jobs) == 1
     assert node.received == 4000
 

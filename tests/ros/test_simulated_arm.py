@@ -245,3 +245,13 @@ def test_gravity_and_effects_are_parameters(bench):
 def test_an_arm_that_cannot_be_made_is_refused_with_the_reason(bench, parameters, words):
     with pytest.raises(ArmidError, match=words):
         bench.add(SimulatedArmNode, **parameters)
+
+
+def test_stamps_in_real_time_are_never_in_the_future(bench):
+    arm = bench.add(SimulatedArmNode, rate=1000.0)
+    ahead = []
+    for _ in range(300):
+        arm.catch_up()
+        ahead.append(arm.stamp_ns - arm.get_clock().now().nanoseconds)
+    assert arm.stamp_ns > 0
+    assert max(ahead) <= 0

@@ -1,0 +1,138 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A slow run before the real one: whether the arm follows, and takes the torques foreseen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from armid_ros.arm import ArmModel
+from armid_ros.excitation.supervision import Path
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+
+#: Samples that are kept; of a longer run every second one is left out, again and again.
+_MOST = 4000
+#: A torque is as foreseen within this factor of its largest foreseen value: a description knows no
+#: friction, and friction is most of what a slow arm takes.
+_SURPRISING = 3.0
+
+
+@dataclass(frozen=True)
+class RehearsalReport:
+    """
+    How a rehearsal went.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        n joint names.
+    tracking : ndarray, shape (n,)
+        Largest distance from where the joint should have been [rad or m].
+    torque, foreseen : ndarray, shape (n,)
+        Largest torque that was measured, and that the description foresees [N m or N]; measured
+        NaN where none was.
+    limit : ndarray, shape (n,)
+        What the drives have [N m or N].
+    samples : int
+        Joint states that it rests on.
+
+    """
+
+    joints: tuple[str, ...]
+    tracking: FloatArray
+    torque: FloatArray
+    foreseen: FloatArray
+    limit: FloatArray
+    samples: int
+
+    @property
+    def surprises(self) -> tuple[str, ...]:
+        """What was not as foreseen, a sentence a joint."""
+        if not self.samples:
+            return ('no joint state came during the rehearsal',)
+        said = []
+        for joint, torque, foreseen, limit in zip(
+            self.joints, self.torque, self.foreseen, self.limit, strict=True
+        ):
+            room = max(foreseen, 0.05 * limit if np.isfinite(limit) else 0.0)
+            if torque > _SURPRISING * room > 0.0:
+                said.append(f'{joint} took {torque:.3g}, and {foreseen:.3g} N m were foreseen')
+        return tuple(said)
+
+    def __str__(self) -> str:
+        """Return the report in a sentence or two."""
+        if not self.samples:
+            return self.surprises[0]
+        worst = int(np.argmax(self.tracking))
+        text = f'followed within {self.tracking[worst]:.3g} ({self.joints[worst]})'
+        if np.isfinite(self.torque).any():
+            share = self.torque / np.where(self.limit > 0.0, self.limit, np.inf)
+            most = int(np.nanargmax(share))
+            text += f'; most torque {self.torque[most]:.3g} N m ({self.joints[most]}), '
+            text += f'{self.foreseen[most]:.3g} foreseen'
+        return '; '.join((text, *self.surprises))
+
+
+@dataclass
+class Rehearsal:
+    """
+    What came of an arm while it rehearsed.
+
+    Parameters
+    ----------
+    path : Path
+        What it should follow.
+    arm : ArmModel
+        Foresees the torque.
+
+    """
+
+    path: Path
+    arm: ArmModel
+    _rows: list[tuple[float, FloatArray, FloatArray]] = field(default_factory=list)
+    _stride: int = 1
+    _count: int = 0
+
+    def add(self, phase: float, q: FloatArray, tau: FloatArray) -> None:
+        """
+        Take a joint state.
+
+        Parameters
+        ----------
+        phase : float
+            Time since the start of the path [s].
+        q, tau : ndarray, shape (n,)
+            Measured position and torque; NaN where there is none.
+
+        """
+        self._count += 1
+        if self._count % self._stride:
+            return
+        self._rows.append((phase, np.array(q), np.array(tau)))
+        if len(self._rows) >= _MOST:
+            self._rows, self._stride = self._rows[::2], 2 * self._stride
+
+    def report(self) -> RehearsalReport:
+        """Return how it went so far."""
+        robot = self.arm.robot
+        n = robot.n_joints
+        if not self._rows:
+            nothing = np.full(n, np.nan)
+            return RehearsalReport(robot.joints, nothing, nothing, nothing, robot.torque_limit, 0)
+        phase = np.array([row[0] for row in self._rows])
+        q, tau = (np.array([row[k] for row in self._rows]) for k in (1, 2))
+        wanted = self.path.at(phase)
+        motion = Motion(robot.joints, wanted.t, wanted.q, wanted.dq, wanted.ddq)
+        measured = np.abs(tau)
+        known = ~np.isnan(measured).all(axis=0)
+        torque = np.full(n, np.nan)
+        torque[known] = np.nanmax(measured[:, known], axis=0)
+        return RehearsalReport(
+            robot.joints,
+            np.abs(q - wanted.q).max(axis=0),
+            torque,
+            np.abs(self.arm.joint_torque(motion)).max(axis=0),
+            robot.torque_limit,
+            len(self._rows),
+        )

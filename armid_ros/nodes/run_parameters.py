@@ -1,0 +1,93 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How an excitation is run on an arm: parameters of the excitation publisher."""
+
+from __future__ import annotations
+
+from armid_ros.nodes.parameters import NodeParameter
+
+SIMULATION = NodeParameter(
+    'simulation',
+    False,
+    'The arm is simulated: by default it begins by itself, and fast. So it is with use_sim_time.',
+)
+START = NodeParameter(
+    'start',
+    False,
+    'Begin without ~/start, as soon as there is a subscriber and the arm is heard of; true by '
+    'default in a simulation only.',
+)
+
+RUN_PARAMETERS = (
+    NodeParameter('rate', 100.0, 'Waypoints per second.', 'Hz', lower=1.0, upper=1000.0),
+    NodeParameter(
+        'approach',
+        3.0,
+        'Shortest time to get to the first point; more where distance and limits ask for it.',
+        's',
+        lower=0.1,
+        upper=60.0,
+        read_only=False,
+    ),
+    NodeParameter(
+        'speed_scaling',
+        1.0,
+        'Share of its speed at which ~/start runs the excitation.',
+        lower=0.1,
+        upper=1.0,
+        read_only=False,
+    ),
+    NodeParameter(
+        'rehearsal_speed',
+        0.2,
+        'Share of its speed at which ~/rehearse runs it.',
+        lower=0.05,
+        upper=1.0,
+        read_only=False,
+    ),
+    NodeParameter(
+        'zero_stamp',
+        False,
+        'Stamp trajectories with zero, which a controller takes for now: where the clocks of '
+        'this computer and of the robot differ. They are not latched then, so that a controller '
+        'that comes up later does not begin; simulated_arm does not hear them.',
+    ),
+    NodeParameter(
+        'stopping',
+        0.5,
+        'Time in which the arm is brought to rest.',
+        's',
+        lower=0.1,
+        upper=10.0,
+        read_only=False,
+    ),
+    SIMULATION,
+    START,
+    NodeParameter(
+        'tracking_tolerance',
+        0.2,
+        'The arm is stopped when a joint is further from where it should be.',
+        'rad or m',
+        lower=0.001,
+        upper=10.0,
+        read_only=False,
+    ),
+    NodeParameter(
+        'state_timeout',
+        0.5,
+        'The arm is stopped, and not started, without a joint state for so long; 5 s by '
+        'default in a simulation.',
+        's',
+        lower=0.01,
+        upper=10.0,
+        read_only=False,
+    ),
+    NodeParameter(
+        'subscriber_timeout',
+        10.0,
+        'How long to wait for a subscriber and joint states; then only ~/start begins.',
+        's',
+        lower=0.0,
+        upper=3600.0,
+    ),
+)

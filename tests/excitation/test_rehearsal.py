@@ -1,0 +1,70 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A rehearsal remembers the worst, in memory that does not grow."""
+
+from __future__ import annotations
+
+from armid_ros.arm import ArmModel
+from armid_ros.excitation import Excitation, FourierTrajectory, Halt, Rehearsal
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope='module')
+def arm():
+    return ArmModel(load_robot('humanoid_arm'))
+
+
+@pytest.fixture(scope='module')
+def run(arm):
+    robot = arm.robot
+    a = np.full((6, 1), 0.1)
+    middle = (robot.lower + robot.upper) / 2.0
+    return Excitation(FourierTrajectory(robot.joints, 5.0, middle, a, 0.0 * a), 1, 1.0)
+
+
+def rehearsed(arm, run, off=0.0, factor=1.0, count=500):
+    rehearsal = Rehearsal(run, arm)
+    for t in np.linspace(0.0, run.duration, count):
+        motion = run.at([t])
+        rehearsal.add(t, motion.q[0] + off, factor * arm.joint_torque(motion)[0])
+    return rehearsal
+
+
+def test_an_arm_as_described_surprises_nobody(arm, run):
+    report = rehearsed(arm, run).report()
+    assert report.surprises == ()
+    np.testing.assert_allclose(report.torque, report.foreseen)
+    np.testing.assert_allclose(report.tracking, 0.0, atol=1e-12)
+
+
+def test_the_largest_distance_is_reported(arm, run):
+    report = rehearsed(arm, run, off=0.02).report()
+    np.testing.assert_allclose(report.tracking, 0.02, atol=1e-12)
+    assert 'followed within 0.02' in str(report)
+
+
+def test_ten_times_the_torque_is_a_surprise(arm, run):
+    assert rehearsed(arm, run, factor=10.0).report().surprises
+
+
+def test_without_joint_states_it_is_said(arm, run):
+    assert Rehearsal(run, arm).report().surprises == ('no joint state came during the rehearsal',)
+
+
+def test_long_rehearsals_keep_a_bounded_number_of_samples(arm, run):
+    report = rehearsed(arm, run, off=0.02, count=20_000).report()
+    assert 1000 < report.samples < 4000
+    np.testing.assert_allclose(report.tracking, 0.02, atol=1e-12)
+
+
+def test_an_arm_that_moves_after_its_time_is_not_at_rest():
+    halt, said = Halt(1.0, 1, -np.inf, np.zeros(2)).looked(0.9, np.zeros(2))
+    assert said is None
+    halt, said = halt.looked(1.1, np.zeros(2))
+    assert said is None
+    halt, said = halt.looked(1.3, np.array([0.0, 0.05]))
+    assert said is False
+    halt, said = halt.looked(1.5, np.array([0.0, 0.05]))
+    assert said is True

@@ -1,0 +1,194 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The excitation publisher in front of a trajectory controller, with what can go wrong there."""
+
+from __future__ import annotations
+
+from armid_ros.arm import ArmModel
+from armid_ros.excitation import (
+    Excitation,
+    Limits,
+    random_feasible,
+    save_excitation,
+    transfer_limits,
+    TransferPlanner,
+)
+from armid_ros.excitation.files import excitation_text
+from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
+from armid_ros.nodes.qos import LATCHED, STREAM
+from armid_ros.nodes.trajectories import read_trajectory
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+from rclpy.parameter import Parameter
+from std_msgs.msg import String
+
+from tests.ros.controller import Controller, SECOND
+
+ROBOT = load_robot('humanoid_arm')
+HOME = (ROBOT.lower + ROBOT.upper) / 2.0
+
+
+@pytest.fixture(scope='module')
+def excitation():
+    rng = np.random.default_rng(3)
+    limits = Limits.of(ROBOT, speed='medium')
+    return Excitation(random_feasible(ArmModel(ROBOT), limits, 2.0, 3, rng), 1, 0.5)
+
+
+@pytest.fixture
+def arm(bench):
+    return Controller(bench, ROBOT, HOME)
+
+
+def publisher(bench, arm, excitation, **parameters):
+    planner = TransferPlanner(ArmModel(ROBOT), transfer_limits(ROBOT, 1.0), None, 0.0)
+    options = {'start': False, 'use_sim_time': True, 'approach': 1.0, 'state_timeout': 0.5}
+    node = bench.add(ExcitationPublisherNode, excitation, planner, **(options | parameters))
+    bench.tick(100 * SECOND)
+    arm.run(100.2)
+    return node
+
+
+def begun(bench, arm, excitation, **parameters):
+    node = publisher(bench, arm, excitation, **parameters)
+    node.start()
+    bench.spin_until(lambda: arm.accepted, 'the trajectory')
+    return node
+
+
+def set_parameter(node, name, value):
+    return node.set_parameters([Parameter(name, value=value)])[0]
+
+
+def test_an_arm_that_follows_gets_to_the_end(bench, arm, excitation):
+    node = begun(bench, arm, excitation)
+    arm.run(100.4 + node.duration)
+    assert len(arm.accepted) == 1
+    assert node.elapsed is None
+    np.testing.assert_allclose(arm.q, excitation.at([excitation.duration]).q[0], atol=1e-3)
+    assert not node.condition()[0]
+
+
+def test_a_stop_brings_the_arm_to_rest_and_is_left_at_that(bench, arm, excitation):
+    node = begun(bench, arm, excitation)
+    arm.run(102.0)
+    node.stop()
+    arm.run(104.5)
+    assert len(arm.accepted) == 2
+    np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
+    assert not node.condition()[0]
+
+
+def test_a_controller_that_keeps_going_is_told_again_and_it_is_said(bench, arm, excitation):
+    node = begun(bench, arm, excitation)
+    arm.run(101.5)
+    arm.faults.deaf = True
+    node.stop()
+    arm.run(103.2)
+    assert 'goes on moving though it was stopped once' in node.condition()[0]
+    assert 'emergency stop' in node.condition()[0]
+    arm.faults.deaf = False
+    arm.run(105.5)
+    np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
+    count = len(arm.accepted)
+    arm.run(107.0)
+    assert count == len(arm.accepted) > 1
+
+
+def test_a_stuck_joint_stops_the_arm_and_is_named(bench, arm, excitation):
+    node = begun(bench, arm, excitation, tracking_tolerance=0.05)
+    arm.run(101.5)
+    arm.faults.stuck = int(np.argmax(np.abs(arm.state(arm.now).dq)))
+    arm.run(103.5)
+    assert f"joint '{ROBOT.joints[arm.faults.stuck]}'" in node.condition()[0]
+    assert node.elapsed is None
+    assert len(arm.accepted) >= 2
+
+
+@pytest.mark.parametrize(('fault', 'value'), [('late', 0.2), ('lost', 3)])
+def test_late_and_lost_joint_states_do_not_stop_the_arm(bench, arm, excitation, fault, value):
+    setattr(arm.faults, fault, value)
+    node = begun(bench, arm, excitation, tracking_tolerance=0.05)
+    arm.run(103.0)
+    assert node.elapsed is not None
+    assert len(arm.accepted) == 1
+
+
+def test_a_driver_that_was_restarted_is_not_where_it_should_be(bench, arm, excitation):
+    node = begun(bench, arm, excitation, tracking_tolerance=0.05)
+    arm.run(102.0)
+    arm.restart()
+    arm.run(103.5)
+    assert 'from where it should be' in node.condition()[0]
+    assert node.elapsed is None
+
+
+def test_at_half_the_speed_the_path_is_the_same_and_the_time_twice(bench, arm, excitation):
+    node = publisher(bench, arm, excitation)
+    assert set_parameter(node, 'speed_scaling', 0.5).successful
+    assert not set_parameter(node, 'speed_scaling', 2.0).successful
+    node.start()
+    slow = excitation.at_speed(0.5, 100.0)
+    assert slow.duration == pytest.approx(2.0 * excitation.duration)
+    t = np.linspace(0.0, excitation.duration, 50)
+    np.testing.assert_allclose(slow.at(2.0 * t).q, excitation.at(t).q, atol=1e-9)
+    np.testing.assert_allclose(2.0 * slow.at(2.0 * t).dq, excitation.at(t).dq, atol=1e-9)
+    bench.spin_until(lambda: arm.accepted, 'the trajectory')
+    sent = read_trajectory(arm.accepted[0])
+    expected = slow.motion(100.0).q
+    np.testing.assert_allclose(sent.q[-len(expected) :], expected, atol=1e-6)
+
+
+def test_a_rehearsal_is_slow_and_says_how_the_arm_followed(bench, arm, excitation):
+    node = publisher(bench, arm, excitation, rehearsal_speed=0.5)
+    answer = bench.call('excitation_publisher/rehearse')
+    assert answer.success
+    assert answer.message.startswith('rehearsal at 50 % of the speed')
+    arm.run(100.4 + node.duration, step=0.2)
+    node.look()
+    said = node.condition()[0]
+    assert said.startswith('rehearsed: followed within')
+    assert said.endswith('~/start runs it at 100 % of its speed')
+    assert len(arm.accepted) == 1
+
+
+def test_torques_that_were_not_foreseen_are_said_after_a_rehearsal(bench, arm, excitation):
+    node = publisher(bench, arm, excitation, rehearsal_speed=1.0)
+    arm.faults.torque = 10.0
+    node.rehearse()
+    arm.run(100.4 + node.duration, step=0.2)
+    node.look()
+    assert 'were foreseen; look into it before ~/start' in node.condition()[0]
+
+
+def test_with_a_zero_stamp_a_controller_of_another_clock_begins_at_once(bench, excitation):
+    arm = Controller(bench, ROBOT, HOME, STREAM)
+    node = begun(bench, arm, excitation, zero_stamp=True)
+    stamp = arm.accepted[0].header.stamp
+    assert (stamp.sec, stamp.nanosec) == (0, 0)
+    late = Controller(bench, ROBOT, HOME, STREAM)
+    arm.run(102.0)
+    assert node.elapsed is not None
+    assert not late.accepted
+
+
+def test_an_excitation_that_was_planned_elsewhere_is_taken_and_not_begun(
+    bench, arm, excitation, tmp_path
+):
+    node = publisher(bench, arm, excitation)
+    other = excitation.at_speed(0.4, 100.0)
+    sender = bench.matched_publisher(String, 'experiment', LATCHED)
+    sender.publish(String(data=excitation_text(other)))
+    bench.settle()
+    assert node.elapsed is None
+    assert node.duration == pytest.approx(1.0 + other.sampled_duration(100.0))
+    save_excitation(excitation, tmp_path / 'run.yaml')
+    assert set_parameter(node, 'file', str(tmp_path / 'run.yaml')).successful
+    assert node.duration == pytest.approx(1.0 + excitation.sampled_duration(100.0))
+    refused = set_parameter(node, 'file', str(tmp_path / 'none.yaml'))
+    assert not refused.successful
+    assert 'none.yaml' in refused.reason
+    sender.publish(String(data='schema: other'))
+    bench.settle()
+    assert 'experiment: not an excitation' in node.complaints.latest
