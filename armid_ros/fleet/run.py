@@ -36,6 +36,8 @@ from armid_ros.fleet.store import Store
 from armid_ros.fleet.summary import prepare, Prepared, Refused
 from distributed import as_completed, Client, Future, KilledWorker
 
+#: Times that an arm is begun again whose tasks were on workers that others ended.
+_HIT = 3
 #: Times that Dask repeats a task whose store failed.
 RETRIES = 3
 #: Bags of an arm are read together until they are so large [bytes], or so many: about a second of
@@ -116,11 +118,17 @@ Group = tuple[BagFile, ...]
 
 @dataclass(frozen=True)
 class _Waiting:
-    """An arm that is to be done: its bags, and those of which it is known that they fail."""
+    """
+    An arm that is to be done: its bags, and those of which it is known that they fail.
+
+    And how often tasks of it were on workers that others ended.
+
+    """
 
     arm: str
     groups: tuple[Group, ...]
     refused: tuple[Refused, ...] = ()
+    hit: int = 0
 
 
 @dataclass
@@ -330,7 +338,8 @@ def _without_failed(
         if any(future.status == 'error' for future in futures):
             break
     else:
-        return arm, []
+        hit = isinstance(tasks.last.exception(), KilledWorker) and arm.hit < _HIT
+        return (replace(arm, hit=arm.hit + 1) if hit else arm), []
     groups: list[Group] = []
     failed: list[Refused] = []
     for group, future in zip(arm.groups, futures, strict=True):
@@ -342,7 +351,7 @@ def _without_failed(
             groups.append(group)
         else:
             failed.append(Refused(group[0], _said(future.exception()), failed=True))
-    return _Waiting(arm.arm, tuple(groups), (*arm.refused, *failed)), failed
+    return replace(arm, groups=tuple(groups), refused=(*arm.refused, *failed)), failed
 
 
 def _read(client: Client, group: Group, job: Future) -> bool:

@@ -134,7 +134,8 @@ def test_a_store_that_never_answers_costs_its_bags_and_no_others(copied, cluster
     (copied / 'failures_arm_0001').unlink()
     resumed = replace(FIXED, resume=True)
     again = identified(cluster, find_bags([flaky(copied)]), URDF, str(tmp_path), resumed)
-    assert (again.done, again.found) == (9, 6)
+    assert again.done == 9
+    assert again.found >= 6  # a task of the first run may have got its answer since
 
 
 def test_killing_a_worker_changes_no_digit(bags, expected, tmp_path):
