@@ -19,7 +19,7 @@ import struct
 import subprocess
 import sys
 import threading
-from typing import BinaryIO, Protocol
+from typing import Any, IO, Protocol
 
 from armid_ros.api.diagnosis import DiagnosisResult
 from armid_ros.diagnosis import Diagnosis, next_run
@@ -206,20 +206,20 @@ class Assistant:
                 except OSError:  # what it was not read of any more
                     pass
 
-    def _listen(self, pipe: BinaryIO) -> None:
+    def _listen(self, pipe: IO[bytes]) -> None:
         while (result := _read(pipe)) is not None:
             self._results.put(result)
         code = self._process.wait()
         self._results.put(Done(f'the process that diagnoses has ended with {code}', success=False))
 
 
-def _write(pipe: BinaryIO, what: object) -> None:
+def _write(pipe: IO[bytes], what: object) -> None:
     data = pickle.dumps(what, protocol=pickle.HIGHEST_PROTOCOL)
     pipe.write(_LENGTH.pack(len(data)) + data)
     pipe.flush()
 
 
-def _read(pipe: BinaryIO) -> object | None:
+def _read(pipe: IO[bytes]) -> Any:
     """Return the next object; None at the end."""
     try:
         head = pipe.read(_LENGTH.size)

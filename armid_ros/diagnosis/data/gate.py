@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.search.candidates import effect_rows
-from armid_ros.effects.load import Payload
+from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -102,20 +103,25 @@ _Change = Callable[[FloatArray], ArmModel | None]
 
 def _changes(bare: ArmModel, data: Sequence[Trajectory]) -> Iterator[tuple[FloatArray, _Change]]:
     """Yield columns, and the arm that values of them make; None where no arm is like that."""
-    load = Payload.on(bare.robot)
 
     def falling(change: FloatArray) -> ArmModel:
         return ArmModel(
             bare.robot.with_gravity(bare.robot.gravity + change), quasi_static=bare.quasi_static
         )
 
-    def loaded(values: FloatArray) -> ArmModel | None:
-        possible = load.plausible(values, np.zeros_like(values), bare)
-        possible = possible and bool(values[0] < load.spread(bare.robot)[0])
-        return bare.with_effect(load, values) if possible else None
-
     yield np.concatenate([p.reduce(bare.gravity_columns(p.motion)) for p in data]), falling
-    yield np.concatenate([effect_rows(bare, load, part) for part in data]), loaded
+    for kind in CATALOGUE.values():
+        if kind.comes_and_goes:
+            load = kind.on(bare.robot)
+            rows = [effect_rows(bare, load, part) for part in data]
+            yield np.concatenate(rows), partial(_loaded, bare, load)
+
+
+def _loaded(bare: ArmModel, load: Effect, values: FloatArray) -> ArmModel | None:
+    """Return an arm with a load; None if it could not be one, or is more than an arm carries."""
+    possible = load.plausible(values, np.zeros_like(values), bare)
+    possible = possible and bool(values[0] < load.spread(bare.robot)[0])
+    return bare.with_effect(load, values) if possible else None
 
 
 def _repaired(torque: FloatArray, model: FloatArray, scale: FloatArray) -> float:
