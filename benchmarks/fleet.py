@@ -300,6 +300,8 @@ def main():
     if asked.part == 'merge':
         merge()
         return
+    if asked.changed > asked.arms or asked.damaged > asked.arms * asked.bags:
+        parser.error('--changed and --damaged are at most the arms and their bags')
     sizes = asked.arms, asked.bags, asked.changed, asked.damaged, asked.seconds, asked.seed
     if asked.part == 'generate':
         generate(asked.folders[0], *sizes)
