@@ -106,6 +106,8 @@ def result_folder(
     try:
         path.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise OutputError(f'{path}: is a file, or below one; --out is a folder') from error
     except OSError as error:
         raise OutputError(f'{path}: cannot be made or opened: {error.strerror}') from error
     try:

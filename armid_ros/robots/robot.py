@@ -16,8 +16,9 @@ import pinocchio as pin
 
 PARAMETERS_PER_BODY = 10
 
-#: How much of the largest number of a body may be lost to floating point.
-_LOST = 1e-6
+#: How much of the largest number of a body may be lost to floating point: in a step of an
+#: identification, whose values are of grouped bodies, a mass may be the rounding of zero.
+_LOST = 0.1
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,7 +43,7 @@ def test_identify_then_watch(bags, tmp_path):
             ('identify', '{bags}/*/*', '--robot', 'humanoid_arm', '--out', '{out}'),
             'no bag of humanoid_arm can be read',
         ),
-        (('identify', '{bags}/*/*', '--robot', ROBOT, '--out', ROBOT), 'is --out a folder'),
+        (('identify', '{bags}/*/*', '--robot', ROBOT, '--out', ROBOT), '--out is a folder'),
         (('report', '--out', '{out}', '--arm', 'a'), 'run `armid fleet identify` first'),
         (('watch', '--out', '{out}'), 'run `armid fleet identify` first'),
         (('diagnose', '--out', '{out}'), 'run `armid fleet identify` first'),

@@ -144,7 +144,7 @@ def test_a_folder_that_cannot_be_written_is_said_before_the_work(tmp_path, monke
         with result_folder(tmp_path, SCHEMA):
             pytest.fail('the work began')
     (tmp_path / 'file').touch()
-    with pytest.raises(OutputError, match=f'{tmp_path / "file" / "out"}: cannot be made'):
+    with pytest.raises(OutputError, match=f'{tmp_path / "file" / "out"}: is a file, or below one'):
         with result_folder(tmp_path / 'file' / 'out', SCHEMA):
             pytest.fail('the work began')
     assert os.listdir(tmp_path) == ['file']

@@ -20,6 +20,7 @@ NODES = {
     'bag_player',
     'excitation_publisher',
     'interaction_identifier',
+    'live_diagnosis',
     'online_identifier',
     'recorder',
     'simulated_arm',
