@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.normal_equations import told_basis
+from armid_ros.identification.normal_equations import told_solution
 from armid_ros.identification.regression import Regression, regressions
 from armid_ros.identification.signals import Conditioning
 from armid_ros.motion import FloatArray
@@ -36,8 +36,6 @@ _STRETCHES = 16
 _NEAR = 0.1
 #: Rows that are enough to compare cut-offs, some hundred for every parameter of seven joints.
 _ROWS = 6000
-#: Directions of the columns with less than this share of the squares are dependent.
-_DEPENDENT = 1e-10
 
 
 def cutoff_of_torques(
@@ -138,6 +136,4 @@ def _fit(
     """Fit weighted rows by least squares, shape (r,)."""
     weights = told * weight
     rows = (x * weights[:, :, np.newaxis]).reshape(-1, x.shape[2])
-    own = rows.T @ rows
-    basis = told_basis(own, _DEPENDENT)
-    return np.asarray(basis @ (basis.T @ (rows.T @ (y * weights).ravel())))
+    return told_solution(rows.T @ rows, rows.T @ (y * weights).ravel())

@@ -7,8 +7,12 @@ from __future__ import annotations
 from armid_ros.motion import FloatArray
 import numpy as np
 
+#: Directions of columns scaled to one length with less than this share of the largest eigenvalue
+#: are not told: products of columns hold no more digits.
+UNTOLD = 1e-10
 
-def told_basis(products: FloatArray, tolerance: float) -> FloatArray:
+
+def told_basis(products: FloatArray, tolerance: float = UNTOLD) -> FloatArray:
     """
     Return directions that data tell.
 
@@ -30,3 +34,23 @@ def told_basis(products: FloatArray, tolerance: float) -> FloatArray:
     values, vectors = np.linalg.eigh(products * np.outer(scale, scale))
     good = values > tolerance * max(float(values.max(initial=0.0)), 1e-300)
     return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
+
+
+def told_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
+    """
+    Solve normal equations; what data do not tell stays where it is.
+
+    Parameters
+    ----------
+    products : ndarray, shape (p, p)
+        Products of columns with each other; positive semi-definite.
+    aim : ndarray, shape (p,)
+        Products of the columns with what they are to make.
+
+    Returns
+    -------
+    ndarray, shape (p,)
+
+    """
+    basis = told_basis(products)
+    return np.asarray(basis @ (basis.T @ aim))

@@ -22,7 +22,7 @@ from armid_ros.effects.load import described_spread
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.least_squares import solve
-from armid_ros.identification.normal_equations import told_basis
+from armid_ros.identification.normal_equations import told_solution
 from armid_ros.identification.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
@@ -34,8 +34,6 @@ _EXCITED = 1e-4
 _MOST_ROUNDS = 4
 #: Squares of a column that are this share of those of the largest one are rounding.
 _ROUNDING = 1e-20
-#: Directions of scaled columns with less than this share of the largest are not told.
-_UNTOLD = 1e-10
 
 
 @dataclass(frozen=True)
@@ -338,9 +336,8 @@ def _step(
     own[:known, :known] += hold
     aim[:known] += pull
     seen = np.diag(own) > _ROUNDING * np.diag(own).max(initial=1e-300)
-    basis = told_basis(own[np.ix_(seen, seen)], _UNTOLD)
     step = np.zeros(size)
-    step[seen] = basis @ (basis.T @ aim[seen])
+    step[seen] = told_solution(own[np.ix_(seen, seen)], aim[seen])
     return step
 
 

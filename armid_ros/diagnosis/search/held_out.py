@@ -269,7 +269,7 @@ class _Base:
         cls, known: Products, train: npt.NDArray[np.bool_], hold: FloatArray, pull: FloatArray
     ) -> _Base:
         own = known.free[train].sum(axis=0) + hold
-        basis = told_basis(own, _UNSEEN)
+        basis = told_basis(own)
         inverse = basis @ basis.T
         border = known.border[train].sum(axis=0)
         return cls(

@@ -17,15 +17,13 @@ from dataclasses import replace
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import fold_rows, make_problem
 from armid_ros.diagnosis.search.fit import Fitted, Told
-from armid_ros.identification.normal_equations import told_basis
+from armid_ros.identification.normal_equations import told_basis, told_solution
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import stats
 
 #: One side of a 95 % interval.
 _LEVEL = 0.975
-#: Directions of scaled columns with less than this share of the largest are not told.
-_UNTOLD = 1e-10
 
 
 def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float) -> Fitted:
@@ -51,41 +49,40 @@ def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float
     size = len(fitted.estimate.values)
     if not size:
         return fitted
+    own, aim = _products(fitted, evidence)
     variance, freedom = np.zeros(size), 0
-    for changes in _left_out(fitted, evidence, told):
+    for changes in _left_out(own, aim, fitted, told):
         variance += (len(changes) - 1) * np.var(changes, axis=0)
         freedom += len(changes) - 1
     few = float(stats.t.ppf(_LEVEL, freedom) / stats.norm.ppf(_LEVEL))
-    along = max(chance - 1.0, 0.0) * _white(fitted, evidence)
+    basis = told_basis(own.sum(axis=0) + fitted.hold)
+    along = max(chance - 1.0, 0.0) * np.sum(basis[-size:] ** 2, axis=1)
     spread = np.sqrt(few**2 * variance + along)
     factor = np.maximum(spread / np.maximum(fitted.estimate.std, 1e-300), 1.0)
     covariance = fitted.estimate.covariance * np.outer(factor, factor)
     return replace(fitted, estimate=replace(fitted.estimate, covariance=covariance))
 
 
-def _white(fitted: Fitted, evidence: Evidence) -> FloatArray:
-    """Return the variances that white noise of the unit gives the values, (p,)."""
-    size = len(fitted.estimate.values)
-    rows = make_problem(evidence.data, evidence.sigma, fitted.residual, list(fitted.columns)).x
-    flat = rows.reshape(-1, rows.shape[2])
-    basis = told_basis(flat.T @ flat + fitted.hold, _UNTOLD)
-    return np.asarray(np.sum(basis[-size:] ** 2, axis=1))
-
-
-def _left_out(fitted: Fitted, evidence: Evidence, told: Told | None) -> Iterator[FloatArray]:
-    """Yield by what the values change without each part of each day, (K, p)."""
-    size = len(fitted.estimate.values)
+def _products(fitted: Fitted, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
+    """Return products of columns with each other and the rest, of each part, (K, f, f), (K, f)."""
     problem = make_problem(evidence.data, evidence.sigma, fitted.residual, list(fitted.columns))
-    fold = fold_rows(evidence.data)
-    width = problem.x.shape[2]
+    fold, width = fold_rows(evidence.data), problem.x.shape[2]
     own, aim = [], []
     for k in range(int(fold.max()) + 1):
         x, y = problem.x[fold == k].reshape(-1, width), problem.y[fold == k].ravel()
         own.append(x.T @ x)
         aim.append(x.T @ y)
-    all_own, all_aim = sum(own) + fitted.hold, sum(aim) + fitted.pull
+    return np.array(own), np.array(aim)
+
+
+def _left_out(
+    own: FloatArray, aim: FloatArray, fitted: Fitted, told: Told | None
+) -> Iterator[FloatArray]:
+    """Yield by what the values change without each part of each day, (K, p)."""
+    size = len(fitted.estimate.values)
+    all_own, all_aim = own.sum(axis=0) + fitted.hold, aim.sum(axis=0) + fitted.pull
     pairs = zip(own, aim, strict=True)
-    yield np.array([_solved(all_own - n, all_aim - b)[-size:] for n, b in pairs])
+    yield np.array([told_solution(all_own - n, all_aim - b)[-size:] for n, b in pairs])
     if told is None:
         return
     before = []
@@ -94,11 +91,6 @@ def _left_out(fitted: Fitted, evidence: Evidence, told: Told | None) -> Iterator
         less_own, less_aim = all_own.copy(), all_aim.copy()
         less_own[:rank, :rank] -= x.T @ x
         less_aim[:rank] -= x.T @ y
-        before.append(_solved(less_own, less_aim)[-size:])
+        before.append(told_solution(less_own, less_aim)[-size:])
     if len(before) > 1:
         yield np.array(before)
-
-
-def _solved(products: FloatArray, aim: FloatArray) -> FloatArray:
-    basis = told_basis(products, _UNTOLD)
-    return np.asarray(basis @ (basis.T @ aim))
