@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from armid_ros.effects import Effect, make_effect, Quantity, register
     from armid_ros.errors import ArmidError
     from armid_ros.estimate import Estimate
-    from armid_ros.identification.online import OnlineIdentifier
+    from armid_ros.identification.online.identifier import OnlineIdentifier
     from armid_ros.model import regressor
     from armid_ros.motion import Motion
     from armid_ros.recording import Recording, write_recording
@@ -64,7 +64,7 @@ _HOMES = {
     'InspectionResult': 'armid_ros.api.inspection',
     'identify': 'armid_ros.api.identification',
     'IdentificationResult': 'armid_ros.api.identification',
-    'OnlineIdentifier': 'armid_ros.identification.online',
+    'OnlineIdentifier': 'armid_ros.identification.online.identifier',
     'diagnose': 'armid_ros.api.diagnosis',
     'DiagnosisResult': 'armid_ros.api.diagnosis',
     'compare': 'armid_ros.api.comparison',

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from armid_ros.estimate import ParameterName
-from armid_ros.identification.change import Change
+from armid_ros.identification.online.change import Change
 import numpy as np
 
 

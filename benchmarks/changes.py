@@ -27,9 +27,9 @@ import time
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
 from armid_ros.estimate import ParameterName
-from armid_ros.identification.change import Change
-from armid_ros.identification.change_watch import BLOCK, ChangeSettings
-from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.identification.online.change import Change
+from armid_ros.identification.online.change_watch import BLOCK, ChangeSettings
+from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, Sensors, simulate, SimulatedArm

@@ -18,7 +18,7 @@ import time
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
-from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import load_robot

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import time
 
-from armid_ros.identification.two_inertia import (
+from armid_ros.elastic.identification import (
     decibel_error,
     decouple,
     ideal_response,
@@ -23,17 +23,15 @@ from armid_ros.identification.two_inertia import (
     measured_response,
     tune,
 )
-from armid_ros.identification.two_inertia.names import unpack
-from armid_ros.robots import load_robot
-from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters
-from armid_ros.simulation.elastic_run import (
+from armid_ros.elastic.identification.names import unpack
+from armid_ros.elastic.plant.run import (
     ElasticRun,
     ElasticSensors,
     Experiment,
     run_all,
     VelocityLoop,
 )
-from armid_ros.simulation.elastic_signals import (
+from armid_ros.elastic.plant.signals import (
     EXCITATION_RMS,
     resonance_experiments,
     step_experiments,
@@ -41,7 +39,9 @@ from armid_ros.simulation.elastic_signals import (
     STEPS,
     WEAK,
 )
-from armid_ros.simulation.elastic_two_link import modes, two_link_loop, two_link_plant
+from armid_ros.elastic.plant.two_link import modes, two_link_loop, two_link_plant
+from armid_ros.robots import load_robot
+from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters
 import numpy as np
 
 DT = 1e-3

@@ -18,9 +18,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import ArmidError
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
+from armid_ros.identification.assess.forward import forward_validation, unlimited
 from armid_ros.identification.estimators.names import ESTIMATORS
 from armid_ros.identification.estimators.side_by_side import compare_methods
-from armid_ros.identification.forward import forward_validation, unlimited
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording, Recording
 from armid_ros.robots import load_robot

@@ -13,17 +13,17 @@ from __future__ import annotations
 
 import argparse
 
-from armid_ros.identification.interaction import Interaction
-from armid_ros.identification.interaction_poses import choose_poses, stiffness_bound
-from armid_ros.identification.interaction_problem import (
+from armid_ros.identification.ties.poses import choose_poses, stiffness_bound
+from armid_ros.identification.ties.problem import (
     Inertias,
     interaction_problem,
     InteractionProblem,
 )
-from armid_ros.identification.interaction_search import find_interaction, InteractionFinding
+from armid_ros.identification.ties.search import find_interaction, InteractionFinding
+from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.simulation.gait import read_gait
-from armid_ros.simulation.leg_pair import (
+from armid_ros.pair.gait import read_gait
+from armid_ros.pair.leg_pair import (
     leg_pair,
     pair_torques,
     PairMotion,
@@ -31,7 +31,7 @@ from armid_ros.simulation.leg_pair import (
     TiedPair,
     walking,
 )
-from armid_ros.simulation.torque_driven import splined
+from armid_ros.pair.torque_driven import splined
 import numpy as np
 
 from benchmarks.exo_deviations import deviations

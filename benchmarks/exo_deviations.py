@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import argparse
 
-from armid_ros.identification.interaction_problem import Inertias
+from armid_ros.identification.ties.problem import Inertias
 from armid_ros.motion import FloatArray
-from armid_ros.simulation.gait import read_gait
-from armid_ros.simulation.leg_pair import leg_pair, PairMotion, stepping
+from armid_ros.pair.gait import read_gait
+from armid_ros.pair.leg_pair import leg_pair, PairMotion, stepping
 import numpy as np
 
 from benchmarks.exo_noise import find_springs, with_torques

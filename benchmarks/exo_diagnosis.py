@@ -14,16 +14,16 @@ import argparse
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings
 from armid_ros.effects.tied import Partner
-from armid_ros.identification.interaction import identify_interaction
-from armid_ros.identification.interaction_recording import (
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.identification.ties.recorded import (
     band_of_motion,
     stacked,
     together_interaction_problem,
 )
-from armid_ros.identification.signals import conditioning, SignalSettings
+from armid_ros.identification.ties.stiffness import identify_interaction
+from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
 from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import load_robot
-from armid_ros.simulation.leg_pair import leg_pair, SEGMENTS
 import numpy as np
 
 from tests.hidden.leg_pair import Straps, walks

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import argparse
 
-from armid_ros.identification.interaction_problem import Inertias, InteractionProblem
-from armid_ros.identification.interaction_recording import recorded_interaction_problem
-from armid_ros.identification.signals import SignalSettings
+from armid_ros.identification.rows.signals import SignalSettings
+from armid_ros.identification.ties.problem import Inertias, InteractionProblem
+from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.motion import FloatArray
-from armid_ros.simulation.gait import read_gait
-from armid_ros.simulation.leg_pair import leg_pair, PairMotion, SEGMENTS, stepping, TiedPair
+from armid_ros.pair.gait import read_gait
+from armid_ros.pair.leg_pair import leg_pair, PairMotion, SEGMENTS, stepping, TiedPair
 import numpy as np
 
 from benchmarks.exo_noise import measured, recorded, with_torques

@@ -10,11 +10,11 @@ Which motion shows four springs: the bound for 200 poses, and what 10 s at 1 kHz
 from __future__ import annotations
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.interaction_poses import stiffness_bound
-from armid_ros.identification.interaction_problem import interaction_problem
+from armid_ros.identification.ties.poses import stiffness_bound
+from armid_ros.identification.ties.problem import interaction_problem
 from armid_ros.motion import FloatArray
 from armid_ros.pair.exercises import exercise, EXERCISES
-from armid_ros.simulation.leg_pair import leg_pair, SEGMENTS
+from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
 import numpy as np
 
 from benchmarks.exo_noise import find_springs, TORQUE_NOISE, with_torques

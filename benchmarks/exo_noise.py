@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armid_ros.identification.interaction import identify_interaction, Interaction
-from armid_ros.identification.interaction_problem import Inertias, interaction_problem
-from armid_ros.identification.interaction_recording import recorded_interaction_problem
+from armid_ros.identification.ties.problem import Inertias, interaction_problem
+from armid_ros.identification.ties.recorded import recorded_interaction_problem
+from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import Motion
+from armid_ros.pair.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.recording import Recording
-from armid_ros.simulation.leg_pair import pair_torques, PairMotion, TiedPair
 import numpy as np
 
 TORQUE_NOISE = 0.5

@@ -262,7 +262,7 @@ def _used(dask_worker):
 def merge(count=10_000, joints=7, rigid=63):
     """Time the merge of triangles of seven joints with 84 parameters, as in a tree."""
     from armid_ros.fleet.merge import FAN_IN
-    from armid_ros.identification.triangle import Triangle
+    from armid_ros.identification.fitting.triangle import Triangle
 
     rng = np.random.default_rng(0)
     rank = rigid + 3 * joints

@@ -23,10 +23,10 @@ from unittest import mock
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification import faulty_samples, mistakes, prediction_error
-from armid_ros.identification.grade_limits import LIMITS
-from armid_ros.identification.mistakes import find_mistake
-from armid_ros.identification.signals import conditioning, SignalSettings
+from armid_ros.identification.assess import faulty_samples, mistakes, prediction_error
+from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.assess.mistakes import find_mistake
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording, Recording
 from armid_ros.robots import load_robot

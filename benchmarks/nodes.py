@@ -22,7 +22,7 @@ import time
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.excitation import Excitation, Limits, random_feasible, save_excitation
-from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.domains import private_context
 from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode

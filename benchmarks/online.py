@@ -21,13 +21,13 @@ import time
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification.causal import MOTION_FILTER_RATIO
-from armid_ros.identification.change_watch import ChangeSettings
-from armid_ros.identification.least_squares import solve
-from armid_ros.identification.online import OnlineIdentifier, OnlineSettings
-from armid_ros.identification.recursive import RecursiveLeastSquares
-from armid_ros.identification.regression import regressions
-from armid_ros.identification.signals import conditioning, SignalSettings
+from armid_ros.identification.fitting.least_squares import solve
+from armid_ros.identification.online.change_watch import ChangeSettings
+from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
+from armid_ros.identification.online.recursive import RecursiveLeastSquares
+from armid_ros.identification.rows.causal import MOTION_FILTER_RATIO
+from armid_ros.identification.rows.regression import regressions
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import load_robot, Robot

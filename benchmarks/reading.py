@@ -29,7 +29,7 @@ import zlib
 
 from armid_ros.motion import FloatArray
 from armid_ros.recording import joint_state_cdr, read_recording
-from armid_ros.recording.mcap_records import map_file
+from armid_ros.recording.mcap.records import map_file
 from armid_ros.recording.message_types import JOINT_STATE, message_type
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer

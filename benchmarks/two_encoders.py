@@ -14,7 +14,7 @@ import os
 from pathlib import Path
 import sys
 
-from armid_ros.identification.two_inertia.transmission import (
+from armid_ros.elastic.identification.transmission import (
     fit_transmission,
     TransmissionFit,
     TwoEncoders,

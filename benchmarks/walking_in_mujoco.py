@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 from armid_ros.motion import FloatArray
 from armid_ros.pair.gait_cycle import GaitCycle
-from armid_ros.simulation.leg_pair import TiedPair
+from armid_ros.pair.leg_pair import TiedPair
 import mujoco
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline

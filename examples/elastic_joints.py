@@ -5,10 +5,10 @@
 from pathlib import Path
 
 import armid_ros as ar
-from armid_ros.identification.two_inertia.joints import fit_springs
+from armid_ros.elastic.identification.joints import fit_springs
+from armid_ros.elastic.plant.arm import record
+from armid_ros.elastic.plant.setup import make_elastic_arm
 from armid_ros.simulation import Reference, Sensors
-from armid_ros.simulation.elastic_arm import record
-from armid_ros.simulation.elastic_setup import make_elastic_arm
 import numpy as np
 
 URDF = Path(__file__).with_name('arm.urdf')

@@ -3,10 +3,10 @@
 """The springs that tie an exoskeleton to its wearer, from angles of both and torques of one."""
 
 import armid_ros as ar
-from armid_ros.identification.interaction import identify_interaction
-from armid_ros.identification.interaction_recording import recorded_interaction_problem
-from armid_ros.simulation.gait import read_gait
-from armid_ros.simulation.leg_pair import leg_pair, pair_torques, stepping
+from armid_ros.identification.ties.recorded import recorded_interaction_problem
+from armid_ros.identification.ties.stiffness import identify_interaction
+from armid_ros.pair.gait import read_gait
+from armid_ros.pair.leg_pair import leg_pair, pair_torques, stepping
 import numpy as np
 
 pair, rng = leg_pair(), np.random.default_rng(1)

@@ -12,8 +12,8 @@ from typing import Any, TYPE_CHECKING
 from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.table import Shown, Summary
 from armid_ros.files import write_file
-from armid_ros.identification.comparison import compare as run
-from armid_ros.identification.comparison import Comparison
+from armid_ros.identification.assess.comparison import compare as run
+from armid_ros.identification.assess.comparison import Comparison
 from armid_ros.identification.parameters_file import Parameters, parameters_of, read_parameters
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from armid_ros.cli import options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import say
 from armid_ros.files import json_text, write_file
-from armid_ros.identification.comparison import compare as run
-from armid_ros.identification.comparison import SCHEMA
+from armid_ros.identification.assess.comparison import compare as run
+from armid_ros.identification.assess.comparison import SCHEMA
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.report.compare_report import compare_report, tell
 import click

@@ -22,8 +22,8 @@ from armid_ros.identification import (
     Score,
     write_document,
 )
-from armid_ros.identification.agreement import Agreement
-from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.identification.assess.agreement import Agreement
+from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.identification.output import SCHEMA
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_recording

@@ -17,7 +17,7 @@ from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, F
 from armid_ros.diagnosis.verdict.document import SCHEMA
 from armid_ros.files import json_text
 from armid_ros.identification import SignalSettings
-from armid_ros.identification.identifiability import told_from_zero
+from armid_ros.identification.fitting.identifiability import told_from_zero
 from armid_ros.report.notation import percent, probability, with_interval
 from armid_ros.residual import require_libraries, TABLE_FILE
 import click

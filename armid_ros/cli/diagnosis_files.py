@@ -26,8 +26,8 @@ from armid_ros.diagnosis import (
 )
 from armid_ros.excitation import save_excitation
 from armid_ros.files import json_text, write_file
-from armid_ros.identification.signals import conditioning
-from armid_ros.identification.verification import ForwardValidation, simulate_held_out
+from armid_ros.identification.assess.verification import ForwardValidation, simulate_held_out
+from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording
 from armid_ros.report.diagnosis_report import diagnosis_report
 from armid_ros.report.provenance import Provenance

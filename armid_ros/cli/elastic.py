@@ -11,19 +11,29 @@ from typing import Any
 from armid_ros.cli import options
 from armid_ros.cli.springs import identify_springs
 from armid_ros.cli.terminal import print_parameters, progress, say
-from armid_ros.errors import RecordingError, RobotError
-from armid_ros.files import json_text, write_file
-from armid_ros.identification.two_inertia import (
+from armid_ros.elastic.identification import (
     Accelerometers,
     identify_two_inertia,
     read_runs,
     TwoInertiaIdentification,
     write_runs,
 )
-from armid_ros.identification.two_inertia.output import elastic_document, SCHEMA
-from armid_ros.identification.two_inertia.story import TuningStory
+from armid_ros.elastic.identification.output import elastic_document, SCHEMA
+from armid_ros.elastic.identification.story import TuningStory
+from armid_ros.elastic.plant.run import ElasticSensors, run_all
+from armid_ros.elastic.plant.signals import (
+    EXCITATION_RMS,
+    resonance_experiments,
+    step_experiments,
+    STEP_POSES,
+    STEPS,
+    WEAK,
+)
+from armid_ros.elastic.plant.two_link import two_link_loop, two_link_plant
+from armid_ros.elastic.report.page import elastic_report
+from armid_ros.errors import RecordingError, RobotError
+from armid_ros.files import json_text, write_file
 from armid_ros.motion import FloatArray
-from armid_ros.report.elastic_report import elastic_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.two_link import (
@@ -33,16 +43,6 @@ from armid_ros.robots.two_link import (
     TwoLinkParameters,
     TwoLinkSet,
 )
-from armid_ros.simulation.elastic_run import ElasticSensors, run_all
-from armid_ros.simulation.elastic_signals import (
-    EXCITATION_RMS,
-    resonance_experiments,
-    step_experiments,
-    STEP_POSES,
-    STEPS,
-    WEAK,
-)
-from armid_ros.simulation.elastic_two_link import two_link_loop, two_link_plant
 import click
 import numpy as np
 
@@ -233,7 +233,7 @@ def _known(robot: Robot, shipped: TwoLinkSet, begin: str) -> tuple[TwoLinkParame
 def _draw(
     result: TwoInertiaIdentification, known: TwoLinkParameters | None, out: Path
 ) -> list[str]:
-    from armid_ros.report.figures.elastic import bode_figure, comparison_figure, step_figure
+    from armid_ros.elastic.report.figures import bode_figure, comparison_figure, step_figure
     from armid_ros.report.figures.style import save_figure
 
     figures = {'bode.png': bode_figure(result)}

@@ -42,9 +42,9 @@ from armid_ros.excitation import (
     with_obstacles,
 )
 from armid_ros.excitation.fitness import FIT
-from armid_ros.excitation.parallel import INTERRUPTED
+from armid_ros.excitation.search.parallel import INTERRUPTED
 from armid_ros.files import json_text
-from armid_ros.identification.signals import conditioning, segments, SignalSettings
+from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.motion import FloatArray
 from armid_ros.robots import collision_model, CollisionModel, Robot
 import click

@@ -10,11 +10,11 @@ from pathlib import Path
 from armid_ros.cli import options
 from armid_ros.cli.excitation_files import BAG, require_free, SCHEMA
 from armid_ros.cli.terminal import say
+from armid_ros.elastic.plant.courses import multisine_course, step_course
 from armid_ros.excitation import Floor, Limits, not_checked, Obstacle, with_obstacles
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.robots import CollisionModel
-from armid_ros.simulation.elastic_courses import multisine_course, step_course
 import click
 import numpy as np
 

@@ -12,28 +12,28 @@ from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say, Tick
 from armid_ros.errors import ModelError
 from armid_ros.files import json_text, write_file
-from armid_ros.identification.interaction import identify_interaction, Interaction
-from armid_ros.identification.interaction_recording import recorded_interaction_problem
+from armid_ros.identification.ties.recorded import recorded_interaction_problem
+from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.pair.driven_cycle import check_cycle
 from armid_ros.pair.exercises import exercise, EXERCISES
+from armid_ros.pair.gait import Gait, read_gait
 from armid_ros.pair.gait_cycle import gait_cycle, weight
-from armid_ros.pair.shares import ground_by_shares
-from armid_ros.pair.walkers import walking_pair
-from armid_ros.recording import read_recording, Recording, write_joint_states
-from armid_ros.recording.writer import whole_bag
-from armid_ros.report.exo_report import exo_report, GaitChecks, WholeCycle
-from armid_ros.report.sections.walk import Driven, SOURCE
-from armid_ros.robots.assumptions import read_assumptions
-from armid_ros.simulation.gait import Gait, read_gait
-from armid_ros.simulation.leg_pair import (
+from armid_ros.pair.leg_pair import (
     leg_pair,
     pair_torques,
     PairMotion,
     TiedPair,
     walking,
 )
-from armid_ros.simulation.torque_driven import check_gait
+from armid_ros.pair.report.page import exo_report, GaitChecks, WholeCycle
+from armid_ros.pair.report.walk import Driven, SOURCE
+from armid_ros.pair.shares import ground_by_shares
+from armid_ros.pair.torque_driven import check_gait
+from armid_ros.pair.walkers import walking_pair
+from armid_ros.recording import read_recording, Recording, write_joint_states
+from armid_ros.recording.writer import whole_bag
+from armid_ros.robots.assumptions import read_assumptions
 import click
 import numpy as np
 

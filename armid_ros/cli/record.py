@@ -10,9 +10,16 @@ from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import options
 from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.effects import Effect, parse_effect
+from armid_ros.elastic.identification import write_runs
+from armid_ros.elastic.plant.arm import ElasticArm, record
+from armid_ros.elastic.plant.setup import (
+    elastic_joints,
+    make_elastic_arm,
+    no_rotor,
+    shipped_arm,
+)
 from armid_ros.errors import ModelError
 from armid_ros.excitation import design, DesignSettings, load_excitation
-from armid_ros.identification.two_inertia import write_runs
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_waypoints, write_recording
 from armid_ros.recording import recover as recover_bag
@@ -20,13 +27,6 @@ from armid_ros.robots import collision_model, Robot
 from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run
 from armid_ros.simulation.bodies import require_masses
-from armid_ros.simulation.elastic_arm import ElasticArm, record
-from armid_ros.simulation.elastic_setup import (
-    elastic_joints,
-    make_elastic_arm,
-    no_rotor,
-    shipped_arm,
-)
 import click
 import numpy as np
 

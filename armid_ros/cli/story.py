@@ -22,7 +22,7 @@ from armid_ros.cli.terminal import progress, say
 from armid_ros.diagnosis import diagnose, Diagnosis
 from armid_ros.effects import CATALOGUE, Effect, make_effect, parse_effect
 from armid_ros.excitation import Excitation, Limits, random_feasible
-from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import read_recording, Recording
 from armid_ros.report.notation import digits, pretty

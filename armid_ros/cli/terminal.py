@@ -13,7 +13,7 @@ from typing import Any, Self
 from armid_ros.errors import visible
 from armid_ros.estimate import Estimate
 from armid_ros.files import json_text
-from armid_ros.identification.identifiability import told_from_zero
+from armid_ros.identification.fitting.identifiability import told_from_zero
 from armid_ros.motion import FloatArray
 import click
 from rich.console import Console

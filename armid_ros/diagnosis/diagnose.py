@@ -39,7 +39,7 @@ from armid_ros.diagnosis.verdict.pattern import find_pattern, Pattern
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.checks import check_motion
+from armid_ros.identification.rows.checks import check_motion
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np

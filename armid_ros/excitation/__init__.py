@@ -9,21 +9,20 @@ from rest to rest.
 
 """
 
-from armid_ros.excitation.clearance import Approach, ClearanceModel
-from armid_ros.excitation.criteria import CRITERIA, Information
 from armid_ros.excitation.design import Design, design, design_speeds, evaluate, Progress
-from armid_ros.excitation.environment import (
+from armid_ros.excitation.feasibility import excitation_faults, Faults, trajectory_faults
+from armid_ros.excitation.files import load_excitation, save_excitation
+from armid_ros.excitation.fitness import Fitness, fitness, not_checked
+from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
+from armid_ros.excitation.geometry.environment import (
     load_environment,
     Obstacle,
     obstacles_alone,
     with_obstacles,
 )
-from armid_ros.excitation.feasibility import excitation_faults, Faults, trajectory_faults
-from armid_ros.excitation.files import load_excitation, save_excitation
-from armid_ros.excitation.fitness import Fitness, fitness, not_checked
-from armid_ros.excitation.floor import find_floor, Floor, floor_obstacles
-from armid_ros.excitation.fourier import FourierTrajectory
-from armid_ros.excitation.heights import LowestPoint
+from armid_ros.excitation.geometry.floor import find_floor, Floor, floor_obstacles
+from armid_ros.excitation.geometry.heights import LowestPoint
 from armid_ros.excitation.limits import (
     check_limits,
     Limits,
@@ -37,6 +36,7 @@ from armid_ros.excitation.random_trajectory import random_feasible
 from armid_ros.excitation.rehearsal import Rehearsal, RehearsalReport
 from armid_ros.excitation.run import plan_run, Run
 from armid_ros.excitation.schedule import Excitation
+from armid_ros.excitation.search.criteria import CRITERIA, Information
 from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
 from armid_ros.excitation.supervision import (
     brought_back,

@@ -11,16 +11,16 @@ import time
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation.clearance import ClearanceModel
-from armid_ros.excitation.criteria import Information
-from armid_ros.excitation.environment import Obstacle, with_obstacles
 from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.geometry.clearance import ClearanceModel
+from armid_ros.excitation.geometry.environment import Obstacle, with_obstacles
 from armid_ros.excitation.limits import Limits, SPEED_CLASSES
-from armid_ros.excitation.parallel import INTERRUPTED, search_all, Task
 from armid_ros.excitation.placing import placed
 from armid_ros.excitation.problem import Problem
 from armid_ros.excitation.schedule import Excitation
-from armid_ros.excitation.search import exact_cost, Found
+from armid_ros.excitation.search.criteria import Information
+from armid_ros.excitation.search.local import exact_cost, Found
+from armid_ros.excitation.search.parallel import INTERRUPTED, search_all, Task
 from armid_ros.excitation.settings import DesignSettings
 from armid_ros.motion import FloatArray
 from armid_ros.robots import CollisionModel

@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.excitation.clearance import Approach, ClearanceModel
 from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
 from armid_ros.excitation.limits import check_limits, Limits, Violation
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.motion import FloatArray, Motion

@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armid_ros.excitation.clearance import Approach, ClearanceModel
-from armid_ros.excitation.environment import Obstacle, with_obstacles
-from armid_ros.excitation.floor import Floor
-from armid_ros.excitation.heights import lowest_point, LowestPoint
+from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
+from armid_ros.excitation.geometry.environment import Obstacle, with_obstacles
+from armid_ros.excitation.geometry.floor import Floor
+from armid_ros.excitation.geometry.heights import lowest_point, LowestPoint
 from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.run import Run
 from armid_ros.motion import Motion

@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation.clearance import ClearanceModel
 from armid_ros.excitation.feasibility import excitation_faults
 from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.limits import check_limits
 from armid_ros.excitation.problem import Problem
 from armid_ros.excitation.schedule import Excitation

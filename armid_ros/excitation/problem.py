@@ -9,15 +9,15 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation.criteria import (
+from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.limits import Limits
+from armid_ros.excitation.search.criteria import (
     Criterion,
     Information,
     RivalCriterion,
     SpectralCriterion,
     SubsetCriterion,
 )
-from armid_ros.excitation.fourier import FourierTrajectory
-from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.settings import DesignSettings
 from armid_ros.model import BaseParameters, group_columns, random_motion
 from armid_ros.motion import FloatArray, Motion, read_only

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation.clearance import ClearanceModel
 from armid_ros.excitation.feasibility import trajectory_faults
 from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.limits import Limits
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import CollisionModel

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import math
 
 from armid_ros.errors import TrajectoryError
+from armid_ros.excitation.geometry.unwinding import unwound
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.transfer import Transfer, TransferPlanner
-from armid_ros.excitation.unwinding import unwound
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt

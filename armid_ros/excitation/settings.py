@@ -7,8 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation.criteria import CRITERIA
 from armid_ros.excitation.limits import Limits
+from armid_ros.excitation.search.criteria import CRITERIA
 from armid_ros.motion import FloatArray
 import numpy as np
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation.clearance import ClearanceModel
-from armid_ros.excitation.heights import zero_pose
+from armid_ros.excitation.geometry.clearance import ClearanceModel
+from armid_ros.excitation.geometry.heights import zero_pose
+from armid_ros.excitation.geometry.paths import clear_line, find_path, PathError
 from armid_ros.excitation.limits import check_limits, Limits, SPEED_CLASSES
-from armid_ros.excitation.paths import clear_line, find_path, PathError
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
 import numpy as np

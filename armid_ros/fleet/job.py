@@ -14,7 +14,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import FleetError
 from armid_ros.identification import Conditioning
 from armid_ros.identification.description import kinematics_digest
-from armid_ros.identification.nonlinear import curved
+from armid_ros.identification.fitting.nonlinear import curved
 from armid_ros.model import BaseParameters, random_motion
 from armid_ros.recording import ReadSettings
 import numpy as np

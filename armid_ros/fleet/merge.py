@@ -24,8 +24,13 @@ from armid_ros.fleet.summary import (
     rows_of,
     Summary,
 )
-from armid_ros.identification.excited import bounds, told_apart
-from armid_ros.identification.triangle import fit_triangle, joint_std, Triangle, TriangleFit
+from armid_ros.identification.fitting.excited import bounds, told_apart
+from armid_ros.identification.fitting.triangle import (
+    fit_triangle,
+    joint_std,
+    Triangle,
+    TriangleFit,
+)
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np

@@ -27,7 +27,7 @@ from armid_ros.fleet.job import Job
 from armid_ros.fleet.merge import ArmEstimate
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.summary import MotionStatistics, OwnEstimate, Refused, Summary
-from armid_ros.identification.triangle import Triangle
+from armid_ros.identification.fitting.triangle import Triangle
 from armid_ros.motion import FloatArray
 import numpy as np
 import pyarrow as pa

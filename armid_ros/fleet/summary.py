@@ -13,18 +13,18 @@ from armid_ros.estimate import ParameterName
 from armid_ros.fleet.bags import BagFile
 from armid_ros.fleet.job import Job
 from armid_ros.fleet.store import fetched
-from armid_ros.identification.checks import check_positions, check_torque, resting
-from armid_ros.identification.excited import bounds, told_apart
-from armid_ros.identification.least_squares import noise_products
-from armid_ros.identification.regression import Regression
-from armid_ros.identification.signals import sampling_rate
-from armid_ros.identification.streaming import streamed
-from armid_ros.identification.triangle import (
+from armid_ros.identification.fitting.excited import bounds, told_apart
+from armid_ros.identification.fitting.least_squares import noise_products
+from armid_ros.identification.fitting.triangle import (
     fit_triangle,
     joint_std,
     Triangle,
     TriangleFit,
 )
+from armid_ros.identification.rows.checks import check_positions, check_torque, resting
+from armid_ros.identification.rows.regression import Regression
+from armid_ros.identification.rows.signals import sampling_rate
+from armid_ros.identification.rows.streaming import streamed
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np

@@ -7,7 +7,8 @@ Identification: recordings in, models with uncertainties out.
 
 """
 
-from armid_ros.identification.grade import Grade, grade
+from armid_ros.identification.assess.grade import Grade, grade
+from armid_ros.identification.assess.verification import Verification, verify
 from armid_ros.identification.identify import (
     Fit,
     Identification,
@@ -16,10 +17,9 @@ from armid_ros.identification.identify import (
     Score,
 )
 from armid_ros.identification.output import identification_document, write_document
-from armid_ros.identification.physical import PhysicalSettings
-from armid_ros.identification.physical_certificate import PhysicalCertificate
-from armid_ros.identification.signals import Conditioning, SignalSettings
-from armid_ros.identification.verification import Verification, verify
+from armid_ros.identification.physical.fit_among_bodies import PhysicalSettings
+from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
+from armid_ros.identification.rows.signals import Conditioning, SignalSettings
 
 __all__ = [
     'Conditioning',

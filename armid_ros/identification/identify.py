@@ -10,22 +10,22 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.checks import check_length, check_motion, check_torque
-from armid_ros.identification.cutoff import cutoff_of_torques
-from armid_ros.identification.damage import without_damage
 from armid_ros.identification.estimators.names import Estimator, least_squares_of
 from armid_ros.identification.estimators.refine import refined
-from armid_ros.identification.excited import excited
-from armid_ros.identification.halves import halves_error
-from armid_ros.identification.identifiability import Unidentified, unidentified
-from armid_ros.identification.least_squares import Method
-from armid_ros.identification.nonlinear import fit_values, FittedValues, through, torques
-from armid_ros.identification.physical import PhysicalSettings
-from armid_ros.identification.physical_certificate import PhysicalCertificate
-from armid_ros.identification.physical_fit import fit_to_bodies
-from armid_ros.identification.quasi_static import free_directions, with_uncertain_inertia
-from armid_ros.identification.regression import predictions, regressions
-from armid_ros.identification.signals import Conditioning, conditioning, SignalSettings
+from armid_ros.identification.fitting.cutoff import cutoff_of_torques
+from armid_ros.identification.fitting.excited import excited
+from armid_ros.identification.fitting.halves import halves_error
+from armid_ros.identification.fitting.identifiability import Unidentified, unidentified
+from armid_ros.identification.fitting.least_squares import Method
+from armid_ros.identification.fitting.nonlinear import fit_values, FittedValues, through, torques
+from armid_ros.identification.fitting.quasi_static import free_directions, with_uncertain_inertia
+from armid_ros.identification.physical.fit_among_bodies import PhysicalSettings
+from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
+from armid_ros.identification.physical.physical_fit import fit_to_bodies
+from armid_ros.identification.rows.checks import check_length, check_motion, check_torque
+from armid_ros.identification.rows.damage import without_damage
+from armid_ros.identification.rows.regression import predictions, regressions
+from armid_ros.identification.rows.signals import Conditioning, conditioning, SignalSettings
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording

@@ -11,11 +11,11 @@ from typing import Any
 
 from armid_ros.arm import parameter_table
 from armid_ros.files import json_text, write_file
-from armid_ros.identification.consistency import NoiseCheck
+from armid_ros.identification.assess.consistency import NoiseCheck
+from armid_ros.identification.assess.grade import Grade
+from armid_ros.identification.assess.verification import Verification
 from armid_ros.identification.description import kinematics_digest
-from armid_ros.identification.grade import Grade
 from armid_ros.identification.identify import Fit, Identification, Score
-from armid_ros.identification.verification import Verification
 from armid_ros.motion import FloatArray
 import numpy as np
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.signals import (
+from armid_ros.identification.rows.signals import (
     conditioning,
     decimate,
     decimated_samples,

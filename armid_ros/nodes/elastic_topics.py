@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
+from armid_ros.elastic.plant.arm import ElasticArm, ElasticSample
 from armid_ros.nodes.qos import STREAM
 from armid_ros.recording.elastic_topics import imu_topic, LINK, REFERENCE
-from armid_ros.simulation.elastic_arm import ElasticArm, ElasticSample
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions

@@ -11,7 +11,7 @@ from armid_ros.arm.model_file import parameter_table, save_model
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate
 from armid_ros.files import write_file
-from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.identification.online.identifier import OnlineIdentifier
 import yaml
 
 SCHEMA = 'armid/estimate/1'

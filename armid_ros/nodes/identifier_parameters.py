@@ -9,8 +9,8 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
-from armid_ros.identification.change_watch import ChangeSettings
-from armid_ros.identification.online import OnlineIdentifier, OnlineSettings
+from armid_ros.identification.online.change_watch import ChangeSettings
+from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.nodes.parameters import NodeParameter
 from armid_ros.robots import load_robot, parse_gravity, robot_from_urdf
 import numpy as np

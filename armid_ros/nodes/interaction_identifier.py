@@ -10,18 +10,18 @@ from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.errors import ArmidError, RecordingError
-from armid_ros.identification.causal import LARGEST
-from armid_ros.identification.interaction import Interaction
-from armid_ros.identification.interaction_online import InteractionSettings, OnlineInteraction
-from armid_ros.identification.joint_gate import joint_gate
-from armid_ros.identification.joint_order import JointOrder
-from armid_ros.identification.straight_line import StreamSample
+from armid_ros.identification.rows.causal import LARGEST
+from armid_ros.identification.samples.joint_gate import joint_gate
+from armid_ros.identification.samples.joint_order import JointOrder
+from armid_ros.identification.samples.straight_line import StreamSample
+from armid_ros.identification.ties.online import InteractionSettings, OnlineInteraction
+from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.parameters import NodeParameter
 from armid_ros.nodes.process import run
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
-from armid_ros.simulation.leg_pair import leg_pair
+from armid_ros.pair.leg_pair import leg_pair
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.clock import Clock, ClockType

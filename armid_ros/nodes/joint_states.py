@@ -8,8 +8,8 @@ import math
 from typing import NamedTuple
 
 from armid_ros.errors import RecordingError
-from armid_ros.identification.joint_merge import JointMerger
-from armid_ros.identification.joint_order import JointOrder
+from armid_ros.identification.samples.joint_merge import JointMerger
+from armid_ros.identification.samples.joint_order import JointOrder
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.complaints import Complaints
 import numpy as np

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.estimate import Estimate
-from armid_ros.identification.change import Change
+from armid_ros.identification.online.change import Change
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 #: A change is a warning for so long [s].

@@ -19,10 +19,11 @@ import time
 from typing import Any, TypeVar
 
 from armid_ros.arm import ArmModel
+from armid_ros.elastic.plant.arm import ElasticArm
 from armid_ros.errors import ArmidError
 from armid_ros.estimate import Estimate
 from armid_ros.excitation import Excitation, TransferPlanner
-from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.domains import private_context
@@ -33,7 +34,6 @@ from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.simulation import SimulatedArm
-from armid_ros.simulation.elastic_arm import ElasticArm
 from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.logging import LoggingSeverity

@@ -14,9 +14,9 @@ from typing import Any
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm.model_file import read_model
 from armid_ros.errors import ArmidError, IdentificationError
-from armid_ros.identification.change import Change
-from armid_ros.identification.learning_progress import LearningProgress, too_little_motion
-from armid_ros.identification.online import OnlineIdentifier, OnlineSample
+from armid_ros.identification.online.change import Change
+from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSample
+from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.estimates import estimate_message, save_identification

@@ -10,6 +10,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import read_model
+from armid_ros.elastic.plant.arm import ElasticArm, ElasticSample
 from armid_ros.errors import ArmidError, ModelError, TrajectoryError
 from armid_ros.nodes.arm_parameters import ARM_PARAMETERS, bare_arm, make_arm, with_effects
 from armid_ros.nodes.base import ArmidNode
@@ -19,7 +20,6 @@ from armid_ros.nodes.process import run
 from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.nodes.trajectories import read_trajectory
 from armid_ros.simulation import Reference, SimulatedArm
-from armid_ros.simulation.elastic_arm import ElasticArm, ElasticSample
 from armid_ros.simulation.run import whole_steps
 from rclpy.clock import Clock, ClockType
 from rclpy.qos_overriding_options import QoSOverridingOptions

@@ -14,9 +14,9 @@ from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters import names, NodeParameter
 from armid_ros.nodes.process import run
 from armid_ros.nodes.qos import STREAM
-from armid_ros.simulation.gait import read_gait
-from armid_ros.simulation.leg_pair import leg_pair, SEGMENTS
-from armid_ros.simulation.simulated_pair import PairSensors, SimulatedPair
+from armid_ros.pair.gait import read_gait
+from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
+from armid_ros.pair.simulated_pair import PairSensors, SimulatedPair
 import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.publisher import Publisher

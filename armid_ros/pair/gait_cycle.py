@@ -18,12 +18,12 @@ from dataclasses import dataclass, replace
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.pair.contact import Ground
+from armid_ros.pair.gait import Gait
+from armid_ros.pair.leg_pair import pair_torques, PairMotion, PairTorques, TiedPair
 from armid_ros.pair.walkable import walkable, WalkableGait
 from armid_ros.pair.walkers import columns, contacts, floating, leg_length, SIDES
 from armid_ros.robots import Robot
 from armid_ros.robots.assumptions import read_assumptions
-from armid_ros.simulation.gait import Gait
-from armid_ros.simulation.leg_pair import pair_torques, PairMotion, PairTorques, TiedPair
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin

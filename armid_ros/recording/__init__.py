@@ -11,15 +11,15 @@ for the nodes; none of it needs ROS.
 
 from armid_ros.recording.bag import Bag, iter_raw, topics
 from armid_ros.recording.beside import Beside
-from armid_ros.recording.joint_state_encoder import (
+from armid_ros.recording.joint_state.encoder import (
     joint_state_cdr,
     write_joint_states,
     write_recording,
 )
+from armid_ros.recording.mcap.recover import recover, RecoveryReport
 from armid_ros.recording.qos import LATCHED, QosProfile
 from armid_ros.recording.reader import read_recording
 from armid_ros.recording.recording import Gap, ReadReport, Recording
-from armid_ros.recording.recover import recover, RecoveryReport
 from armid_ros.recording.settings import ReadSettings
 from armid_ros.recording.source import RawMessage, Topic
 from armid_ros.recording.string_message import read_robot_description, string_cdr

@@ -25,7 +25,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular, reading
 from armid_ros.recording.compression import message_content, unpacked
 from armid_ros.recording.damage import Damage
-from armid_ros.recording.mcap_source import McapSource
+from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.metadata import BagMetadata, FILE_NAME, read_metadata
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Block, RawMessage, Source, Topic

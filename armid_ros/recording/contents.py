@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.joint_state_decoder import JointStateDecoder
+from armid_ros.recording.joint_state.decoder import JointStateDecoder
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.files import reading
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.joint_state_decoder import JointStateDecoder, JointStates
+from armid_ros.recording.joint_state.decoder import JointStateDecoder, JointStates
 from armid_ros.recording.reader import assemble, check_joints, choose_topic
 from armid_ros.recording.recording import Recording
 from armid_ros.recording.settings import DEFAULT, ReadSettings

@@ -12,7 +12,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import reading
 from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.joint_state_decoder import JointStateDecoder, JointStates
+from armid_ros.recording.joint_state.decoder import JointStateDecoder, JointStates
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.recording import Clock, Gap, ReadReport, Recording
 from armid_ros.recording.series import (

@@ -18,7 +18,7 @@ from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 
 from armid_ros.motion import FloatArray
-from armid_ros.recording.joint_state_decoder import JointStates
+from armid_ros.recording.joint_state.decoder import JointStates
 from armid_ros.recording.recording import Clock
 from armid_ros.recording.source import IntArray
 import numpy as np

@@ -13,7 +13,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import reading
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.joint_state_encoder import Measured
+from armid_ros.recording.joint_state.encoder import Measured
 from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for, STRING
 from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.settings import DEFAULT, ReadSettings

@@ -20,8 +20,8 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from armid_ros.errors import ArmidError, RecordingError
-from armid_ros.recording.mcap_records import MESSAGE, RECORD_HEADER
-from armid_ros.recording.mcap_writer import Compression, McapWriter, message_record
+from armid_ros.recording.mcap.records import MESSAGE, RECORD_HEADER
+from armid_ros.recording.mcap.writer import Compression, McapWriter, message_record
 from armid_ros.recording.message_types import message_type, MessageType
 from armid_ros.recording.metadata import bag_information, dump, write_metadata
 from armid_ros.recording.qos import dump_qos_text, QosProfile

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.estimate import ParameterName
-from armid_ros.identification.comparison import Change, Comparison, GroupChange
-from armid_ros.identification.identifiability import HALF_WIDTH, told_from_zero
+from armid_ros.identification.assess.comparison import Change, Comparison, GroupChange
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH, told_from_zero
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, measured, pretty, robot_label
 from armid_ros.report.page import Page

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, NextRun
 from armid_ros.diagnosis.verdict.detectable import detectable
-from armid_ros.identification.verification import ForwardValidation
+from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
 from armid_ros.report.notation import counted, robot_label
 from armid_ros.report.page import Page, Section

@@ -24,7 +24,7 @@ from armid_ros.excitation import (
     with_obstacles,
 )
 from armid_ros.excitation.fitness import FIT, UNFIT
-from armid_ros.excitation.heights import vertical
+from armid_ros.excitation.geometry.heights import vertical
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, digits, pretty, robot_label, torque_unit

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from armid_ros.identification import Fit, Identification, Score, Verification
-from armid_ros.identification.grade_limits import LIMITS
-from armid_ros.identification.identifiability import told_from_zero
+from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.fitting.identifiability import told_from_zero
 from armid_ros.recording import Recording
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, digits

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.identification.identifiability import HALF_WIDTH
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.lunar.paper import LOAD, STATED_ERROR
 from armid_ros.identification.lunar.reproduction import Repeated, Reproduction
 from armid_ros.report.notation import digits, measured

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armid_ros.excitation.capsules import outline
+from armid_ros.excitation.geometry.capsules import outline
 from armid_ros.motion import FloatArray
 from armid_ros.report.strip import CORNER, Strip, svg_points
 from armid_ros.robots import CollisionModel

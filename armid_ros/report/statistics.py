@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification import Fit, Identification
-from armid_ros.identification.identifiability import HALF_WIDTH
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 import numpy as np
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from armid_ros.arm import ArmModel
 from armid_ros.errors import RobotError
 from armid_ros.identification import SignalSettings
-from armid_ros.identification.regression import predictions
-from armid_ros.identification.signals import conditioning
+from armid_ros.identification.rows.regression import predictions
+from armid_ros.identification.rows.signals import conditioning
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot

@@ -6,8 +6,8 @@ import json
 
 from armid_ros.cli.commands import COMMANDS
 from armid_ros.effects import CATALOGUE, make_effect
+from armid_ros.elastic.identification import Accelerometers, read_runs
 from armid_ros.excitation import load_excitation
-from armid_ros.identification.two_inertia import Accelerometers, read_runs
 from armid_ros.recording import read_joint_trajectory, read_recording
 from armid_ros.robots import load_robot
 import numpy as np

@@ -4,7 +4,7 @@
 
 from armid_ros.cli import main
 from armid_ros.recording import Recording, write_recording
-from armid_ros.recording.mcap_records import map_file
+from armid_ros.recording.mcap.records import map_file
 from armid_ros.robots import load_robot
 import click
 import numpy as np

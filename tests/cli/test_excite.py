@@ -15,7 +15,7 @@ from armid_ros.excitation import (
     Limits,
     load_excitation,
 )
-from armid_ros.excitation.heights import lowest_point
+from armid_ros.excitation.geometry.heights import lowest_point
 from armid_ros.recording import read_joint_trajectory, read_recording
 from armid_ros.robots import collision_model, load_robot
 import numpy as np

@@ -4,7 +4,7 @@
 
 from armid_ros.diagnosis.data.evidence import trajectories
 from armid_ros.diagnosis.data.floor import noise_floor
-from armid_ros.identification.signals import conditioning, SignalSettings
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np
 import pytest
 from scipy.signal import lfilter

@@ -10,7 +10,7 @@ from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.search.fit import excited, fit
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.effects import CATALOGUE, make_effect
-from armid_ros.identification.two_inertia.transmission import fit_transmission
+from armid_ros.elastic.identification.transmission import fit_transmission
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 import numpy as np

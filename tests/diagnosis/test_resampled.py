@@ -8,7 +8,7 @@ from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.resampled import widened
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
-from armid_ros.identification.signals import conditioning
+from armid_ros.identification.rows.signals import conditioning
 import numpy as np
 import pytest
 

@@ -9,11 +9,11 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel, load_model, save_model
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import ModelError
-from armid_ros.identification.signals import Conditioning, segments
+from armid_ros.identification.rows.signals import Conditioning, segments
 from armid_ros.motion import Motion
+from armid_ros.pair.gait import read_gait
+from armid_ros.pair.leg_pair import leg_pair, pair_torques, PairMotion, TiedPair, walking
 from armid_ros.recording import recorded_together, Recording
-from armid_ros.simulation.gait import read_gait
-from armid_ros.simulation.leg_pair import leg_pair, pair_torques, PairMotion, TiedPair, walking
 import numpy as np
 import pytest
 

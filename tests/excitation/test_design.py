@@ -18,7 +18,7 @@ from armid_ros.excitation import (
     Problem,
     random_feasible,
 )
-from armid_ros.excitation.parallel import search_all, Task
+from armid_ros.excitation.search.parallel import search_all, Task
 from armid_ros.robots import collision_model
 import numpy as np
 import pytest

@@ -7,12 +7,12 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.excitation import DesignSettings, Problem
-from armid_ros.excitation.chain import Chain
-from armid_ros.excitation.clearance import ClearanceModel
-from armid_ros.excitation.constraints import Constraints
-from armid_ros.excitation.objective import Objective
+from armid_ros.excitation.geometry.chain import Chain
+from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.random_trajectory import random_feasible
-from armid_ros.excitation.rigid_gradient import RigidRegressor
+from armid_ros.excitation.search.constraints import Constraints
+from armid_ros.excitation.search.objective import Objective
+from armid_ros.excitation.search.rigid_gradient import RigidRegressor
 from armid_ros.model import random_motion, regressor
 import numpy as np
 import pytest

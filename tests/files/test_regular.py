@@ -9,11 +9,11 @@ from armid_ros.errors import ArmidError, RobotError
 from armid_ros.excitation import load_environment, load_excitation
 from armid_ros.files import read_text
 from armid_ros.identification.parameters_file import read_parameters
+from armid_ros.pair.gait import read_gait
 from armid_ros.recording import Bag, read_recording, recover
 from armid_ros.robots import collision_model, load_robot
 from armid_ros.robots.assumptions import read_assumptions
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation.gait import read_gait
 import pytest
 
 READERS = {

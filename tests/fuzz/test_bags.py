@@ -17,7 +17,7 @@ from armid_ros.recording import (
     write_recording,
 )
 from armid_ros.recording.compression import decompressed
-from armid_ros.recording.mcap_records import map_file
+from armid_ros.recording.mcap.records import map_file
 from hypothesis import given
 from hypothesis import strategies as st
 import lz4.frame

@@ -17,7 +17,7 @@ import os
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
-from armid_ros.identification.online import OnlineIdentifier, OnlineSettings
+from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.motion import Motion
 from armid_ros.nodes.joint_states import JointStateReader
 from armid_ros.robots import load_robot

@@ -9,7 +9,7 @@ from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.verdict.gap import Overlay
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
-from armid_ros.identification.signals import conditioning
+from armid_ros.identification.rows.signals import conditioning
 import numpy as np
 import pytest
 

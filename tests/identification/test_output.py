@@ -3,7 +3,7 @@
 import json
 
 from armid_ros.identification import identification_document, identify, write_document
-from armid_ros.identification.comparison import compare
+from armid_ros.identification.assess.comparison import compare
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.motion import Motion
 import numpy as np

@@ -5,8 +5,8 @@
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
-from armid_ros.identification.recursive import RecursiveLeastSquares
-from armid_ros.identification.regression import regressions
+from armid_ros.identification.online.recursive import RecursiveLeastSquares
+from armid_ros.identification.rows.regression import regressions
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 import numpy as np

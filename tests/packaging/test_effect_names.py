@@ -12,15 +12,15 @@ import pytest
 LEFT = {
     # what acts on an arm that is shipped
     'cli/demo.py': 3,
-    'simulation/elastic_two_link.py': 4,
+    'elastic/plant/two_link.py': 4,
     # advice and examples for a person
     'cli/record.py': 2,
     'nodes/interaction_identifier.py': 1,
-    'simulation/elastic_plant.py': 3,
-    'simulation/elastic_setup.py': 3,
+    'elastic/plant/plant.py': 3,
+    'elastic/plant/setup.py': 3,
     # fields of springs.json that are called as an effect is
     'cli/springs.py': 4,
-    'identification/two_inertia/output.py': 3,
+    'elastic/identification/output.py': 3,
     # knowledge that effects ought to have
     'diagnosis/next_run/plan.py': 1,
     'diagnosis/search/shapes.py': 2,

@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
+from armid_ros.pair.gait import read_gait
 from armid_ros.pair.gait_cycle import gait_cycle, GaitCycle
 from armid_ros.pair.walkers import walking_pair
-from armid_ros.simulation.gait import read_gait
 import pytest
 
 

@@ -7,8 +7,8 @@ import struct
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording import iter_raw, read_recording, ReadSettings, recover, write_recording
-from armid_ros.recording.mcap_content import walk
-from armid_ros.recording.mcap_records import map_file, MESSAGE
+from armid_ros.recording.mcap.content import walk
+from armid_ros.recording.mcap.records import map_file, MESSAGE
 import numpy as np
 import pytest
 

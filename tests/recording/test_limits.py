@@ -9,7 +9,7 @@ import zlib
 from armid_ros.errors import RecordingError
 from armid_ros.recording import Bag, read_recording, ReadSettings, write_recording
 from armid_ros.recording.compression import decompressed, message_content
-from armid_ros.recording.mcap_records import MAGIC
+from armid_ros.recording.mcap.records import MAGIC
 import lz4.frame
 import pytest
 import zstandard

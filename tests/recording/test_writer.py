@@ -22,7 +22,7 @@ from armid_ros.recording import (
     topics,
     write_recording,
 )
-from armid_ros.recording.mcap_writer import McapWriter
+from armid_ros.recording.mcap.writer import McapWriter
 from armid_ros.recording.message_types import JOINT_STATE, message_type, store_for, STRING
 from armid_ros.recording.writer import DEFAULT_CHUNK_AGE, whole_bag
 from mcap.reader import make_reader

@@ -10,7 +10,7 @@ from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.recording import write_joint_trajectory, write_recording
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.mcap_records import map_file
+from armid_ros.recording.mcap.records import map_file
 from armid_ros.recording.writer import BagWriter
 import numpy as np
 import pytest

@@ -8,7 +8,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, parse_effect
 from armid_ros.errors import ArmidError
 from armid_ros.excitation import Excitation, Limits, random_feasible
-from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.lockstep import EPOCH_NS, replay_lockstep, run_lockstep
 from armid_ros.recording import read_recording, topics
 from armid_ros.robots import load_robot

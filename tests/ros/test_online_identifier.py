@@ -8,7 +8,7 @@ from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import load_model
 from armid_ros.effects import parse_effect
-from armid_ros.identification.online import OnlineIdentifier
+from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.motion import Motion
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.qos import LATCHED

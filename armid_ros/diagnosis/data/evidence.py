@@ -20,7 +20,7 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.sensor_noise import SensorNoise
 from armid_ros.effects.timing import smoothed
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.signals import (
+from armid_ros.identification.rows.signals import (
     Conditioning,
     decimate,
     decimated_samples,

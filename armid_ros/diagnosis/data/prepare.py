@@ -13,9 +13,9 @@ from armid_ros.diagnosis.data.floor import Floor, noise_floor
 from armid_ros.diagnosis.search.fit import excited, fit
 from armid_ros.diagnosis.search.question import with_friction
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.identification.cutoff import cutoff_of_torques
-from armid_ros.identification.interaction_recording import band_of_motion
-from armid_ros.identification.signals import Conditioning, conditioning, MODEL_BANDS
+from armid_ros.identification.fitting.cutoff import cutoff_of_torques
+from armid_ros.identification.rows.signals import Conditioning, conditioning, MODEL_BANDS
+from armid_ros.identification.ties.recorded import band_of_motion
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording

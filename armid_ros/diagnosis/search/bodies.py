@@ -18,7 +18,7 @@ from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.rows import weighted_rows
 from armid_ros.diagnosis.search.explain import Explanation
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.physical import physical_program, PhysicalSettings
+from armid_ros.identification.physical.fit_among_bodies import physical_program, PhysicalSettings
 from armid_ros.motion import FloatArray
 import numpy as np
 import scipy.linalg

@@ -21,9 +21,9 @@ from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
 from armid_ros.effects.load import described_spread
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.identification.least_squares import solve
-from armid_ros.identification.normal_equations import told_solution
-from armid_ros.identification.regression import Regression
+from armid_ros.identification.fitting.least_squares import solve
+from armid_ros.identification.fitting.normal_equations import told_solution
+from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
 import numpy as np

@@ -21,7 +21,7 @@ from functools import cached_property
 
 from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.identification.normal_equations import told_basis
+from armid_ros.identification.fitting.normal_equations import told_basis
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt

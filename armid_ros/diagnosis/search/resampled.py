@@ -17,7 +17,7 @@ from dataclasses import replace
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import fold_rows, make_problem
 from armid_ros.diagnosis.search.fit import Fitted, Told
-from armid_ros.identification.normal_equations import told_basis, told_solution
+from armid_ros.identification.fitting.normal_equations import told_basis, told_solution
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import stats

@@ -23,11 +23,11 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.tied import Tied, TiedInteraction
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.identification.interaction import identify_interaction, Interaction
-from armid_ros.identification.interaction_problem import Inertias, InteractionProblem
-from armid_ros.identification.interaction_recording import stacked, together_interaction_problem
-from armid_ros.identification.interaction_search import LEAST_Z, with_springs
-from armid_ros.identification.signals import Conditioning
+from armid_ros.identification.rows.signals import Conditioning
+from armid_ros.identification.ties.problem import Inertias, InteractionProblem
+from armid_ros.identification.ties.recorded import stacked, together_interaction_problem
+from armid_ros.identification.ties.search import LEAST_Z, with_springs
+from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording

@@ -15,9 +15,9 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects.tied import Tied, TiedSlack
-from armid_ros.identification.interaction_problem import InteractionProblem
-from armid_ros.identification.interaction_recording import together_interaction_problem
-from armid_ros.identification.signals import Conditioning
+from armid_ros.identification.rows.signals import Conditioning
+from armid_ros.identification.ties.problem import InteractionProblem
+from armid_ros.identification.ties.recorded import together_interaction_problem
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot

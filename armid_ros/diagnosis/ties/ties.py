@@ -24,7 +24,7 @@ from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
-from armid_ros.identification.interaction_search import LEAST_Z
+from armid_ros.identification.ties.search import LEAST_Z
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np

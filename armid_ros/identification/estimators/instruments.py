@@ -17,13 +17,13 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError, IdentificationError
-from armid_ros.identification.excited import bounds
-from armid_ros.identification.forward import unlimited
-from armid_ros.identification.least_squares import noise_products
-from armid_ros.identification.nonlinear import FittedValues, linearised, moved, torques
-from armid_ros.identification.regression import filtered_columns, Regression
-from armid_ros.identification.signals import Conditioning, segments
-from armid_ros.identification.triangle import within
+from armid_ros.identification.assess.forward import unlimited
+from armid_ros.identification.fitting.excited import bounds
+from armid_ros.identification.fitting.least_squares import noise_products
+from armid_ros.identification.fitting.nonlinear import FittedValues, linearised, moved, torques
+from armid_ros.identification.fitting.triangle import within
+from armid_ros.identification.rows.regression import filtered_columns, Regression
+from armid_ros.identification.rows.signals import Conditioning, segments
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.simulation import ComputedTorque, Plant, simulate

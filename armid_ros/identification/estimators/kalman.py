@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.excited import bounds
-from armid_ros.identification.nonlinear import FittedValues, moved, torques
-from armid_ros.identification.regression import REST_SPEED
-from armid_ros.identification.signals import (
+from armid_ros.identification.fitting.excited import bounds
+from armid_ros.identification.fitting.nonlinear import FittedValues, moved, torques
+from armid_ros.identification.rows.regression import REST_SPEED
+from armid_ros.identification.rows.signals import (
     Conditioning,
     conditioning,
     decimate,

@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import get_args, Literal
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.least_squares import Method
+from armid_ros.identification.fitting.least_squares import Method
 
 Estimator = Literal['ols', 'wls', 'irls', 'iv', 'cloe', 'ekf']
 

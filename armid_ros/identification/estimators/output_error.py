@@ -20,13 +20,13 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.identification.assess.forward import BANDWIDTH, driven
 from armid_ros.identification.estimators.instruments import at_times
-from armid_ros.identification.excited import bounds
-from armid_ros.identification.forward import BANDWIDTH, driven
-from armid_ros.identification.least_squares import Solution, solve
-from armid_ros.identification.nonlinear import FittedValues, moved, torques
-from armid_ros.identification.regression import filtered_columns, Regression
-from armid_ros.identification.signals import Conditioning, decimate, segments
+from armid_ros.identification.fitting.excited import bounds
+from armid_ros.identification.fitting.least_squares import Solution, solve
+from armid_ros.identification.fitting.nonlinear import FittedValues, moved, torques
+from armid_ros.identification.rows.regression import filtered_columns, Regression
+from armid_ros.identification.rows.signals import Conditioning, decimate, segments
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np

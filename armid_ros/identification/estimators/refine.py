@@ -12,10 +12,10 @@ from armid_ros.identification.estimators.instruments import fit_by_instruments
 from armid_ros.identification.estimators.kalman import fit_by_kalman_filter
 from armid_ros.identification.estimators.names import Estimator, least_squares_of
 from armid_ros.identification.estimators.output_error import fit_output_error
-from armid_ros.identification.nonlinear import FittedValues, ungrouped
-from armid_ros.identification.physical import PhysicalSettings
-from armid_ros.identification.physical_fit import fit_to_bodies
-from armid_ros.identification.signals import Conditioning
+from armid_ros.identification.fitting.nonlinear import FittedValues, ungrouped
+from armid_ros.identification.physical.fit_among_bodies import PhysicalSettings
+from armid_ros.identification.physical.physical_fit import fit_to_bodies
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.recording import Recording
 from armid_ros.simulation import Plant
 import numpy as np

@@ -17,21 +17,21 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
-from armid_ros.identification.consistency import (
+from armid_ros.identification.assess.consistency import (
     calm_recording,
     INSTRUMENT_SHARE,
     position_noise,
 )
+from armid_ros.identification.assess.forward import forward_validation
 from armid_ros.identification.estimators.names import Estimator
-from armid_ros.identification.forward import forward_validation
 from armid_ros.identification.identify import (
     Identification,
     IdentificationSettings,
     identify,
     Score,
 )
-from armid_ros.identification.physical import PhysicalSettings
-from armid_ros.identification.signals import segments, SignalSettings
+from armid_ros.identification.physical.fit_among_bodies import PhysicalSettings
+from armid_ros.identification.rows.signals import segments, SignalSettings
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.simulation import Plant

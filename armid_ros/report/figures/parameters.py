@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 from armid_ros.estimate import Estimate
-from armid_ros.identification.agreement import Agreement
+from armid_ros.identification.assess.agreement import Agreement
 from armid_ros.motion import FloatArray
 from armid_ros.report.families import parameter_families, short_label
 from armid_ros.report.figures.style import (

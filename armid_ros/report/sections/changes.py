@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.identification.comparison import Change, Comparison
-from armid_ros.identification.identifiability import HALF_WIDTH, told_from_zero
+from armid_ros.identification.assess.comparison import Change, Comparison
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH, told_from_zero
 from armid_ros.report.families import parameter_families
 from armid_ros.report.notation import measured, pretty
 from armid_ros.report.page import Section

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.identification.consistency import NoiseCheck
+from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import digits, pretty
 from armid_ros.report.page import Section

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.identification.identifiability import HALF_WIDTH
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.lunar.reproduction import Composite, Repeated
 from armid_ros.motion import FloatArray
 from armid_ros.report.charts import Chart, Series, thinned

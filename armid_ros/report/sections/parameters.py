@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.estimate import Estimate
-from armid_ros.identification.identifiability import HALF_WIDTH, Unidentified
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH, Unidentified
 from armid_ros.motion import FloatArray
 from armid_ros.report.families import full_label, parameter_families
 from armid_ros.report.notation import digits, measured, pretty

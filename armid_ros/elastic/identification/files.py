@@ -1,0 +1,255 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Experiments with a two-link arm as bags.
+
+/joint_states (or /motor/joint_states) has positions, velocities and torques of the motors as seen
+at the joints, /link/joint_states positions and velocities of the links, /reference/joint_states
+what the velocity loops are asked for, and an Imu topic per link the accelerometer on its axis, x
+outwards and y sideways. An experiment is a stretch in which the loops are asked to move: standing
+ends it, and so does a pause in the stamps.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from pathlib import Path
+
+from armid_ros.elastic.plant.run import ElasticRun
+from armid_ros.errors import RecordingError
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import (
+    LATCHED,
+    read_recording,
+    Recording,
+    string_cdr,
+    topics,
+    write_joint_states,
+)
+from armid_ros.recording.elastic_topics import imu_topic, LINK, MOTOR, REFERENCE
+from armid_ros.recording.imu import read_accelerations, write_accelerations
+from armid_ros.recording.message_types import STRING
+from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.writer import whole_bag
+from armid_ros.robots import Robot
+from armid_ros.simulation.accelerometers import LinkAccelerometers
+import numpy as np
+import numpy.typing as npt
+
+#: Where the motors may be instead.
+_OTHER_MOTOR = '/motor/joint_states'
+_PAUSE_NS = 10**9
+#: Share of the samples that all topics have to have.
+_SHARED = 0.9
+#: How long the loops are asked to stand between two experiments [s], and the shortest one [s].
+_STANDING, _SHORTEST = 0.1, 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Accelerometers:
+    """
+    Where the accelerometers of a planar two-link arm are.
+
+    Attributes
+    ----------
+    radius : ndarray, shape (2,)
+        Distance from the axis of each link's own joint [m].
+    length : float
+        From the first axis to the second [m].
+
+    """
+
+    radius: FloatArray
+    length: float
+
+    @classmethod
+    def on(cls, robot: Robot, radius: npt.ArrayLike) -> Accelerometers:
+        """Place accelerometers on a robot, at distances from the joints, shape (2,) [m]."""
+        offset = np.asarray(robot.model.jointPlacements[2].translation)
+        return cls(np.asarray(radius, dtype=float), float(np.hypot(offset[0], offset[1])))
+
+    def on_links(self, robot: Robot) -> LinkAccelerometers:
+        """Return them as sensors of a simulated robot."""
+        return LinkAccelerometers(robot, np.outer(self.radius, [1.0, 0.0, 0.0]))
+
+    def accelerations(
+        self, q: FloatArray, dq: FloatArray, first: FloatArray, second: FloatArray
+    ) -> FloatArray:
+        """
+        Return the angular accelerations of the joints, shape (N, 2) [rad/s^2].
+
+        Parameters
+        ----------
+        q, dq : ndarray, shape (N, 2)
+            Motion of the links.
+        first, second : ndarray, shape (N, 3)
+            Readings; those sideways count.
+
+        """
+        a1 = first[:, 1] / self.radius[0]
+        carried = self.length * (a1 * np.cos(q[:, 1]) + dq[:, 0] ** 2 * np.sin(q[:, 1]))
+        return np.column_stack([a1, (second[:, 1] - carried) / self.radius[1] - a1])
+
+
+def write_runs(
+    path: str | Path, runs: Sequence[ElasticRun], robot: Robot, sensors: LinkAccelerometers
+) -> None:
+    """
+    Write experiments with any arm to a bag, one after the other with a pause of 1 s.
+
+    Raises
+    ------
+    RecordingError
+        The bag exists already.
+
+    """
+    joints = robot.joints
+    with whole_bag(path) as writer:
+        writer.add_topic('/robot_description', STRING, qos=[LATCHED])
+        writer.write('/robot_description', string_cdr(robot.urdf), _PAUSE_NS)
+        start = _PAUSE_NS
+        for run in runs:
+            motor, link = run.motor, run.link
+            stamps = start + np.rint((motor.t - motor.t[0]) * 1e9).astype(np.int64)
+            dt = float(np.median(np.diff(motor.t)))
+            asked = motor.q[0] + dt * np.cumsum(run.reference, axis=0)
+            write_joint_states(writer, MOTOR, joints, stamps, motor.q, motor.dq, motor.tau)
+            write_joint_states(writer, LINK, joints, stamps, link.q, link.dq)
+            write_joint_states(writer, REFERENCE, joints, stamps, asked, run.reference)
+            felt = sensors.readings(link) if run.felt is None else run.felt
+            for name, values in zip(robot.links, felt, strict=True):
+                write_accelerations(writer, imu_topic(name), name, stamps, values)
+            start = int(stamps[-1]) + _PAUSE_NS
+
+
+def read_runs(
+    path: str | Path,
+    robot: Robot,
+    sensors: Accelerometers,
+    settings: ReadSettings = DEFAULT,
+    read: Callable[..., None] | None = None,
+) -> list[ElasticRun]:
+    """
+    Read the experiments of a bag.
+
+    `read` is given the recordings of joint states, which know how they were read.
+
+    Raises
+    ------
+    RecordingError
+        A topic or quantity is missing, the samples of two topics are not of the same time, or the
+        loops are never asked to move.
+
+    """
+    motors = _motor_topic(path, settings)
+    names = (motors, LINK, REFERENCE)
+    recordings = [
+        read_recording(path, joints=robot.joints, topic=topic, settings=settings)
+        for topic in names
+    ]
+    felt = [read_accelerations(path, imu_topic(name), settings) for name in robot.links]
+    if read is not None:
+        read(*recordings)
+    if recordings[0].tau is None or any(recording.dq is None for recording in recordings):
+        raise RecordingError(
+            f'{path}: velocities of {motors}, {LINK} and {REFERENCE}, and torques of {motors}, '
+            'are needed; one of them was not recorded'
+        )
+    stamps = [*map(_microseconds, recordings), *(np.rint(f[0] / 1000).astype(int) for f in felt)]
+    common = _common(path, (*names, *map(imu_topic, robot.links)), stamps)
+    motor, link, asked = (
+        recording.select(np.flatnonzero(np.isin(own, common)))
+        for recording, own in zip(recordings, stamps, strict=False)
+    )
+    first, second = (
+        values[np.searchsorted(own, common, sorter=np.argsort(own))]
+        for (_, values), own in zip(felt, stamps[3:], strict=True)
+    )
+    assert motor.dq is not None and motor.tau is not None
+    assert link.dq is not None and asked.dq is not None
+    ddq = sensors.accelerations(link.q, link.dq, first, second)
+    period = float(np.median(np.diff(motor.t)))
+    left = asked.q - motor.q
+    runs = []
+    for stood, start, stop in _experiments(motor.t, np.any(asked.dq != 0.0, axis=1), period):
+        rows = slice(start, stop)
+        t = np.asarray(period * np.arange(stop - start), dtype=np.float64)
+        zero = np.zeros((stop - start, 2))
+        runs.append(
+            ElasticRun(
+                Motion(robot.joints, t, motor.q[rows], motor.dq[rows], zero, motor.tau[rows]),
+                Motion(robot.joints, t, link.q[rows], link.dq[rows], ddq[rows]),
+                asked.dq[rows],
+                left[stood:start].mean(axis=0) if stood < start else np.zeros(2),
+            )
+        )
+    if not runs:
+        raise RecordingError(
+            f'{path}: {REFERENCE} asks for no motion of {_SHORTEST:g} s or more; record what the '
+            'velocity loops are asked for'
+        )
+    return runs
+
+
+def read_sides(
+    path: str | Path, robot: Robot, settings: ReadSettings = DEFAULT
+) -> tuple[Recording, Recording]:
+    """
+    Read motors and links of any arm from a bag.
+
+    Raises
+    ------
+    RecordingError
+        A topic is missing.
+
+    """
+    motors = _motor_topic(path, settings)
+    motor, link = (
+        read_recording(path, joints=robot.joints, topic=topic, settings=settings)
+        for topic in (motors, LINK)
+    )
+    return motor, link
+
+
+def _motor_topic(path: str | Path, settings: ReadSettings) -> str:
+    names = {topic.name for topic in topics(path, settings)}
+    return _OTHER_MOTOR if _OTHER_MOTOR in names else MOTOR
+
+
+def _experiments(
+    t: FloatArray, moving: npt.NDArray[np.bool_], period: float
+) -> list[tuple[int, int, int]]:
+    """Return stretches of motion: a sample from which on it stood, the first and the end."""
+    pause, shortest = round(_STANDING / period), round(_SHORTEST / period)
+    found = []
+    cuts = np.flatnonzero(np.diff(t) > 1.5 * period) + 1
+    for rows in np.split(np.arange(len(t)), cuts):
+        active = rows[moving[rows]]
+        stood = int(rows[0])
+        for part in np.split(active, np.flatnonzero(np.diff(active) > pause) + 1):
+            if len(part) >= shortest:
+                start = int(part[0])
+                found.append((max(stood, start - pause), start, int(part[-1]) + 1))
+            stood = int(part[-1]) + 1 if len(part) else stood
+    return found
+
+
+def _microseconds(recording: Recording) -> npt.NDArray[np.int64]:
+    return np.asarray(np.rint(recording.start_ns / 1000 + recording.t * 1e6), dtype=np.int64)
+
+
+def _common(
+    path: str | Path, names: Sequence[str], stamps: Sequence[npt.NDArray[np.int64]]
+) -> npt.NDArray[np.int64]:
+    """Return the stamps that all topics have [us]; a few lost messages are no harm."""
+    common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
+    if len(common) < _SHARED * max(map(len, stamps)):
+        counts = ', '.join(f'{name} ({len(s)})' for name, s in zip(names, stamps, strict=True))
+        raise RecordingError(
+            f'{path}: of the samples of {counts} only {len(common)} have the same stamps; stamp '
+            'alike what is measured at one time, and record all of it'
+        )
+    return common

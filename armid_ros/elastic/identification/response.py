@@ -1,0 +1,271 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Closed-loop velocity responses of the two-link arm, with exact derivatives by its parameters.
+
+Many runs at once, as arrays; the derivatives come from the complex step, f(x + ih) = f + ih f',
+through every operation of the integration, friction included: what slips and what sticks is
+decided by the real part. The scheme is the plant's: the Pade approximation (2, 2) of the
+exponential for motors, springs and links, the middle of the step for what is not linear. Squire
+and Trapp 1998 for the complex step.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from armid_ros.elastic.identification.names import SIZE, unpack
+from armid_ros.elastic.plant.run import ElasticRun, VelocityLoop
+from armid_ros.motion import FloatArray
+from armid_ros.robots.two_link import TwoLinkParameters
+import numpy as np
+import numpy.typing as npt
+
+#: Real values, or values with an infinitesimal change as their imaginary part.
+DualArray = npt.NDArray[Any]
+#: Imaginary step: its square is lost in rounding, so the derivative has no truncation error.
+_STEP = 1e-30
+_ROUNDS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """
+    Closed-loop experiments of equal length, to be simulated together.
+
+    Attributes
+    ----------
+    q : ndarray, shape (E, 2)
+        Where the links stand at first [rad].
+    reference : ndarray, shape (N, E, 2)
+        Reference velocities [rad/s].
+    dt : float
+        Time between samples, at which the loop acts [s].
+    loop : VelocityLoop
+        Gains.
+    integral : ndarray, shape (E, 2)
+        What the integral of the loop holds at first [rad].
+    substeps : int
+        Parts that a sample is integrated in.
+
+    """
+
+    q: FloatArray
+    reference: FloatArray
+    dt: float
+    loop: VelocityLoop
+    integral: FloatArray
+    substeps: int = 2
+
+    @classmethod
+    def of(cls, runs: Sequence[ElasticRun], loop: VelocityLoop) -> Steps:
+        """Return the experiments of some runs, as long as the shortest of them."""
+        count = min(len(run.motor) for run in runs)
+        t = runs[0].motor.t
+        return cls(
+            np.array([run.link.q[0] for run in runs]),
+            np.stack([run.reference[:count] for run in runs], axis=1),
+            float(t[-1] - t[0]) / (len(t) - 1),
+            loop,
+            np.array([np.zeros(2) if run.integral is None else run.integral for run in runs]),
+        )
+
+
+def velocities(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
+    """Return velocities of motors (at the joints) and links, shape (N, E, 4) [rad/s]."""
+    values = unpack(parameters)[np.newaxis]
+    return np.asarray(_simulate(steps, values, parameters).real[:, :, 0])
+
+
+def sensitivities(
+    steps: Steps, parameters: TwoLinkParameters, directions: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Return velocities and their derivatives along directions of the parameters.
+
+    Parameters
+    ----------
+    steps : Steps
+        The experiments.
+    parameters : TwoLinkParameters
+        Where to differentiate.
+    directions : ndarray, shape (D, 13) or (D, 15)
+        Changes of the parameters of ``names.unpack``, then of the motors' Coulomb torques; they
+        should be of the size of these.
+
+    Returns
+    -------
+    values : ndarray, shape (N, E, 4)
+        Velocities of motors and links [rad/s].
+    derivatives : ndarray, shape (N, E, 4, D)
+
+    """
+    point = np.concatenate([unpack(parameters), parameters.coulomb])
+    values = point[: directions.shape[1]] + 1j * _STEP * directions
+    found = _simulate(steps, values, parameters)
+    return found[:, :, 0].real, np.moveaxis(found.imag / _STEP, 2, 3)
+
+
+def ringing(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
+    """
+    Return derivatives of the velocities by what an arm at rest may still do.
+
+    Returns
+    -------
+    ndarray, shape (N, E, 4, 4)
+        Of velocities of motors and links, by the twist of both springs [rad] and the velocities of
+        both links [rad/s] at first.
+
+    """
+    values = np.tile(unpack(parameters).astype(complex), (4, 1))
+    found = _simulate(steps, values, parameters, 1j * _STEP * np.eye(4))
+    return np.moveaxis(found.imag / _STEP, 2, 3)
+
+
+def _simulate(
+    steps: Steps, values: DualArray, fixed: TwoLinkParameters, rest: DualArray | None = None
+) -> DualArray:
+    """Run E experiments with D parameter vectors and initial states each; (N, E, D, 4)."""
+    experiments, sets = len(steps.q), len(values)
+    arm = _Arm(np.tile(values, (experiments, 1)), fixed, steps.dt / steps.substeps)
+    size = experiments * sets
+    dtype = values.dtype
+    q2 = np.repeat(steps.q[:, 1], sets).astype(dtype)
+    x = np.zeros((size, 6), dtype)
+    if rest is not None:
+        x[:, [0, 1, 4, 5]] = np.tile(rest, (experiments, 1))
+    dv = np.zeros((size, 4), dtype)
+    modes = np.zeros((size, 2), int)
+    integral = np.repeat(steps.integral, sets, axis=0).astype(dtype)
+    limit = np.repeat(steps.reference, sets, axis=1)
+    out = np.empty((len(steps.reference), size, 4), np.complex128)
+    for k, reference in enumerate(limit):
+        out[k] = x[:, 2:]
+        error = reference - x[:, 2:4]
+        integral = integral + steps.dt * error
+        torque = steps.loop.proportional * error + steps.loop.integral * integral
+        for _ in range(steps.substeps):
+            q2, x, dv, modes = arm.advance(q2, x, dv, modes, torque)
+    return out.reshape(len(out), experiments, sets, 4)
+
+
+class _Arm:
+    """The two links with B parameter vectors, shape (B, 13), for one step of integration."""
+
+    def __init__(self, values: DualArray, fixed: TwoLinkParameters, dt: float):
+        self.alpha, self.beta, self.gamma = values[:, 0], values[:, 1], values[:, 2]
+        self.rotor = values[:, 3:5] * fixed.gear**2
+        self.stiffness = values[:, 5:7]
+        self.link_damping = values[:, 7:9]
+        self.motor_damping = values[:, 9:11] * fixed.gear**2
+        self.spring_damping = values[:, 11:13]
+        free = values.shape[1] > SIZE
+        self.coulomb = values[:, SIZE:] * fixed.gear if free else fixed.joint_coulomb
+        self.dt = dt
+        batch, dtype = len(values), values.dtype
+        self.a = np.zeros((batch, 6, 6), dtype)
+        joints = np.arange(2)
+        self.a[:, joints, 2 + joints] = 1.0
+        self.a[:, joints, 4 + joints] = -1.0
+        self.a[:, 2 + joints, joints] = -self.stiffness / self.rotor
+        self.a[:, 2 + joints, 2 + joints] = (
+            -(self.motor_damping + self.spring_damping) / self.rotor
+        )
+        self.a[:, 2 + joints, 4 + joints] = self.spring_damping / self.rotor
+        # What springs, dampers and friction of the links do to the links, before the inertia.
+        self.pull = np.zeros((batch, 2, 6), dtype)
+        self.pull[:, joints, joints] = self.stiffness
+        self.pull[:, joints, 2 + joints] = self.spring_damping
+        self.pull[:, joints, 4 + joints] = -(self.link_damping + self.spring_damping)
+        self.eye = np.eye(6)
+
+    def advance(
+        self,
+        q2: DualArray,
+        x: DualArray,
+        dv: DualArray,
+        modes: npt.NDArray[np.int_],
+        torque: DualArray,
+    ) -> tuple[DualArray, DualArray, DualArray, npt.NDArray[np.int_]]:
+        """Return angle of joint 2, state, accelerations and friction modes one step later."""
+        dt, a = self.dt, self.a
+        middle = q2 + 0.5 * dt * (x[:, 5] + 0.25 * dt * dv[:, 3])
+        v = x[:, 4:] + 0.5 * dt * dv[:, 2:]
+        inverse, bias = self._links(middle, v)
+        a[:, 4:] = inverse @ self.pull
+        constant = np.zeros_like(x)
+        constant[:, 2:4] = torque / self.rotor
+        constant[:, 4:] = -np.einsum('bij,bj->bi', inverse, bias)
+        z = dt * a
+        even = self.eye + (z @ z) / 12.0
+        right = np.zeros((*x.shape, 3), x.dtype)
+        right[:, :, 0] = np.einsum('bij,bj->bi', even + 0.5 * z, x) + dt * constant
+        right[:, 2, 1], right[:, 3, 2] = dt / self.rotor[:, 0], dt / self.rotor[:, 1]
+        after = np.linalg.solve(even - 0.5 * z, right)
+        response = after[:, :, 1:]
+        rub, modes = _friction(response[:, 2:4], after[:, 2:4, 0], self.coulomb, modes)
+        x_next = after[:, :, 0] - np.einsum('bij,bj->bi', response, rub)
+        constant[:, 2:4] -= rub / self.rotor
+        first = np.einsum('bij,bj->bi', a, x) + constant
+        last = np.einsum('bij,bj->bi', a, x_next) + constant
+        moved = 0.5 * dt * (x + x_next) + dt**2 / 12.0 * (first - last)
+        held = modes == 0
+        still = held & (x[:, 2:4] == 0.0)
+        x_next[:, :2] = np.where(still, x[:, :2] - moved[:, 4:], x_next[:, :2])
+        x_next[:, 2:4] = np.where(held, 0.0, x_next[:, 2:4])
+        return q2 + moved[:, 5], x_next, last[:, 2:], modes
+
+    def _links(self, q2: DualArray, v: DualArray) -> tuple[DualArray, DualArray]:
+        """Return the inverse inertia matrix, (B, 2, 2), and centrifugal torques, (B, 2)."""
+        cosine, sine = self.gamma * np.cos(q2), self.gamma * np.sin(q2)
+        coupling = self.beta + cosine
+        first = self.alpha + self.beta + 2.0 * cosine
+        determinant = first * self.beta - coupling**2
+        inverse = np.empty((len(q2), 2, 2), q2.dtype)
+        inverse[:, 0, 0], inverse[:, 1, 1] = self.beta, first
+        inverse[:, 0, 1] = inverse[:, 1, 0] = -coupling
+        inverse /= determinant[:, np.newaxis, np.newaxis]
+        bias = np.empty_like(v)
+        bias[:, 0] = -sine * (2.0 * v[:, 0] + v[:, 1]) * v[:, 1]
+        bias[:, 1] = sine * v[:, 0] ** 2
+        return inverse, bias
+
+
+def _friction(
+    response: DualArray, free: DualArray, level: DualArray, modes: npt.NDArray[np.int_]
+) -> tuple[DualArray, npt.NDArray[np.int_]]:
+    """
+    Find friction torques: bounds for what slips, whatever stops the rest.
+
+    Parameters
+    ----------
+    response : ndarray, shape (B, 2, 2)
+        Change of velocity at the end of the step per torque.
+    free : ndarray, shape (B, 2)
+        Velocity at the end without friction.
+    level : ndarray, shape (2,) or (B, 2)
+        Coulomb torque.
+    modes : ndarray of int, shape (B, 2)
+        First guess: 1 slips forwards, -1 backwards, 0 sticks.
+
+    """
+    modes = modes.copy()
+    for _ in range(_ROUNDS):
+        stuck = modes == 0
+        system = np.where(stuck[:, :, np.newaxis], response, np.eye(2))
+        right = np.where(stuck, free, level * modes)
+        determinant = system[:, 0, 0] * system[:, 1, 1] - system[:, 0, 1] * system[:, 1, 0]
+        torque = np.empty_like(free)
+        torque[:, 0] = system[:, 1, 1] * right[:, 0] - system[:, 0, 1] * right[:, 1]
+        torque[:, 1] = system[:, 0, 0] * right[:, 1] - system[:, 1, 0] * right[:, 0]
+        torque /= determinant[:, np.newaxis]
+        speed = (free - np.einsum('bij,bj->bi', response, torque)).real
+        over = stuck & (np.abs(torque.real) > level.real * (1.0 + 1e-12))
+        against = ~stuck & (speed * modes < -1e-13)
+        if not np.any(over | against):
+            break
+        modes = np.where(over, np.sign(torque.real).astype(int), np.where(against, 0, modes))
+    return torque, modes

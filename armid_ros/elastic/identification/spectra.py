@@ -1,0 +1,75 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Frequency responses straight from the data, of no model and no order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.elastic.identification.subspace import Signals
+from armid_ros.errors import IdentificationError
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import get_window
+
+ComplexArray = npt.NDArray[np.complex128]
+
+
+def measured_response(
+    experiments: Sequence[Signals],
+    dt: float,
+    *,
+    window: float = 1.0,
+    hold: bool = True,
+) -> tuple[FloatArray, ComplexArray]:
+    """
+    Estimate the frequency response from all inputs to all outputs by averaged spectra (H1).
+
+    Parameters
+    ----------
+    experiments : sequence of Signals
+        With m inputs and p outputs.
+    dt : float
+        Time between samples [s].
+    window : float
+        Length of the averaged stretches [s], half overlapping, under a Hann window.
+    hold : bool
+        Whether the first input is held between samples; its response is then that to the
+        continuous, held signal.
+
+    Returns
+    -------
+    frequency : ndarray, shape (K,)
+        [Hz], zero left out.
+    response : ndarray of complex, shape (K, p, m)
+
+    Raises
+    ------
+    IdentificationError
+        If the data are shorter than one window.
+
+    """
+    size = round(window / dt)
+    taper = get_window('hann', size)[:, np.newaxis]
+    cross: list[ComplexArray] = []
+    power: list[ComplexArray] = []
+    for e in experiments:
+        for start in range(0, len(e.u) - size + 1, size // 2):
+            part = slice(start, start + size)
+            u, y = (
+                np.fft.rfft(taper * (x[part] - x[part].mean(axis=0)), axis=0) for x in (e.u, e.y)
+            )
+            cross.append(np.einsum('kp,km->kpm', y, u.conj()))
+            power.append(np.einsum('kl,km->klm', u, u.conj()))
+    if not cross:
+        raise IdentificationError(
+            f'no experiment is as long as the window of {window:g} s of the spectra'
+        )
+    frequency = np.fft.rfftfreq(size, dt)[1:]
+    inverse = np.linalg.pinv(np.sum(power, axis=0)[1:], rcond=1e-12, hermitian=True)
+    response = np.asarray(np.sum(cross, axis=0)[1:] @ inverse)
+    if hold:
+        s = 2j * np.pi * frequency * dt
+        response[:, :, 0] /= ((1.0 - np.exp(-s)) / s)[:, np.newaxis]
+    return np.asarray(frequency, dtype=np.float64), response

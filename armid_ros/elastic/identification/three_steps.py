@@ -1,0 +1,203 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The three steps, one after the other: from measured experiments to physical parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.elastic.identification.interaction import (
+    decouple,
+    DecoupledJoint,
+    joint_signals,
+)
+from armid_ros.elastic.identification.physical import fit_joint, JointFit
+from armid_ros.elastic.identification.rigid import fit_rigid, RigidFit
+from armid_ros.elastic.identification.spectra import measured_response
+from armid_ros.elastic.identification.tuning import tune, Tuning
+from armid_ros.elastic.plant.run import ElasticRun, VelocityLoop
+from armid_ros.errors import IdentificationError
+from armid_ros.motion import FloatArray
+from armid_ros.robots.two_link import TwoLinkParameters
+import numpy as np
+import numpy.typing as npt
+
+#: Quantiles of the poses that stand for all of them.
+_SHARES = np.linspace(0.02, 0.98, 25)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredJoint:
+    """
+    Frequency responses of one joint as measured: from its motor torque to motor and link velocity.
+
+    Attributes
+    ----------
+    joint : str
+        Its name.
+    frequency : ndarray, shape (K,)
+        [Hz].
+    decoupled, coupled : ndarray of complex, shape (K, 2)
+        With the interaction torque as a second input, and without [rad/s / (N m)].
+
+    """
+
+    joint: str
+    frequency: FloatArray
+    decoupled: npt.NDArray[np.complex128]
+    coupled: npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class TwoInertiaIdentification:
+    """
+    What the three steps found.
+
+    Attributes
+    ----------
+    rigid : RigidFit
+        Step 1.
+    measured : tuple of MeasuredJoint
+        Responses of no model, for comparison.
+    joints : tuple of DecoupledJoint
+        Step 2, of both joints.
+    fits : tuple of JointFit
+        Step 3a, of both joints.
+    untuned : TwoLinkParameters
+        Parameters after step 3a.
+    experiments : int
+        Number of experiments through the resonances.
+    angles : ndarray, shape (S,)
+        Poses of joint 2 that the experiments went through [rad].
+    tuning : Tuning or None
+        Step 3b, where there were step responses.
+
+    """
+
+    rigid: RigidFit
+    measured: tuple[MeasuredJoint, MeasuredJoint]
+    joints: tuple[DecoupledJoint, DecoupledJoint]
+    fits: tuple[JointFit, JointFit]
+    untuned: TwoLinkParameters
+    experiments: int
+    angles: FloatArray
+    tuning: Tuning | None
+
+    @property
+    def parameters(self) -> TwoLinkParameters:
+        """The parameters after the last step."""
+        return self.untuned if self.tuning is None else self.tuning.parameters
+
+
+def identify_two_inertia(
+    runs: Sequence[ElasticRun],
+    drives: TwoLinkParameters,
+    *,
+    steps: Sequence[ElasticRun] = (),
+    loop: VelocityLoop | None = None,
+    start: TwoLinkParameters | None = None,
+    progress: Callable[[float, str], None] | None = None,
+) -> TwoInertiaIdentification:
+    """
+    Identify a planar two-link arm with elastic joints.
+
+    Parameters
+    ----------
+    runs : sequence of ElasticRun
+        Experiments through the resonances, with some slow motion.
+    drives : TwoLinkParameters
+        Gears and torque constants; nothing else of it is used.
+    steps : sequence of ElasticRun
+        Step responses under a velocity loop, for the tuning; none leaves that out.
+    loop : VelocityLoop, optional
+        The loop's gains.
+    start : TwoLinkParameters, optional
+        Where the tuning begins, in place of what step 3a found; Coulomb friction is that of
+        step 1 all the same.
+    progress : callable, optional
+        Is told the share that is done and what comes next.
+
+    Raises
+    ------
+    IdentificationError
+        If the data do not tell; the message says which step, and what to do.
+
+    """
+    if not runs:
+        raise IdentificationError('no experiments through the resonances are given')
+    if steps and loop is None:
+        raise IdentificationError('tuning to step responses needs the gains of their loop')
+
+    def tell(share: float, what: str) -> None:
+        if progress is not None:
+            progress(share, what)
+
+    tell(0.0, 'step 1: rigid arm')
+    rigid = fit_rigid(runs)
+    known = _rigid_guess(rigid, drives)
+    tell(0.05, 'step 2: decoupled joints')
+    joints = decouple(runs, known)
+    tell(0.35, 'measured responses')
+    measured = _measured(runs, known)
+    tell(0.45, 'step 3: physical parameters')
+    fits = fit_joint(joints[0]), fit_joint(joints[1])
+    untuned = _physical(fits, known)
+    tuning = None
+    if steps and loop is not None:
+        tell(0.5, 'step 3: tuning to step responses')
+        begin = untuned if start is None else replace(start, coulomb=untuned.coulomb)
+        tuning = tune(steps, begin, loop)
+    tell(1.0, 'done')
+    angles = np.quantile(np.concatenate([run.link.q[:, 1] for run in runs]), _SHARES)
+    return TwoInertiaIdentification(
+        rigid, measured, joints, fits, untuned, len(runs), angles, tuning
+    )
+
+
+def _rigid_guess(rigid: RigidFit, drives: TwoLinkParameters) -> TwoLinkParameters:
+    """Return what step 1 knows; step 2 takes beta, gamma and the Coulomb torques from it."""
+    first, beta, gamma, rotor = rigid.estimate.values[:4].tolist()
+    if not (first > 0.0 and beta > 0.0 and first * beta > gamma**2):
+        raise IdentificationError(
+            f'step 1 found alpha + mm gear^2 = {first:.3g}, beta = {beta:.3g} and gamma = '
+            f'{gamma:.3g} kg m^2, which no two links have; is the slow motion strong enough, and '
+            'do torques and velocities of a joint have the same sign?'
+        )
+    alpha = max(first - max(rotor, 0.0), 1.01 * gamma**2 / beta)
+    return replace(
+        drives, alpha=alpha, beta=beta, gamma=gamma, coulomb=rigid.coulomb / drives.gear
+    )
+
+
+def _physical(fits: tuple[JointFit, JointFit], known: TwoLinkParameters) -> TwoLinkParameters:
+    def both(name: str) -> FloatArray:
+        return np.array([getattr(fit, name) for fit in fits])
+
+    return replace(
+        known,
+        alpha=fits[0].inertia,
+        beta=fits[1].inertia,
+        motor_inertia=both('rotor') / known.gear**2,
+        stiffness=both('stiffness'),
+        link_damping=both('link_damping'),
+        motor_damping=both('motor_damping') / known.gear**2,
+        spring_damping=both('spring_damping'),
+    )
+
+
+def _measured(
+    runs: Sequence[ElasticRun], known: TwoLinkParameters
+) -> tuple[MeasuredJoint, MeasuredJoint]:
+    t = runs[0].motor.t
+    dt = float(t[-1] - t[0]) / (len(t) - 1)
+    window = min(1.0, min(len(run.motor) for run in runs) * dt)
+    found = []
+    for joint, name in enumerate(runs[0].motor.joints):
+        signals = joint_signals(runs, known, joint, decoupled=True)
+        alone = joint_signals(runs, known, joint, decoupled=False)
+        frequency, decoupled = measured_response(signals, dt, window=window)
+        _, coupled = measured_response(alone, dt, window=window)
+        found.append(MeasuredJoint(name, frequency, decoupled[:, :, 0], coupled[:, :, 0]))
+    first, second = found
+    return first, second

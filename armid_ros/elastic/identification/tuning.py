@@ -1,0 +1,256 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Step 3b: the parameters that make simulated velocity responses the measured ones.
+
+Nonlinear least squares in the logarithms of the parameters, which keeps them positive and makes
+every one a scale factor. A rigid motion shows the sum of the viscous frictions of motor and link
+of a joint, dl + dm gear^2, alone, and what a vibration shows of their difference is far below its
+noise: free, the fit runs away with much noise; tied to the split of the start, which is not right,
+the error of the split goes into the stiffness, and no interval knows. So the split is believed to
+a factor of two, and the data decide how much of that is left. Coulomb torques begin where step 1
+has them and are free: taken for known, their error would go into all others. Nor does an arm that
+stands stand still: what its springs still ring with is noise of a known course in the velocities.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.elastic.identification.names import pack, parameter_names, SIZE, unpack
+from armid_ros.elastic.identification.response import (
+    ringing,
+    sensitivities,
+    Steps,
+    velocities,
+)
+from armid_ros.elastic.plant.run import ElasticRun, VelocityLoop
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate
+from armid_ros.motion import FloatArray
+from armid_ros.robots.two_link import TwoLinkParameters
+import numpy as np
+from scipy.optimize import least_squares
+
+#: Places of dl and dm of both joints in the parameter vector, and of the Coulomb torques after it.
+_LINK, _MOTOR = (7, 8), (9, 10)
+_COULOMB = (SIZE, SIZE + 1)
+#: How far the split of friction and the Coulomb torques are believed: logarithms, one deviation.
+_SPLIT, _BELIEVED = np.log(2.0), 0.1
+#: What an arm that stands may still do, one deviation: twist of the springs [rad], velocity of the
+#: links [rad/s]. Some tenths of a second after a step of 1 rad/s that is left.
+_RINGING = np.array([1e-5, 1e-5, 1e-3, 1e-3])
+_ROUNDS = 3
+#: Residuals are looked at for this share of an experiment for whether they last (1 / share).
+_LASTING = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Tuning:
+    """
+    Parameters tuned to closed-loop responses.
+
+    Attributes
+    ----------
+    parameters : TwoLinkParameters
+        The result.
+    estimate : Estimate
+        The thirteen values and their covariance, Coulomb torques free beside them.
+    steps : Steps
+        The experiments.
+    measured, before, after : ndarray, shape (N, E, 4)
+        Velocities of motors and links [rad/s], measured and simulated with the parameters at
+        the start and at the end.
+    evaluations : int
+        Simulations of all experiments with derivatives.
+
+    """
+
+    parameters: TwoLinkParameters
+    estimate: Estimate
+    steps: Steps
+    measured: FloatArray
+    before: FloatArray
+    after: FloatArray
+    evaluations: int
+
+    @property
+    def rms(self) -> tuple[float, float]:
+        """Root mean square of what is not explained before and after, noise included [rad/s]."""
+        return (
+            float(np.sqrt(np.mean((self.before - self.measured) ** 2))),
+            float(np.sqrt(np.mean((self.after - self.measured) ** 2))),
+        )
+
+
+def believed(split: float = _SPLIT) -> FloatArray:
+    """
+    Return what is believed of the logarithms of factors, a row of unit deviation each, (4, 15).
+
+    Parameters
+    ----------
+    split : float
+        How far that of motor and link friction is, one deviation.
+
+    """
+    rows = np.zeros((4, SIZE + 2))
+    for row, (link, motor) in enumerate(zip(_LINK, _MOTOR, strict=True)):
+        rows[row, link], rows[row, motor] = 1.0 / split, -1.0 / split
+    rows[[2, 3], list(_COULOMB)] = 1.0 / _BELIEVED
+    return rows
+
+
+def tune(
+    runs: Sequence[ElasticRun],
+    start: TwoLinkParameters,
+    loop: VelocityLoop,
+    *,
+    split: float = _SPLIT,
+    links_only: bool = False,
+) -> Tuning:
+    """
+    Tune the parameters to velocity responses under the loop that drove them.
+
+    Parameters
+    ----------
+    runs : sequence of ElasticRun
+        Measured responses to steps of the reference, from rest.
+    start : TwoLinkParameters
+        Where to begin; its drives stay.
+    loop : VelocityLoop
+        Gains of the loop.
+    split : float
+        How far the split of friction between motor and link of the start is believed: logarithm
+        of a factor, one standard deviation.
+    links_only : bool
+        Whether the velocities of the motors are left out.
+
+    Raises
+    ------
+    IdentificationError
+        If there are no runs, or the responses do not determine the factors.
+
+    """
+    if not runs:
+        raise IdentificationError('tuning needs step responses, and there are none')
+    steps = Steps.of(runs, loop)
+    count = len(steps.reference)
+    measured = np.stack(
+        [np.hstack([run.motor.dq[:count], run.link.dq[:count]]) for run in runs], axis=1
+    )
+    chosen = slice(2, 4) if links_only else slice(0, 4)
+    base = np.concatenate([unpack(start), start.coulomb])
+    prior = believed(split)
+    weight = np.ones(measured[:, :, chosen].shape[-1])
+    white = _Whitener.of(steps, start, chosen, weight)
+
+    def arm(factors: FloatArray) -> TwoLinkParameters:
+        values = base * np.exp(factors)
+        return replace(pack(values[:SIZE], start), coulomb=values[SIZE:])
+
+    def residual(factors: FloatArray) -> FloatArray:
+        simulated = velocities(steps, arm(factors))
+        left = white((simulated - measured)[:, :, chosen, np.newaxis] / weight[:, np.newaxis])
+        return np.concatenate([left.ravel(), prior @ factors])
+
+    def jacobian(factors: FloatArray) -> FloatArray:
+        now = base * np.exp(factors)
+        _, slopes = sensitivities(steps, arm(factors), np.diag(now))
+        slopes = white(slopes[:, :, chosen] / weight[:, np.newaxis])
+        return np.vstack([slopes.reshape(-1, len(base)), prior])
+
+    factors, evaluations = np.zeros(len(base)), 0
+    for _ in range(_ROUNDS):  # from the second on every sensor counts by its own noise
+        fit = least_squares(
+            residual, factors, jac=jacobian, method='trf', x_scale='jac', xtol=1e-9
+        )
+        factors, evaluations = fit.x, evaluations + fit.njev
+        left = fit.fun[: -len(prior)].reshape(-1, len(weight)) * weight
+        weight = np.sqrt(np.mean(left**2, axis=0)) + 1e-12
+        white = _Whitener.of(steps, arm(factors), chosen, weight)
+    after = arm(factors)
+    found = unpack(after)
+    rows, left = jacobian(factors), residual(factors)
+    relative = _covariance(rows) * _lasting(rows, left, measured.shape[:2])
+    relative = relative[:SIZE, :SIZE]
+    return Tuning(
+        after,
+        Estimate(parameter_names(runs[0].motor.joints), found, relative * np.outer(found, found)),
+        steps,
+        measured,
+        velocities(steps, start),
+        velocities(steps, after),
+        evaluations,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Whitener:
+    """What arms that ring at first put into velocities is taken from them."""
+
+    shapes: FloatArray  # (E, 4, N C): how ringing looks, orthonormal
+    shares: FloatArray  # (E, 4): what of each is taken away
+
+    @classmethod
+    def of(
+        cls, steps: Steps, parameters: TwoLinkParameters, chosen: slice, weight: FloatArray
+    ) -> _Whitener:
+        slopes = ringing(steps, parameters)[:, :, chosen] * _RINGING / weight[:, np.newaxis]
+        flat = np.moveaxis(slopes, 1, 0).reshape(slopes.shape[1], -1, slopes.shape[3])
+        shapes, sizes, _ = np.linalg.svd(flat, full_matrices=False)
+        return cls(shapes.transpose(0, 2, 1), 1.0 - 1.0 / np.sqrt(1.0 + sizes**2))
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """Whiten values of shape (N, E, C, D)."""
+        flat = np.moveaxis(values, 1, 0).reshape(values.shape[1], -1, values.shape[3])
+        part = self.shares[..., np.newaxis] * (self.shapes @ flat)
+        clean = flat - self.shapes.transpose(0, 2, 1) @ part
+        count, experiments, channels, columns = values.shape
+        clean = clean.reshape(experiments, count, channels, columns)
+        return np.asarray(np.moveaxis(clean, 0, 1))
+
+
+def _lasting(jacobian: FloatArray, residual: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """
+    Return how much wider covariances are where residuals last, shape (F, F), 1 for white noise.
+
+    Parameters
+    ----------
+    jacobian, residual : ndarray, shapes (K, F) and (K,)
+        Of samples, experiments and channels, in this order, and what is believed after them.
+    shape : tuple of int
+        Samples and experiments.
+
+    """
+    count, experiments = shape
+    data = len(residual) - len(believed())
+    scores = (jacobian * residual[:, np.newaxis])[:data]
+    scores = scores.reshape(count, experiments, -1, jacobian.shape[1]).sum(axis=2)
+    seen = jacobian[data:].T @ jacobian[data:]
+    lags = max(1, count // _LASTING)
+    for lag in range(lags):
+        product = np.einsum('nep,neq->pq', scores[: count - lag], scores[lag:])
+        seen = seen + (1.0 - lag / lags) * (product if lag == 0 else product + product.T)
+    white = _covariance(jacobian)
+    ratio = np.diag(white @ seen @ white) / np.diag(white)
+    factor = np.sqrt(np.maximum(ratio, 1.0))
+    return np.outer(factor, factor)
+
+
+def _covariance(jacobian: FloatArray) -> FloatArray:
+    """Return the covariance of the factors where the residuals have unit variance."""
+    scale = np.linalg.norm(jacobian, axis=0)
+    if np.any(scale == 0.0):
+        raise IdentificationError(
+            'the step responses do not depend on every parameter; do both joints move in them?'
+        )
+    _, sizes, rows = np.linalg.svd(jacobian / scale, full_matrices=False)
+    if sizes[-1] < 1e-10 * sizes[0]:
+        raise IdentificationError(
+            'the step responses do not tell the parameters apart; add steps of both joints, in '
+            'several poses'
+        )
+    half = rows.T / sizes
+    return np.asarray(half @ half.T / np.outer(scale, scale))

@@ -1,0 +1,113 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From an arm model to a simulated arm with elastic joints, drives and sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.arm import ArmModel
+from armid_ros.elastic.plant.arm import ElasticArm
+from armid_ros.elastic.plant.motor_control import MotorControl
+from armid_ros.elastic.plant.plant import ElasticPlant
+from armid_ros.elastic.plant.run import VelocityLoop
+from armid_ros.elastic.plant.two_link import two_link_arm, two_link_loop
+from armid_ros.robots import Robot
+from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkSet
+from armid_ros.simulation.accelerometers import LinkAccelerometers
+from armid_ros.simulation.sensors import Sensors
+import numpy as np
+import numpy.typing as npt
+
+
+def shipped_arm(robot: Robot) -> tuple[ArmModel, TwoLinkSet | None]:
+    """
+    Return a robot as it is shipped: its effects, and its drives where they are known.
+
+    That is the bare robot, but for the two-link arm, whose springs, friction and drives are in
+    its parameter set 'after'.
+
+    """
+    if robot.name != ROBOT:
+        return ArmModel(robot), None
+    shipped = two_link_set('after')
+    return two_link_arm(shipped.parameters, robot), shipped
+
+
+def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """
+    Return the joints whose transmissions are springs: those with rotors, and those without.
+
+    A motor without inertia has no motion of its own; its spring can only be simulated as a twist
+    that follows the load at once.
+
+    """
+    action, joints = arm.action(), arm.robot.joints
+    if action.transmission is None:
+        return (), ()
+    rotor = np.zeros(len(joints)) if action.inertia is None else np.diag(action.inertia)
+    springs = np.flatnonzero(np.isfinite(action.transmission.stiffness))
+    with_rotor = tuple(joints[j] for j in springs if rotor[j] > 0.0)
+    return with_rotor, tuple(joints[j] for j in springs if rotor[j] <= 0.0)
+
+
+def no_rotor(joints: Sequence[str]) -> str:
+    """Say what becomes of springs whose motors have no inertia."""
+    return (
+        f'{", ".join(joints)}: joint_elasticity without rotor_inertia, so that no motor moves on '
+        'its own: all joints are simulated as rigid ones whose encoders read the twist under '
+        'load; add rotor_inertia to have vibrations'
+    )
+
+
+def make_elastic_arm(
+    arm: ArmModel,
+    *,
+    rng: np.random.Generator,
+    drives: TwoLinkSet | None = None,
+    gain: float = 1.0,
+    dt: float = 1e-3,
+    sensors: Sensors | None = None,
+    start: npt.ArrayLike | None = None,
+) -> ElasticArm:
+    """
+    Make a simulated arm with elastic joints.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        With joint_elasticity and rotor_inertia.
+    rng : numpy.random.Generator
+        Source of the sensors' noise.
+    drives : TwoLinkSet, optional
+        Velocity loops, friction of the links and places of the accelerometers of the two-link
+        arm; other arms get loops that suit them, led by their own model.
+    gain : float
+        Share of the gains of the loops.
+    dt : float
+        Step of plant and loops [s].
+    sensors, start
+        As for `ElasticArm`.
+
+    Raises
+    ------
+    ModelError
+        If no joint gives way, or the motor of one that does has no inertia.
+
+    """
+    if drives is None:
+        plant, places = ElasticPlant(arm, dt), None
+        control = MotorControl.of(plant)
+    else:
+        plant = ElasticPlant(arm, dt, link_damping=drives.parameters.link_damping)
+        control = MotorControl(two_link_loop(drives))
+        places = np.outer(drives.assumptions['accelerometer_radius'], [1.0, 0.0, 0.0])
+    loop = VelocityLoop(gain * control.loop.proportional, gain * control.loop.integral)
+    return ElasticArm(
+        plant,
+        rng=rng,
+        control=MotorControl(loop, control.guide),
+        sensors=sensors,
+        accelerometers=LinkAccelerometers(plant.robot, places),
+        start=start,
+    )

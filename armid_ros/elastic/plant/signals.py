@@ -1,0 +1,134 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Experiments that show the springs of an arm: multisines through the resonances, and steps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.elastic.plant.run import Experiment
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+
+#: For the shipped two-link arm: torque of the multisine [N m] rms, the share of the loop's gains
+#: it runs under, and steps of velocity [rad/s] in poses [rad] that tell all parameters apart.
+EXCITATION_RMS, WEAK = (60.0, 45.0), 0.15
+STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 4))
+STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
+
+
+def multisine(
+    count: int,
+    dt: float,
+    band: tuple[float, float],
+    rms: npt.ArrayLike,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """
+    Return one period of sines of equal size and random phase at every frequency of a band.
+
+    Parameters
+    ----------
+    count : int
+        Samples of the period.
+    dt : float
+        Time between samples [s].
+    band : tuple of float
+        Lowest and highest frequency [Hz].
+    rms : array_like, shape (n,)
+        Root mean square of each signal.
+    rng : numpy.random.Generator
+        Source of the phases.
+
+    Returns
+    -------
+    ndarray, shape (count, n)
+
+    """
+    size = np.asarray(rms, dtype=float)
+    frequency = np.fft.rfftfreq(count, dt)
+    inside = (frequency >= band[0]) & (frequency <= band[1])
+    spectrum = np.zeros((len(frequency), len(size)), dtype=complex)
+    spectrum[inside] = np.exp(2j * np.pi * rng.random((int(inside.sum()), len(size))))
+    signal = np.fft.irfft(spectrum, count, axis=0)
+    return np.asarray(size * signal / np.sqrt(np.mean(signal**2, axis=0)))
+
+
+def resonance_experiments(
+    count: int,
+    *,
+    rms: npt.ArrayLike,
+    rng: np.random.Generator,
+    duration: float = 4.0,
+    dt: float = 1e-3,
+    band: tuple[float, float] = (2.0, 100.0),
+    speed: npt.ArrayLike = 0.8,
+    slow: tuple[float, float] = (0.3, 1.0),
+    reach: npt.ArrayLike = np.pi / 3.0,
+) -> list[Experiment]:
+    """
+    Return experiments that excite all joints through their resonances, in many poses.
+
+    Motors follow a slow sine of velocity under a loop of low gain, so that friction has one sign
+    most of the time, and get a multisine of torque on top. Poses are random, around the arm
+    stretched, where links act on each other most.
+
+    Parameters
+    ----------
+    count : int
+        Number of experiments.
+    rms : array_like, shape (n,)
+        Of the torque of the multisine [N m].
+    rng : numpy.random.Generator
+        Source of phases and poses.
+    duration, dt : float
+        Of each experiment, and its step [s].
+    band : tuple of float
+        Of the multisine [Hz].
+    speed : array_like
+        Amplitude of the slow velocity [rad/s].
+    slow : tuple of float
+        Lowest and highest frequency of it [Hz]; each experiment has its own.
+    reach : array_like
+        How far the links begin from zero at most [rad].
+
+    """
+    size, far = np.asarray(rms, dtype=float), np.asarray(reach, dtype=float)
+    steps = round(duration / dt)
+    t = dt * np.arange(steps)[:, np.newaxis]
+    experiments = []
+    for _ in range(count):
+        rate = 2.0 * np.pi * rng.uniform(*slow, len(size))
+        phase = 2.0 * np.pi * rng.random(len(size))
+        ramp = np.minimum(t / 0.2, 1.0)
+        velocity = ramp * np.asarray(speed) * np.cos(rate * t + phase)
+        torque = ramp * multisine(steps, dt, band, size, rng)
+        pose = far * rng.uniform(-1.0, 1.0, len(size))
+        experiments.append(Experiment(pose, velocity, torque))
+    return experiments
+
+
+def step_experiments(
+    poses: Sequence[npt.ArrayLike],
+    velocities: Sequence[npt.ArrayLike],
+    *,
+    duration: float = 0.5,
+    dt: float = 1e-3,
+) -> list[Experiment]:
+    """
+    Return steps of the reference velocity from rest.
+
+    Parameters
+    ----------
+    poses, velocities : sequence of array_like, each of shape (n,)
+        Where each begins [rad], and what it asks for [rad/s].
+    duration, dt : float
+        Of each experiment, and its step [s].
+
+    """
+    steps = round(duration / dt)
+    return [
+        Experiment(np.asarray(q, dtype=float), np.tile(np.asarray(v, dtype=float), (steps, 1)))
+        for q, v in zip(poses, velocities, strict=True)
+    ]

@@ -1,0 +1,104 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report of two links on springs: how stiff they are, and how the joints answer."""
+
+from __future__ import annotations
+
+from armid_ros.elastic.identification import (
+    decibel_error,
+    ideal_response,
+    TwoInertiaIdentification,
+)
+from armid_ros.elastic.report.parameters import ElasticParameters, RigidParameters
+from armid_ros.elastic.report.steps import COMPARED, Responses, StepResponses
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.report.notation import counted, digits
+from armid_ros.report.page import Page, Section
+from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.origin import Origin
+from armid_ros.report.sections.verdict import Verdict
+from armid_ros.robots.two_link import TwoLinkParameters
+
+#: How far the measured, decoupled response may be from that of the parameters [dB rms].
+_CLOSE_DB = 0.5
+
+
+def elastic_report(
+    result: TwoInertiaIdentification,
+    robot: str,
+    *,
+    known: TwoLinkParameters | None = None,
+    source: str = '',
+    provenance: Provenance | None = None,
+) -> str:
+    """
+    Return report.html of an identification of elastic joints.
+
+    Parameters
+    ----------
+    result : TwoInertiaIdentification
+        What the three steps found.
+    robot : str
+        Its name.
+    known : TwoLinkParameters, optional
+        What the parameters are compared with.
+    source : str
+        Where that comes from, in words.
+    provenance : Provenance, optional
+        Files, versions, settings, seed.
+
+    """
+    sections: list[Section] = [_verdict(result), Responses(result)]
+    if result.tuning is not None:
+        sections.append(StepResponses(result.tuning))
+    sections += [
+        ElasticParameters(result, known, source),
+        RigidParameters(result.rigid),
+        Origin(provenance or Provenance()),
+    ]
+    steps = 0 if result.tuning is None else result.tuning.measured.shape[1]
+    subtitle = f'{robot} · {counted(result.experiments, "experiment")} through the resonances'
+    subtitle += f' · {counted(steps, "step response")}'
+    return Page(f'Elastic joints of {robot}', subtitle, sections).html()
+
+
+def _verdict(result: TwoInertiaIdentification) -> Verdict:
+    """Say how stiff the springs are, how surely, and what is not known."""
+    springs = []
+    for k, joint in enumerate(result.joints):
+        value = f'{result.parameters.stiffness[k]:.0f}'
+        if result.tuning is not None:
+            estimate = result.tuning.estimate
+            value += f' ± {HALF_WIDTH * estimate.std[estimate.index("kg", joint.joint)]:.0f}'
+        springs.append(f'{value} N m/rad at {joint.joint}')
+    interval = ' (95 %)' if result.tuning is not None else ''
+    sentences = [f'The springs have {" and ".join(springs)}{interval}.']
+    poor = [joint.joint for k, joint in enumerate(result.joints) if _apart(result, k) > _CLOSE_DB]
+    beware = (
+        [
+            f'{", ".join(poor)}: what was measured is not the response of a motor and a link on a '
+            f'spring, by more than {_CLOSE_DB:g} dB; look at the frequency responses.'
+        ]
+        if poor
+        else []
+    )
+    if result.tuning is None:
+        beware.append('Without step responses the parameters have no intervals.')
+    else:
+        before, after = result.tuning.rms
+        sentences.append(
+            f'Of the step responses {digits(before)} rad/s rms was unexplained before tuning and '
+            f'{digits(after)} rad/s is after it, noise included.'
+        )
+        beware.append(
+            'Viscous friction of link and motor are known as a sum; their shares are not.'
+        )
+    return Verdict('uncertain' if poor else 'found', 'fair' if poor else 'good', sentences, beware)
+
+
+def _apart(result: TwoInertiaIdentification, joint: int) -> float:
+    """Return how far measured and physical responses of a joint are apart, 5 to 60 Hz [dB]."""
+    measured = result.measured[joint]
+    seen = (measured.frequency >= COMPARED[0]) & (measured.frequency <= COMPARED[1])
+    ideal = ideal_response(result.parameters, joint, measured.frequency[seen])[:, 0, 0]
+    return decibel_error(measured.decoupled[seen, 0], ideal)

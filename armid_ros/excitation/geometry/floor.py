@@ -1,0 +1,185 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The floor that an arm must not hit, which no URDF names.
+
+It is given as a height, or a file beside the description says it, or it is the base plane of an
+arm that stands. Of an arm that hangs, or reaches below its base, nobody can tell: it is asked for.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation.geometry.environment import Obstacle
+from armid_ros.excitation.geometry.heights import link_heights, vertical, zero_pose
+from armid_ros.excitation.random_trajectory import UNLIMITED_HALF_RANGE
+from armid_ros.motion import FloatArray, read_only
+from armid_ros.robots import CollisionModel, read_mounting, Robot
+import numpy as np
+
+#: Name of the floor as an obstacle.
+FLOOR = 'floor'
+#: What --floor takes where there is none.
+NO_FLOOR = 'none'
+#: An arm that stands reaches above its base plane this many times as far as below it, at zero:
+#: stretched out, the wrist of a small industrial arm hangs a third of its shoulder's height below.
+_ABOVE_TO_BELOW = 2.0
+#: Poses in which it is looked whether a link can be clear of the floor at all.
+_POSES = 400
+_SEED = 0
+
+
+@dataclass(frozen=True)
+class Floor:
+    """
+    The floor of an arm.
+
+    Attributes
+    ----------
+    height : float or None
+        Above the origin of the base, along ``up`` [m]; None: no floor is checked.
+    up : ndarray, shape (3,)
+        Normal of the floor in the base frame, a unit vector.
+    source : str
+        Who says so: 'given', 'base plane', 'environment', or the file that does.
+
+    """
+
+    height: float | None
+    up: FloatArray
+    source: str
+
+    def __post_init__(self) -> None:
+        """Freeze the normal."""
+        object.__setattr__(self, 'up', read_only(self.up))
+
+    def __str__(self) -> str:
+        """Say it in a few words."""
+        if self.height is None:
+            return f'none ({self.source})'
+        return f'{self.height:g} m above the base ({self.source})'
+
+
+def find_floor(
+    collision: CollisionModel, given: str | None = None, surroundings: Sequence[Obstacle] = ()
+) -> Floor:
+    """
+    Find out where the floor of an arm is.
+
+    Parameters
+    ----------
+    collision : CollisionModel
+        The arm and its bodies.
+    given : str, optional
+        Height above the origin of the base along the vertical [m], or 'none'.
+    surroundings : sequence of Obstacle
+        What stands around the arm; where there is something, no floor is assumed.
+
+    Raises
+    ------
+    TrajectoryError
+        If what is given is neither, or the arm does not stand on its base plane and nobody says
+        where its floor is.
+
+    """
+    robot = collision.robot
+    up = vertical(robot.gravity)
+    if given:
+        return Floor(_height(given), up, 'given')
+    if surroundings:
+        return Floor(None, up, 'environment')
+    mounting = read_mounting(robot)
+    if mounting is not None:
+        return Floor(mounting.floor, up, mounting.path.name)
+    reason = _why_not_standing(collision, up)
+    if reason:
+        raise TrajectoryError(
+            f'{robot.name}: {reason}, so its base plane is not its floor; say how high the floor '
+            f'is above the origin of the base [m], --floor Z, or --floor {NO_FLOOR}'
+        )
+    return Floor(0.0, np.array([0.0, 0.0, 1.0]), 'base plane')
+
+
+def floor_obstacles(
+    collision: CollisionModel, floor: Floor, margin: float
+) -> tuple[Obstacle, ...]:
+    """
+    Return the floor as an obstacle, if there is one.
+
+    Links that are nowhere clear of it touch it by construction, such as the turret that turns on
+    the base; it ignores them.
+
+    Parameters
+    ----------
+    collision : CollisionModel
+        The arm and its bodies.
+    floor : Floor
+        Where it is.
+    margin : float
+        Clearance to keep [m].
+
+    """
+    if floor.height is None:
+        return ()
+    position = floor.height * floor.up
+    x, y, z = floor.up
+    rpy = (-math.asin(float(np.clip(y, -1.0, 1.0))), math.atan2(x, z), 0.0)
+    touching = touching_links(collision, floor, margin)
+    return (Obstacle(FLOOR, 'plane', (), tuple(position), rpy, ignore=touching),)
+
+
+def touching_links(collision: CollisionModel, floor: Floor, margin: float) -> tuple[str, ...]:
+    """Return the moving links that no pose takes further from the floor than a margin [m]."""
+    assert floor.height is not None
+    robot = collision.robot
+    lower, upper = _range(robot)
+    q = np.random.default_rng(_SEED).uniform(lower, upper, (_POSES, robot.n_joints))
+    highest: dict[str, FloatArray] = {}
+    for link, lowest, _ in link_heights(collision, floor.up, q):
+        highest[link] = np.minimum(highest.get(link, np.inf), lowest)
+    return tuple(link for link, lowest in highest.items() if lowest.max() < floor.height + margin)
+
+
+def _range(robot: Robot) -> tuple[FloatArray, FloatArray]:
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -UNLIMITED_HALF_RANGE)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, UNLIMITED_HALF_RANGE)
+    return lower, upper
+
+
+def _height(text: str) -> float | None:
+    if text.strip().lower() == NO_FLOOR:
+        return None
+    try:
+        height = float(text)
+    except ValueError:
+        height = math.nan
+    if not math.isfinite(height):
+        raise TrajectoryError(
+            f"floor: a height above the origin of the base [m], or {NO_FLOOR}; not '{text}'"
+        )
+    return height
+
+
+def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
+    """Say why the floor of an arm is not its base plane; empty when it is."""
+    normal = np.array([0.0, 0.0, 1.0])
+    if up[2] < np.cos(np.pi / 4.0):
+        return 'gravity does not pull it onto its base plane'
+    q = zero_pose(collision.robot)[np.newaxis]
+    heights = [
+        (link, float(low[0]), float(high[0]))
+        for link, low, high in link_heights(collision, normal, q, fixed=True)
+    ]
+    link, below, _ = min(heights, key=lambda entry: entry[1])
+    above = max(high for _, _, high in heights)
+    if above > 0.0 and above >= -_ABOVE_TO_BELOW * below:
+        return ''
+    return (
+        f'with all joints at zero it reaches {max(above, 0.0):.2f} m above its base plane and '
+        f'{max(-below, 0.0):.2f} m below it ({link})'
+    )

@@ -1,0 +1,223 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The limits as smooth constraints on the Fourier coefficients.
+
+Each limit of each joint is one constraint, c <= 0: the soft maximum (Kreisselmeier and Steinhauser
+1979) of its excess over all samples, relative to the limit. A soft maximum is never below the
+maximum, so a trajectory that meets the constraints meets the limits in every sample; what it
+gives away is at most log(samples) / sharpness.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from armid_ros.arm import TorqueSlope
+from armid_ros.excitation.fourier import fourier_basis
+from armid_ros.excitation.geometry.clearance import ClearanceModel
+from armid_ros.excitation.problem import Problem
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+import numpy.typing as npt
+
+#: Distance over which the clearance counts as one unit of a constraint [m].
+_CLEARANCE_UNIT = 0.1
+
+#: Bodies further apart than the margin by this many units are not measured: at a sharpness of
+#: 60, exp(-36) of them enters the soft maximum.
+_CLEARANCE_REACH = 0.6
+
+#: Stretches of the period, each with a clearance constraint of its own: a step of the solver is
+#: bent around several near encounters at once.
+_STRETCHES = 20
+
+#: Samples per sample of the settings at which position, velocity and acceleration are looked at,
+#: and those at which torque and clearance are.
+_DENSE, _STATES = 3, 2
+
+#: Values of some constraints, and what works out their gradients.
+Part = tuple[FloatArray, Callable[[], FloatArray]]
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """
+    Position, velocity, acceleration, torque and clearance as functions of the coefficients.
+
+    Attributes
+    ----------
+    problem : Problem
+        Gives limits and prior model.
+    clearance : ClearanceModel or None
+        Bodies to keep apart.
+    margin : float
+        Clearance to keep [m].
+    reserve : float
+        Share of every limit that is kept free for what happens between the samples.
+    sharpness : float
+        Of the soft maximum.
+    dense : tuple of ndarray, each of shape (M, 1 + 2 H)
+        q, dq and ddq per coefficient, where position, velocity and acceleration are looked at.
+    t : ndarray, shape (N,)
+        Times at which torque and clearance are looked at [s].
+    basis : tuple of ndarray, each of shape (N, 1 + 2 H)
+        q, dq and ddq per coefficient at these times.
+
+    """
+
+    problem: Problem
+    clearance: ClearanceModel | None
+    margin: float
+    reserve: float
+    sharpness: float
+    dense: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
+    t: FloatArray = field(repr=False)
+    basis: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        clearance: ClearanceModel | None,
+        *,
+        margin: float,
+        reserve: float,
+        sharpness: float,
+        more_times: FloatArray,
+    ) -> Constraints:
+        """Prepare for evenly spaced times, and more of them for torque and clearance."""
+        settings = problem.settings
+        period, harmonics = settings.period, settings.harmonics
+        dense: FloatArray = np.linspace(0.0, period, _DENSE * settings.samples, endpoint=False)
+        states: FloatArray = np.linspace(0.0, period, _STATES * settings.samples, endpoint=False)
+        times = np.unique(np.concatenate([states, more_times]))
+        return cls(
+            problem,
+            clearance,
+            margin,
+            reserve,
+            sharpness,
+            fourier_basis(dense, period, harmonics),
+            times,
+            fourier_basis(times, period, harmonics),
+        )
+
+    def value(self, x: FloatArray) -> Part:
+        """
+        Return the constraints, and what works out their gradients.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n, 1 + 2 H)
+            Coefficients.
+
+        Returns
+        -------
+        values : ndarray, shape (m,)
+            Not positive where the limit is kept.
+        gradients : callable () -> ndarray, shape (m, n, 1 + 2 H)
+            Derivatives by the coefficients; a line search does without most of them.
+
+        """
+        limits = self.problem.limits
+        span = limits.upper - limits.lower
+        span = np.where(np.isfinite(span), span, 1.0)
+        q, dq, ddq = self.dense
+        velocity, acceleration = limits.velocity, limits.acceleration
+        parts = [
+            self._own_joint(q, x, limits.lower, limits.upper, span),
+            self._own_joint(dq, x, -velocity, velocity, velocity),
+            self._own_joint(ddq, x, -acceleration, acceleration, acceleration),
+        ]
+        motion = Motion(limits.joints, self.t, *(basis @ x.T for basis in self.basis))
+        if np.isfinite(limits.torque).any():
+            parts.append(self._torque(motion))
+        if self.clearance is not None and len(self.clearance.pairs):
+            parts.append(self._clear(motion))
+        return (
+            np.concatenate([values for values, _ in parts]),
+            lambda: np.concatenate([gradients() for _, gradients in parts]),
+        )
+
+    def _own_joint(
+        self,
+        basis: FloatArray,
+        x: FloatArray,
+        lower: FloatArray,
+        upper: FloatArray,
+        unit: FloatArray,
+    ) -> Part:
+        """Constrain quantities that depend on the coefficients of their own joint only."""
+        values = basis @ x.T
+        limited = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
+        signed = np.empty((len(limited), len(values)))
+        totals = np.empty(len(limited))
+        for row, j in enumerate(limited):
+            over, under = values[:, j] - upper[j], lower[j] - values[:, j]
+            excess = np.concatenate([over, under]) / unit[j] + self.reserve
+            totals[row], weights = self._soft_maximum(excess)
+            signed[row] = (weights[: len(values)] - weights[len(values) :]) / unit[j]
+
+        def gradients() -> FloatArray:
+            result = np.zeros((len(limited), values.shape[1], basis.shape[1]))
+            result[np.arange(len(limited)), limited] = signed @ basis
+            return result
+
+        return totals, gradients
+
+    def _torque(self, motion: Motion) -> Part:
+        arm, limits = self.problem.arm, self.problem.limits
+        torque = arm.joint_torque(motion)
+        limited = np.flatnonzero(np.isfinite(limits.torque))
+        of_torque = np.zeros((len(limited), *torque.shape))
+        totals = np.empty(len(limited))
+        count = len(motion)
+        for row, j in enumerate(limited):
+            relative = torque[:, j] / limits.torque[j]
+            totals[row], weights = self._soft_maximum(
+                np.concatenate([relative, -relative]) - 1.0 + self.reserve
+            )
+            of_torque[row, :, j] = (weights[:count] - weights[count:]) / limits.torque[j]
+
+        def gradients() -> FloatArray:
+            slope = TorqueSlope.of(arm, motion)
+            result = np.empty((len(limited), motion.n_joints, self.basis[0].shape[1]))
+            for row, weights in enumerate(of_torque):
+                result[row] = sum(
+                    by.T @ basis
+                    for by, basis in zip(slope.pullback(weights), self.basis, strict=True)
+                )
+            return result
+
+        return totals, gradients
+
+    def _clear(self, motion: Motion) -> Part:
+        """Constrain the clearance, once in every stretch of the period."""
+        assert self.clearance is not None
+        near = self.clearance.near(motion.q, self.margin + _CLEARANCE_REACH * _CLEARANCE_UNIT)
+        stretch = self.t[near.sample] * (_STRETCHES / self.problem.settings.period)
+        totals = np.full(_STRETCHES, -_CLEARANCE_REACH)
+        weighted: list[tuple[int, npt.NDArray[np.intp], FloatArray]] = []
+        for number in range(_STRETCHES):
+            rows = np.flatnonzero(stretch.astype(int) == number)
+            if len(rows):
+                lack = (self.margin - near.distance[rows]) / _CLEARANCE_UNIT
+                totals[number], weights = self._soft_maximum(lack)
+                weighted.append((number, rows, -weights[:, np.newaxis] / _CLEARANCE_UNIT))
+
+        def gradients() -> FloatArray:
+            result = np.zeros((_STRETCHES, motion.n_joints, self.basis[0].shape[1]))
+            for number, rows, weights in weighted:
+                result[number] = (weights * near.by_q[rows]).T @ self.basis[0][near.sample[rows]]
+            return result
+
+        return totals, gradients
+
+    def _soft_maximum(self, excess: FloatArray) -> tuple[float, FloatArray]:
+        largest = excess.max()
+        weights = np.exp(self.sharpness * (excess - largest))
+        total = weights.sum()
+        return float(largest + np.log(total) / self.sharpness), weights / total

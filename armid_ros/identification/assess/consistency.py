@@ -1,0 +1,305 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether encoder noise spoils an identification: a test, and by how much.
+
+Least squares takes the regressor as known, but it is computed from noisy positions. Two checks:
+
+- The Durbin-Wu-Hausman test holds the fit against one with instruments, which stay unbiased if
+  the instruments do not share the regressor's noise. They are the regressor of the same motion,
+  smoothed to a fifth of the band, where a three-thousandth of the accelerations' noise is left.
+- The bias itself comes from a simulation: the arm is taken along the smoothed motion, its
+  positions are given the noise that the recorded ones have, and it is identified again.
+
+Source: Hausman 1978; Janot, Vandanjon and Gautier 2014 for robots, with instruments of a simulated
+arm; Cook and Stefanski 1994 for the simulation.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate
+from armid_ros.identification.fitting.least_squares import noise_products, solve
+from armid_ros.identification.fitting.nonlinear import linearised
+from armid_ros.identification.identify import Identification
+from armid_ros.identification.rows.regression import Regression, regressions
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+import numpy as np
+from scipy import signal
+from scipy.stats import chi2
+
+#: The instruments keep this share of the band of the regressor, which is ten times the motion's.
+INSTRUMENT_SHARE = 0.2
+#: Noise is what lies above this share of the sampling rate.
+_NOISE_ABOVE = 0.3
+#: A difference between the two fits of less than this share of a deviation does not matter, and
+#: counts little in the test: two fits of the same data can be told apart to a thousandth.
+NEGLIGIBLE = 0.1
+#: Deviations of bias that matter: a quarter takes 95 % intervals to 94 %.
+BIAS_LIMIT = 0.25
+#: Significance of the test.
+SIGNIFICANCE = 0.05
+
+
+@dataclass(frozen=True)
+class NoiseCheck:
+    """
+    What encoder noise does to an identification.
+
+    Attributes
+    ----------
+    statistic : float
+        Durbin-Wu-Hausman statistic.
+    freedom : float
+        Its degrees of freedom, 1 or more: what is expected of it if encoder noise does nothing.
+    p_value : float
+        Probability of a larger one if encoder noise did nothing.
+    instrumental : Estimate
+        The fit with instruments.
+    position_noise : ndarray, shape (n,)
+        Standard deviation of the position noise [rad or m].
+    bias : ndarray, shape (r,)
+        What encoder noise adds to the parameters.
+    bias_std : ndarray, shape (r,)
+        How well that is known, from the number of simulations.
+    std : ndarray, shape (r,)
+        Standard deviations of the parameters, to hold it against.
+
+    """
+
+    statistic: float
+    freedom: float
+    p_value: float
+    instrumental: Estimate
+    position_noise: FloatArray
+    bias: FloatArray
+    bias_std: FloatArray
+    std: FloatArray
+
+    @property
+    def consistent(self) -> bool:
+        """Whether the test finds nothing."""
+        return self.p_value >= SIGNIFICANCE
+
+    @property
+    def relative_bias(self) -> FloatArray:
+        """Bias in standard deviations of each parameter, shape (r,)."""
+        return np.asarray(self.bias / np.where(self.std > 0.0, self.std, np.inf))
+
+    @property
+    def harmless(self) -> bool:
+        """Whether no parameter is biased by a share of its deviation that matters."""
+        return bool(np.max(np.abs(self.relative_bias), initial=0.0) < BIAS_LIMIT)
+
+    def sentences(self) -> tuple[str, ...]:
+        """Say in words what was found."""
+        low, high = self.position_noise.min(), self.position_noise.max()
+        found = 'no sign' if self.consistent else 'a sign'
+        worst = int(np.argmax(np.abs(self.relative_bias)))
+        name = self.instrumental.parameters[worst]
+        leader = name.name.split(' ')[0]
+        where = f'{leader} of {name.joint}' if name.joint else leader
+        size = float(abs(self.relative_bias[worst]))
+        verdict = 'the intervals hold' if self.harmless else 'the intervals are off by that'
+        return (
+            f'Durbin-Wu-Hausman test: {found} that encoder noise biases the parameters '
+            f'(statistic {self.statistic:.1f}, {self.freedom:.1f} degrees of freedom, '
+            f'p = {self.p_value:.2g})',
+            f'position noise {low:.2g} to {high:.2g} rad (or m): the bias that it makes is at '
+            f'most {size:.2g} standard deviations ({where}); {verdict}',
+        )
+
+
+def check_noise(
+    result: Identification,
+    recordings: Sequence[Recording],
+    *,
+    rng: np.random.Generator,
+    repeats: int = 6,
+    progress: Callable[[float], None] | None = None,
+) -> NoiseCheck:
+    """
+    Test an identification for the effect of encoder noise and estimate its bias.
+
+    Parameters
+    ----------
+    result : Identification
+        The identification.
+    recordings : sequence of Recording
+        What it was fitted to.
+    rng : numpy.random.Generator
+        Draws the noise of the simulations.
+    repeats : int
+        Simulations, 2 or more.
+    progress : callable, optional
+        Told the share that is done, 0 to 1.
+
+    Returns
+    -------
+    NoiseCheck
+        Test and bias.
+
+    Raises
+    ------
+    IdentificationError
+        If there are fewer than 2 repeats.
+
+    """
+    if repeats < 2:
+        raise IdentificationError(f'{repeats} simulations do not tell a mean from chance: take 2')
+    used = result.used
+    tick = _steps(repeats + 2, progress)
+    problem = _about(result, recordings)
+    tick()
+    solution = solve(problem, result.settings.least_squares)
+    calm = [
+        calm_recording(recording, INSTRUMENT_SHARE * used.cutoff_hz) for recording in recordings
+    ]
+    instruments = _about(result, calm)
+    tick()
+    statistic, freedom, values, covariance = _hausman(problem, instruments, solution.weights)
+
+    noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
+    bias, bias_std = _simulated_bias(
+        result, calm, instruments, solution.weights, noise, rng, repeats, tick
+    )
+    return NoiseCheck(
+        statistic=statistic,
+        freedom=freedom,
+        p_value=float(chi2.sf(statistic, freedom)),
+        instrumental=Estimate(result.base.parameters, values, covariance),
+        position_noise=noise,
+        bias=bias,
+        bias_std=bias_std,
+        std=result.estimate.std,
+    )
+
+
+def _steps(count: int, progress: Callable[[float], None] | None) -> Callable[[], None]:
+    """Return what is called after each of some steps of equal length."""
+    done = 0
+
+    def tick() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done / count)
+
+    return tick
+
+
+def calm_recording(recording: Recording, cutoff_hz: float) -> Recording:
+    """Return a recording with positions smoothed below a frequency."""
+    sections = signal.butter(4, cutoff_hz * recording.period * 2.0, output='sos')
+    return replace(recording, q=signal.sosfiltfilt(sections, recording.q, axis=0), dq=None)
+
+
+def _hausman(
+    problem: Sequence[Regression], instruments: Sequence[Regression], weights: FloatArray
+) -> tuple[float, float, FloatArray, FloatArray]:
+    """
+    Compare the fit with the one by instruments; both are linear in the torque.
+
+    Returns
+    -------
+    statistic : float
+    freedom : float
+    values : ndarray, shape (r,)
+        Fit by instruments.
+    covariance : ndarray, shape (r, r)
+        Of that.
+
+    """
+    rank = problem[0].columns.shape[2]
+    w, z = (np.concatenate([p.columns for p in parts]) for parts in (problem, instruments))
+    tau = np.concatenate([part.target for part in problem])
+    scale = np.linalg.norm((weights[:, :, np.newaxis] * w).reshape(-1, rank), axis=0)
+    scaled = [replace(part, columns=part.columns / scale) for part in problem]
+    weighted_w = (weights[:, :, np.newaxis] * w / scale).reshape(-1, rank)
+    weighted_z = (weights[:, :, np.newaxis] * z / scale).reshape(-1, rank)
+    torque = (weights * tau).ravel()
+    triangle = np.linalg.qr(weighted_w, mode='r')
+    inverse = np.linalg.inv(triangle)
+    by_w, by_z = inverse @ inverse.T, np.linalg.inv(weighted_z.T @ weighted_w)
+    plain, other = by_w @ (weighted_w.T @ torque), by_z @ (weighted_z.T @ torque)
+
+    residual = (torque - weighted_w @ plain).reshape(weights.shape)
+    further = [part.columns / scale for part in instruments]
+    products = noise_products(scaled, residual, weights, inverse, further)
+    difference = np.concatenate([-by_w, by_z], axis=1)
+    spread = difference @ products @ difference.T
+    covariance = by_z @ products[rank:, rank:] @ by_z.T
+    unit = 1.0 / np.sqrt(np.diag(covariance))
+    sizes, axes = np.linalg.eigh(spread * np.outer(unit, unit))
+    sizes = sizes.clip(0.0)
+    along = axes.T @ ((other - plain) * unit)
+    statistic = float(np.sum(along**2 / (sizes + NEGLIGIBLE**2)))
+    freedom = float(np.sum(sizes / (sizes + NEGLIGIBLE**2)))  # what to expect of it
+    return statistic, max(freedom, 1.0), other / scale, covariance / np.outer(scale, scale)
+
+
+def position_noise(recording: Recording) -> FloatArray:
+    """Return the standard deviation of white position noise, from the top of the spectrum (n,)."""
+    rate = 1.0 / recording.period
+    length = min(len(recording), int(8.0 * rate))
+    frequency, power = signal.welch(
+        recording.q, fs=rate, window='blackmanharris', nperseg=length, detrend='linear', axis=0
+    )
+    level = np.mean(power[frequency > _NOISE_ABOVE * rate], axis=0)
+    return np.asarray(np.sqrt(level * 0.5 * rate))
+
+
+def _simulated_bias(
+    result: Identification,
+    calm: Sequence[Recording],
+    exact: Sequence[Regression],
+    weights: FloatArray,
+    noise: FloatArray,
+    rng: np.random.Generator,
+    repeats: int,
+    tick: Callable[[], None],
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Return how much noisy positions change a fit, and the standard error of that.
+
+    A fit with noisy columns V to the torque W beta of exact ones finds M beta, M = V^+ W; what was
+    found is M beta of the truth, so the bias is beta_hat - M^-1 beta_hat, or M^-1 V^+ times the
+    difference of the torques of what was found along the exact and the noisy motion.
+
+    """
+    scale = np.where(result.estimate.std > 0.0, result.estimate.std, 1.0)
+    w = _weighted(exact, weights, scale)
+    found = _torque(exact, weights, result.estimate.values)
+    biases = []
+    for _ in range(repeats):
+        noisy = [replace(r, q=r.q + noise * rng.normal(size=r.q.shape)) for r in calm]
+        again = _about(result, noisy)
+        off = found - _torque(again, weights, result.estimate.values)
+        both = np.column_stack([w, off])
+        gain = np.linalg.lstsq(_weighted(again, weights, scale), both, rcond=None)[0]
+        biases.append(np.linalg.solve(gain[:, :-1], gain[:, -1]))
+        tick()
+    spread = np.std(biases, axis=0, ddof=1) / np.sqrt(repeats)
+    return scale * np.mean(biases, axis=0), scale * spread
+
+
+def _about(result: Identification, recordings: Sequence[Recording]) -> Sequence[Regression]:
+    """Linearise the identified arm along recordings, with a constant where it is not linear."""
+    if result.passes > 1:
+        return linearised(result.arm, result.base, recordings, result.used)[0]
+    return regressions(result.arm, result.base.independent, recordings, result.used)
+
+
+def _torque(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the weighted torque of linear models, shape (N n,)."""
+    return np.asarray((weights * np.concatenate([p.torque(values) for p in problem])).ravel())
+
+
+def _weighted(problem: Sequence[Regression], weights: FloatArray, scale: FloatArray) -> FloatArray:
+    columns = np.concatenate([part.columns for part in problem]) * scale
+    return np.asarray((weights[:, :, np.newaxis] * columns).reshape(-1, len(scale)))

@@ -1,0 +1,168 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What an identification is good for, in one word, and why.
+
+The word follows the torque error on data that were not fitted, and what the recordings show to be
+wrong with them.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from armid_ros.arm import ArmModel
+from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.assess.mistakes import find_mistake, Mistake
+from armid_ros.identification.identify import Fit, Identification, Score
+from armid_ros.recording import Recording
+
+Word = Literal['good', 'poor', 'unusable']
+_WORDS: tuple[Word, ...] = ('good', 'poor', 'unusable')
+
+
+@dataclass(frozen=True)
+class Grade:
+    """
+    What an identification is good for.
+
+    Attributes
+    ----------
+    word : {'good', 'poor', 'unusable'}
+        The worst that any reason says.
+    reasons : tuple of str
+        Why, the worst first; one at least.
+
+    """
+
+    word: Word
+    reasons: tuple[str, ...]
+
+    def document(self) -> dict[str, object]:
+        """Return the grade for programs to read."""
+        return {'grade': self.word, 'reasons': list(self.reasons)}
+
+
+class _Reason(NamedTuple):
+    word: Word
+    text: str
+
+
+def grade(
+    result: Identification,
+    description: ArmModel,
+    recordings: Sequence[Recording],
+    validation: Mapping[str, Sequence[Fit]],
+    held_out: Sequence[Recording] = (),
+) -> Grade:
+    """
+    Grade an identification.
+
+    Parameters
+    ----------
+    result : Identification
+        What was found.
+    description : ArmModel
+        The model before it.
+    recordings : sequence of Recording
+        What it was fitted to.
+    validation : mapping of str to sequence of Fit
+        Predictions of recordings that were not used for fitting, by recording.
+    held_out : sequence of Recording
+        Those recordings.
+
+    """
+    reasons = [
+        *_mistakes(result, description, [*recordings, *held_out]),
+        *_errors(result, validation),
+        *_clocks([*recordings, *held_out]),
+    ]
+    ordered = sorted(reasons, key=lambda reason: -_WORDS.index(reason.word))
+    return Grade(ordered[0].word, tuple(reason.text for reason in ordered))
+
+
+def by_error(error: float) -> Word:
+    """Return the grade of a relative torque error on data that were not fitted [%]."""
+    return 'good' if error <= LIMITS.poor else 'poor' if error <= LIMITS.unusable else 'unusable'
+
+
+def _mistakes(
+    result: Identification, description: ArmModel, recordings: Sequence[Recording]
+) -> Iterator[_Reason]:
+    robot = description.body
+    alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
+    for recording in recordings:
+        mistake = find_mistake(robot, recording, result.used)
+        if mistake is not None:
+            kind = mistake.hypotheses[0].kind
+            alike.setdefault(kind, []).append((recording.source, mistake))
+    for found in alike.values():
+        worst = max((mistake for _, mistake in found), key=lambda m: float(m.before.joints.max()))
+        where = ', '.join(dict.fromkeys(source for source, _ in found))
+        text = worst.sentence(robot)
+        if len(found) < len(recordings):
+            text = f'in {where}: {text}'
+        error = 100.0 * float(worst.before.joints[worst.joint])
+        certain = error > LIMITS.unusable and not worst.hypotheses[0].disputable
+        yield _Reason('unusable' if certain else 'poor', _sentence(text))
+
+
+def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[_Reason]:
+    for bag, fits in validation.items():
+        score = Score.of(fits)
+        error = score.relative_error_percent
+        word = by_error(error)
+        use = {
+            'good': '',
+            'poor': ': too much to compute torques with',
+            'unusable': ': the model does not describe this motion',
+        }
+        text = f'the predicted torque of {bag}, held out, is off by {error:.3g} %{use[word]}'
+        yield _Reason(word, _sentence(text))
+    if not validation:
+        yield _halves(result)
+    fits = [fit for part in validation.values() for fit in part] or list(result.training)
+    errors = Score.of(fits).joint_relative_error_percent
+    off = [
+        f'{joint} ({error:.0f} %)'
+        for joint, error in zip(result.arm.robot.joints, errors, strict=True)
+        if error > LIMITS.unusable
+    ]
+    if off:
+        yield _Reason('good', _sentence(f'the torque is hardly predicted of {", ".join(off)}'))
+
+
+def _halves(result: Identification) -> _Reason:
+    """Judge by what one half of the data says of the other, where nothing was held out."""
+    training = Score.of(result.training).relative_error_percent
+    error = result.halves_error
+    word = by_error(error)
+    undetermined = error > max(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
+    if undetermined and word == 'good':
+        word = 'poor'
+    text = f'no recording was held out; halves of the data predict each other to {error:.3g} %'
+    if undetermined:
+        time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
+        text += (
+            f', but {training:.2g} % is left of what is fitted: {time:.2g} s of this motion do '
+            f'not determine {result.base.rank} parameters; record longer, or move more'
+        )
+    return _Reason(word, _sentence(text))
+
+
+def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:
+    for recording in recordings:
+        report = recording.report
+        if report.restarted:
+            text = (
+                f'the clock of {recording.source} jumped back; {report.restarted} of '
+                f'{report.messages} messages, on the shorter side of it, are left out'
+            )
+            yield _Reason('good', _sentence(text))
+
+
+def _sentence(text: str) -> str:
+    return f'{text[0].upper()}{text[1:]}.'

@@ -1,0 +1,400 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What may be wrong with a recording: each a change of the data that would put it right.
+
+A hypothesis changes the motion, or leaves some values free that the torque is linear in. It is
+believed if the arm then predicts data that were not used for the fit far better; nothing here
+decides that.
+
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
+from itertools import combinations
+from typing import ClassVar, Literal
+
+from armid_ros.identification.assess.grade_limits import GradeLimits
+from armid_ros.model import gravity_sensitivity, inverse_dynamics
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import GRAVITIES, Robot
+import numpy as np
+
+Quantity = Literal['position', 'torque', 'position and torque']
+
+#: Times that torque may be late by [s]; the best is refined.
+DELAYS = (0.01, 0.02, 0.05, 0.1, 0.2)
+#: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
+TURNS = (-135, -90, -45, 45, 90, 135, 180)
+QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
+#: Free values that are within this of an axis [degrees] are written as that axis.
+_AXIS = 15.0
+
+
+class Hypothesis(ABC):
+    """
+    One thing that may be wrong with a recording.
+
+    Attributes
+    ----------
+    values : int
+        Numbers that are chosen to fit the data.
+    disputable : bool
+        Whether a description with other masses would explain as much, so that a person has to
+        say which it is.
+
+    """
+
+    values: ClassVar[int] = 1
+    disputable: ClassVar[bool] = False
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What is wrong and where, without by how much."""
+        parts = (getattr(self, part.name) for part in fields(self) if part.compare)  # type: ignore
+        return (type(self).__name__, *(v for v in parts if not isinstance(v, float | tuple)))
+
+    def motion(self, motion: Motion) -> Motion:
+        """Return a motion and its torque as they would be without the mistake."""
+        return motion
+
+    def stretches(self, stretches: Sequence[Motion]) -> list[Motion]:
+        """Return all of a recording as it would be without the mistake."""
+        return [self.motion(motion) for motion in stretches]
+
+    def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
+        """
+        Return what the described body takes along the changed motion.
+
+        Returns
+        -------
+        fixed : ndarray, shape (N, n)
+            Torque that is known [N m].
+        columns : ndarray, shape (N, n, k)
+            What free values are multiplied by.
+
+        """
+        return inverse_dynamics(robot, motion), np.empty((*motion.q.shape, 0))
+
+    def settled(self, values: FloatArray) -> Hypothesis:
+        """Return the hypothesis with the free values that fit."""
+        return self
+
+    def nearby(self) -> Iterator[Hypothesis]:
+        """Yield finer steps of the same kind."""
+        return iter(())
+
+    def material(self, robot: Robot, limits: GradeLimits) -> bool:
+        """Whether the description cannot be what is wrong instead."""
+        return True
+
+    @abstractmethod
+    def sentence(self, robot: Robot) -> str:
+        """Say what seems to be wrong and what to do, without a full stop."""
+
+
+@dataclass(frozen=True)
+class AsRecorded(Hypothesis):
+    """Nothing is wrong."""
+
+    values: ClassVar[int] = 0
+
+    def sentence(self, robot: Robot) -> str:
+        """Say so."""
+        return 'the data are as they should be'
+
+
+@dataclass(frozen=True)
+class WithoutBody(Hypothesis):
+    """The description says nothing of this arm: friction and drives take all there is."""
+
+    values: ClassVar[int] = 0
+
+    def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
+        """Leave the body out."""
+        return np.zeros_like(motion.q), np.empty((*motion.q.shape, 0))
+
+    def sentence(self, robot: Robot) -> str:
+        """Say so."""
+        return 'the description says nothing of the torques'
+
+
+@dataclass(frozen=True)
+class Reversed(Hypothesis):
+    """Position, torque or both of a joint have the opposite sign."""
+
+    joint: int
+    quantity: Quantity
+
+    def motion(self, motion: Motion) -> Motion:
+        """Turn the sign of the joint."""
+        sign = np.ones(motion.n_joints)
+        sign[self.joint] = -1.0
+        return _changed(motion, self.quantity, lambda values: values * sign)
+
+    def sentence(self, robot: Robot) -> str:
+        """Name the joint."""
+        joint = robot.joints[self.joint]
+        if self.quantity == 'position and torque':
+            return f'position and torque of {joint} seem to have the opposite sign: negate both'
+        return f'the {self.quantity} of {joint} seems to have the opposite sign: negate it'
+
+
+@dataclass(frozen=True)
+class Exchanged(Hypothesis):
+    """Two joints have each other's position, torque or both."""
+
+    first: int
+    second: int
+    quantity: Quantity
+
+    def motion(self, motion: Motion) -> Motion:
+        """Exchange them back."""
+        order = np.arange(motion.n_joints)
+        order[[self.first, self.second]] = order[[self.second, self.first]]
+        return _changed(motion, self.quantity, lambda values: values[:, order])
+
+    def sentence(self, robot: Robot) -> str:
+        """Name the joints."""
+        a, b = robot.joints[self.first], robot.joints[self.second]
+        return (
+            f'the {self.quantity} of {a} and of {b} seem to be exchanged: check the names of '
+            'the joints'
+        )
+
+
+@dataclass(frozen=True)
+class ZeroOff(Hypothesis):
+    """The zero of a joint is not that of the description."""
+
+    joint: int
+    degrees: float
+
+    def motion(self, motion: Motion) -> Motion:
+        """Shift the position back."""
+        shift = np.zeros(motion.n_joints)
+        shift[self.joint] = -np.deg2rad(self.degrees)
+        return replace(motion, q=motion.q + shift)
+
+    def nearby(self) -> Iterator[Hypothesis]:
+        """Yield angles in steps of 15 degrees."""
+        for step in (-15.0, 15.0):
+            yield replace(self, degrees=self.degrees + step)
+
+    def sentence(self, robot: Robot) -> str:
+        """Name the joint and the angle."""
+        wrong = (self.degrees + 180.0) % 360.0 - 180.0
+        wrong = 180.0 if wrong == -180.0 else wrong
+        remedy = f'{"subtract" if wrong > 0 else "add"} {np.deg2rad(abs(wrong)):.4g} rad'
+        return (
+            f'the zero of {robot.joints[self.joint]} seems to be off by about {wrong:.0f} '
+            f'degrees: {remedy}'
+        )
+
+
+@dataclass(frozen=True)
+class Late(Hypothesis):
+    """Torque comes later than the position that it belongs to, or earlier."""
+
+    seconds: float
+
+    def motion(self, motion: Motion) -> Motion:
+        """
+        Take the motion of the time that the torque belongs to.
+
+        The torque stays as it is, for its noise would be less between samples.
+
+        """
+        t = motion.t - self.seconds
+        inside = (t >= motion.t[0]) & (t <= motion.t[-1])
+        q, dq, ddq = (
+            np.column_stack([np.interp(t, motion.t, column) for column in x.T])
+            for x in (motion.q, motion.dq, motion.ddq)
+        )
+        return replace(motion, q=q, dq=dq, ddq=ddq).select(inside)
+
+    def nearby(self) -> Iterator[Hypothesis]:
+        """Yield times in steps of an eighth."""
+        for share in (0.75, 0.875, 1.125, 1.25):
+            yield Late(share * self.seconds)
+
+    def sentence(self, robot: Robot) -> str:
+        """Say by how much."""
+        side = 'later' if self.seconds > 0.0 else 'earlier'
+        return (
+            f'the torque seems to come about {1e3 * abs(self.seconds):.0f} ms {side} than the '
+            'position: stamp both alike'
+        )
+
+
+@dataclass(frozen=True)
+class InDegrees(Hypothesis):
+    """Positions are in degrees."""
+
+    def motion(self, motion: Motion) -> Motion:
+        """Convert them."""
+        return _changed(motion, 'position', np.deg2rad)
+
+    def sentence(self, robot: Robot) -> str:
+        """Say so."""
+        return 'the positions seem to be in degrees: convert them to rad'
+
+
+@dataclass(frozen=True)
+class OtherGravity(Hypothesis):
+    """Gravity is another vector than was told; torque is linear in it, so the data give it."""
+
+    values: ClassVar[int] = 3
+
+    vector: tuple[float, float, float] = (np.nan, np.nan, np.nan)
+
+    def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
+        """Leave gravity free."""
+        weightless = robot.with_gravity(np.zeros(3))
+        return inverse_dynamics(weightless, motion), gravity_sensitivity(robot, motion.q)
+
+    def settled(self, values: FloatArray) -> Hypothesis:
+        """Return the vector that fits."""
+        return OtherGravity((float(values[0]), float(values[1]), float(values[2])))
+
+    def material(self, robot: Robot, limits: GradeLimits) -> bool:
+        """Whether it is too far from what was told for masses to be what is wrong."""
+        told, found = robot.gravity, np.array(self.vector)
+        size = max(float(np.linalg.norm(told)), 1.0)
+        return bool(np.linalg.norm(found - told) > limits.gravity_change * size)
+
+    def sentence(self, robot: Robot) -> str:
+        """Say the direction and the option that puts it right."""
+        axis, option = known_gravity(np.array(self.vector), robot.gravity)
+        direction = ', '.join(f'{part:.3g}' for part in axis)
+        size = float(np.linalg.norm(self.vector))
+        return (
+            f'gravity seems to act along ({direction}) of the base with {size:.3g} m/s^2: '
+            f'--gravity {option}'
+        )
+
+
+@dataclass(frozen=True)
+class OtherUnit(Hypothesis):
+    """Efforts are a factor from N m, the same in all joints: currents, a gear ratio, a unit."""
+
+    disputable: ClassVar[bool] = True
+
+    factor: float = np.nan
+
+    def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
+        """Leave the factor free."""
+        described = inverse_dynamics(robot, motion)
+        return np.zeros_like(described), described[:, :, np.newaxis]
+
+    def settled(self, values: FloatArray) -> Hypothesis:
+        """Return the factor that fits."""
+        return OtherUnit(float(values[0]))
+
+    def material(self, robot: Robot, limits: GradeLimits) -> bool:
+        """Whether it is too far from one for masses to be what is wrong."""
+        return not 1.0 / limits.torque_factor < self.factor < limits.torque_factor
+
+    def sentence(self, robot: Robot) -> str:
+        """Say the factor."""
+        return (
+            f'the efforts of all joints seem to be {self.factor:.2g} times the torque in N m '
+            '(currents?): convert them, unless it is the masses of the description'
+        )
+
+
+@dataclass(frozen=True)
+class Faulty(Hypothesis):
+    """
+    A few samples are wrong: a torque far out of the rest, a position that jumps.
+
+    Attributes
+    ----------
+    what : str
+        The first of them, in words.
+    count : int
+        How many there are.
+    without : tuple of Motion
+        The recording without them.
+
+    """
+
+    what: str
+    count: int
+    without: tuple[Motion, ...] = field(repr=False, compare=False)
+
+    def stretches(self, stretches: Sequence[Motion]) -> list[Motion]:
+        """Return the recording without faulty samples."""
+        return list(self.without)
+
+    def sentence(self, robot: Robot) -> str:
+        """Say how many, and where the first is."""
+        many = '' if self.count == 1 else f' (the first of {self.count})'
+        return f'{self.what}{many}: leave out what is faulty, or record again'
+
+
+def hypotheses(robot: Robot) -> Iterator[Hypothesis]:
+    """Yield what may be wrong with any recording of an arm."""
+    for delay in DELAYS:
+        yield Late(delay)
+        yield Late(-delay)
+    yield OtherGravity()
+    yield OtherUnit()
+    if not np.all(robot.prismatic):
+        yield InDegrees()
+    for joint in range(robot.n_joints):
+        for quantity in QUANTITIES:
+            yield Reversed(joint, quantity)
+        if not robot.prismatic[joint]:
+            for degrees in TURNS:
+                yield ZeroOff(joint, degrees)
+    for first, second in combinations(range(robot.n_joints), 2):
+        for quantity in QUANTITIES:
+            yield Exchanged(first, second, quantity)
+
+
+def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str]:
+    """
+    Write a gravity vector that was found as a person would.
+
+    Parameters
+    ----------
+    vector : ndarray, shape (3,)
+        As it was found [m/s^2].
+    told : ndarray, shape (3,)
+        As it was told; its size is kept where the found one is near.
+
+    Returns
+    -------
+    direction : ndarray, shape (3,)
+        Unit vector; that of an axis where it is near.
+    option : str
+        What to give to --gravity.
+
+    """
+    size = float(np.linalg.norm(vector))
+    direction = vector / size
+    axis = np.round(direction)
+    if np.linalg.norm(axis) == 1.0 and direction @ axis > np.cos(np.deg2rad(_AXIS)):
+        direction = axis + 0.0
+    sizes = [float(np.linalg.norm(told)), *(-value[2] for value in GRAVITIES.values())]
+    near = min(sizes, key=lambda known: abs(np.log(size / max(known, 1e-9))))
+    size = near if 0.75 < size / max(near, 1e-9) < 1.33 else size
+    for name, value in GRAVITIES.items():
+        if np.allclose(size * direction, value, atol=1e-6):
+            return direction, name
+    return direction, ','.join(f'{part:.3g}' for part in size * direction + 0.0)
+
+
+def _changed(
+    motion: Motion, quantity: Quantity, change: Callable[[FloatArray], FloatArray]
+) -> Motion:
+    if quantity != 'torque':
+        motion = replace(motion, q=change(motion.q), dq=change(motion.dq), ddq=change(motion.ddq))
+    if quantity != 'position':
+        assert motion.tau is not None
+        motion = motion.with_torque(change(motion.tau))
+    return motion

@@ -1,0 +1,233 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which mistake a recording shows, if any.
+
+Hypotheses are tried one by one, where the arm as described predicts the recording badly enough
+for one of them to matter; where none is believed and the prediction fails, once more with a body
+that is fitted too.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from armid_ros.effects.timing import within_band
+from armid_ros.identification.assess.faulty_samples import faulty_samples
+from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.assess.hypotheses import (
+    AsRecorded,
+    Faulty,
+    hypotheses,
+    Hypothesis,
+    OtherGravity,
+    OtherUnit,
+    WithoutBody,
+)
+from armid_ros.identification.assess.prediction_error import (
+    described_error,
+    fitted_error,
+    PredictionError,
+)
+from armid_ros.identification.rows.signals import (
+    Conditioning,
+    decimate,
+    decimated_samples,
+    segments,
+)
+from armid_ros.motion import Motion
+from armid_ros.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+
+#: Samples of a recording that are looked at: a hundred and more for every value that is fitted to
+#: the torque of a joint, and ten and more where the body is fitted too.
+_ROWS, _ROWS_FITTED = 600, 200
+#: Samples below which nothing can be asked.
+_FEWEST = 40
+
+Judge = Callable[[Hypothesis], tuple[PredictionError, Hypothesis] | None]
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """
+    What a recording shows to be wrong with it.
+
+    Attributes
+    ----------
+    hypotheses : tuple of Hypothesis
+        The one that explains most, and those that explain as much.
+    before, after : PredictionError
+        As recorded, and with the mistake put right.
+    fitted : bool
+        Whether the body had to be fitted to see it.
+
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    before: PredictionError
+    after: PredictionError
+    fitted: bool
+
+    @property
+    def joint(self) -> int:
+        """The joint with most of the torque explained."""
+        return int(np.argmax(self.before.joints.clip(max=1.0) - self.after.joints))
+
+    def sentence(self, robot: Robot) -> str:
+        """Say what seems to be wrong, what to do and what shows it, without a full stop."""
+        said = ', or '.join(one.sentence(robot) for one in self.hypotheses)
+        before, after = (
+            100.0 * min(float(error.joints[self.joint]), 9.99)
+            for error in (self.before, self.after)
+        )
+        arm = 'fitted' if self.fitted else 'described'
+        return (
+            f'{said} (the arm as {arm} predicts the torque of {robot.joints[self.joint]} to '
+            f'{before:.0f} % as recorded, to {after:.0f} % with that put right)'
+        )
+
+
+def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mistake | None:
+    """
+    Try what may be wrong with a recording.
+
+    Parameters
+    ----------
+    robot : Robot
+        The description.
+    recording : Recording
+        Data with torques.
+    used : Conditioning
+        Filters that the recording is identified with.
+
+    Returns
+    -------
+    Mistake or None
+        None where the data are best as they are.
+
+    """
+    slow = _slow_motions(recording, used)
+    if sum(len(motion) for motion in slow) < _FEWEST:
+        return None
+    tried = list(hypotheses(robot))
+    faults = faulty_samples(recording)
+    if faults is not None:
+        without = tuple(_slow_motions(recording.select(faults.sound), used))
+        tried.append(Faulty(faults.first, faults.count, without))
+    found = _best(robot, tried, _described(robot, slow), fitted=False)
+    if found is not None:
+        return found
+    as_recorded = _fitted(robot, slow)(AsRecorded())
+    if as_recorded is None or 100.0 * as_recorded[0].whole < LIMITS.poor:
+        return None
+    changes = [one for one in tried if not isinstance(one, OtherGravity | OtherUnit)]
+    return _best(robot, changes, _fitted(robot, slow), fitted=True)
+
+
+def _described(robot: Robot, slow: Sequence[Motion]) -> Judge:
+    def judge(one: Hypothesis) -> tuple[PredictionError, Hypothesis] | None:
+        motion = _thinned(one.stretches(slow), _ROWS)
+        if motion is None:
+            return None
+        error = described_error(motion, *one.torque(robot, motion))
+        return error, one.settled(error.shared)
+
+    return judge
+
+
+def _fitted(robot: Robot, slow: Sequence[Motion]) -> Judge:
+    def judge(one: Hypothesis) -> tuple[PredictionError, Hypothesis] | None:
+        motion = _thinned(one.stretches(slow), _ROWS_FITTED)
+        return None if motion is None else (fitted_error(robot, motion), one)
+
+    return judge
+
+
+def _best(
+    robot: Robot, tried: Sequence[Hypothesis], judge: Judge, *, fitted: bool
+) -> Mistake | None:
+    """Return the hypothesis that gains most, if that is enough for what it is free to choose."""
+    as_recorded = judge(AsRecorded())
+    if as_recorded is None:
+        return None
+    before = as_recorded[0]
+    nothing = None if fitted else judge(WithoutBody())
+    rival = before if nothing is None else before.least(nothing[0])
+    price = LIMITS.gain if not fitted else LIMITS.gain**LIMITS.free_body
+    if rival.best_gain() < price:
+        return None
+    rows = _judged(robot, tried, judge, rival, price)
+    if not rows:
+        return None
+    nearest = max(rows, key=lambda row: row.surplus)
+    rows += _judged(robot, list(nearest.hypothesis.nearby()), judge, rival, price)
+    believed = [
+        row for row in rows if row.surplus >= 1.0 and 100.0 * row.after.whole < LIMITS.unusable
+    ]
+    if not believed:
+        return None
+    first = max(believed, key=lambda row: row.surplus)
+    as_good = {
+        type(row.hypothesis): row.hypothesis
+        for row in sorted(believed, key=lambda row: row.gain)
+        if type(row.hypothesis) is not type(first.hypothesis)
+        and row.gain * LIMITS.gain**0.5 > first.gain
+    }
+    return Mistake((first.hypothesis, *as_good.values()), before, first.after, fitted)
+
+
+class _Row(NamedTuple):
+    """A hypothesis, how far it divides the error, and that over what it has to."""
+
+    hypothesis: Hypothesis
+    after: PredictionError
+    gain: float
+    surplus: float
+
+
+def _judged(
+    robot: Robot,
+    tried: Sequence[Hypothesis],
+    judge: Judge,
+    rival: PredictionError,
+    price: float,
+) -> list[_Row]:
+    rows = []
+    for one in tried:
+        pair = judge(one)
+        if pair is not None and pair[1].material(robot, LIMITS):
+            after, settled = pair
+            gain = rival.gain(after)
+            rows.append(_Row(settled, after, gain, gain / price**settled.values))
+    return rows
+
+
+def _slow_motions(recording: Recording, used: Conditioning) -> list[Motion]:
+    """Return the stretches of a recording, with what is in the band of the motion alone."""
+    result = []
+    for motion in segments(recording, used):
+        kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
+        assert motion.tau is not None
+        slow, tau = motion.select(kept), decimate(motion.tau, used)
+        if len(slow) >= _FEWEST:
+            parts = (within_band(slow, x) for x in (slow.q, slow.dq, slow.ddq, tau))
+            result.append(Motion(slow.joints, slow.t, *parts))
+    return result
+
+
+def _thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
+    """Put stretches one after the other, and keep some of the samples."""
+    if not stretches:
+        return None
+    arrays = [
+        np.concatenate([getattr(part, name) for part in stretches])
+        for name in ('t', 'q', 'dq', 'ddq', 'tau')
+    ]
+    step = max(1, len(arrays[0]) // rows)
+    motion = Motion(stretches[0].joints, *(array[::step] for array in arrays))
+    return motion if len(motion) >= _FEWEST else None

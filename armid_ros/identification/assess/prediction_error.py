@@ -1,0 +1,165 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+How well an arm predicts a recording that it is fitted to elsewhere.
+
+Friction, offset and drive inertia of every joint are fitted, the body is that of the description
+or held softly to it. Blocks of the recording take turns at being fitted and being predicted.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.model import regressor
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+
+#: Blocks of a recording, of which every other one is fitted.
+_BLOCKS = 10
+#: Columns of each joint's own: offset, viscous and Coulomb friction, drive inertia.
+_OWN = 4
+
+
+@dataclass(frozen=True)
+class PredictionError:
+    """
+    What is left of the torque in blocks that were not fitted.
+
+    Attributes
+    ----------
+    joints : ndarray, shape (n,)
+        Of each joint, as a share of its torque.
+    whole : float
+        Of all joints together.
+    shared : ndarray, shape (k,)
+        Values that all joints share, fitted to all blocks.
+
+    """
+
+    joints: FloatArray
+    whole: float
+    shared: FloatArray
+
+    def gain(self, better: PredictionError) -> float:
+        """
+        Return the factor by which errors are larger than others, of all joints together.
+
+        It is the likelihood ratio of two models with unknown noise, per sample. Errors below the
+        floor and above the torque itself count as that much.
+
+        """
+        ratio = self._counted() / better._counted()
+        return float(np.prod(ratio))
+
+    def least(self, other: PredictionError) -> PredictionError:
+        """Return the smaller error of every joint."""
+        joints = np.minimum(self.joints, other.joints)
+        return PredictionError(joints, min(self.whole, other.whole), np.empty(0))
+
+    def best_gain(self) -> float:
+        """Return the largest gain that anything could have."""
+        return float(np.prod(self._counted() / LIMITS.floor))
+
+    def _counted(self) -> FloatArray:
+        return np.clip(self.joints, LIMITS.floor, 1.0)
+
+
+def described_error(motion: Motion, fixed: FloatArray, columns: FloatArray) -> PredictionError:
+    """
+    Predict with the body of the description.
+
+    Parameters
+    ----------
+    motion : Motion
+        N samples with torque.
+    fixed : ndarray, shape (N, n)
+        Torque that is known [N m].
+    columns : ndarray, shape (N, n, k)
+        What k values that all joints share are multiplied by.
+
+    """
+    assert motion.tau is not None
+    scale = _scale(motion.tau)
+    rest, shared = (motion.tau - fixed) / scale, columns / scale[:, np.newaxis]
+    own = [_own_columns(motion, joint) for joint in range(motion.n_joints)]
+    left = np.empty_like(rest)
+    for fitted in _folds(len(motion)):
+        values = _shared_values(own, rest, shared, fitted)
+        error = rest - shared @ values
+        for joint, mine in enumerate(own):
+            coefficients = np.linalg.lstsq(mine[fitted], error[fitted, joint], rcond=None)[0]
+            left[~fitted, joint] = error[~fitted, joint] - mine[~fitted] @ coefficients
+    everything = np.ones(len(motion), dtype=bool)
+    return _error(left, scale, _shared_values(own, rest, shared, everything))
+
+
+def fitted_error(robot: Robot, motion: Motion) -> PredictionError:
+    """Predict with a body that is fitted too; what the blocks do not tell stays as described."""
+    assert motion.tau is not None
+    n = motion.n_joints
+    scale = _scale(motion.tau)
+    columns = np.zeros((len(motion), n, len(robot.rigid_parameters) + _OWN * n))
+    columns[:, :, : -_OWN * n] = regressor(robot, motion)
+    rest = (motion.tau - columns[:, :, : -_OWN * n] @ robot.rigid_parameters) / scale
+    for joint in range(n):
+        start = columns.shape[2] - _OWN * (n - joint)
+        columns[:, joint, start : start + _OWN] = _own_columns(motion, joint)
+    columns /= scale[:, np.newaxis]
+    size = np.sqrt(np.mean(np.sum(columns**2, axis=1), axis=0))
+    columns /= np.where(size > 0.0, size, 1.0)
+    left = np.empty_like(rest)
+    for fitted in _folds(len(motion)):
+        values = _softly(columns[fitted], rest[fitted])
+        left[~fitted] = rest[~fitted] - columns[~fitted] @ values
+    return _error(left, scale, np.empty(0))
+
+
+def _softly(columns: FloatArray, rest: FloatArray) -> FloatArray:
+    """Fit, where every value costs as much as a residual at the floor does."""
+    stacked = columns.reshape(-1, columns.shape[2])
+    normal = stacked.T @ stacked
+    normal[np.diag_indices_from(normal)] += LIMITS.floor**2
+    return np.asarray(np.linalg.solve(normal, stacked.T @ rest.ravel()))
+
+
+def _shared_values(
+    own: list[FloatArray], rest: FloatArray, shared: FloatArray, fitted: npt.NDArray[np.bool_]
+) -> FloatArray:
+    """Fit what joints share, with what each has of its own taken out (Frisch and Waugh 1933)."""
+    if shared.shape[2] == 0:
+        return np.empty(0)
+    parts = []
+    for joint, mine in enumerate(own):
+        both = np.column_stack([shared[fitted, joint], rest[fitted, joint]])
+        basis = np.linalg.svd(mine[fitted], full_matrices=False)
+        kept = basis[0][:, basis[1] > 1e-9 * basis[1][0]]
+        parts.append(both - kept @ (kept.T @ both))
+    stacked = np.concatenate(parts)
+    return np.asarray(np.linalg.lstsq(stacked[:, :-1], stacked[:, -1], rcond=None)[0])
+
+
+def _own_columns(motion: Motion, joint: int) -> FloatArray:
+    dq, ddq = motion.dq[:, joint], motion.ddq[:, joint]
+    return np.column_stack([np.ones(len(dq)), dq, np.sign(dq), ddq])
+
+
+def _folds(count: int) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    even = (np.arange(count) * _BLOCKS // count) % 2 == 0
+    return even, ~even
+
+
+def _scale(tau: FloatArray) -> FloatArray:
+    """Return the root mean square of every joint's torque; one where there is none."""
+    size = np.sqrt(np.mean(tau**2, axis=0))
+    return np.where(size > 0.0, size, 1.0)
+
+
+def _error(left: FloatArray, scale: FloatArray, shared: FloatArray) -> PredictionError:
+    joints = np.sqrt(np.mean(left**2, axis=0))
+    whole = np.linalg.norm(joints * scale) / np.linalg.norm(scale)
+    return PredictionError(joints, float(whole), shared)

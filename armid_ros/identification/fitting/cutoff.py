@@ -1,0 +1,139 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The cut-off of positions that the torques ask for.
+
+Where the spectrum of a position stands out of white noise it may still be no motion that a torque
+makes: stamps that jitter, steps of an encoder and slack in a gear look like motion and are
+multiplied by the square of their frequency in the acceleration. Torques tell them apart: the
+cut-off is the one with which torques are predicted best that were not fitted.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.fitting.normal_equations import told_solution
+from armid_ros.identification.rows.regression import Regression, regressions
+from armid_ros.identification.rows.signals import Conditioning
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+import numpy as np
+import numpy.typing as npt
+
+#: A cut-off is compared with one lower by this factor.
+_STEP = 0.5
+#: A cut-off that loses more of the rows at the ends of stretches is too low for them.
+_KEPT = 0.8
+#: Stretches of the data that are predicted in turn; their losses give the deviation of a mean.
+_STRETCHES = 16
+#: Nor is a cut-off lowered for less than a tenth of the error; jitter and slack cost a third and
+#: more on every machine that was tried.
+_NEAR = 0.1
+#: Rows that are enough to compare cut-offs, some hundred for every parameter of seven joints.
+_ROWS = 6000
+
+
+def cutoff_of_torques(
+    arm: ArmModel,
+    columns: npt.NDArray[np.intp],
+    recordings: Sequence[Recording],
+    used: Conditioning,
+) -> Conditioning:
+    """
+    Lower the cut-off of positions as far as it makes torques more predictable.
+
+    The highest cut-off is taken whose loss on data that were left out is within a tenth of the
+    least, or one standard deviation (Breiman et al., Classification and Regression Trees, 1984):
+    clean data keep theirs.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Rigid body and effects.
+    columns : ndarray of int, shape (r,)
+        Parameters of the arm that any motion tells apart.
+    recordings : sequence of Recording
+        Data with torques.
+    used : Conditioning
+        Filters with the highest cut-off to be tried.
+
+    Returns
+    -------
+    Conditioning
+        The same with the cut-off that was chosen.
+
+    """
+    tried: list[tuple[float, FloatArray]] = []
+    cutoff, rows = used.cutoff_hz, 0
+    while True:
+        try:
+            problem = regressions(arm, columns, recordings, replace(used, cutoff_hz=cutoff))
+        except IdentificationError:
+            break
+        count = sum(len(part.tau) for part in problem)
+        if count < _KEPT * rows or not problem:
+            break
+        rows = max(rows, count)
+        tried.append((cutoff, _losses(problem)))
+        best = min(tried, key=lambda one: float(np.mean(one[1])))
+        if not _as_good(tried[-1][1], best[1]):
+            break
+        cutoff *= _STEP
+    if not tried:
+        return used
+    good = [hz for hz, losses in tried if _as_good(losses, best[1])]
+    return replace(used, cutoff_hz=max(good))
+
+
+def _as_good(losses: FloatArray, best: FloatArray) -> bool:
+    """Tell whether stretches are predicted as well as the best way does, to one deviation."""
+    worse = losses - best
+    deviation = np.std(worse, ddof=1) / np.sqrt(len(worse))
+    return bool(np.mean(worse) <= max(float(deviation), _NEAR * float(np.mean(best))))
+
+
+def _losses(problem: Sequence[Regression]) -> FloatArray:
+    """
+    Predict every second stretch from the others, and those from it.
+
+    Returns
+    -------
+    ndarray, shape (S,)
+        Root mean square of what is left over that of the torque, mean of the joints, of each
+        stretch.
+
+    """
+    step = max(1, sum(len(part.tau) for part in problem) // _ROWS)
+    x = np.concatenate([part.columns for part in problem])[::step]
+    y = np.concatenate([part.target for part in problem])[::step]
+    told = np.concatenate([part.informative for part in problem])[::step]
+    stretch = np.arange(len(y)) * _STRETCHES // len(y)
+    left = np.zeros_like(y)
+    whole = _fit(x, y, told, np.ones(y.shape[1]))
+    weight = 1.0 / np.maximum(_rms(y - x @ whole, told), 1e-12)
+    for odd in (0, 1):
+        chosen = stretch % 2 == odd
+        value = _fit(x[chosen], y[chosen], told[chosen], weight)
+        left[~chosen] = y[~chosen] - x[~chosen] @ value
+    rms = [_rms(left[stretch == k], told[stretch == k]) for k in range(_STRETCHES)]
+    return np.asarray(np.mean(rms / np.maximum(_rms(y, told), 1e-12), axis=1))
+
+
+def _rms(values: FloatArray, told: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return the root mean square of what is told, shape (n,)."""
+    count = np.maximum(told.sum(axis=0), 1)
+    return np.asarray(np.sqrt(np.sum(values**2, axis=0, where=told) / count))
+
+
+def _fit(
+    x: FloatArray, y: FloatArray, told: npt.NDArray[np.bool_], weight: FloatArray
+) -> FloatArray:
+    """Fit weighted rows by least squares, shape (r,)."""
+    weights = told * weight
+    rows = (x * weights[:, :, np.newaxis]).reshape(-1, x.shape[2])
+    return told_solution(rows.T @ rows, rows.T @ (y * weights).ravel())

@@ -1,0 +1,75 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+How well one half of the data predicts the other: what a fit to its own data does not show.
+
+Where motion is too short or too poor, parameters are what the noise makes them; either half then
+gives others, and predicts the other half badly.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.identification.rows.regression import Regression
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Rows that are enough of any data: some fifty for every parameter of seven joints.
+_ROWS = 4000
+
+
+def halves_error(
+    problem: Sequence[Regression], weights: FloatArray, described: FloatArray
+) -> float:
+    """
+    Fit the first half and predict the second, and the other way round.
+
+    Parameters
+    ----------
+    problem : sequence of Regression
+        N rows of r columns, in the order of time.
+    weights : ndarray, shape (N, n)
+        What the fit multiplied the rows of every joint by: the inverse of their residual.
+    described : ndarray, shape (r,)
+        Values of the description, where those stay that a half does not tell.
+
+    Returns
+    -------
+    float
+        Relative error of the predicted torque [%].
+
+    """
+    step = max(1, sum(len(part.tau) for part in problem) // _ROWS)
+    columns = np.concatenate([part.columns for part in problem])[::step]
+    tau = np.concatenate([part.tau for part in problem])[::step]
+    target = np.concatenate([part.target for part in problem])[::step]
+    told = np.concatenate([part.informative for part in problem])[::step]
+    rest, weight = target - columns @ described, weights[::step]
+    middle = len(tau) // 2
+    halves = slice(0, middle), slice(middle, None)
+    left = np.zeros_like(tau)
+    for fitted, predicted in (halves, halves[::-1]):
+        change = _fit(columns[fitted], rest[fitted], tau[fitted], weight[fitted])
+        left[predicted] = rest[predicted] - columns[predicted] @ change
+    length = float(np.linalg.norm(told * tau))
+    return float(100.0 * np.linalg.norm(told * left) / length) if length > 0.0 else 0.0
+
+
+def _fit(columns: FloatArray, rest: FloatArray, tau: FloatArray, weight: FloatArray) -> FloatArray:
+    """
+    Fit changes of the description, each of which may make as much torque as there is.
+
+    That is a Bayesian estimate in units of the residual; without it, what a half does not tell at
+    all would be any number.
+
+    """
+    stacked = (columns * weight[:, :, np.newaxis]).reshape(-1, columns.shape[2])
+    size = np.sqrt(np.mean(stacked**2, axis=0))
+    size[size == 0.0] = 1.0
+    torque = np.sqrt(np.mean((tau * weight) ** 2))
+    stacked = stacked / size
+    normal = stacked.T @ stacked
+    normal[np.diag_indices_from(normal)] += 1.0 / max(torque, 1.0) ** 2
+    return np.asarray(np.linalg.solve(normal, stacked.T @ (rest * weight).ravel()) / size)

@@ -1,0 +1,379 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Least squares of an arm whose torque need not be linear in its parameters, by Gauss-Newton.
+
+Friction in proportion to the load, gains of torque sensors, zeros of encoders, gravity and
+elasticity change the columns of everything else. A fit at the columns of the description is the
+first step only: the arm is linearised again at what was found, until the torque that the linear
+model promises is the torque of the arm. Steps that make the fit worse are damped (Marquardt 1963).
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.identification.fitting.excited import bounds
+from armid_ros.identification.fitting.least_squares import Method, Solution, solve
+from armid_ros.identification.rows.regression import predictions, Regression, regressions
+from armid_ros.identification.rows.signals import Conditioning
+from armid_ros.model import BaseParameters
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+import numpy as np
+import scipy.linalg
+
+#: Samples of a stretch along which the torque is looked at for curvature.
+_SAMPLES = 2000
+#: Curvature below this share of the torque is rounding.
+_ROUNDING = 1e-9
+#: Linear model and arm agree where they differ by less than this share of the residual ...
+AGREED = 1e-4
+#: ... or of the torque, where there is no noise.
+_EXACT = 1e-8
+#: Linearisations; fits that settle take three to eight.
+MOST_PASSES = 20
+#: Torque that is left below this share is none.
+_FINE = 1e-6
+#: A gain in squares of residuals that is less than one standard deviation of one parameter.
+_NOTHING = 1.0
+#: A step that gains less than this of the same is the last.
+_LITTLE = 0.1
+#: Share of the squares that a model with corners promises in vain where it can get no better.
+_STUCK = 0.5
+#: Shares of the squared columns that damp a step.
+_DAMPINGS = tuple(10.0 ** np.arange(-8.0, 3.0))
+#: A step keeps its promise if it leaves at most so many times the squares.
+_KEPT = 2.0
+
+Torques = tuple[FloatArray, ...]
+
+
+@dataclass(frozen=True)
+class FittedValues:
+    """
+    A fit, and the torque that the arm has with it.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        The arm with the values.
+    base : BaseParameters
+        What the data tell apart.
+    values : ndarray, shape (r,)
+        Base parameters.
+    problem : tuple of Regression
+        The linear problem that gave them.
+    solution : Solution
+        Its solution: covariance, weights.
+    predicted : tuple of ndarray, each of shape (M, n)
+        Torque of the arm, filtered, for each stretch [N m].
+    passes : int
+        Linearisations that it took; 1 if the torque is linear.
+    settled : bool
+        Whether the linear model and the arm agree.
+
+    """
+
+    arm: ArmModel
+    base: BaseParameters
+    values: FloatArray
+    problem: tuple[Regression, ...]
+    solution: Solution
+    predicted: Torques
+    passes: int = 1
+    settled: bool = True
+
+
+def fit_values(
+    arm: ArmModel,
+    base: BaseParameters,
+    problem: Sequence[Regression],
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    method: Method,
+    free: FloatArray | None = None,
+) -> FittedValues:
+    """
+    Fit base parameters, again and again where the torque is not linear in them.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Where to begin, and where what the data do not tell stays.
+    base : BaseParameters
+        What the data tell apart there.
+    problem : sequence of Regression
+        The columns there.
+    recordings : sequence of Recording
+        Training data.
+    used : Conditioning
+        Filters.
+    method : {'ols', 'wls', 'irls'}
+        As of ``solve``.
+    free : ndarray, shape (10 n, k), optional
+        Orthonormal directions of the rigid parameters that change no torque, where they are not
+        all those that base does not tell apart.
+
+    """
+    solution = solve(problem, method, bounds(arm, base))
+    motions = [part.motion for part in problem]
+    chosen = ungrouped(arm, base) if free is None else free
+    reached = moved(arm, base, solution.values, chosen)
+    bare = arm.with_theta(np.where(np.arange(len(arm.theta)) < _rigid(arm), arm.theta, 0.0))
+    if curved(bare, arm, motions):
+        problem, _ = linearised(arm, base, recordings, used)
+    elif not curved(arm, reached, motions):
+        predicted = tuple(part.torque(solution.values) for part in problem)
+        found = (
+            reached
+            if free is not None
+            else _lifted(arm, base, problem, solution, reached, recordings, used)
+        )
+        return FittedValues(found, base, solution.values, tuple(problem), solution, predicted)
+    return _iterate(arm, base, problem, recordings, used, method, chosen)
+
+
+def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool:
+    """
+    Tell whether the torque is not linear in the parameters between two arms of one structure.
+
+    Parameters
+    ----------
+    before, after : ArmModel
+        Two arms that differ in their values.
+    motions : sequence of Motion
+        What to look along.
+
+    """
+    if np.array_equal(before.theta, after.theta):
+        return False
+    middle = before.with_theta(0.5 * (before.theta + after.theta))
+    for motion in motions:
+        some = motion.select(slice(None, None, -(-len(motion) // _SAMPLES)))
+        ends, half = (before.torque(some), after.torque(some)), middle.torque(some)
+        size = max(float(np.max(np.abs(tau))) for tau in (*ends, half))
+        if float(np.max(np.abs(ends[0] + ends[1] - 2.0 * half))) > _ROUNDING * size:
+            return True
+    return False
+
+
+def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatArray) -> ArmModel:
+    """
+    Return an arm with other base parameters.
+
+    Of what no motion tells apart, effects stay where they are and rigid parameters move as little
+    as may be: what is grouped with rigid parameters alone is so wherever the effects are.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Where to begin.
+    base : BaseParameters
+        What is told apart.
+    values : ndarray, shape (r,)
+        Base parameters that the arm is to have.
+    free : ndarray, shape (10 n, k)
+        Orthonormal directions of the rigid parameters that change no torque.
+
+    """
+    change = np.zeros(len(arm.theta))
+    change[base.independent] = values - base.values(arm.theta)
+    rigid = _rigid(arm)
+    change[:rigid] -= free @ (free.T @ change[:rigid])
+    return arm.with_theta(arm.theta + change)
+
+
+def linearised(
+    arm: ArmModel, base: BaseParameters, recordings: Sequence[Recording], used: Conditioning
+) -> tuple[tuple[Regression, ...], Torques]:
+    """
+    Linearise the torque of an arm about the values that it has.
+
+    Returns
+    -------
+    problem : tuple of Regression
+        With the constant that makes the linear model the arm's torque at its own values.
+    predicted : tuple of ndarray, each of shape (M, n)
+        That torque, filtered.
+
+    """
+    predicted = torques(arm, recordings, used)
+    problem = regressions(arm, base.independent, recordings, used)
+    return through(problem, predicted, base.values(arm.theta)), predicted
+
+
+def torques(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> Torques:
+    """Return the filtered torque of an arm along every stretch of recordings."""
+    return tuple(part.torque for part in predictions(arm, recordings, used))
+
+
+def through(
+    problem: Sequence[Regression], predicted: Torques, values: FloatArray
+) -> tuple[Regression, ...]:
+    """Return linear models that have the predicted torque at the values."""
+    return tuple(
+        replace(part, constant=torque - part.columns @ values)
+        for part, torque in zip(problem, predicted, strict=True)
+    )
+
+
+def agree(
+    problem: Sequence[Regression], weights: FloatArray, promised: Torques, predicted: Torques
+) -> bool:
+    """Tell whether the torque of an arm is what a linear model promised, as far as it matters."""
+    off = _size(weights, [p - q for p, q in zip(promised, predicted, strict=True)])
+    whole = _size(weights, [part.tau for part in problem])
+    return bool(off <= max(AGREED * np.sqrt(_cost(problem, weights, promised)), _EXACT * whole))
+
+
+def _iterate(
+    arm: ArmModel,
+    base: BaseParameters,
+    problem: Sequence[Regression],
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    method: Method,
+    free: FloatArray,
+) -> FittedValues:
+    """Take Gauss-Newton steps, damped where they lead astray, until linear model and arm agree."""
+    limits = bounds(arm, base)
+    now = _State(arm, base.values(arm.theta), problem)
+    passes, settled = 0, True
+    while True:
+        passes += 1
+        solution = solve(now.problem, method, limits)
+        promised = tuple(part.torque(solution.values) for part in now.problem)
+        if passes > 1 and abs(now.gain(promised)) < _NOTHING:
+            break
+        steps = [now.damped(damping, limits) for damping in _DAMPINGS]
+        trial = _best_step(now, solution.values, promised, steps, base, free, recordings, used)
+        if trial is None:
+            settled = all(now.gain(now.linear(values)) < _STUCK * now.cost() for values in steps)
+            break
+        settled = agree(now.problem, solution.weights, promised, trial.predicted)
+        settled = settled or now.gain(trial.predicted) < _LITTLE
+        if settled or passes == MOST_PASSES:
+            now = trial
+            break
+        fresh = regressions(trial.arm, base.independent, recordings, used)
+        now = _State(trial.arm, trial.values, through(fresh, trial.predicted, trial.values))
+    return FittedValues(
+        now.arm, base, now.values, now.problem, solution, now.predicted, max(passes, 2), settled
+    )
+
+
+def _best_step(
+    now: _State,
+    straight: FloatArray,
+    promised: Torques,
+    damped: Iterable[FloatArray],
+    base: BaseParameters,
+    free: FloatArray,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+) -> _State | None:
+    """Go straight to a solution that keeps its promise, else by the best of damped steps."""
+    best = None
+    for values in (straight, *damped):
+        arm = moved(now.arm, base, values, free)
+        predicted = torques(arm, recordings, used)
+        if now.cost(predicted) <= now.cost(None if best is None else best.predicted):
+            best = _State(arm, values, through(now.problem, predicted, values))
+        if values is straight and now.cost(predicted) <= _KEPT * now.cost(promised):
+            break
+    return best
+
+
+class _State:
+    """
+    Where an iteration is: an arm, its values, its linear model, and what that leaves.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The arm.
+    values : ndarray, shape (r,)
+        Its base parameters.
+    problem : sequence of Regression
+        Linear models that have its torque at its values.
+
+    """
+
+    def __init__(self, arm: ArmModel, values: FloatArray, problem: Sequence[Regression]) -> None:
+        self.arm, self.values, self.problem = arm, values, tuple(problem)
+        self.predicted = tuple(part.torque(values) for part in problem)
+        self._tau = np.concatenate([part.tau for part in problem])
+        self._used = np.concatenate([part.informative for part in problem])
+        self._left = self._tau - np.concatenate(self.predicted)
+        counts = np.maximum(self._used.sum(axis=0), 1)
+        rms = np.sqrt(np.sum(self._left**2, axis=0, where=self._used) / counts)
+        self._weights = self._used / np.maximum(rms, _EXACT * max(rms.max(), 1e-100))
+
+    def gain(self, predicted: Torques) -> float:
+        """Return the squares of residuals that torques take away; none where nothing is left."""
+        if np.linalg.norm(self._used * self._left) <= _FINE * np.linalg.norm(
+            self._used * self._tau
+        ):
+            return 0.0
+        return self.cost() - self.cost(predicted)
+
+    def linear(self, values: FloatArray) -> Torques:
+        """Return what the linear models take the torque for."""
+        return tuple(part.torque(values) for part in self.problem)
+
+    def damped(self, damping: float, limits: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Return the values after a step of Levenberg and Marquardt, within limits."""
+        columns = np.concatenate([part.columns for part in self.problem])
+        w = (self._weights[:, :, np.newaxis] * columns).reshape(-1, len(self.values))
+        size = np.linalg.norm(w, axis=0)
+        scaled = w / np.where(size > 0.0, size, 1.0)
+        normal = scaled.T @ scaled + damping * np.eye(len(size))
+        step = np.linalg.solve(normal, scaled.T @ (self._weights * self._left).ravel())
+        return np.clip(self.values + step / np.where(size > 0.0, size, np.inf), *limits)
+
+    def cost(self, predicted: Torques | None = None) -> float:
+        """Return the sum of squares that torques leave, in what is left now of each joint."""
+        if predicted is None:
+            return float(np.sum((self._weights * self._left) ** 2))
+        left = self._weights * (self._tau - np.concatenate(predicted))
+        return float(np.sum(left**2))
+
+
+def _lifted(
+    arm: ArmModel,
+    base: BaseParameters,
+    problem: Sequence[Regression],
+    solution: Solution,
+    reached: ArmModel,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+) -> ArmModel:
+    """Return the arm nearest to the description that has the fitted torque along this motion."""
+    found = arm.with_theta(base.lift(solution.values, arm.theta))
+    if np.allclose(found.theta[_rigid(arm) :], reached.theta[_rigid(arm) :]):
+        return found
+    promised = tuple(part.torque(solution.values) for part in problem)
+    same = agree(problem, solution.weights, promised, torques(found, recordings, used))
+    return found if same else reached
+
+
+def ungrouped(arm: ArmModel, base: BaseParameters) -> FloatArray:
+    """Return directions of the rigid parameters that change no base parameter, (10 n, k)."""
+    return np.asarray(scipy.linalg.null_space(base.grouping[:, : _rigid(arm)]))
+
+
+def _rigid(arm: ArmModel) -> int:
+    return len(arm.robot.rigid_parameters)
+
+
+def _cost(problem: Sequence[Regression], weights: FloatArray, predicted: Torques) -> float:
+    left = [part.tau - torque for part, torque in zip(problem, predicted, strict=True)]
+    return _size(weights, left) ** 2
+
+
+def _size(weights: FloatArray, torque: Sequence[FloatArray]) -> float:
+    return float(np.linalg.norm(weights * np.concatenate(torque)))

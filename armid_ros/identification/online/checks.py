@@ -1,0 +1,54 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a stream has to be like to identify anything; as a recording, see `checks`."""
+
+from __future__ import annotations
+
+from armid_ros.identification.rows.checks import position_problem, REST_RANGE, SHORTEST, SILENT
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
+import numpy as np
+
+
+class StreamChecks:
+    """
+    Watch how far positions and torques of a stream have ranged.
+
+    Parameters
+    ----------
+    robot : Robot
+        Gives the limits.
+
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        n = self._robot.n_joints
+        self._lowest, self._highest = np.full((2, n), np.inf), np.full((2, n), -np.inf)
+        self._moved: float | None = None
+        self._moving = 0.0
+
+    def take(self, t: float, q: FloatArray, tau: FloatArray) -> None:
+        """Take in a sample that is not damaged: stamp, positions, torques, shape (n,)."""
+        signals = np.stack([q, tau])
+        np.minimum(self._lowest, signals, out=self._lowest)
+        np.maximum(self._highest, signals, out=self._highest)
+        if self._moved is None and np.any(self._highest[0] - self._lowest[0] > REST_RANGE):
+            self._moved = t
+        self._moving = 0.0 if self._moved is None else t - self._moved
+
+    @property
+    def silent(self) -> bool:
+        """Whether no torque has ever changed, so that nothing can be learned from it."""
+        return bool(np.all(self._highest[1] <= self._lowest[1]))
+
+    @property
+    def error(self) -> str:
+        """What has to be mended before anything can be identified; empty when all is well."""
+        if self.silent and abs(self._moving) > SHORTEST:
+            return SILENT
+        return position_problem(self._robot, self._lowest[0], self._highest[0])

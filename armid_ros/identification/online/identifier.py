@@ -1,0 +1,394 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Online identification: joint states in, one at a time; an estimate that converges, out."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate
+from armid_ros.identification.fitting.friction_beside import by_joint, FrictionBeside
+from armid_ros.identification.online.change import Change, change_candidates
+from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
+from armid_ros.identification.online.checks import StreamChecks
+from armid_ros.identification.online.recursive import RecursiveLeastSquares
+from armid_ros.identification.online.score_variance import ScoreVariance
+from armid_ros.identification.online.settings import OnlineSettings
+from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, TripleLag
+from armid_ros.identification.rows.row_noise import Misfit, RowNoise, sensor_noise
+from armid_ros.identification.samples.joint_gate import joint_gate
+from armid_ros.identification.samples.spikes import SpikeGate
+from armid_ros.identification.samples.straight_line import StreamSample
+from armid_ros.model import BaseParameters
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+__all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
+
+#: Time constants of the row filter until its start, or a joint's rest, is forgotten, to 3e-3.
+_FORGOTTEN = 10.0
+#: Windows of which the colour of the noise is learned [s]: longer than what it lasts.
+_WINDOW = 4.0
+
+
+@dataclass(frozen=True)
+class OnlineSample:
+    """
+    One sample that the estimator saw.
+
+    Attributes
+    ----------
+    t : float
+        When it was [s]: the stamp of the newest joint state minus the delay of the filters.
+    measured : ndarray, shape (n,)
+        Filtered measured torque [N m].
+    predicted : ndarray, shape (n,)
+        What the estimate before this sample predicts, filtered alike [N m].
+    used : ndarray of bool, shape (n,)
+        False for a joint at rest, which friction may hold with any torque.
+
+    """
+
+    t: float
+    measured: FloatArray
+    predicted: FloatArray
+    used: npt.NDArray[np.bool_]
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured minus predicted torque, shape (n,) [N m]."""
+        return self.measured - self.predicted
+
+
+class OnlineIdentifier:
+    """
+    Estimate the base parameters of an arm and of its effects while it moves.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Structure: robot and effects, which have to be linear in their parameters.
+    settings : OnlineSettings, optional
+        Filters, weights, forgetting.
+    rng : numpy.random.Generator
+        Draws the states over which base parameters are found.
+
+    Raises
+    ------
+    IdentificationError
+        If a setting is out of range or does not fit the arm.
+
+    Attributes
+    ----------
+    base : BaseParameters
+        What is estimated.
+    latest : tuple of OnlineSample
+        What the last update brought: several samples where some had waited for it.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> import numpy as np
+    >>> run = ar.read_recording('monday', 'my_arm.urdf')
+    >>> arm = ar.ArmModel.of('my_arm.urdf', effects='viscous_friction,coulomb_friction')
+    >>> online = ar.OnlineIdentifier(arm, rng=np.random.default_rng(0))
+    >>> for t, q, tau in zip(run.t, run.q, run.tau, strict=True):
+    ...     _ = online.update(t, q, None, tau)
+    >>> estimate = online.estimate()
+    >>> print(estimate.values[estimate.index('viscous_coefficient', 'elbow')].round(1))
+    0.3
+
+    """
+
+    def __init__(
+        self,
+        arm: ArmModel,
+        settings: OnlineSettings | None = None,
+        *,
+        rng: np.random.Generator,
+    ) -> None:
+        settings = settings or OnlineSettings()
+        robot = arm.robot
+        for effect in arm.effects:
+            if not effect.instantaneous:
+                raise IdentificationError(
+                    f'{effect.name} depends on the motion before, which single samples do not '
+                    'tell; identify it from a recording'
+                )
+        self.arm = arm
+        self.settings = settings
+        self.base: BaseParameters = arm.base_parameters(rng)
+        self._filter = CausalFilter(
+            robot.n_joints,
+            settings.cutoff,
+            period=settings.period,
+            max_gap=settings.max_gap,
+            measured_velocity=settings.measured_velocity,
+            prismatic=robot.prismatic,
+        )
+        self._gate = _gate(arm, settings)
+        self._checks = StreamChecks(robot)
+        self.latest: tuple[OnlineSample, ...] = ()
+        self._row_filter = TripleLag(settings.cutoff)
+        self._row_period = 1.0 / settings.rows_per_second()
+        self._estimator = RecursiveLeastSquares(
+            self.base.parameters,
+            sensor_noise(robot, settings.torque_noise),
+            forgetting=settings.forgetting,
+            prior=settings.prior,
+            start=self.base.values(arm.theta),
+            scale_covariance=settings.torque_noise is None,
+        )
+        window = max(1, round(_WINDOW / self._row_period))
+        self._scores = ScoreVariance(window, settings.forgetting)
+        self._watch = None
+        if settings.changes is not None:
+            self._beside = FrictionBeside(arm)
+            self._watch = ChangeWatch(
+                self._estimator,
+                self._beside.parameters,
+                change_candidates(arm, self.base),
+                settings.changes,
+            )
+        self._data = robot.model.createData()
+        held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
+        self._held = np.array([joint in held for joint in robot.joints])
+        self._generation = -1
+        self._last_row: float | None = None
+        self._last_moving = np.full(robot.n_joints, -np.inf)
+        self._last_useless: FloatArray | None = None
+        self._noise: RowNoise | None = None
+        self._misfit = Misfit(robot.n_joints, settings.forgetting)
+
+    def reset(self) -> None:
+        """Forget everything that was learned, and set the counters to zero."""
+        self._filter.reset()
+        self._misfit.reset()
+        self._checks.reset()
+        self.latest = ()
+        if self._gate is not None:
+            self._gate.reset()
+        self._estimator.reset()
+        self._scores.reset()
+        if self._watch is not None:
+            self._watch.reset()
+
+    def update(
+        self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
+    ) -> OnlineSample | None:
+        """
+        Take in one joint state.
+
+        Parameters
+        ----------
+        t : float
+            Stamp [s].
+        q, tau : array_like, shape (n,)
+            Measured position [rad or m] and torque [N m or N], in the order of the robot.
+        dq : array_like, shape (n,), or None
+            Measured velocity; not used unless the settings say so.
+
+        Returns
+        -------
+        OnlineSample or None
+            None between rows, while the filters settle, and for a sample that is left out.
+
+        """
+        signal = self._filter.signal(t, q, dq, tau)
+        if signal is None:
+            self.latest = ()
+        elif self._gate is None:
+            self.latest = self._take(t, signal)
+        else:
+            good = self._gate.take(t, signal, self._without_consequence)
+            self.latest = tuple(one for sample in good for one in self._take_good(sample))
+        return self.latest[-1] if self.latest else None
+
+    def _take_good(self, sample: StreamSample) -> tuple[OnlineSample, ...]:
+        """Learn from a sample of the gate, which says where a stretch begins."""
+        if sample.begins:
+            self._filter.restart('position_step')
+        return self._take(sample.t, sample.x)
+
+    def _take(self, t: float, signal: FloatArray) -> tuple[OnlineSample, ...]:
+        """Learn from a good sample; return what it brought, if anything."""
+        n = self.arm.robot.n_joints
+        self._checks.take(t, signal[:n], signal[-n:])
+        motion = self._filter.advance(t, signal)
+        if motion is None:
+            return ()
+        if self._filter.generation != self._generation:
+            self._begin()
+        useless = self._watch_rest(motion)
+        step = self._row_period if self._last_row is None else motion.t - self._last_row
+        if step < self._row_period - 0.5 * (self._filter.period or 0.0):
+            return ()
+        self._last_row = motion.t
+        used = motion.t - useless > _FORGOTTEN / self._row_filter.pole
+        usable = not (self._checks.silent or self._checks.error)
+        return (self._learn(motion, step, used & usable),)
+
+    def estimate(self) -> Estimate:
+        """Return values and covariance of the base parameters, errors that last included."""
+        estimate = self._estimator.estimate
+        covariance = self._scores.covariance(self._estimator.learned().root)
+        return estimate if covariance is None else replace(estimate, covariance=covariance)
+
+    def model(self) -> ArmModel:
+        """Return the arm with the estimate, otherwise as near as possible to what it was."""
+        return self.arm.with_theta(self.base.lift(self._estimator.values, self.arm.theta))
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What has changed about the arm since the last reset, oldest first."""
+        return () if self._watch is None else tuple(self._watch.changes)
+
+    @property
+    def condition_number(self) -> float:
+        """Condition number of the weighted regressor so far; takes a millisecond."""
+        return self._estimator.condition_number
+
+    @property
+    def samples(self) -> int:
+        """Samples that the estimate rests on."""
+        return self._estimator.samples
+
+    @property
+    def rejected(self) -> Mapping[str, int]:
+        """Joint states left out, by reason; see CausalFilter and SpikeGate."""
+        damaged = Counter() if self._gate is None else self._gate.rejected
+        return Counter(self._filter.rejected) + damaged
+
+    @property
+    def error(self) -> str:
+        """Why nothing can be learned, such as torques that are absent; empty when all is well."""
+        return self._checks.error
+
+    @property
+    def spikes(self) -> Mapping[tuple[str, str], int]:
+        """Joint states left out as a signal jumped and came back, by joint and signal."""
+        counts = {} if self._gate is None else self._gate.spikes
+        joints = self.arm.robot.joints
+        names = (
+            ('position', 'velocity', 'effort')
+            if self.settings.measured_velocity
+            else ('position', 'effort')
+        )
+        return {
+            (joints[k % len(joints)], names[k // len(joints)]): count
+            for k, count in counts.items()
+        }
+
+    @property
+    def restarts(self) -> Mapping[str, int]:
+        """Restarts of the filters, by reason; see CausalFilter."""
+        return self._filter.restarts
+
+    @property
+    def delay(self) -> float | None:
+        """Delay of the filters [s]; None until the sampling period is known."""
+        pole = self._filter.pole
+        return None if pole is None else 3.0 / pole + self._row_filter.delay
+
+    def _begin(self) -> None:
+        """Start the row filter anew, together with the motion filter."""
+        self._row_filter.reset()
+        self._scores.interrupt()
+        if self._watch is not None:
+            self._watch.interrupt()
+        self._generation = self._filter.generation
+        self._last_row = None
+        self._last_moving[:] = -np.inf
+        self._last_useless = None
+        self._noise = None
+
+    def _watch_rest(self, motion: CausalMotion) -> FloatArray:
+        """Return when each joint was last at rest, or the row filter started, shape (n,) [s]."""
+        if self._last_useless is None:
+            self._last_useless = np.full(len(motion.q), motion.t)
+        self._last_moving[np.abs(motion.dq) >= self.settings.rest_velocity] = motion.t
+        resting = motion.t - self._last_moving > self.settings.rest_time
+        self._last_useless[resting & self._held] = motion.t
+        return self._last_useless
+
+    def _learn(
+        self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_]
+    ) -> OnlineSample:
+        one = _one_sample(self.arm, motion)
+        stacked = np.column_stack([motion.tau, self._rows(one), self._rows_beside(one)])
+        filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
+        measured, rows, beside = np.split(filtered, [1, 1 + self.base.rank], axis=1)
+        measured = measured[:, 0]
+        noise = self._row_noise()
+        gain, independent = noise.gain, noise.independent(min(step, self._row_period))
+        stamp = motion.t - (self.delay or 0.0)
+        weights = np.asarray(used * independent)
+        sample = measured / gain, weights
+        if self._watch is None:
+            innovation = self._estimator.update(rows / gain, *sample)
+        else:
+            known = len(self._watch.changes)
+            wider = np.hstack([rows, by_joint(beside)]) / gain
+            innovation = self._watch.update(stamp, wider, *sample)
+            for change in self._watch.changes[known:]:
+                self._scores.reopen(change.reopened, self._estimator.values)
+        self._misfit.learn(innovation, sample[0] - rows / gain @ self._estimator.values, weights)
+        scale = self._estimator.scale(weights) / gain
+        self._scores.add(rows * scale[:, np.newaxis], measured * scale, self._estimator.values)
+        return OnlineSample(stamp, measured, measured - innovation * gain, used)
+
+    @property
+    def _without_consequence(self) -> FloatArray:
+        """What a single sample may be off by before a row shows it, positions not so judged."""
+        n = self.arm.robot.n_joints
+        floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
+        if self._filter.pole is not None and self._filter.period is not None:
+            floor[-n:] = self._misfit.size * self._row_noise().single
+        return floor
+
+    def _rows(self, motion: Motion) -> FloatArray:
+        """Return the regressor of one sample in the independent columns, shape (n, r)."""
+        robot = self.arm.robot
+        q, dq, ddq = motion.q[0], motion.dq[0], motion.ddq[0]
+        rigid = pin.computeJointTorqueRegressor(robot.model, self._data, q, dq, ddq)
+        rigid = rigid.reshape(robot.n_joints, -1)  # of a single joint it is a vector
+        effects = self.arm.effect_columns(motion)[0]
+        return np.concatenate([rigid, effects], axis=1).take(self.base.independent, axis=1)
+
+    def _rows_beside(self, motion: Motion) -> FloatArray:
+        """Return what the search for changes learns beside, joint by joint, shape (n, K)."""
+        if self._watch is None:
+            return np.empty((motion.n_joints, 0))
+        return self._beside.torques(motion)
+
+    def _row_noise(self) -> RowNoise:
+        """Return the noise of the rows since the filters were started."""
+        if self._noise is None:
+            period, pole = self._filter.period, self._filter.pole
+            assert period is not None and pole is not None
+            self._noise = RowNoise.of(period, pole, self._row_filter.pole)
+        return self._noise
+
+
+def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
+    """Return what leaves damaged samples out, if that is wanted."""
+    if settings.longest_damage < 1:
+        return None
+    changes = settings.changes or ChangeSettings()
+    return joint_gate(
+        arm.robot.prismatic,
+        'qvt' if settings.measured_velocity else 'qt',
+        max_gap=settings.longest_damage,
+        false_alarm_time=changes.false_alarm_time,
+    )
+
+
+def _one_sample(arm: ArmModel, motion: CausalMotion) -> Motion:
+    state = (motion.q[None], motion.dq[None], motion.ddq[None])
+    return Motion(arm.robot.joints, np.array([motion.t]), *state)

@@ -1,0 +1,298 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Recursive least squares in square-root information form.
+
+The state is the triangle R and the vector z of the QR factorisation of all weighted rows so far,
+so without forgetting the estimate is the one of a batch solution, at any number of samples, and
+the covariance R^-1 R^-T cannot lose its symmetry or become negative (Bierman 1977, chapter V).
+
+Forgetting is directional (Kulhavy and Karny 1984): old information is given up only where a new
+sample brings information, and never more than the sample brings. So the covariance never grows,
+and what is not excited is neither forgotten nor moved: an arm may rest for hours. The price is
+that what a strong burst of motion taught is forgotten late by the weak motion after it.
+
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.online import square_root
+from armid_ros.motion import FloatArray, read_only
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+
+#: A smaller forgetting factor forgets within ten samples, which is not identification.
+SMALLEST_FORGETTING = 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """
+    What an estimator knew at some time, to return to.
+
+    Attributes
+    ----------
+    root : ndarray, shape (P, P)
+        Upper triangle R; the information is R^T R.
+    values : ndarray, shape (P,)
+        Estimated parameters.
+    squares, freedom : float
+        Weighted squares of the residuals, and observations beyond the parameters.
+    samples : int
+        Samples used.
+
+    """
+
+    root: FloatArray
+    values: FloatArray
+    squares: float
+    freedom: float
+    samples: int
+
+
+class RecursiveLeastSquares:
+    """
+    Estimate theta of tau = rows @ theta + noise, a few rows at a time.
+
+    Parameters
+    ----------
+    parameters : tuple of ParameterName
+        P names.
+    noise : array_like, shape (m,), optional
+        Standard deviation of the noise of the m rows of a sample, usually one per joint [N m].
+        Without it the rows weigh the same and the covariance is scaled by the residuals.
+    forgetting : float
+        1 keeps everything. Below 1, a direction that is excited all the time is estimated from
+        about the last 1 / (1 - forgetting) samples.
+    prior : Estimate, optional
+        What is known beforehand. Without it all values are those of `start` within PRIOR_STD,
+        which is a ridge too weak to be seen once a parameter is excited.
+    start : array_like, shape (P,), optional
+        Values to begin with when there is no prior, zero by default.
+    scale_covariance : bool, optional
+        Whether the covariance is multiplied by ``variance_factor``; by default when the noise is
+        not given. Right when the noise is known up to a factor.
+
+    Raises
+    ------
+    IdentificationError
+        If the noise, the forgetting factor or the prior cannot be used.
+
+    Attributes
+    ----------
+    parameters : tuple of ParameterName
+        P names.
+    samples : int
+        Samples used since the last reset.
+
+    """
+
+    def __init__(
+        self,
+        parameters: tuple[ParameterName, ...],
+        noise: npt.ArrayLike | None = None,
+        *,
+        forgetting: float = 1.0,
+        prior: Estimate | None = None,
+        start: npt.ArrayLike | None = None,
+        scale_covariance: bool | None = None,
+    ) -> None:
+        if not SMALLEST_FORGETTING <= forgetting <= 1.0:
+            raise IdentificationError(
+                f'forgetting factor {forgetting}: has to be from {SMALLEST_FORGETTING} to 1'
+            )
+        self.parameters = parameters
+        self.samples = 0
+        self._forgetting = float(forgetting)
+        self._noise = None if noise is None else _checked_noise(noise)
+        self._scale = noise is None if scale_covariance is None else scale_covariance
+        self._prior = square_root.prior_root(parameters, prior, start)
+        # without a prior the first P observations fit exactly and say nothing of the noise
+        self._initial_freedom = -float(len(parameters)) if prior is None else 0.0
+        self.reset()
+
+    def with_more(self, parameters: tuple[ParameterName, ...]) -> RecursiveLeastSquares:
+        """Return an estimator in its beginning, of more parameters that nothing is known of."""
+        more, (root, right) = len(parameters), self._prior
+        wider = copy(self)
+        wider.parameters = self.parameters + parameters
+        wider._prior = (
+            scipy.linalg.block_diag(root, np.eye(more) / square_root.PRIOR_STD),
+            np.concatenate([right, np.zeros((more, 1))]),
+        )
+        wider._initial_freedom = self._initial_freedom - float(more)
+        wider.reset()
+        return wider
+
+    def reset(self) -> None:
+        """Return to the prior."""
+        self.samples = 0
+        self._root, self._right = (np.array(part, order='F') for part in self._prior)
+        self._squares = 0.0
+        self._freedom = self._initial_freedom
+        self._values = square_root.solved(self._root, self._right)
+
+    def update(
+        self,
+        rows: FloatArray,
+        tau: FloatArray,
+        weights: npt.ArrayLike | None = None,
+    ) -> FloatArray:
+        """
+        Take in one sample.
+
+        Parameters
+        ----------
+        rows : ndarray, shape (m, P)
+            Sensitivity of the torques to the parameters.
+        tau : ndarray, shape (m,)
+            Measured torque [N m].
+        weights : array_like, shape (m,), optional
+            Independent observations that each row stands for: 0 for a row not to be used, less
+            than 1 for one of many filtered rows that share their noise. Ones by default.
+
+        Returns
+        -------
+        ndarray, shape (m,)
+            Innovation: the torque minus its prediction from the samples before [N m].
+
+        Raises
+        ------
+        IdentificationError
+            If shapes do not agree or a number is not finite; the estimate is unchanged.
+
+        """
+        rows, tau, counts = self._checked(rows, tau, weights)
+        innovation = tau - rows @ self._values
+        used = float(counts.sum())
+        if used == 0.0:
+            return innovation
+        scale = self.scale(counts)
+        rows = rows * scale[:, np.newaxis]
+        if self._forgetting < 1.0:
+            self._root = square_root.replaced(self._root, rows, self._forgetting)
+            self._values = self._values + square_root.step_along(
+                self._root, rows.T @ (innovation * scale)
+            )
+            self._squares *= self._forgetting
+            self._freedom *= self._forgetting
+        else:
+            self._root, self._right = square_root.absorbed(
+                self._root, self._right, rows, tau * scale
+            )
+            self._values = square_root.solved(self._root, self._right)
+        after = tau * scale - rows @ self._values
+        self._squares += float(innovation * scale @ after)
+        self._freedom += used
+        self.samples += 1
+        return innovation
+
+    def scale(self, weights: FloatArray) -> FloatArray:
+        """Return what gives rows of these weights noise of variance 1, shape (m,) [1/(N m)]."""
+        root = np.sqrt(weights)
+        return root if self._noise is None else root / self._noise
+
+    def learned(self) -> Learned:
+        """Return what is known now."""
+        return Learned(
+            read_only(self._root), self._values, self._squares, self._freedom, self.samples
+        )
+
+    def restore(self, learned: Learned) -> None:
+        """Return to what was known."""
+        self._take(np.array(learned.root, order='F'), learned.values)
+        self._squares, self._freedom = learned.squares, learned.freedom
+        self.samples = learned.samples
+
+    def reopen(self, directions: FloatArray) -> None:
+        """
+        Forget the values along some directions, and nothing else.
+
+        Parameters
+        ----------
+        directions : ndarray, shape (P, k)
+            Independent combinations of parameters that may have changed.
+
+        """
+        self._take(square_root.reopened(self._root, directions), self._values)
+        self._freedom -= directions.shape[1]
+
+    @property
+    def values(self) -> FloatArray:
+        """Estimated parameters, shape (P,)."""
+        return self._values
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the values, shape (P, P)."""
+        return square_root.inverse_products(self._root) * self.covariance_factor
+
+    @property
+    def noise_is_relative(self) -> bool:
+        """Whether the noise is known up to a factor only, which the residuals tell."""
+        return self._scale
+
+    @property
+    def covariance_factor(self) -> float:
+        """What the covariance is multiplied by: the variance factor, or 1 for known noise."""
+        return self.variance_factor if self._scale else 1.0
+
+    @property
+    def variance_factor(self) -> float:
+        """
+        Variance of the weighted residuals: 1 when the noise is as given.
+
+        Without a prior, 1 as well until there are more observations than parameters.
+
+        """
+        return self._squares / self._freedom if self._freedom >= 1.0 else 1.0
+
+    @property
+    def condition_number(self) -> float:
+        """Condition number of the weighted regressor so far, prior included."""
+        singular = np.linalg.svd(self._root, compute_uv=False)
+        return float(singular[0] / singular[-1])
+
+    @property
+    def estimate(self) -> Estimate:
+        """Values and covariance with their names."""
+        return Estimate(self.parameters, self._values.copy(), self.covariance)
+
+    def _take(self, root: FloatArray, values: FloatArray) -> None:
+        self._root, self._values = root, values
+        self._right = np.asfortranarray((root @ values)[:, np.newaxis])
+
+    def _checked(
+        self, rows: FloatArray, tau: FloatArray, weights: npt.ArrayLike | None
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        rows = np.asarray(rows, dtype=np.float64)
+        tau = np.asarray(tau, dtype=np.float64)
+        count = len(tau) if self._noise is None else len(self._noise)
+        expected = (count, len(self.parameters))
+        if rows.shape != expected or tau.shape != expected[:1]:
+            raise IdentificationError(
+                f'update: rows of shape {rows.shape} and torques of shape {tau.shape}, '
+                f'where {expected} and {expected[:1]} were expected'
+            )
+        counts = np.ones(count) if weights is None else np.asarray(weights, dtype=np.float64)
+        if counts.shape != (count,) or not np.all(counts >= 0.0):
+            raise IdentificationError(f'update: weights {counts} have to be {count} numbers >= 0')
+        # one sum instead of isfinite: any NaN or infinity survives in it
+        if not np.isfinite(rows.sum() + tau.sum() + counts.sum()):
+            raise IdentificationError('update: rows, torques and weights have to be finite')
+        return rows, tau, counts
+
+
+def _checked_noise(noise: npt.ArrayLike) -> FloatArray:
+    values = np.array(noise, dtype=np.float64)
+    if values.ndim != 1 or not np.all(np.isfinite(values)) or not np.all(values > 0.0):
+        raise IdentificationError(
+            f'noise {values}: has to be one finite standard deviation > 0 for each joint'
+        )
+    return values

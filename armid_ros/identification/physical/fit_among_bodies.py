@@ -1,0 +1,330 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The fit among bodies: torque least squares over parameters that physics allows.
+
+The constraints are part of the fit. Moving an unconstrained estimate to the nearest body
+afterwards spoils the torques, for it is nearest in parameters of which they say nothing. What the
+data leave open comes from the description; how much that counts is decided by blocks of the
+training data that are left out in turn.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate
+from armid_ros.identification.physical.physical_certificate import (
+    PhysicalCertificate,
+    walls_reached,
+)
+from armid_ros.identification.physical.physical_program import Box, PhysicalProgram
+from armid_ros.identification.rows.regression import Regression
+from armid_ros.model import BaseParameters
+from armid_ros.model.pseudo_inertia import (
+    Consistency,
+    link_parameters,
+    PER_LINK,
+    pseudo_inertia,
+)
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
+import numpy as np
+import scipy.linalg
+
+#: A fit better than this share of the torque is taken as that good: there is always some noise.
+FINEST_FIT = 1e-4
+#: A mass beyond so many times the described one is said.
+HEAVY = 3.0
+#: Weights of the divergence that are tried. The fit is a mean of squares of about one.
+WEIGHTS = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
+#: The heaviest weight is taken whose held-out error is within this share of the least one.
+TOLERANCE = 1e-3
+#: A mass within this share of its range, in logarithms, is at its bound.
+_AT_MASS = 1e-3
+#: Smallest radius of gyration of a prior [m], for descriptions that give points for links.
+SMALLEST_RADIUS = 0.005
+#: Radius of gyration of a prior for a link of which the description says nothing [m].
+UNKNOWN_RADIUS = 0.05
+
+
+@dataclass(frozen=True)
+class PhysicalSettings:
+    """
+    What is known beside the recordings.
+
+    Attributes
+    ----------
+    total_mass : float or None
+        Mass of everything that the driven joints move [kg], as of a scale.
+    boxes : mapping of str to (sequence of float, sequence of float)
+        Joint, and two corners [m] of a box in its frame that contains the link.
+    mass_range : float or None
+        Factor above 1 by which a link is lighter or heavier than described at most.
+    blocks : int
+        Blocks of the training data that are left out in turn to choose the weight of the prior.
+    weights : tuple of float
+        Weights that are tried.
+
+    """
+
+    total_mass: float | None = None
+    boxes: Mapping[str, tuple[Sequence[float], Sequence[float]]] = field(default_factory=dict)
+    mass_range: float | None = None
+    blocks: int = 5
+    weights: tuple[float, ...] = WEIGHTS
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        if self.total_mass is not None and not 0.0 < self.total_mass < np.inf:
+            raise IdentificationError(f'total mass {self.total_mass} kg: it has to be positive')
+        if self.mass_range is not None and not 1.0 < self.mass_range < np.inf:
+            raise IdentificationError(
+                f'a mass range of {self.mass_range:g}: it has to be a factor above 1'
+            )
+        for joint, (lower, upper) in self.boxes.items():
+            if len(lower) != 3 or len(upper) != 3 or not np.all(np.less(lower, upper)):
+                raise IdentificationError(
+                    f"box of joint '{joint}': {tuple(lower)} has to be below {tuple(upper)} "
+                    'along x, y and z'
+                )
+        if self.blocks < 2 or not self.weights or not min(self.weights) > 0.0:
+            raise IdentificationError('a prior is weighed by 2 blocks or more, and is positive')
+
+
+def fit_bodies(
+    arm: ArmModel,
+    base: BaseParameters,
+    problem: Sequence[Regression],
+    weights: FloatArray,
+    unconstrained: Estimate,
+    settings: PhysicalSettings,
+) -> tuple[FloatArray, PhysicalCertificate]:
+    """
+    Fit the standard parameters of an arm to torques, all links being bodies.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Description: the prior of the links, bounds of the effects.
+    base : BaseParameters
+        Columns of the problem.
+    problem : sequence of Regression
+        Filtered columns and torques.
+    weights : ndarray, shape (N, n)
+        Weight of every row, as of the unconstrained fit.
+    unconstrained : Estimate
+        That fit.
+    settings : PhysicalSettings
+        What else is known.
+
+    Returns
+    -------
+    theta : ndarray, shape (P,)
+        Standard parameters.
+    certificate : PhysicalCertificate
+        Why to believe it.
+
+    """
+    program, notes = physical_program(arm, base, settings)
+    prior, lower, upper, boxes = program.prior, program.lower, program.upper, program.boxes
+    blocks = compress(problem, weights, settings.blocks)
+    whole = np.concatenate(blocks)
+    least = float(np.linalg.norm(_residual(whole, unconstrained.values)))
+    least = max(least, FINEST_FIT * float(np.linalg.norm(whole[:, -1])))
+    rows = np.array_split(np.count_nonzero(weights, axis=1), settings.blocks)
+    share = np.array([part.sum() for part in rows], dtype=float)
+    counts = share / share.sum() * least**2  # so that the unconstrained fit's mean square is one
+
+    tried = _held_out_errors(program, blocks, counts, settings.weights)
+    best = min(error for _, error in tried)
+    weight = max(w for w, error in tried if error <= (1.0 + TOLERANCE) * best)
+    theta = program.solve(_triangle(whole), float(counts.sum()), weight)
+    rigid = theta[: len(theta) - len(lower)].reshape(-1, PER_LINK)
+    links = tuple(
+        Consistency.of(link, values) for link, values in zip(arm.robot.links, rigid, strict=True)
+    )
+    effects = theta[len(theta) - len(lower) :]
+    scale = 1e-6 * np.maximum(np.abs(effects).max(initial=0.0), 1e-9)
+    held = (effects - lower <= scale) | (upper - effects <= scale)
+    names = arm.parameters[len(theta) - len(lower) :]
+    misfit = float(np.linalg.norm(_residual(whole, base.values(theta))))
+    return theta, PhysicalCertificate(
+        links=links,
+        shares=np.array(
+            [
+                scipy.linalg.eigh(pseudo_inertia(own), pseudo_inertia(described))[0][0]
+                for own, described in zip(rigid, prior[: rigid.size].reshape(-1, 10), strict=True)
+            ]
+        ),
+        at_bound=tuple(name for name, at in zip(names, held, strict=True) if at),
+        at_wall=tuple(
+            f'{arm.robot.joints[link]} at {wall}'
+            for link, box in boxes.items()
+            for wall in walls_reached(rigid[link], box)
+        ),
+        total_mass=settings.total_mass,
+        weight=weight,
+        tried=tried,
+        unconstrained=unconstrained,
+        misfit_ratio=max(misfit / least, 1.0),
+        notes=(*notes, *_heavy(arm.robot, rigid)),
+        at_mass=_at_mass(arm.robot.links, rigid[:, 0], prior[: rigid.size : PER_LINK], settings),
+    )
+
+
+def _at_mass(
+    links: Sequence[str], masses: FloatArray, prior: FloatArray, settings: PhysicalSettings
+) -> tuple[str, ...]:
+    """Return the links that are as light or as heavy as they may be."""
+    if settings.mass_range is None:
+        return ()
+    off = np.abs(np.log(masses / prior)) > (1.0 - _AT_MASS) * np.log(settings.mass_range)
+    return tuple(link for link, at in zip(links, off, strict=True) if at)
+
+
+def _heavy(robot: Robot, rigid: FloatArray) -> tuple[str, ...]:
+    """Say which links are far heavier than described, shape (n, 10)."""
+    described = robot.rigid_parameters[::PER_LINK]
+    named = [
+        f'{link} {found:.3g} kg, described {mass:.3g} kg'
+        for link, found, mass in zip(robot.links, rigid[:, 0], described, strict=True)
+        if found > HEAVY * mass > 0.0
+    ]
+    if not named:
+        return ()
+    return (
+        f'more than {HEAVY:g} times as heavy as described: {"; ".join(named)}; look for what is '
+        'not the links, such as rotors, springs or a load, or correct the masses',
+    )
+
+
+def physical_program(
+    arm: ArmModel, base: BaseParameters, settings: PhysicalSettings
+) -> tuple[PhysicalProgram, tuple[str, ...]]:
+    """Return what physics allows for the parameters of an arm, and what was assumed for it."""
+    prior, notes = bodily_prior(arm)
+    bounds = [effect.bounds() for effect in arm.effects]
+    lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in bounds)]) for k in (0, 1))
+    boxes: dict[int, Box] = {
+        arm.robot.index(joint): (np.array(low, dtype=float), np.array(high, dtype=float))
+        for joint, (low, high) in settings.boxes.items()
+    }
+    rigid = len(prior) - len(lower)
+    prior[rigid:] = np.clip(prior[rigid:], lower, upper)
+    program = PhysicalProgram(
+        base, prior, lower, upper, settings.total_mass, boxes, settings.mass_range
+    )
+    return program, notes
+
+
+def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
+    """
+    Return the standard parameters of an arm with bodies where the description has none.
+
+    A link of no mass becomes a ball of the mean mass of the others; one that is a point, or whose
+    moments no body has, is given the least second moments that a body has there.
+
+    Returns
+    -------
+    theta : ndarray, shape (P,)
+        Standard parameters, those of every link positive definite.
+    notes : tuple of str
+        What was assumed.
+
+    """
+    theta = arm.theta.copy()
+    masses = [float(m) for m in theta[: PER_LINK * arm.robot.n_joints : PER_LINK] if m > 0.0]
+    typical = float(np.mean(masses)) if masses else 1.0
+    notes = []
+    for index, link in enumerate(arm.robot.links):
+        part = slice(PER_LINK * index, PER_LINK * (index + 1))
+        matrix = pseudo_inertia(theta[part])
+        mass = matrix[3, 3]
+        if mass <= 1e-6 * typical:
+            ball = np.diag([UNKNOWN_RADIUS**2] * 3 + [1.0]) * typical
+            theta[part] = link_parameters(ball)
+            notes.append(
+                f"link '{link}': the description has no mass; a ball of {typical:.3g} kg is the "
+                'prior where the data say nothing'
+            )
+            continue
+        center = matrix[:3, 3] / mass
+        second = matrix[:3, :3] - mass * np.outer(center, center)
+        values, axes = np.linalg.eigh(second)
+        floor = mass * SMALLEST_RADIUS**2
+        if values[0] < 1e-3 * floor or values[0] < 1e-4 * values[2]:
+            least = max(floor, 1e-2 * values[2])
+            second = (axes * np.maximum(values, least)) @ axes.T
+            matrix[:3, :3] = second + mass * np.outer(center, center)
+            theta[part] = link_parameters(matrix)
+            notes.append(
+                f"link '{link}': the description's inertia is hardly that of a body; the prior "
+                f'has a radius of gyration of {1e3 * np.sqrt(least / mass):.2g} mm at least'
+            )
+    return theta, tuple(notes)
+
+
+def compress(
+    problem: Sequence[Regression], weights: FloatArray, blocks: int
+) -> tuple[FloatArray, ...]:
+    """
+    Shrink the weighted problem to one triangular factor per block of successive samples.
+
+    Parameters
+    ----------
+    problem : sequence of Regression
+        Stretches with the same r columns.
+    weights : ndarray, shape (N, n)
+        Weight of every row.
+    blocks : int
+        How many.
+
+    Returns
+    -------
+    tuple of ndarray, each of shape (k, r + 1), k <= r + 1
+        Factor of columns and torque: all that least squares needs of a block.
+
+    """
+    columns = np.concatenate([part.columns for part in problem])
+    tau = np.concatenate([part.target for part in problem])
+    factors = []
+    for rows in np.array_split(np.arange(len(tau)), blocks):
+        scaled = weights[rows, :, np.newaxis] * columns[rows]
+        stacked = np.concatenate([scaled, (weights * tau)[rows, :, np.newaxis]], axis=2)
+        factors.append(_triangle(stacked.reshape(-1, stacked.shape[2])))
+    return tuple(factors)
+
+
+def _held_out_errors(
+    program: PhysicalProgram,
+    blocks: Sequence[FloatArray],
+    counts: FloatArray,
+    weights: Sequence[float],
+) -> tuple[tuple[float, float], ...]:
+    """Return the error on blocks left out, per weight, relative to unconstrained fits."""
+    free = 0.0
+    squares = dict.fromkeys(weights, 0.0)
+    for left_out, block in enumerate(blocks):
+        others = [b for k, b in enumerate(blocks) if k != left_out]
+        triangle = _triangle(np.concatenate(others))
+        count = float(counts.sum() - counts[left_out])
+        values = np.asarray(np.linalg.lstsq(triangle[:, :-1], triangle[:, -1], rcond=1e-10)[0])
+        free += float(np.sum(_residual(block, values) ** 2))
+        for weight in weights:
+            theta = program.solve(triangle, count, weight)
+            squares[weight] += float(np.sum(_residual(block, program.base.values(theta)) ** 2))
+    floor = max(free, FINEST_FIT**2 * float(sum(np.sum(b[:, -1] ** 2) for b in blocks)))
+    return tuple((weight, float(np.sqrt(total / floor))) for weight, total in squares.items())
+
+
+def _triangle(rows: FloatArray) -> FloatArray:
+    return np.asarray(scipy.linalg.qr(rows, mode='r', check_finite=False)[0][: rows.shape[1]])
+
+
+def _residual(rows: FloatArray, values: FloatArray) -> FloatArray:
+    return np.asarray(rows[:, -1] - rows[:, :-1] @ values)

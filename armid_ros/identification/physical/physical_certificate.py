@@ -1,0 +1,168 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What shows that an identified arm is made of bodies, and which constraints hold it there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.physical.physical_program import Box, box_conditions
+from armid_ros.model.pseudo_inertia import Consistency
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: A pseudo-inertia that has shrunk to this share of the description's in some direction is at the
+#: limit of what a body can be; a distance of this share of a box is none.
+ACTIVE_SHARE = 1e-3
+#: Bodies that predict held-out torques worse than this, relative to an unconstrained fit, are not
+#: those of the arm.
+DEAR = 1.03
+
+
+@dataclass(frozen=True)
+class PhysicalCertificate:
+    """
+    What shows that an identified arm is made of bodies, and what it cost.
+
+    Attributes
+    ----------
+    links : tuple of Consistency
+        Eigenvalues of every pseudo-inertia, mass, centre, principal moments.
+    shares : ndarray, shape (n,)
+        Smallest size of each pseudo-inertia relative to the prior's, over all directions.
+    at_bound : tuple of ParameterName
+        Effect parameters that their bound holds.
+    at_wall : tuple of str
+        Joints whose link is at the limit of its box, and where.
+    total_mass : float or None
+        What the masses had to add up to [kg].
+    weight : float
+        Weight of the prior.
+    tried : tuple of (float, float)
+        Weights that were tried, and the error on the blocks left out, relative to that of
+        unconstrained fits.
+    unconstrained : Estimate
+        The fit without constraints.
+    misfit_ratio : float
+        Weighted error on the training data, relative to the unconstrained fit's.
+    notes : tuple of str
+        What was assumed of links of which the description has no body.
+    at_mass : tuple of str
+        Links that are as light or as heavy as they may be.
+
+    """
+
+    links: tuple[Consistency, ...]
+    shares: FloatArray
+    at_bound: tuple[ParameterName, ...]
+    at_wall: tuple[str, ...]
+    total_mass: float | None
+    weight: float
+    tried: tuple[tuple[float, float], ...]
+    unconstrained: Estimate
+    misfit_ratio: float
+    notes: tuple[str, ...]
+    at_mass: tuple[str, ...] = ()
+
+    @property
+    def consistent(self) -> bool:
+        """Whether every link is a body."""
+        return all(link.consistent for link in self.links)
+
+    @property
+    def held_out_ratio(self) -> float:
+        """Error on blocks left out with the chosen weight, relative to unconstrained fits'."""
+        return dict(self.tried)[self.weight]
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Links that are at the limit of what a body can be."""
+        near = self.shares < ACTIVE_SHARE
+        return tuple(link.link for link, at in zip(self.links, near, strict=True) if at)
+
+    @property
+    def activity(self) -> tuple[str, ...]:
+        """Say which constraints hold the fit, and when they do it harm; empty if none does."""
+        said = []
+        if self.held_out_ratio > DEAR:
+            said.append(
+                f'constraints cost {100.0 * (self.held_out_ratio - 1.0):.1f} % of torque error on '
+                'blocks left out: a mass or box that was given is not that of the arm, or the '
+                'model lacks an effect'
+            )
+        if self.active:
+            said.append(
+                f'at the limit of what a body can be: {", ".join(self.active)}; '
+                'the model lacks an effect there, or the data say little'
+            )
+        if self.at_wall:
+            said.append(f'at the limit of the box: {", ".join(self.at_wall)}')
+        if self.at_mass:
+            said.append(f'as light or heavy as they may be: {", ".join(self.at_mass)}')
+        if self.total_mass is not None:
+            said.append(f'the masses add up to {self.total_mass:g} kg, as given')
+        if self.at_bound:
+            names = ', '.join(f'{p.name} of {p.joint}' for p in self.at_bound)
+            said.append(f'held by their bounds: {names}')
+        return tuple(said)
+
+    def sentences(self) -> tuple[str, ...]:
+        """Say in words what was found."""
+        least = min(self.links, key=lambda link: float(link.eigenvalues[0]))
+        verdict = 'every link is a body' if self.consistent else 'not every link is a body'
+        return (
+            f'{verdict}: the smallest eigenvalue of a pseudo-inertia is '
+            f'{least.eigenvalues[0]:.3g} ({least.link})',
+            f'constraints cost {100.0 * (self.misfit_ratio - 1.0):.2f} % of torque error on the '
+            f'training data and {100.0 * (self.held_out_ratio - 1.0):+.2f} % on blocks left out; '
+            f'weight of the description {self.weight:.0e}',
+            *(self.activity or ('no constraint is active',)),
+            *self.notes,
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return the certificate for programs to read."""
+        return {
+            'consistent': self.consistent,
+            'links': [
+                {
+                    'link': link.link,
+                    'eigenvalues': link.eigenvalues.tolist(),
+                    'mass': link.mass,
+                    'center': link.center.tolist(),
+                    'principal_moments': link.moments.tolist(),
+                    'share_of_prior': float(share),
+                    'at_limit': link.link in self.active,
+                }
+                for link, share in zip(self.links, self.shares, strict=True)
+            ],
+            'at_bound': [{'name': p.name, 'joint': p.joint} for p in self.at_bound],
+            'at_wall': list(self.at_wall),
+            'at_mass': list(self.at_mass),
+            'total_mass': self.total_mass,
+            'prior_weight': self.weight,
+            'tried': [{'weight': w, 'held_out_ratio': ratio} for w, ratio in self.tried],
+            'training_ratio': self.misfit_ratio,
+            'held_out_ratio': self.held_out_ratio,
+        }
+
+
+def walls_reached(parameters: FloatArray, box: Box) -> tuple[str, ...]:
+    """
+    Say which limits of its box a link is at.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (10,)
+        Of the link.
+    box : tuple of two ndarray, each of shape (3,)
+        Corners [m].
+
+    """
+    width = box[1] - box[0]
+    largest = np.concatenate([width, width, 0.25 * width**2]) * parameters[0]
+    near = box_conditions(box) @ parameters < ACTIVE_SHARE * largest
+    walls = [f'{side} {axis}' for side in ('lower', 'upper', 'spread along') for axis in 'xyz']
+    return tuple(wall for wall, at in zip(walls, near, strict=True) if at)

@@ -1,0 +1,210 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What data must be like to identify anything, and what to do when they are not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.rows.regression import Regression
+from armid_ros.identification.rows.signals import Conditioning, segments
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+
+#: A joint that stays within this range is at rest [rad or m].
+REST_RANGE = 1e-3
+#: Positions further out of the limits than this are not in the unit of the description: two turns
+#: of a joint that a controller has let spin [rad], or [m].
+LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
+#: A recording shorter than this holds less than a movement [s].
+SHORTEST = 1.0
+#: Said of torques that are absent.
+SILENT = 'the torque of every joint is constant; is effort filled in?'
+
+
+def check_motion(
+    robot: Robot, recordings: Sequence[Recording], used: Conditioning | None = None
+) -> tuple[str, ...]:
+    """
+    Refuse recordings without usable motion.
+
+    Parameters
+    ----------
+    robot : Robot
+        Whose they are.
+    recordings : sequence of Recording
+        What was recorded.
+    used : Conditioning, optional
+        Filters behind which something has to be left, where ``check_length`` does not see to it.
+
+    Returns
+    -------
+    tuple of str
+        Notes, such as joints that are at rest throughout.
+
+    Raises
+    ------
+    IdentificationError
+        Naming the recording, the joint and the remedy.
+
+    """
+    for recording in recordings:
+        check_positions(robot, recording.source, recording.q.min(axis=0), recording.q.max(axis=0))
+        if recording.duration < SHORTEST or not _outlasts(recording, used):
+            raise _too_short(recording)
+    ranges = np.max([np.ptp(recording.q, axis=0) for recording in recordings], axis=0)
+    return resting(robot, recordings[0].source, ranges)
+
+
+def check_length(recordings: Sequence[Recording], problem: Sequence[Regression]) -> None:
+    """Refuse recordings of which nothing is left behind the filters."""
+    left = {part.source for part in problem}
+    for recording in recordings:
+        if recording.source not in left:
+            raise _too_short(recording)
+
+
+def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
+    """Say which joints are at rest, given how far each moved, (n,); refuse it of all of them."""
+    names = [name for name, size in zip(robot.joints, ranges, strict=True) if size < REST_RANGE]
+    if len(names) == robot.n_joints:
+        raise IdentificationError(
+            f'{source}: no motion, every joint stays within {REST_RANGE} rad; '
+            'record the arm while it follows an excitation'
+        )
+    if names:
+        return (f'at rest throughout: {", ".join(names)}; nothing of their own is identified',)
+    return ()
+
+
+def _outlasts(recording: Recording, used: Conditioning | None) -> bool:
+    return used is None or any(True for _ in segments(recording, used))
+
+
+def _too_short(recording: Recording) -> IdentificationError:
+    return IdentificationError(
+        f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
+        f'too short; record a movement of several seconds'
+    )
+
+
+def check_torque(
+    arm: ArmModel, recordings: Sequence[Recording], problem: Sequence[Regression]
+) -> tuple[str, ...]:
+    """
+    Refuse torques that are absent, of the wrong sign or in another unit than N m.
+
+    The sign shows in the power: over a recording an arm takes in energy and dissipates it. The
+    unit shows against the rigid body of the description, if all the joints that follow it agree
+    on the same power of ten.
+
+    Raises
+    ------
+    IdentificationError
+        Naming the joints and the remedy.
+
+    """
+    robot = arm.robot
+    tau = np.concatenate([part.tau for part in problem])
+    silent = [name for name, y in zip(robot.joints, tau.T, strict=True) if np.ptp(y) == 0.0]
+    source = recordings[0].source
+    if len(silent) == robot.n_joints:
+        raise IdentificationError(f'{source}: {SILENT}')
+    slope, correlation = _slope_on_description(robot, problem)
+    clear = np.abs(correlation) > 0.9
+    if np.sum(clear) >= min(2, robot.n_joints):
+        factors = slope[clear]
+        joints = ', '.join(np.array(robot.joints)[clear])
+        if np.all(factors < 0.0):
+            raise IdentificationError(
+                f'{source}: torques of {joints} have the opposite sign of what the description '
+                'takes; effort has to be positive along the URDF joint axis: negate it'
+            )
+        for unit, factor in (('N mm', 1e3), ('kN m', 1e-3)):
+            if np.all((factors > 0.5 * factor) & (factors < 2.0 * factor)):
+                raise IdentificationError(
+                    f'{source}: torques of {joints} are {factor:g} times what the description '
+                    f'takes; they seem to be in {unit}: convert them to N m'
+                )
+    if _gives_out_energy(problem):
+        raise IdentificationError(
+            f'{source}: the arm gives out energy throughout, so the torques have the wrong sign; '
+            'effort has to be positive along the URDF joint axis: negate it'
+        )
+    if silent:
+        return (f'torque constant throughout: {", ".join(silent)}',)
+    return ()
+
+
+def _gives_out_energy(problem: Sequence[Regression]) -> bool:
+    """
+    Whether an arm drives its motors, in all and in every joint, as only a wrong sign can show.
+
+    A short motion may give out energy too, that of weights that went down; friction is what is
+    left of the power where weight and inertia of the joint are taken out.
+
+    """
+    power = sum(float(np.sum(part.tau * part.motion.dq)) for part in problem)
+    activity = sum(float(np.sum(np.abs(part.tau * part.motion.dq))) for part in problem)
+    if power >= -0.2 * activity:
+        return False
+    for joint in range(problem[0].tau.shape[1]):
+        q, dq, ddq, tau = (
+            np.concatenate([array[:, joint] for array in arrays])
+            for arrays in zip(
+                *((p.motion.q, p.motion.dq, p.motion.ddq, p.tau) for p in problem), strict=True
+            )
+        )
+        held = np.column_stack([np.ones(len(q)), np.sin(q), np.cos(q), ddq])
+        pair = np.column_stack([dq, tau])
+        rest = pair - held @ np.linalg.lstsq(held, pair, rcond=None)[0]
+        if rest[:, 0] @ rest[:, 1] > 0.0:
+            return False
+    return True
+
+
+def check_positions(robot: Robot, source: str, lowest: FloatArray, highest: FloatArray) -> None:
+    """Refuse a recording whose joints, from lowest to highest (n,), are far out of limits."""
+    problem = position_problem(robot, lowest, highest)
+    if problem:
+        raise IdentificationError(f'{source}: {problem}')
+
+
+def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> str:
+    """Say which joint is far out of its limits, given where joints have been; empty if none."""
+    excess = np.maximum(robot.lower - lowest, highest - robot.upper)
+    allowed = np.where(robot.prismatic, LIMIT_EXCESS_SLIDING, LIMIT_EXCESS_TURNING)
+    worst = int(np.argmax(excess / allowed))
+    if not excess[worst] > allowed[worst]:
+        return ''
+    reach = max(abs(lowest[worst]), abs(highest[worst]))
+    hint = '' if robot.prismatic[worst] else ' (degrees?)'
+    return (
+        f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its limits are '
+        f'{robot.lower[worst]:.4g} to {robot.upper[worst]:.4g}; positions have to be in rad '
+        'or m, with the zero of the description'
+    )
+
+
+def _slope_on_description(
+    robot: Robot, problem: Sequence[Regression]
+) -> tuple[FloatArray, FloatArray]:
+    """Regress measured torques on the description's, friction and offset taken out first."""
+    slope, correlation = np.zeros((2, robot.n_joints))
+    predicted = np.concatenate([inverse_dynamics(robot, part.motion) for part in problem])
+    measured = np.concatenate([part.tau for part in problem])
+    dq = np.concatenate([part.motion.dq for part in problem])
+    for joint in range(robot.n_joints):
+        nuisance = np.column_stack([np.ones(len(dq)), dq[:, joint], np.sign(dq[:, joint])])
+        pair = np.column_stack([predicted[:, joint], measured[:, joint]])
+        rest = pair - nuisance @ np.linalg.lstsq(nuisance, pair, rcond=None)[0]
+        product, own = rest[:, 0] @ rest[:, 1], rest[:, 0] @ rest[:, 0]
+        if own > 0.0 and rest[:, 1] @ rest[:, 1] > 0.0:
+            slope[joint] = product / own
+            correlation[joint] = product / np.sqrt(own * (rest[:, 1] @ rest[:, 1]))
+    return slope, correlation

@@ -1,0 +1,168 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Damaged samples of a recording, found as those of a stream are (`spikes`), and made up for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.identification.rows.row_noise import NOISE_OF_TORQUE
+from armid_ros.identification.rows.signals import Conditioning, conditioning, SignalSettings
+from armid_ros.identification.samples.joint_gate import joint_gate
+from armid_ros.identification.samples.spikes import FIRST, SpikeGate
+from armid_ros.identification.samples.straight_line import Excursion, StreamSample
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+import numpy as np
+import numpy.typing as npt
+
+#: Samples that are named at most.
+_NAMED = 3
+
+
+@dataclass(frozen=True)
+class Damage:
+    """
+    Samples that were made up for.
+
+    Attributes
+    ----------
+    source : str
+        The recording.
+    samples : int
+        How many.
+    worst : tuple of str
+        What jumped and when, of the first few.
+
+    """
+
+    source: str
+    samples: int
+    worst: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Say what was found."""
+        what = '1 sample jumps and comes back; it was'
+        if self.samples > 1:
+            what = f'{self.samples} samples jump and come back; they were'
+        more = ', ...' if self.samples > len(self.worst) else ''
+        return f'{self.source}: {what} interpolated across: {", ".join(self.worst)}{more}'
+
+
+def without_damage(
+    recordings: Sequence[Recording], settings: SignalSettings
+) -> tuple[list[Recording], tuple[Damage, ...]]:
+    """
+    Interpolate across damaged samples.
+
+    A torque is damaged if it alone would move a filtered row by more than noise does; how large
+    noise is, before anything has been fitted, is a share of how much the torque varies.
+
+    Returns
+    -------
+    list of Recording
+        Those without damage are the same objects.
+    tuple of Damage
+        What was found.
+
+    """
+    used = conditioning(list(recordings), settings)
+    repaired, found = [], []
+    for recording in recordings:
+        one = None
+        if recording.tau is not None and len(recording) > 2:
+            one, bad = _damage(recording, used)
+        if one is not None:
+            found.append(one)
+            recording = _repaired(recording, bad)
+        repaired.append(recording)
+    return repaired, tuple(found)
+
+
+def _damage(
+    recording: Recording, used: Conditioning
+) -> tuple[Damage | None, npt.NDArray[np.bool_]]:
+    """Return the damage of a recording, None without, and which samples it is, shape (N,)."""
+    assert recording.tau is not None
+    middle = np.median(recording.tau, axis=0)
+    spread = 1.4826 * np.median(np.abs(recording.tau - middle), axis=0)
+    peak = float(np.max(used.taps()) / np.sum(used.taps()))
+    floor = np.concatenate([np.zeros(recording.n_joints), NOISE_OF_TORQUE * spread / peak])
+    # angles of a recording are not wrapped
+    gate = joint_gate([True] * recording.n_joints, 'qt')
+    signals = np.hstack([recording.q, recording.tau])
+    excursions = impossible_excursions(gate, recording.t, signals, floor)
+    names = [f'{what} of {joint}' for what in ('position', 'effort') for joint in recording.joints]
+    worst = [
+        f'{names[int(np.argmax(one.off))]} at {sample.t:.3f} s'
+        for one in excursions
+        for sample in one.samples
+    ]
+    damaged = [sample.t for one in excursions for sample in one.samples]
+    bad = np.isin(recording.t, damaged)
+    if not excursions or bad.all():
+        return None, bad
+    return Damage(recording.source, len(damaged), tuple(worst[:_NAMED])), bad
+
+
+def impossible_excursions(
+    gate: SpikeGate, t: FloatArray, x: FloatArray, floor: FloatArray
+) -> list[Excursion]:
+    """
+    Return what no arm makes in a whole recording, as if a gate had taken every sample of it.
+
+    What is usual, and what the signals reach, is that of the whole. Only samples that are too far
+    off what is predicted of them are taken indeed, and those after them.
+
+    Parameters
+    ----------
+    gate : SpikeGate
+        What judges.
+    t : ndarray, shape (N,)
+        Stamps, at least 3, each after the one before [s].
+    x : ndarray, shape (N, m)
+        Signals.
+    floor : ndarray, shape (m,)
+        What a sample may be off by without consequence.
+
+    Returns
+    -------
+    list of Excursion
+
+    """
+    lines = gate.line_errors(t, x)
+    found: list[Excursion] = []
+    done = 0
+    for k in np.flatnonzero(np.any(lines.off(floor) > 1.0, axis=1)).tolist():
+        if k < done:
+            continue
+        start, known = int(lines.stretch[k]), []
+        if k - start >= FIRST or start < done:
+            start, known = k, [StreamSample(float(t[i]), x[i]) for i in (k - 2, k - 1)]
+        gate.begin(lines.usual, known, lines.bent[k - 1] if known else 0.0)
+        passed, done = 0, start
+        while done < len(t) and (passed < 2 or done <= k):
+            good = gate.take(float(t[done]), x[done], floor)
+            passed = passed + 1 if len(good) == 1 else 0
+            found += gate.left_out
+            done += 1
+    good_ones = ~np.isin(t, [sample.t for one in found for sample in one.samples])
+    if not (found and good_ones.any()):
+        return found
+    lowest, highest = np.min(x[good_ones], axis=0), np.max(x[good_ones], axis=0)
+    return [one for one in found if not gate.possible(one, lowest, highest)]
+
+
+def _repaired(recording: Recording, bad: npt.NDArray[np.bool_]) -> Recording:
+    """Return a recording with straight lines across damaged samples."""
+
+    def across(values: FloatArray | None) -> FloatArray | None:
+        if values is None:
+            return None
+        t, good = recording.t, ~bad
+        return np.stack([np.interp(t, t[good], column[good]) for column in values.T], axis=1)
+
+    q = across(recording.q)
+    assert q is not None
+    return replace(recording, q=q, dq=across(recording.dq), tau=across(recording.tau))

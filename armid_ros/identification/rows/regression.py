@@ -1,0 +1,320 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The linear problem of an identification: decimated torques and base columns, joint by joint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from armid_ros.arm import ArmModel
+from armid_ros.identification.rows.signals import (
+    Conditioning,
+    decimate,
+    decimated_samples,
+    segments,
+)
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.recording import Recording
+import numpy as np
+import numpy.typing as npt
+
+#: Full-rate samples whose regressor is in memory at once; 7 joints of 70 columns are 80 MB.
+_CHUNK = 20_000
+#: A joint is at rest while it is slower than this share of its own top speed ...
+REST_SPEED = 0.02
+#: ... for at least this long [s]; a reversal of direction is shorter.
+REST_TIME = 0.2
+
+
+@dataclass(frozen=True)
+class Regression:
+    """
+    One unbroken stretch of motion as a linear problem, filtered and decimated on both sides.
+
+    Attributes
+    ----------
+    motion : Motion
+        Decimated motion of M samples with the filtered torque.
+    columns : ndarray, shape (M, n, r)
+        Filtered columns of the chosen parameters.
+    informative : ndarray of bool, shape (M, n)
+        False where a joint that dry friction may hold is at rest: its torque says nothing.
+    source : str
+        The recording it comes from.
+    constant : ndarray, shape (M, n), or None
+        Filtered torque that the linear model has where all values are zero; None for none, as of
+        a model that is linear in all its parameters.
+
+    """
+
+    motion: Motion
+    columns: FloatArray
+    informative: npt.NDArray[np.bool_]
+    source: str
+    constant: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        """Freeze the columns."""
+        object.__setattr__(self, 'columns', read_only(self.columns))
+
+    @property
+    def tau(self) -> FloatArray:
+        """Filtered measured torque, shape (M, n)."""
+        assert self.motion.tau is not None
+        return self.motion.tau
+
+    @property
+    def target(self) -> FloatArray:
+        """What columns times values have to be, shape (M, n)."""
+        return self.tau if self.constant is None else self.tau - self.constant
+
+    def torque(self, values: FloatArray) -> FloatArray:
+        """Return the torque of the linear model for values of the columns, shape (M, n)."""
+        linear = self.columns @ values
+        return np.asarray(linear if self.constant is None else linear + self.constant)
+
+    def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> Regression:
+        """Return the problem in some of its columns; itself if that is all of them in order."""
+        if np.array_equal(columns, np.arange(self.columns.shape[2])):
+            return self
+        return replace(self, columns=self.columns[:, :, columns])
+
+
+def regressions(
+    arm: ArmModel,
+    columns: npt.NDArray[np.intp],
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    progress: Callable[[float], None] | None = None,
+) -> list[Regression]:
+    """
+    Set up the linear problem of some columns of an arm's regressor on recordings.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Rigid body and effects.
+    columns : ndarray of int, shape (r,)
+        Which of ``arm.parameters`` to keep, such as the independent ones.
+    recordings : sequence of Recording
+        Data with torques.
+    used : Conditioning
+        Filters.
+    progress : callable, optional
+        Told the share that is done, 0 to 1.
+
+    Returns
+    -------
+    list of Regression
+        One per unbroken stretch.
+
+    """
+    total = sum(len(recording.t) for recording in recordings)
+    done = 0
+
+    def tick(samples: int) -> None:
+        nonlocal done
+        done += samples
+        if progress is not None:
+            progress(min(1.0, done / total))
+
+    result = []
+    for recording in recordings:
+        for motion in segments(recording, used):
+            decimated, informative = _rows(arm, motion, used)
+            stacked = filtered_columns(arm, columns, motion, used, tick)
+            result.append(Regression(decimated, stacked, informative, recording.source))
+    return result
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """
+    The torque of an arm along one unbroken stretch of motion, filtered like the measured one.
+
+    Attributes
+    ----------
+    motion : Motion
+        Decimated motion of M samples with the filtered measured torque.
+    torque : ndarray, shape (M, n)
+        Filtered torque of the arm [N m].
+    informative : ndarray of bool, shape (M, n)
+        False where a joint that dry friction may hold is at rest.
+    source : str
+        The recording it comes from.
+
+    """
+
+    motion: Motion
+    torque: FloatArray
+    informative: npt.NDArray[np.bool_]
+    source: str
+
+
+def predictions(
+    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
+) -> list[Prediction]:
+    """Return what the torque of an arm is along recordings, one per unbroken stretch."""
+    return [
+        Prediction(*_rows_with_torque(arm, motion, used), recording.source)
+        for recording in recordings
+        for motion in segments(recording, used)
+    ]
+
+
+def filtered_torque(arm: ArmModel, motion: Motion, used: Conditioning) -> FloatArray:
+    """
+    Filter and decimate the torque of an arm along one unbroken stretch.
+
+    Returns
+    -------
+    ndarray, shape (M, n)
+
+    """
+    if not all(effect.instantaneous for effect in arm.effects):
+        return decimate(arm.torque(motion), used)
+    margin = arm.neighbours(1.0 / used.rate_hz)
+    blocks = []
+    for samples in _overlapping(len(motion), used):
+        around = slice(max(0, samples.start - margin), samples.stop + margin)
+        inside = slice(samples.start - around.start, samples.stop - around.start)
+        blocks.append(decimate(arm.torque(motion.select(around))[inside], used))
+    return np.concatenate(blocks)
+
+
+def _rows(
+    arm: ArmModel, motion: Motion, used: Conditioning
+) -> tuple[Motion, npt.NDArray[np.bool_]]:
+    """Return the rows of a stretch: decimated motion and torque, and which say something."""
+    kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
+    assert motion.tau is not None
+    decimated = motion.select(kept).with_torque(decimate(motion.tau, used))
+    return decimated, ~_at_rest(arm, motion)[kept]
+
+
+def _rows_with_torque(
+    arm: ArmModel, motion: Motion, used: Conditioning
+) -> tuple[Motion, FloatArray, npt.NDArray[np.bool_]]:
+    decimated, informative = _rows(arm, motion, used)
+    return decimated, filtered_torque(arm, motion, used), informative
+
+
+def filtered_columns(
+    arm: ArmModel,
+    columns: npt.NDArray[np.intp],
+    motion: Motion,
+    used: Conditioning,
+    tick: Callable[[int], None] = lambda samples: None,
+) -> FloatArray:
+    """
+    Filter and decimate some columns of an arm's regressor along one unbroken stretch.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Rigid body and effects.
+    columns : ndarray of int, shape (r,)
+        Which of ``arm.parameters`` to keep.
+    motion : Motion
+        The stretch at the full rate.
+    used : Conditioning
+        Filters.
+    tick : callable, optional
+        Told how many samples were done since it was last told.
+
+    Returns
+    -------
+    ndarray, shape (M, n, r)
+
+    """
+    result = np.empty((len(decimated_samples(len(motion), used)), motion.n_joints, len(columns)))
+    sources = _sources(arm, columns)
+    for source in sources:
+        if not source.instantaneous:
+            whole = source.columns(motion)[:, :, source.inner]
+            result[:, :, source.outer] = decimate(whole, used)
+    margin = arm.neighbours(1.0 / used.rate_hz)
+    stride = used.smooth_stride if margin == 0 else 1
+    first = 0
+    for samples in _overlapping(len(motion), used):
+        around = slice(max(0, samples.start - margin), samples.stop + margin)
+        part = motion.select(around)
+        inside = slice(samples.start - around.start, samples.stop - around.start)
+        count = len(decimated_samples(samples.stop - samples.start, used))
+        for source in sources:
+            if source.smooth and stride > 1:
+                block = source.columns(part.select(slice(None, None, stride)))
+                filtered = decimate(block[:, :, source.inner], used, stride)
+                result[first : first + count, :, source.outer] = filtered
+            elif source.instantaneous:
+                block = source.columns(part)[inside, :, source.inner]
+                result[first : first + count, :, source.outer] = decimate(block, used)
+        first += count
+        tick(samples.stop - samples.start)
+    result.setflags(write=False)  # so that nobody who freezes it has to copy it
+    return result
+
+
+@dataclass(frozen=True)
+class _Source:
+    """
+    Where some of the columns come from: the rigid body, or one effect.
+
+    Attributes
+    ----------
+    columns : callable Motion -> ndarray (N, n, P)
+        Its columns.
+    inner, outer : ndarray of int
+        Which of them are wanted, and where they go.
+    instantaneous : bool
+        Whether a part of the motion will do.
+    smooth : bool
+        Whether they have no steps, so that fewer samples will do.
+
+    """
+
+    columns: Callable[[Motion], FloatArray]
+    inner: npt.NDArray[np.intp]
+    outer: npt.NDArray[np.intp]
+    instantaneous: bool
+    smooth: bool
+
+
+def _sources(arm: ArmModel, columns: npt.NDArray[np.intp]) -> list[_Source]:
+    """Return where the wanted columns come from, without what is not wanted at all."""
+    sizes = [len(arm.robot.rigid_parameters), *(len(values) for values in arm.values)]
+    functions: list[Callable[[Motion], FloatArray]] = [arm.rigid_columns]
+    functions.extend(partial(arm.columns_of, effect) for effect in arm.effects)
+    instantaneous = [True, *(effect.instantaneous for effect in arm.effects)]
+    sources, start = [], 0
+    for size, function, local in zip(sizes, functions, instantaneous, strict=True):
+        outer = np.flatnonzero((columns >= start) & (columns < start + size))
+        if len(outer):
+            rigid = start == 0
+            sources.append(_Source(function, columns[outer] - start, outer, local, rigid))
+        start += size
+    return sources
+
+
+def _at_rest(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
+    """Return where joints stand still that dry friction may hold, shape (N, n)."""
+    held = {joint for effect in arm.effects if effect.holds_at_rest for joint in effect.joints}
+    rest = np.zeros(motion.q.shape, dtype=bool)
+    shortest = REST_TIME / float(motion.t[1] - motion.t[0])
+    for joint in [motion.joints.index(name) for name in held]:
+        speed = np.abs(motion.dq[:, joint])
+        slow = np.concatenate([[False], speed < REST_SPEED * speed.max(), [False]])
+        edges = np.flatnonzero(np.diff(slow.astype(int))).reshape(-1, 2)
+        for start, stop in edges[np.diff(edges, axis=1)[:, 0] >= shortest]:
+            rest[start:stop, joint] = True
+    return rest
+
+
+def _overlapping(n_samples: int, used: Conditioning) -> list[slice]:
+    """Cut samples into chunks that overlap by the filter, so that their outputs join."""
+    overlap = len(used.taps()) - 1
+    step = max(used.decimation, _CHUNK // used.decimation * used.decimation)
+    starts = range(0, max(1, n_samples - overlap), step)
+    return [slice(start, min(n_samples, start + step + overlap)) for start in starts]

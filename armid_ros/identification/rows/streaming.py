@@ -1,0 +1,154 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Rows of a recording that may be larger than the memory, piece by piece.
+
+Pieces overlap by what the filters need to forget their ends, and a piece begins where a row of the
+one before would sit, so rows are those of the whole recording; each comes from one piece alone.
+Where stamps jitter each piece has an even time base of its own, and a joint counts as at rest by
+its top speed within the piece.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from armid_ros.arm import ArmModel
+from armid_ros.identification.rows.damage import without_damage
+from armid_ros.identification.rows.regression import Regression, regressions
+from armid_ros.identification.rows.signals import (
+    Conditioning,
+    EDGE_PERIODS,
+    GAP_PERIODS,
+    SignalSettings,
+)
+from armid_ros.recording import ReadSettings, Recording
+from armid_ros.recording.pieces import read_pieces
+import numpy as np
+import numpy.typing as npt
+
+#: Periods of the cut-off after which a filter of order 4 has forgotten where it began: exp(-38).
+_FORGET_PERIODS = 16.0
+
+
+class Cuts:
+    """
+    Where a recording is cut into pieces.
+
+    Parameters
+    ----------
+    used : Conditioning
+        The filters that have to fit between a row and the end of its piece.
+
+    Attributes
+    ----------
+    used : Conditioning
+        The filters.
+
+    """
+
+    def __init__(self, used: Conditioning) -> None:
+        self.used = used
+        periods = (EDGE_PERIODS + _FORGET_PERIODS) * used.rate_hz / used.cutoff_hz
+        self._margin = int(np.ceil(periods)) + len(used.taps())
+
+    @property
+    def overlap(self) -> int:
+        """Samples that two pieces share, at most."""
+        return 2 * self._margin + self.used.decimation
+
+    def keep(self, piece: Recording) -> int:
+        """Return the stamp of the sample that the next piece begins with [ns]."""
+        return self._stamp(piece, self._places(piece)[0])
+
+    def end(self, piece: Recording) -> int:
+        """Return when the rows of a piece end and those of the next one begin [ns]."""
+        half = round(0.5e9 / self.used.rate_hz)
+        return self._stamp(piece, self._places(piece)[1]) - half
+
+    def _places(self, piece: Recording) -> tuple[int, int]:
+        """Return with which sample the next piece begins, and with which its rows."""
+        longest = GAP_PERIODS * max(1.0 / self.used.rate_hz, piece.period)
+        gaps = np.flatnonzero(np.diff(piece.t) > longest)
+        origin = int(gaps[-1]) + 1 if len(gaps) else 0
+        first = len(piece) - 2 * self._margin
+        if first <= origin:
+            return origin, origin
+        first -= (first - origin) % self.used.decimation
+        return first, first + self._margin
+
+    @staticmethod
+    def _stamp(piece: Recording, sample: int) -> int:
+        return piece.start_ns + round(1e9 * float(piece.t[sample]))
+
+
+def _owned(
+    piece: Recording, rows: Regression, start_ns: float, stop_ns: float
+) -> Regression | None:
+    """Return the rows between two times [ns]; None if there are none."""
+    t = 1e9 * rows.motion.t
+    inside = (t >= start_ns - piece.start_ns) & (t < stop_ns - piece.start_ns)
+    if inside.all():
+        return rows
+    which = np.flatnonzero(inside)
+    if not len(which):
+        return None
+    return replace(
+        rows,
+        motion=rows.motion.select(which),
+        columns=rows.columns[which],
+        informative=rows.informative[which],
+    )
+
+
+def streamed(
+    path: str | Path,
+    arm: ArmModel,
+    columns: npt.NDArray[np.intp],
+    choose: Callable[[Recording], Conditioning],
+    samples: int,
+    *,
+    topic: str | None = None,
+    settings: ReadSettings,
+) -> Iterator[tuple[Recording, Sequence[Regression]]]:
+    """
+    Yield pieces of a recording without damaged samples, with the rows that each has to itself.
+
+    Parameters
+    ----------
+    path : str or Path
+        The bag.
+    arm : ArmModel
+        Rigid body and effects.
+    columns : ndarray of int, shape (r,)
+        Which of ``arm.parameters`` to keep.
+    choose : callable
+        Returns the filters, given the first piece.
+    samples : int
+        New samples a piece has at most.
+    topic, settings
+        As of ``read_recording``.
+
+    """
+    cuts: list[Cuts] = []  # made with the first piece, before any cut
+    start = -np.inf
+    for piece, last in read_pieces(
+        path,
+        joints=arm.robot.joints,
+        topic=topic,
+        samples=samples,
+        keep=lambda piece: cuts[0].keep(piece),
+        settings=settings,
+    ):
+        if not cuts:
+            cuts.append(Cuts(choose(piece)))
+        used = cuts[0].used
+        (repaired,), _ = without_damage([piece], SignalSettings(used.cutoff_hz, used.decimation))
+        stop = np.inf if last else float(cuts[0].end(piece))
+        parts = regressions(arm, columns, [repaired], used)
+        owned = [_owned(piece, rows, start, stop) for rows in parts]
+        yield repaired, [rows for rows in owned if rows is not None]
+        start = stop

@@ -1,0 +1,209 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Springs between two machines while both move: samples in, present stiffness out."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.ties.problem import Inertias, InteractionProblem
+from armid_ros.identification.ties.recorded import recorded_interaction_problem
+from armid_ros.identification.ties.slack import find_slack, Slack
+from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
+from armid_ros.model.spring_ties import Tie
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+
+#: Samples are averaged to about this rate [Hz]: far above how people move, and cheap.
+_RATE = 100.0
+#: Springs without slack that leave this many times the noise, as a mean square, are worth a look.
+_SIGN = 1.5
+
+
+@dataclass(frozen=True)
+class InteractionSettings:
+    """
+    How springs are identified online.
+
+    Attributes
+    ----------
+    memory : float
+        How much of the past counts [s].
+    period : float
+        Time between two estimates [s].
+    slack_period : float
+        Time between two looks for slack, which take several estimates [s].
+    inertias : {'known', 'free'}
+        Whether the machine's inertias are those of its description or are estimated as well.
+
+    """
+
+    memory: float = 10.0
+    period: float = 2.0
+    slack_period: float = 10.0
+    inertias: Inertias = 'known'
+
+    def __post_init__(self) -> None:
+        """Refuse times that do not fit."""
+        if not (self.memory >= 3.0 and 0.0 < self.period <= self.memory and self.slack_period > 0):
+            raise IdentificationError(
+                f'a memory of {self.memory:g} s and estimates every {self.period:g} s: the memory '
+                'has to be at least 3 s and no shorter than the time between estimates'
+            )
+
+
+@dataclass
+class _Averages:
+    """Means of successive samples, as many as the rate asks for."""
+
+    memory: float
+    t: deque[float] = field(default_factory=deque)
+    rows: deque[FloatArray] = field(default_factory=deque)
+    _group: list[tuple[float, FloatArray]] = field(default_factory=list)
+
+    def take(self, t: float, row: FloatArray) -> None:
+        if self._group and not 0.0 < t - self._group[-1][0] < 1.0 / _RATE:
+            if t <= self._group[-1][0]:
+                self.clear()
+            self._close()
+        self._group.append((t, row))
+        if t - self._group[0][0] >= 0.75 / _RATE:
+            self._close()
+
+    def clear(self) -> None:
+        self.t.clear()
+        self.rows.clear()
+        self._group.clear()
+
+    def _close(self) -> None:
+        if self._group:
+            self.t.append(float(np.mean([t for t, _ in self._group])))
+            self.rows.append(np.mean([row for _, row in self._group], axis=0))
+            self._group.clear()
+        while self.t and self.t[-1] - self.t[0] > self.memory:
+            self.t.popleft()
+            self.rows.popleft()
+
+
+class OnlineInteraction:
+    """
+    Identify the springs between two machines while they move.
+
+    Parameters
+    ----------
+    robot, other : Robot
+        The machine whose torques are measured, and the one it is tied to.
+    ties : sequence of Tie
+        Where springs may be.
+    settings : InteractionSettings, optional
+        Memory and how often.
+
+    Attributes
+    ----------
+    together, separate : Interaction or None
+        One stiffness for all springs, and one for each; None before there is enough.
+    slack : Slack or None
+        How loose the straps are; None while springs without slack explain the torques.
+
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        other: Robot,
+        ties: Sequence[Tie],
+        settings: InteractionSettings | None = None,
+    ) -> None:
+        self.robot, self.other, self.ties = robot, other, tuple(ties)
+        self.settings = settings or InteractionSettings()
+        self._own = _Averages(self.settings.memory)
+        self._far = _Averages(self.settings.memory)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self.interrupt()
+        self.together: Interaction | None = None
+        self.separate: Interaction | None = None
+        self.slack: Slack | None = None
+
+    def interrupt(self) -> None:
+        """Forget the motion so far, which what comes does not continue; estimates stay."""
+        self._own.clear()
+        self._far.clear()
+        self._due: float | None = None
+        self._slack_due: float | None = None
+
+    def take_other(self, t: float, q: FloatArray) -> None:
+        """Take in positions of the other machine, shape (m,) [rad], at a time [s]."""
+        self._far.take(t, q)
+
+    def take(self, t: float, q: FloatArray, tau: FloatArray) -> bool:
+        """
+        Take in positions and torques of the machine.
+
+        Parameters
+        ----------
+        t : float
+            Time [s], of the same clock as the other machine's.
+        q, tau : ndarray, shape (n,)
+            Position [rad] and torque [N m].
+
+        Returns
+        -------
+        bool
+            Whether there is a new estimate.
+
+        Raises
+        ------
+        IdentificationError
+            If the motion of the last seconds shows no springs, or the machines share no time.
+
+        """
+        self._own.take(t, np.concatenate([q, tau]))
+        if self._due is None or t < self._due - 2.0 * self.settings.memory:
+            self._due = t + self.settings.memory
+            self._slack_due = self._due
+        if t < self._due:
+            return False
+        self._due = t + self.settings.period
+        self.together = identify_interaction(self._problem(separate=False))
+        self.separate = identify_interaction(self._problem(separate=True))
+        assert self._slack_due is not None
+        if self.together.misfit < _SIGN * self.together.residual.size:
+            self.slack = None
+        elif t >= self._slack_due:
+            self._slack_due = t + self.settings.slack_period
+            self.slack = find_slack(lambda slack: self._problem(separate=False, slack=slack))
+        return True
+
+    def _problem(self, *, separate: bool, slack: float = 0.0) -> InteractionProblem:
+        n = self.robot.n_joints
+        if len(self._own.t) < 2 or len(self._far.t) < 2:
+            raise IdentificationError(
+                f'{self.robot.name} and {self.other.name}: joint states of both are needed'
+            )
+        begin = self._own.t[0]
+        rows = np.array(self._own.rows)
+        own, far = (
+            Recording(joints=machine.joints, t=np.array(t) - begin, q=q, tau=tau)
+            for machine, t, q, tau in (
+                (self.robot, self._own.t, rows[:, :n], rows[:, n:]),
+                (self.other, self._far.t, np.array(self._far.rows), None),
+            )
+        )
+        return recorded_interaction_problem(
+            self.robot,
+            own,
+            self.other,
+            far,
+            self.ties,
+            inertias=self.settings.inertias,
+            separate=separate,
+            slack=slack,
+        )

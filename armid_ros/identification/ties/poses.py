@@ -1,0 +1,118 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+How well poses can tell the stiffness of springs, and which poses tell it best.
+
+Of torques and angles with Gaussian noise no estimate without bias has less variance than the
+inverse of their information (Cramer and Rao). Which poses have most of it is a matter of geometry
+alone: it is decided before they are measured.
+
+"""
+
+from __future__ import annotations
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.ties.problem import InteractionProblem
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+
+#: Rounds of the multiplicative algorithm: weights are known to some per cent by then.
+_ROUNDS = 200
+
+
+def stiffness_bound(
+    problem: InteractionProblem, theta: FloatArray, torque_noise: npt.ArrayLike
+) -> FloatArray:
+    """
+    Return the least standard deviation that stiffnesses can have, shape (S,) [N/m].
+
+    Parameters
+    ----------
+    problem : InteractionProblem
+        Of the motion without noise, with the noise that its angles will have.
+    theta : ndarray, shape (P,)
+        Stiffnesses and inertias.
+    torque_noise : array_like, number or shape (n,)
+        Standard deviation of the torques [N m].
+
+    Raises
+    ------
+    IdentificationError
+        If the poses do not tell every stiffness.
+
+    """
+    information = _information(problem, theta, torque_noise).sum(axis=0)
+    inverse = _inverse(information)
+    return np.asarray(np.sqrt(np.diag(inverse)[: len(problem.segments)]))
+
+
+def choose_poses(
+    problem: InteractionProblem, theta: FloatArray, torque_noise: npt.ArrayLike, count: int
+) -> npt.NDArray[np.intp]:
+    """
+    Choose the poses that tell the stiffnesses best, each relative to its own deviation.
+
+    Weights of a best design by the multiplicative algorithm (Silvey, Titterington and Torsney
+    1978); the poses with the largest ones are taken.
+
+    Parameters
+    ----------
+    problem : InteractionProblem
+        Of all poses to choose from, as they are planned: chosen by measured angles, their noise
+        would be chosen with them.
+    theta : ndarray, shape (P,)
+        Stiffnesses and inertias, as far as they are known; a factor of two does not matter.
+    torque_noise : array_like, number or shape (n,)
+        Standard deviation that the torques will have [N m].
+    count : int
+        How many to choose.
+
+    Returns
+    -------
+    ndarray of int, shape (count,)
+        Which samples of the problem, in their order.
+
+    Raises
+    ------
+    IdentificationError
+        If there are fewer, or all of them do not tell every stiffness.
+
+    """
+    each = _information(problem, theta, torque_noise)
+    if count > len(each):
+        raise IdentificationError(f'{count} poses cannot be chosen of {len(each)}')
+    size = np.sqrt(np.diag(each.sum(axis=0)))
+    each = each / np.outer(size, size)
+    springs = len(problem.segments)
+    weight = np.full(len(each), 1.0 / len(each))
+    for _ in range(_ROUNDS):
+        inverse = _inverse(np.einsum('n,npq->pq', weight, each))
+        relative = inverse[:, :springs] / np.sqrt(np.diag(inverse)[:springs])
+        weight = weight * np.sqrt(np.einsum('npq,pk,qk->n', each, relative, relative))
+        weight = weight / weight.sum()
+    return np.sort(np.argsort(-weight)[:count])
+
+
+def _information(
+    problem: InteractionProblem, theta: FloatArray, torque_noise: npt.ArrayLike
+) -> FloatArray:
+    """Return the information of each pose on all parameters, shape (N, P, P)."""
+    variance = np.broadcast_to(np.asarray(torque_noise, dtype=float) ** 2, problem.tau.shape[1:])
+    by_motion = problem.sensitivity(theta)
+    covariance = by_motion @ problem.motion_noise @ by_motion.transpose(0, 2, 1)
+    scaled = np.linalg.solve(covariance + np.diag(variance), problem.columns)
+    return np.asarray(np.einsum('nip,niq->npq', problem.columns, scaled))
+
+
+def _inverse(information: FloatArray) -> FloatArray:
+    size = np.sqrt(np.diag(information))
+    try:
+        inverse = np.linalg.inv(information / np.outer(size, size))
+    except np.linalg.LinAlgError:
+        inverse = np.full_like(information, np.nan)
+    if not np.all(np.diag(inverse) > 0.0):
+        raise IdentificationError(
+            'these poses do not tell every stiffness; let the pair move more'
+        )
+    return np.asarray(inverse / np.outer(size, size))

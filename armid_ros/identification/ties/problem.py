@@ -1,0 +1,316 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The regression of the springs between two machines: torques, columns, and what noise does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from armid_ros.effects.load import described_spread
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import ParameterName
+from armid_ros.identification.rows.signals import (
+    Conditioning,
+    decimate,
+    decimated_samples,
+)
+from armid_ros.model import (
+    BaseParameters,
+    group_columns,
+    inverse_dynamics,
+    inverse_dynamics_derivatives,
+    regressor,
+    rigid_parameter_names,
+)
+from armid_ros.model.spring_ties import Tie, tie_columns_derivatives, tie_geometry
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+from scipy import signal
+import scipy.linalg
+
+#: A column of which others leave less than this share is not told apart from them.
+_RANK_TOLERANCE = 1e-6
+#: Step of the central differences of rigid columns [rad or m].
+_STEP = 1e-5
+
+#: Samples over which errors may last after filtering.
+_LAGS = 6
+
+Inertias = Literal['known', 'free']
+#: Arrays of a problem that have its samples first.
+STACKED = ('tau', 'known', 'columns', 'known_by_motion', 'columns_by_motion')
+#: The others.
+_ALIKE = ('motion_lags', 'torque_lags', 'torque_noise', 'described', 'precision')
+
+
+@dataclass(frozen=True)
+class InteractionProblem:
+    """
+    tau = known + columns theta, and how it depends on the angles of both machines.
+
+    Attributes
+    ----------
+    tau : ndarray, shape (N, n)
+        Measured torques of the machine [N m].
+    known : ndarray, shape (N, n)
+        What the rigid body takes, where its inertias are known; zero where they are free.
+    columns : ndarray, shape (N, n, P)
+        Springs, then combinations of inertias.
+    known_by_motion : ndarray, shape (N, n, 3 J)
+        Derivatives by positions, velocities and accelerations of the J = n + m joints of both.
+    columns_by_motion : ndarray, shape (N, n, P, 3 J)
+        Derivatives by the same.
+    motion_lags : ndarray, shape (1 + L, 3 J, 3 J)
+        Covariances of what noisy angles make of positions, velocities and accelerations of a
+        sample and of itself and the L next; none where errors are independent.
+    torque_lags : ndarray, shape (1 + L,)
+        Correlations of the noise of torques of the same.
+    torque_noise : ndarray, shape (n,)
+        Standard deviation that the torques have at least, as they are here [N m].
+    segments : tuple of str
+        Names of the springs.
+    spring_joints : tuple of str
+        The joint that moves each; empty for all at once.
+    rigid : tuple of ParameterName
+        The combinations of inertias that are free.
+    described : ndarray, shape (P,)
+        Parameters as the machine's description has them; zero where it says nothing.
+    precision : ndarray, shape (P, P)
+        How strongly it is believed. Of columns that are hardly more than noise any value explains
+        the torques, the larger the better; it keeps them to what a body can have.
+    typical_way : float
+        How far springs are drawn out, root mean square [m].
+
+    """
+
+    tau: FloatArray
+    known: FloatArray
+    columns: FloatArray
+    known_by_motion: FloatArray
+    columns_by_motion: FloatArray
+    motion_lags: FloatArray
+    torque_lags: FloatArray
+    torque_noise: FloatArray
+    segments: tuple[str, ...]
+    spring_joints: tuple[str, ...]
+    rigid: tuple[ParameterName, ...]
+    described: FloatArray
+    precision: FloatArray
+    typical_way: float
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        for name in (*STACKED, *_ALIKE):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def motion_noise(self) -> FloatArray:
+        """Covariance of what noisy angles make of the motion of a sample, shape (3 J, 3 J)."""
+        return np.asarray(self.motion_lags[0])
+
+    @property
+    def position_noise(self) -> FloatArray:
+        """Standard deviation of the angles of both machines, shape (J,) [rad]."""
+        variance = np.diag(self.motion_noise)
+        return np.asarray(np.sqrt(variance[: len(variance) // 3]))
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Return what is left of the torques, shape (N, n) [N m]."""
+        return np.asarray(self.tau - self.known - self.columns @ theta)
+
+    def sensitivity(self, theta: FloatArray) -> FloatArray:
+        """Return the derivative of the model by the motion, shape (N, n, 3 J)."""
+        spring = np.einsum('nipj,p->nij', self.columns_by_motion, theta)
+        return np.asarray(self.known_by_motion + spring)
+
+    def deviation(self, theta: FloatArray) -> FloatArray:
+        """Return what noise gives the residuals, root mean square, shape (n,) [N m]."""
+        by_motion = self.sensitivity(theta)
+        angles = np.sum(by_motion @ self.motion_noise * by_motion, axis=2)
+        return np.asarray(np.sqrt(np.mean(angles, axis=0) + self.torque_noise**2))
+
+
+def interaction_problem(
+    robot: Robot,
+    motion: Motion,
+    other: Robot,
+    other_motion: Motion,
+    ties: Sequence[Tie],
+    *,
+    position_noise: npt.ArrayLike = 0.0,
+    torque_noise: npt.ArrayLike = 0.0,
+    used: Conditioning | None = None,
+    inertias: Inertias = 'known',
+    separate: bool = False,
+    slack: float | FloatArray = 0.0,
+) -> InteractionProblem:
+    """
+    Set up the regression on motions of both machines.
+
+    Parameters
+    ----------
+    robot, other : Robot
+        The machine whose torques were measured, and the one it is tied to.
+    motion, other_motion : Motion
+        On one time base; ``motion`` with torques.
+    ties : sequence of Tie
+        Where the springs are.
+    position_noise : array_like, number or shape (n + m,)
+        Standard deviation of the angles in the motions [rad].
+    torque_noise : array_like, number or shape (n,)
+        Standard deviation that the torques have at least [N m].
+    used : Conditioning, optional
+        The filters that the positions went through, and by which torques and columns are to be
+        decimated. By default every sample counts and noise is in the angles alone.
+    inertias : {'known', 'free'}
+        Whether the machine's inertias are those of its description or are estimated as well.
+    separate : bool
+        Whether every spring has a stiffness of its own, or all have one.
+    slack : float or ndarray, shape (S,)
+        Way that the springs give before they pull [m].
+
+    Raises
+    ------
+    IdentificationError
+        If there are no torques or the time bases differ.
+
+    """
+    if motion.tau is None:
+        raise IdentificationError(f'{robot.name}: no torques; the stiffness is in them alone')
+    if len(motion) != len(other_motion) or np.max(np.abs(motion.t - other_motion.t)) > 1e-6:
+        raise IdentificationError(
+            f'{robot.name} and {other.name}: their motions have to be on one time base'
+        )
+    kept = np.array(decimated_samples(len(motion), used) if used else range(len(motion)))
+    slow, far = motion.select(kept), other_motion.select(kept)
+    geometry = tie_geometry(robot, motion.q, other, other_motion.q, ties)
+    springs = geometry.pulled(slack)
+    springs_by = _springs_by_motion(robot, slow, other, far, ties, slack)
+    if not separate:
+        springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))
+    count = springs_by.shape[3] // 3
+    rigid: tuple[ParameterName, ...] = ()
+    described: FloatArray = np.zeros(0)
+    precision: FloatArray = np.zeros((0, 0))
+    if inertias == 'known':
+        known = inverse_dynamics(robot, motion)
+        known_by = _placed(np.stack(inverse_dynamics_derivatives(robot, slow), axis=2), count)
+        columns, columns_by = springs, springs_by
+    else:
+        body = regressor(robot, motion)
+        base = _told_apart(robot, body, springs, ties, separate)
+        independent, rigid = base.independent, base.parameters
+        described = base.values(robot.rigid_parameters)
+        spread = base.grouping * described_spread(robot).ravel()
+        precision = np.asarray(np.linalg.inv(spread @ spread.T))
+        known = np.zeros_like(motion.tau)
+        known_by = np.zeros((*slow.q.shape, 3 * count))
+        columns = np.concatenate([springs, body[:, :, independent]], axis=2)
+        body_by = _placed(_regressor_by_motion(robot, slow, independent), count)
+        columns_by = np.concatenate([springs_by, body_by], axis=2)
+    tau = motion.tau
+    passed, left = np.diag([1.0, 0.0, 0.0])[np.newaxis], np.ones(1)
+    if used is not None:
+        tau, known, columns = (decimate(values, used) for values in (tau, known, columns))
+        passed, left = _passed(used), _torque_passed(used)
+    deviation = np.broadcast_to(np.asarray(position_noise, dtype=float), (count,))
+    return InteractionProblem(
+        tau,
+        known,
+        columns,
+        known_by,
+        columns_by,
+        np.asarray(np.kron(passed, np.diag(deviation**2))),
+        left / left[0],
+        np.sqrt(left[0]) * np.broadcast_to(np.asarray(torque_noise, float), tau.shape[1:]),
+        tuple(tie.name for tie in ties) if separate else ('all',),
+        tuple(tie.joint for tie in ties) if separate else ('',),
+        rigid,
+        np.concatenate([np.zeros(springs.shape[2]), described]),
+        scipy.linalg.block_diag(np.zeros((springs.shape[2],) * 2), precision),
+        float(np.sqrt(np.mean(np.sum(geometry.way**2, axis=2)))),
+    )
+
+
+def _passed(used: Conditioning) -> FloatArray:
+    """
+    Return what is left of white noise in position, velocity and acceleration, (1 + lags, 3, 3).
+
+    Covariances of a row with itself and with later ones. Columns are slow beside the filter of the
+    decimation, so that noise in them goes through it as if it were by itself.
+
+    """
+    w = np.linspace(0.0, np.pi, 8001)
+    sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
+    gain = np.abs(signal.sosfreqz(sections, w)[1]) ** 4
+    gain = gain * np.abs(signal.freqz(used.taps(), worN=w)[1]) ** 2
+    result = np.empty((1 + _LAGS, 3, 3))
+    for lag, i, j in np.ndindex(result.shape):
+        turned = np.cos(w * lag * used.decimation + (i + j) * np.pi / 2.0)
+        result[lag, i, j] = (-1) ** i * np.mean(gain * (used.rate_hz * w) ** (i + j) * turned)
+    return result
+
+
+def _torque_passed(used: Conditioning) -> FloatArray:
+    """Return the same of white noise of torques, shape (1 + lags,)."""
+    taps = used.taps()
+    ends = [len(taps) - lag * used.decimation for lag in range(1 + _LAGS)]
+    return np.array([taps[:end] @ taps[-end:] if end > 0 else 0.0 for end in ends])
+
+
+def _told_apart(
+    robot: Robot, body: FloatArray, springs: FloatArray, ties: Sequence[Tie], separate: bool
+) -> BaseParameters:
+    """Return the rigid columns that the motion tells apart beside the springs."""
+    names = rigid_parameter_names(robot)
+    base = group_columns(body.reshape(-1, body.shape[2]), names, _RANK_TOLERANCE)
+    w = np.concatenate([body[:, :, base.independent], springs], axis=2)
+    w = w.reshape(-1, w.shape[2])
+    scale = np.linalg.norm(w, axis=0)
+    scaled = w / np.where(scale > 0.0, scale, 1.0)
+    left = np.abs(np.diag(np.linalg.qr(scaled, mode='r')))[base.rank :]
+    if len(left) and left.min() < _RANK_TOLERANCE:
+        name = ties[int(np.argmin(left))].name if separate else 'the springs'
+        raise IdentificationError(
+            f'{name}: this motion does not tell its stiffness from weight and inertia; '
+            'keep the inertias known, or move more'
+        )
+    return base
+
+
+def _springs_by_motion(
+    robot: Robot,
+    motion: Motion,
+    other: Robot,
+    other_motion: Motion,
+    ties: Sequence[Tie],
+    slack: float | FloatArray,
+) -> FloatArray:
+    """Return the derivatives of the spring columns, shape (N, n, S, 3 J)."""
+    by_q, by_far = tie_columns_derivatives(robot, motion.q, other, other_motion.q, ties, slack)
+    by_angles = np.concatenate([by_q, by_far], axis=3)
+    return np.concatenate([by_angles, np.zeros_like(by_angles), np.zeros_like(by_angles)], axis=3)
+
+
+def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp]) -> FloatArray:
+    """Return the derivatives of some rigid columns, shape (N, n, P, 3, n)."""
+    n = motion.n_joints
+    result = np.empty((len(motion), n, len(kept), 3, n))
+    for order, name in enumerate(('q', 'dq', 'ddq')):
+        for j, step in enumerate(_STEP * np.eye(n)):
+            at = getattr(motion, name)
+            after = regressor(robot, replace(motion, **{name: at + step}))
+            before = regressor(robot, replace(motion, **{name: at - step}))
+            result[:, :, :, order, j] = (after - before)[:, :, kept] / (2.0 * _STEP)
+    return result
+
+
+def _placed(by_own: FloatArray, count: int) -> FloatArray:
+    """Spread derivatives by the machine's motion, shape (..., 3, n), over both: (..., 3 J)."""
+    result = np.zeros((*by_own.shape[:-1], count))
+    result[..., : by_own.shape[-1]] = by_own
+    return result.reshape((*by_own.shape[:-2], 3 * count))

@@ -1,0 +1,249 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The regression of the springs between two machines, from recordings of both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import comb
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.rows.signals import (
+    Conditioning,
+    conditioning,
+    segments,
+    SignalSettings,
+)
+from armid_ros.identification.ties.problem import (
+    Inertias,
+    interaction_problem,
+    InteractionProblem,
+    STACKED,
+)
+from armid_ros.model.spring_ties import Tie
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import recorded_together, Recording
+from armid_ros.robots import Robot
+import numpy as np
+from scipy import signal
+
+#: Order of the differences that noise is measured by.
+_ORDER = 6
+#: The filter's pass band is so much wider than the motion's that it leaves the motion as it is.
+_MARGIN = 2.0
+#: Length of the pieces that spectra are averaged over [s].
+_SPECTRUM = 4.0
+#: The motion ends where its spectrum is less than this many times the noise.
+_ABOVE = 3.0
+
+
+def recorded_interaction_problem(
+    robot: Robot,
+    recording: Recording,
+    other: Robot,
+    other_recording: Recording,
+    ties: Sequence[Tie],
+    *,
+    settings: SignalSettings | None = None,
+    inertias: Inertias = 'known',
+    separate: bool = False,
+    slack: float | FloatArray = 0.0,
+) -> InteractionProblem:
+    """
+    Set up the regression on recordings, the noise of their angles being measured in them.
+
+    The angles of the other machine are brought to the stamps of the first; both are filtered and
+    torques and columns decimated as for any identification. White noise is what the angles have
+    in the upper two fifths of their spectrum; the filters leave a known share of it.
+
+    Parameters
+    ----------
+    robot, other : Robot
+        The machine whose torques were measured, and the one it is tied to.
+    recording, other_recording : Recording
+        Of both, with overlapping stamps.
+    ties : sequence of Tie
+        Where the springs are.
+    settings : SignalSettings, optional
+        Filters.
+    inertias : {'known', 'free'}
+        Whether the machine's inertias are those of its description or are estimated as well.
+    separate : bool
+        Whether every spring has a stiffness of its own, or all have one.
+    slack : float or ndarray, shape (S,)
+        Way that the springs give before they pull [m].
+
+    Raises
+    ------
+    IdentificationError
+        If there are no torques, no common time, or too little of it.
+
+    """
+    if recording.tau is None:
+        raise IdentificationError(f'{recording.source}: {recording.topic} has no effort')
+    together = recorded_together(recording, other_recording, other, ties)
+    settings = settings or SignalSettings()
+    both = _one_machine(together)
+    used = band_of_motion([both], conditioning([both], settings), settings)
+    return together_interaction_problem(
+        robot, together, used, inertias=inertias, separate=separate, slack=slack
+    )
+
+
+def together_interaction_problem(
+    robot: Robot,
+    recording: Recording,
+    used: Conditioning,
+    *,
+    inertias: Inertias = 'known',
+    separate: bool = False,
+    slack: float | FloatArray = 0.0,
+    rest: Callable[[Motion], FloatArray] | None = None,
+) -> InteractionProblem:
+    """
+    Set up the regression on a recording with the other machine beside it.
+
+    Parameters
+    ----------
+    robot : Robot
+        The machine whose torques were measured.
+    recording : Recording
+        Of it, with torques, and with the other one and their ties beside it.
+    used : Conditioning
+        Filters.
+    inertias, separate, slack
+        As of `recorded_interaction_problem`.
+    rest : callable, optional
+        Torque along a motion of what else acts on the machine, such as friction, shape (N, n)
+        [N m].
+
+    Raises
+    ------
+    IdentificationError
+        If there is too little of it.
+
+    """
+    beside, n = recording.beside, len(recording.joints)
+    assert beside is not None
+    both = _one_machine(recording)
+    assert both.tau is not None
+    noise, torque_noise = _white(both.q), _white(both.tau[:, :n])
+    problems = []
+    for stretch, own in zip(segments(both, used), segments(recording, used), strict=True):
+        assert own.tau is not None
+        tau = own.tau if rest is None else own.tau - rest(own)
+        problems.append(
+            interaction_problem(
+                robot,
+                own.with_torque(tau),
+                beside.robot,
+                _joints(stretch, slice(n, None), both.joints[n:]),
+                beside.ties,
+                position_noise=noise,
+                torque_noise=torque_noise,
+                used=used,
+                inertias=inertias,
+                separate=separate,
+                slack=slack,
+            )
+        )
+    if not problems:
+        raise IdentificationError(
+            f'{recording.source}: no stretch is long enough for a filter of '
+            f'{used.cutoff_hz:.3g} Hz'
+        )
+    return stacked(problems)
+
+
+def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
+    """
+    Put stretches or recordings together.
+
+    Raises
+    ------
+    IdentificationError
+        If they do not free the same inertias.
+
+    """
+    if any(part.rigid != problems[0].rigid for part in problems):
+        raise IdentificationError('a stretch between gaps moves too little to free the inertias')
+    joined = {name: np.concatenate([getattr(part, name) for part in problems]) for name in STACKED}
+    return replace(problems[0], **joined)  # type: ignore[arg-type]
+
+
+def _one_machine(recording: Recording) -> Recording:
+    """Return a recording and what is beside it as of one machine, without torques of the other."""
+    assert recording.beside is not None and recording.tau is not None
+    far = recording.beside.q
+    return replace(
+        recording,
+        joints=(*recording.joints, *recording.beside.robot.joints),
+        q=np.hstack([recording.q, far]),
+        dq=None,
+        tau=np.hstack([recording.tau, np.zeros_like(far)]),
+        beside=None,
+    )
+
+
+def _joints(motion: Motion, columns: slice, joints: tuple[str, ...]) -> Motion:
+    assert motion.tau is not None
+    parts = (motion.q, motion.dq, motion.ddq, motion.tau)
+    return Motion(joints, motion.t, *(np.array(part[:, columns]) for part in parts))
+
+
+def band_of_motion(
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    settings: SignalSettings,
+    margin: float = _MARGIN,
+) -> Conditioning:
+    """
+    Return filters that leave the motion and nothing else, as far as settings leave them open.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        What is to be filtered.
+    used : Conditioning
+        Filters that are to be narrowed.
+    settings : SignalSettings
+        What was asked for.
+    margin : float
+        How much wider than the motion the pass band is. Accelerations have noise that grows with
+        its power of 2.5.
+
+    """
+    if settings.cutoff_hz is None:
+        crossing = max(_crossing(recording, used.rate_hz) for recording in recordings)
+        used = replace(used, cutoff_hz=min(used.cutoff_hz, margin * crossing))
+    if settings.decimation is None:
+        factor = int(used.rate_hz / (2.0 * used.cutoff_hz))
+        used = replace(used, decimation=max(used.decimation, factor))
+    return used
+
+
+def _crossing(recording: Recording, rate: float) -> float:
+    """Return where the motion of the fastest angle sinks into its noise [Hz]."""
+    frequency, power = signal.welch(
+        recording.q,
+        fs=rate,
+        window='blackmanharris',
+        nperseg=min(len(recording.t), int(_SPECTRUM * rate)),
+        detrend='linear',
+        axis=0,
+    )
+    above = power > _ABOVE * 2.0 * _white(recording.q) ** 2 / rate
+    above[-1] = False
+    return max(float(frequency[2:][np.argmin(column)]) for column in above[2:].T)
+
+
+def _white(signals: FloatArray) -> FloatArray:
+    """
+    Return the standard deviation of white noise in signals of shape (N, n).
+
+    Differences of high order leave nothing of a motion that is sampled densely.
+
+    """
+    differences = np.diff(signals, _ORDER, axis=0)
+    return np.asarray(np.sqrt(np.mean(differences**2, axis=0) / comb(2 * _ORDER, _ORDER)))

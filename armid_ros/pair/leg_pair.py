@@ -1,0 +1,293 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Two machines tied by springs: what each has to supply, and what each feels of the other.
+
+A pair is any two robots with a common base frame. The shipped one is a man and the exoskeleton
+that he wears, tied at both thighs and both shanks.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from armid_ros.errors import ModelError
+from armid_ros.model import inverse_dynamics, point_motion
+from armid_ros.model.spring_ties import centroid_ties, Tie, tie_geometry, TieGeometry
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.pair.gait import (
+    Gait,
+    Phase,
+    stance_motion,
+    steady_phase,
+    stepping_phase,
+)
+from armid_ros.robots import load_robot, Robot
+from armid_ros.robots.assumptions import read_assumptions
+import numpy as np
+import numpy.typing as npt
+
+#: Segments of the leg pair that are tied: in the order of the source, F1 to F4.
+SEGMENTS = ('swing_shank', 'swing_thigh', 'stance_thigh', 'stance_shank')
+#: The joint that moves each of them.
+_MOVED_BY = ('swing_knee', 'swing_hip', 'stance_knee', 'stance_ankle')
+
+
+@dataclass(frozen=True)
+class TiedPair:
+    """
+    A machine, the other one, and the springs between them.
+
+    Attributes
+    ----------
+    robot, other : Robot
+        The exoskeleton and its wearer, or any other two.
+    ties : tuple of Tie
+        Where the S springs are.
+    stiffness : ndarray, shape (S,)
+        k [N/m].
+    damping : ndarray, shape (S,)
+        Of dampers beside the springs [N s/m]; zero by default.
+    slack : ndarray, shape (S,)
+        Way that a spring gives before it pulls [m]; zero by default.
+
+    """
+
+    robot: Robot
+    other: Robot
+    ties: tuple[Tie, ...]
+    stiffness: FloatArray
+    damping: FloatArray | None = None
+    slack: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        """Spread single numbers over the springs and check them."""
+        size = (len(self.ties),)
+        for name in ('stiffness', 'damping', 'slack'):
+            values = getattr(self, name)
+            try:
+                spread = np.broadcast_to(np.asarray(0.0 if values is None else values), size)
+            except ValueError:
+                raise ModelError(
+                    f'{name}: {np.shape(values)} values for {size[0]} ties, '
+                    f'{", ".join(tie.name for tie in self.ties)}'
+                ) from None
+            if np.any(spread < 0.0) or not np.all(np.isfinite(spread)):
+                raise ModelError(f'{name}: {spread} has to be finite and not negative')
+            object.__setattr__(self, name, read_only(np.array(spread, dtype=float)))
+
+    @property
+    def segments(self) -> tuple[str, ...]:
+        """Names of the ties."""
+        return tuple(tie.name for tie in self.ties)
+
+    def with_stiffness(self, stiffness: npt.ArrayLike) -> TiedPair:
+        """Return the pair with other springs, one number or one for each [N/m]."""
+        return replace(self, stiffness=np.asarray(stiffness, dtype=float))
+
+    def with_slack(self, slack: npt.ArrayLike) -> TiedPair:
+        """Return the pair with looser ties, one number or one for each [m]."""
+        return replace(self, slack=np.asarray(slack, dtype=float))
+
+    def geometry(self, motion: Motion, other_motion: Motion) -> TieGeometry:
+        """Return the ties along the motions of both."""
+        return tie_geometry(self.robot, motion.q, self.other, other_motion.q, self.ties)
+
+    def forces(
+        self, motion: Motion, other_motion: Motion, geometry: TieGeometry | None = None
+    ) -> FloatArray:
+        """
+        Return what the springs do to the machine; they do the opposite to the other one.
+
+        Returns
+        -------
+        ndarray, shape (N, S, 3)
+            Forces at the machine's ends in the base frame [N].
+
+        """
+        geometry = geometry or self.geometry(motion, other_motion)
+        own = np.einsum('nsxj,nj->nsx', geometry.jacobian, motion.dq)
+        far = np.einsum('nsxj,nj->nsx', geometry.other_jacobian, other_motion.dq)
+        return self.law(geometry.way, own - far)
+
+    def law(self, way: FloatArray, velocity: FloatArray) -> FloatArray:
+        """Return the force on the machine's end of springs drawn out so, shape (..., S, 3) [N]."""
+        assert self.damping is not None and self.slack is not None
+        length = np.linalg.norm(way, axis=-1)
+        pulling = np.maximum(1.0 - self.slack / np.maximum(length, 1e-12), 0.0)
+        pull = (self.stiffness * pulling)[..., np.newaxis] * way
+        return np.asarray(-pull - self.damping[:, np.newaxis] * velocity)
+
+
+class PairMotion(NamedTuple):
+    """
+    How both machines move, on one time base.
+
+    Attributes
+    ----------
+    own, other : Motion
+        Of the machine (exoskeleton) and of the other one (wearer).
+
+    """
+
+    own: Motion
+    other: Motion
+
+
+@dataclass(frozen=True)
+class PairTorques:
+    """
+    What a motion of a pair takes.
+
+    Attributes
+    ----------
+    tau, other_tau : ndarray, shape (N, n) and (N, m)
+        Torques of the machine's joints and of the other one's [N m].
+    forces : ndarray, shape (N, S, 3)
+        What the springs do to the machine [N].
+
+    """
+
+    tau: FloatArray
+    other_tau: FloatArray
+    forces: FloatArray
+
+
+def pair_torques(
+    pair: TiedPair,
+    motion: Motion,
+    other_motion: Motion,
+    *,
+    foot_force: FloatArray | None = None,
+    foot: tuple[str, tuple[float, float, float]] = ('exo_swing_ankle', (0.0, 0.0, 0.0)),
+) -> PairTorques:
+    """
+    Compute the joint torques of both machines, springs included.
+
+    Parameters
+    ----------
+    pair : TiedPair
+        The machines and their springs.
+    motion, other_motion : Motion
+        How each moves, on one time base.
+    foot_force : ndarray, shape (N, 3), optional
+        In double support: what the ground does to the second foot of the machine [N], (27). It
+        has to be measured or assumed: two feet on the ground leave it open.
+    foot : (str, (float, float, float))
+        Joint that moves that foot, and where the force acts in its frame [m].
+
+    """
+    geometry = pair.geometry(motion, other_motion)
+    forces = pair.forces(motion, other_motion, geometry)
+    tau = inverse_dynamics(pair.robot, motion)
+    tau -= np.einsum('nsxj,nsx->nj', geometry.jacobian, forces)
+    other_tau = inverse_dynamics(pair.other, other_motion)
+    other_tau += np.einsum('nsxj,nsx->nj', geometry.other_jacobian, forces)
+    if foot_force is not None:
+        _, jacobian = point_motion(pair.robot, foot[0], foot[1], motion.q)
+        tau -= np.einsum('nxj,nx->nj', jacobian, foot_force)
+    return PairTorques(read_only(tau), read_only(other_tau), read_only(forces))
+
+
+def leg_pair(
+    stiffness: npt.ArrayLike | None = None, segments: Sequence[str] = SEGMENTS
+) -> TiedPair:
+    """
+    Return the shipped pair: exoskeleton_legs worn by human_legs.
+
+    Parameters
+    ----------
+    stiffness : array_like, optional
+        Of all springs or of each [N/m]; by default what ``assumptions.yaml`` has.
+    segments : sequence of str
+        Those that are tied.
+
+    Raises
+    ------
+    ModelError
+        If there is no such segment.
+
+    """
+    exo, human = load_robot('exoskeleton_legs'), load_robot('human_legs')
+    ties = leg_ties(exo, human, segments)
+    if stiffness is None:
+        stiffness = read_assumptions()['interaction_stiffness'].value
+    return TiedPair(exo, human, ties, np.asarray(stiffness, dtype=float))
+
+
+def leg_ties(exo: Robot, human: Robot, segments: Sequence[str] = SEGMENTS) -> tuple[Tie, ...]:
+    """
+    Tie the shipped exoskeleton to its wearer where the source has springs.
+
+    Raises
+    ------
+    ModelError
+        If there is no such segment.
+
+    """
+    unknown = [segment for segment in segments if segment not in SEGMENTS]
+    if unknown:
+        raise ModelError(f"no segment '{unknown[0]}'; there are {', '.join(SEGMENTS)}")
+    joints = [_MOVED_BY[SEGMENTS.index(segment)] for segment in segments]
+    ties = centroid_ties(exo, human, [(f'exo_{j}', f'human_{j}') for j in joints])
+    return tuple(replace(tie, name=s) for tie, s in zip(ties, segments, strict=True))
+
+
+def walking(pair: TiedPair, gait: Gait, t: FloatArray, start: float | None = None) -> PairMotion:
+    """
+    Let the leg pair walk: the wearer as the gait says, the exoskeleton nearly so.
+
+    Parameters
+    ----------
+    pair : TiedPair
+        The shipped pair.
+    gait : Gait
+        Of one leg.
+    t : ndarray, shape (N,)
+        Time [s].
+    start : float, optional
+        Phase of the stance leg at t = 0; by default where single support begins.
+
+    """
+    known = read_assumptions()
+    begin = known['single_support'].value[0] if start is None else start
+    cycle = known['cycle_time'].value
+    return _moving(pair, gait, t, lambda time: steady_phase(time, cycle, begin))
+
+
+def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = None) -> PairMotion:
+    """
+    Let the leg pair step forward through single support and back, for as long as one likes.
+
+    Parameters
+    ----------
+    pair : TiedPair
+        The shipped pair.
+    gait : Gait
+        Of one leg.
+    t : ndarray, shape (N,)
+        Time [s].
+    period : float, optional
+        Of a step forward and back [s]; by default what ``assumptions.yaml`` has.
+
+    """
+    known = read_assumptions()
+    begin, end = known['single_support'].value
+    length = known['stepping_period'].value if period is None else period
+    return _moving(pair, gait, t, lambda time: stepping_phase(time, length, begin, end))
+
+
+def _moving(
+    pair: TiedPair, gait: Gait, t: FloatArray, phase: Callable[[FloatArray], Phase]
+) -> PairMotion:
+    known = read_assumptions()
+    other = stance_motion(gait, pair.other.joints, t, phase(t))
+    late = phase(t - known['exoskeleton_delay'].value)
+    own = stance_motion(gait, pair.robot.joints, t, late)
+    scale = known['exoskeleton_scale'].value
+    offset = np.radians(known['exoskeleton_offset_deg'].value)
+    own = replace(own, q=scale * own.q + offset, dq=scale * own.dq, ddq=scale * own.ddq)
+    return PairMotion(own, other)

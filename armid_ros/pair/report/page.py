@@ -1,0 +1,180 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a machine and its wearer: what ties them, and what each feels of the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from armid_ros.identification.ties.stiffness import Interaction
+from armid_ros.motion import FloatArray
+from armid_ros.pair.gait_cycle import GaitCycle
+from armid_ros.pair.leg_pair import pair_torques, PairMotion, TiedPair
+from armid_ros.pair.report.poses import draw_poses
+from armid_ros.pair.report.sections import Assumptions, Forces, Gait, Poses, Stiffness
+from armid_ros.pair.report.walk import CycleByTorque, Driven, FootForces, Walk
+from armid_ros.pair.torque_driven import GaitCheck
+from armid_ros.report.page import Page, Section
+from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.origin import Origin
+from armid_ros.report.sections.verdict import Verdict
+from armid_ros.robots.assumptions import Assumption
+import numpy as np
+
+_POSES = 6
+#: Intervals wider than this share of the value are called poor.
+_NARROW = 0.1
+
+
+@dataclass(frozen=True)
+class GaitChecks:
+    """
+    Joints that were driven by their torques.
+
+    Attributes
+    ----------
+    checks : sequence of (GaitCheck, GaitCheck)
+        Each with the right torque and with that for springs that are too soft.
+    softer : float
+        By which share.
+    phase : ndarray, shape (N,)
+        Phase of the swing leg.
+    rate : float
+        Torque samples per second.
+
+    """
+
+    checks: Sequence[tuple[GaitCheck, GaitCheck]]
+    softer: float
+    phase: FloatArray
+    rate: float
+
+
+@dataclass(frozen=True)
+class WholeCycle:
+    """
+    A cycle of walking, and joints by their torque in it.
+
+    Attributes
+    ----------
+    cycle : GaitCycle
+        How both walk.
+    driven : sequence of Driven
+        Joints by their torque.
+    softer : float
+        By which share springs were taken too soft.
+    rate : float
+        Torque samples per second.
+
+    """
+
+    cycle: GaitCycle
+    driven: Sequence[Driven]
+    softer: float
+    rate: float
+
+
+def exo_report(
+    pair: TiedPair,
+    motions: PairMotion,
+    abscissa: FloatArray,
+    abscissa_name: str,
+    found: Sequence[Interaction],
+    *,
+    truth: Mapping[str, float] | None = None,
+    gait: GaitChecks | None = None,
+    whole: WholeCycle | None = None,
+    assumptions: Mapping[str, Assumption] | None = None,
+    provenance: Provenance | None = None,
+) -> str:
+    """
+    Return report.html of a tied pair.
+
+    Parameters
+    ----------
+    pair : TiedPair
+        Both machines, with the stiffness that was found.
+    motions : PairMotion
+        The motion that is shown.
+    abscissa : ndarray, shape (N,)
+        What it is drawn over.
+    abscissa_name : str
+        Its name and unit.
+    found : sequence of Interaction
+        One stiffness for all, then one for each.
+    truth : mapping of str to float, optional
+        True stiffnesses of simulated data [N/m].
+    gait : GaitChecks, optional
+        Joints driven by torque in single support.
+    whole : WholeCycle, optional
+        The same over a whole cycle of walking.
+    assumptions : mapping, optional
+        What was assumed.
+    provenance : Provenance, optional
+        Files, versions, settings, seed.
+
+    """
+    torques = pair_torques(pair, *motions)
+    alone = pair_torques(pair.with_stiffness(0.0), *motions)
+    samples = np.linspace(0, len(abscissa) - 1, _POSES).astype(int).tolist()
+    captions = [f'{abscissa[k]:.2f}' for k in samples]
+    sections: list[Section] = [_verdict(found, gait, whole), Stiffness(found, truth or {})]
+    if whole is not None:
+        sections += [
+            Walk(whole.cycle, whole.driven),
+            CycleByTorque(whole.cycle, whole.driven, whole.softer, whole.rate),
+            FootForces(whole.cycle),
+        ]
+    if gait is not None:
+        sections.append(Gait(gait.checks, gait.softer, gait.phase, gait.rate))
+    sections += [
+        Forces(
+            abscissa,
+            abscissa_name,
+            torques.forces,
+            pair.segments,
+            torques.tau,
+            alone.tau,
+            pair.robot.joints,
+        ),
+        Poses(draw_poses(pair, motions, samples, captions)),
+    ]
+    if assumptions:
+        sections.append(Assumptions(assumptions))
+    sections.append(Origin(provenance or Provenance()))
+    title = f'{pair.robot.name} on {pair.other.name}'
+    return Page(title, f'{len(pair.ties)} springs · {len(abscissa)} samples', sections).html()
+
+
+def _verdict(
+    found: Sequence[Interaction], gait: GaitChecks | None, whole: WholeCycle | None
+) -> Verdict:
+    """Say what ties the two, how surely, and whether the torques walk."""
+    overall = found[0]
+    k, reach = overall.stiffness[0], 1.96 * overall.std[0]
+    sentences = [f'The springs between the two have {k:.0f} ± {reach:.0f} N/m (95 %).']
+    weak = [
+        name.replace('_', ' ')
+        for part in found[1:]
+        for name, value, std in zip(part.segments, part.stiffness, part.std, strict=True)
+        if 1.96 * std > _NARROW * abs(value)
+    ]
+    if gait is not None:
+        each = ', '.join(
+            f'{right.joint} {np.degrees(np.abs(right.error).max()):.1e}°'
+            for right, _ in gait.checks
+        )
+        sentences.append(
+            f'Driven by their torques, joints follow the gait in single support: {each} at most.'
+        )
+    if whole is not None:
+        each = ', '.join(f'{d.joint} {d.errors[0]:.2g}°' for d in whole.driven)
+        sentences.append(
+            f'Over a whole cycle of walking, on either foot and on both: {each} at most.'
+        )
+    beware = [f'{", ".join(weak)}: too slightly drawn out to know within 10 %.'] if weak else []
+    if k - reach <= 0.0:
+        return Verdict('no interaction', 'fair', ['No interaction is seen.'], beware)
+    sure = reach < _NARROW * k
+    return Verdict('found' if sure else 'uncertain', 'good' if sure else 'fair', sentences, beware)

@@ -1,0 +1,196 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The tied pair as it stands there: both step to and fro, by prescription or by torque."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.pair.gait import Gait, read_gait
+from armid_ros.pair.leg_pair import leg_pair, pair_torques, PairMotion, stepping, TiedPair
+from armid_ros.pair.torque_driven import drive_by_torque
+from armid_ros.robots.assumptions import read_assumptions
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
+#: Samples that are computed in one go.
+_BLOCK = 50
+#: Runge-Kutta steps in a block: 5 ms at 1 kHz, half the time between two torque samples.
+_INTEGRATED = 10
+#: A driven joint so far off the gait has fallen [rad].
+_FALLEN = np.radians(60.0)
+
+
+@dataclass(frozen=True)
+class PairSensors:
+    """
+    What is measured of a pair.
+
+    Attributes
+    ----------
+    angle_noise : float
+        Standard deviation of all angles [rad].
+    torque_noise : float
+        Standard deviation of the machine's torques [N m].
+
+    """
+
+    angle_noise: float = 0.0
+    torque_noise: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class PairSample:
+    """
+    One reading of both machines.
+
+    Attributes
+    ----------
+    t : float
+        Time [s].
+    q, dq, tau : ndarray, shape (n,)
+        Of the machine [rad, rad/s, N m].
+    other_q, other_dq : ndarray, shape (m,)
+        Of its wearer.
+
+    """
+
+    t: float
+    q: FloatArray
+    dq: FloatArray
+    tau: FloatArray
+    other_q: FloatArray
+    other_dq: FloatArray
+
+
+class SimulatedPair:
+    """
+    A pair that steps through single support and back, for as long as one likes.
+
+    Joints that are driven follow the torques of the gait, sampled and splined as in the source;
+    all others are where the gait has them. Driven one at a time a joint stays with the gait; all
+    joints together are an inverted pendulum in open loop, and fall.
+
+    Parameters
+    ----------
+    pair : TiedPair, optional
+        The machines and their springs; the shipped ones by default.
+    gait : Gait, optional
+        The shipped one by default.
+    driven : sequence of str
+        Joints of the machine that follow torques.
+    torque_rate : float, optional
+        Torque samples per second [Hz]; by default what is assumed of the source.
+    rate : float
+        Samples per second [Hz].
+    sensors : PairSensors, optional
+        Perfect by default.
+    rng : numpy.random.Generator
+        Source of the noise.
+
+    Raises
+    ------
+    RobotError
+        If the machine has no such joint.
+
+    """
+
+    def __init__(
+        self,
+        pair: TiedPair | None = None,
+        gait: Gait | None = None,
+        *,
+        driven: Sequence[str] = (),
+        torque_rate: float | None = None,
+        rate: float = 1000.0,
+        sensors: PairSensors | None = None,
+        rng: np.random.Generator,
+    ) -> None:
+        known = read_assumptions()
+        self.pair = leg_pair() if pair is None else pair
+        self.driven = tuple(driven)
+        self._columns = [self.pair.robot.index(joint) for joint in self.driven]
+        self._gait = read_gait() if gait is None else gait
+        self._rate = rate
+        self._sensors = sensors or PairSensors()
+        self._rng = rng
+        period = float(known['stepping_period'].value)
+        knots = np.linspace(
+            0.0, period, round(period * (torque_rate or known['torque_rate'].value))
+        )
+        tau = np.array(pair_torques(self.pair, *stepping(self.pair, self._gait, knots)).tau)
+        tau[-1] = tau[0]
+        self._torque = CubicSpline(knots, tau, bc_type='periodic')
+        self.reset()
+
+    def reset(self) -> None:
+        """Put both back to where they began."""
+        self._steps = 0
+        self._first = 0
+        self._block: tuple[PairMotion, FloatArray] | None = None
+        self._state: FloatArray | None = None
+        self.deviation = 0.0
+
+    @property
+    def t(self) -> float:
+        """Time since the beginning [s]."""
+        return self._steps / self._rate
+
+    @property
+    def fallen(self) -> bool:
+        """Whether a driven joint is so far off the gait that there is no way back."""
+        return bool(self.deviation > _FALLEN)
+
+    def advance(self) -> PairSample:
+        """Let a sample's time go by, and read the sensors."""
+        self._steps += 1
+        if self._block is None or self._steps - self._first > _BLOCK:
+            self._first = self._steps - 1
+            self._block = self._look_ahead()
+        (own, other), tau = self._block
+        k = self._steps - self._first
+        noise = self._rng.standard_normal((3, len(tau[k])))
+        angles, torques = self._sensors.angle_noise, self._sensors.torque_noise
+        return PairSample(
+            self.t,
+            own.q[k] + angles * noise[0],
+            own.dq[k],
+            tau[k] + torques * noise[1],
+            other.q[k] + angles * noise[2],
+            other.dq[k],
+        )
+
+    def _look_ahead(self) -> tuple[PairMotion, FloatArray]:
+        """Return motion and torques from the sample before the next one on."""
+        t = (self._first + np.arange(_BLOCK + 1)) / self._rate
+        own, other = stepping(self.pair, self._gait, t)
+        if not self._columns:
+            return PairMotion(own, other), pair_torques(self.pair, own, other).tau
+        own = self._driven(own)
+        tau = np.array(pair_torques(self.pair, own, other).tau)
+        tau[:, self._columns] = self._torque(t)[:, self._columns]
+        return PairMotion(own, other), tau
+
+    def _driven(self, own: Motion) -> Motion:
+        """Let the driven joints follow their torques over the block."""
+        coarse = np.linspace(own.t[0], own.t[-1], 2 * _INTEGRATED + 1)
+        prescribed, other = stepping(self.pair, self._gait, coarse)
+        if self._state is not None:
+            q, dq = np.array(prescribed.q), np.array(prescribed.dq)
+            q[0, self._columns], dq[0, self._columns] = self._state
+            prescribed = replace(prescribed, q=q, dq=dq)
+        moved = drive_by_torque(self.pair, prescribed, other, self.driven, self._driving_torque)
+        self._state = np.array([moved.q[-1, self._columns], moved.dq[-1, self._columns]])
+        q, dq, ddq = (np.array(part) for part in (own.q, own.dq, own.ddq))
+        far = moved.q[-1, self._columns] - q[-1, self._columns]
+        self.deviation = float(np.abs(far).max())
+        speed = CubicHermiteSpline(moved.t, moved.dq, moved.ddq)
+        path = CubicHermiteSpline(moved.t, moved.q, moved.dq)
+        for values, curve in ((q, path(own.t)), (dq, speed(own.t)), (ddq, speed(own.t, 1))):
+            values[:, self._columns] = curve[:, self._columns]
+        return replace(own, q=q, dq=dq, ddq=ddq)
+
+    def _driving_torque(self, t: float) -> FloatArray:
+        return np.asarray(self._torque(t))[self._columns]

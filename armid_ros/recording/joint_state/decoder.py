@@ -1,0 +1,229 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From blocks of serialised JointState messages to arrays, without a Python object a message."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from armid_ros.motion import FloatArray
+from armid_ros.recording.joint_state.layout import JointStateLayout, MalformedMessage
+from armid_ros.recording.source import Block, IntArray, records_at
+import numpy as np
+import numpy.typing as npt
+
+# A topic of more layouts in one block is not one publisher's; messages are then read one by one.
+_LAYOUTS_A_BLOCK = 32
+_FIELDS = ('position', 'velocity', 'effort')
+#: What is reserved at once of a quantity, as counts of damaged files may be anything [bytes].
+_MOST_ROOM = 1 << 30
+
+
+@dataclass(frozen=True)
+class JointStates:
+    """
+    Messages that name the same joints, in the order of storage.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        Those of the joints asked for that the messages name, k of them, in the order asked.
+    number : ndarray, shape (N,)
+        Position of each message among all of the topic.
+    header, receive : ndarray, shape (N,)
+        Stamp of the header, and when the message was recorded [ns].
+    position, velocity, effort : ndarray, shape (N, k), or None
+        Values [rad or m, their rate, N m or N]; None where the messages have none.
+
+    """
+
+    joints: tuple[str, ...]
+    number: IntArray
+    header: IntArray
+    receive: IntArray
+    position: FloatArray | None
+    velocity: FloatArray | None
+    effort: FloatArray | None
+
+    def __len__(self) -> int:
+        """Return the number of messages."""
+        return len(self.number)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the arrays [bytes]."""
+        values = (self.position, self.velocity, self.effort)
+        arrays = (self.number, self.header, self.receive, *(v for v in values if v is not None))
+        return sum(array.nbytes for array in arrays)
+
+
+class JointStateDecoder:
+    """
+    Decodes the messages of one topic, remembering the layouts it met.
+
+    Attributes
+    ----------
+    messages : int
+        Messages decoded or dropped so far.
+    malformed : int
+        Messages dropped: no JointState, or arrays that do not fit the names.
+    first_problem : str
+        What was wrong with the first of them.
+    names_seen : tuple of str
+        All joint names met, in order of appearance.
+
+    """
+
+    def __init__(self, joints: Sequence[str], expected: int = 0) -> None:
+        """
+        Decode the values of these joints, as far as messages name them.
+
+        Parameters
+        ----------
+        joints : sequence of str
+            The joints.
+        expected : int
+            How many messages are put together in the end, for which room is made at once.
+
+        """
+        self._wanted = tuple(joints)
+        self._room = _Room(expected)
+        self._plans: dict[int, list[_Plan]] = {}
+        self._names: dict[str, None] = {}
+        self.messages = 0
+        self.malformed = 0
+        self.first_problem = ''
+
+    @property
+    def names_seen(self) -> tuple[str, ...]:
+        """Return all joint names met, in order of appearance."""
+        return tuple(self._names)
+
+    def decode(self, block: Block) -> Iterator[JointStates]:
+        """Yield the messages of a block that name a joint asked for, grouped by layout."""
+        numbers = np.arange(self.messages, self.messages + len(block), dtype=np.int64)
+        self.messages += len(block)
+        lengths = block.length
+        if len(lengths) and (lengths == lengths[0]).all():
+            rows = records_at(block.data, block.start, int(lengths[0]))
+            yield from self._decode_equal(rows, numbers, block.log_time)
+            return
+        for length in np.unique(lengths):
+            chosen = np.flatnonzero(lengths == length)
+            rows = records_at(block.data, block.start[chosen], int(length))
+            yield from self._decode_equal(rows, numbers[chosen], block.log_time[chosen])
+
+    def _decode_equal(
+        self, raw: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
+    ) -> Iterator[JointStates]:
+        """Decode messages of equal length."""
+        for _ in range(_LAYOUTS_A_BLOCK):
+            if not len(raw):
+                return
+            plan = self._plan_for(raw[:1])
+            if plan is None:
+                # What equals a message that cannot be read cannot be read either.
+                other = raw != raw[0]
+                self.malformed += len(raw) - 1 - int(other.sum())
+                raw, numbers, receive = raw[other], numbers[other], receive[other]
+                continue
+            rows = raw.view(plan.dtype)
+            fits = plan.layout.fits(rows)
+            if fits.all():
+                yield from plan.read(rows, numbers, receive, self._room)
+                return
+            yield from plan.read(rows[fits], numbers[fits], receive[fits], self._room)
+            raw, numbers, receive = raw[~fits], numbers[~fits], receive[~fits]
+        for at in range(len(raw)):
+            plan = self._plan_for(raw[at : at + 1])
+            if plan is not None:
+                rows = raw[at : at + 1].view(plan.dtype)
+                one = numbers[at : at + 1], receive[at : at + 1]
+                yield from plan.read(rows, *one, self._room)
+
+    def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
+        """Return how to read a message; None, and the message counted, if there is no way."""
+        length = first.dtype.itemsize
+        known = self._plans.setdefault(length, [])
+        for plan in known:
+            if plan.layout.fits(first.view(plan.dtype)).all():
+                return plan
+        try:
+            layout = JointStateLayout.of(first.tobytes())
+            plan = _Plan.make(layout, length, self._wanted)
+        except MalformedMessage as problem:
+            self.malformed += 1
+            self.first_problem = self.first_problem or str(problem)
+            return None
+        self._names.update(dict.fromkeys(layout.names))
+        known.insert(0, plan)
+        del known[_LAYOUTS_A_BLOCK:]
+        return plan
+
+
+class _Room:
+    """Room for the values of messages, so that those of one kind follow each other in memory."""
+
+    def __init__(self, expected: int) -> None:
+        self._expected = expected
+        self._free: dict[tuple[str, int], FloatArray] = {}
+
+    def take(self, name: str, count: int, joints: int) -> FloatArray:
+        """Return an array of shape (count, joints), behind the one before if there is room."""
+        expected = min(self._expected, _MOST_ROOM // (8 * joints))
+        free = self._free.get((name, joints))
+        if free is None:
+            free = np.empty((expected, joints))
+        if count > len(free):
+            return np.empty((count, joints))
+        self._free[name, joints] = free[count:]
+        return free[:count]
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """How to read the joints asked for out of messages of one layout."""
+
+    layout: JointStateLayout
+    dtype: np.dtype[np.void]
+    joints: tuple[str, ...]
+    columns: slice | list[int]
+
+    @classmethod
+    def make(cls, layout: JointStateLayout, length: int, wanted: Sequence[str]) -> _Plan:
+        """Find the columns of the joints asked for."""
+        if len(set(layout.names)) != len(layout.names):
+            raise MalformedMessage(f'a joint is named twice: {", ".join(layout.names)}')
+        for name, count in zip(_FIELDS, layout.counts, strict=True):
+            if count not in (0, len(layout.names)):
+                raise MalformedMessage(
+                    f'{count} values of {name} for {len(layout.names)} joint names'
+                )
+        joints = tuple(name for name in wanted if name in layout.names)
+        columns = [layout.names.index(name) for name in joints]
+        first = columns[0] if columns else 0
+        contiguous = columns == list(range(first, first + len(columns)))
+        return cls(
+            layout,
+            layout.dtype(length),
+            joints,
+            slice(first, first + len(columns)) if contiguous else columns,
+        )
+
+    def read(
+        self, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray, room: _Room
+    ) -> Iterator[JointStates]:
+        """Yield the values of messages of this layout, if there is a joint asked for in them."""
+        if not self.joints:
+            return
+        header = rows['sec'].astype(np.int64)
+        header *= 10**9
+        header += rows['nanosec']
+        values: list[FloatArray | None] = []
+        for name, count in zip(_FIELDS, self.layout.counts, strict=True):
+            place = room.take(name, len(rows), len(self.joints)) if count else None
+            if place is not None:
+                place[:] = rows[name][:, self.columns]
+            values.append(place)
+        yield JointStates(self.joints, numbers, header, receive, *values)

@@ -1,0 +1,213 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Serialised JointState messages from arrays, and bags of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from armid_ros.errors import RecordingError
+from armid_ros.motion import FloatArray
+from armid_ros.recording.joint_state.layout import JointStateLayout
+from armid_ros.recording.mcap.writer import Compression
+from armid_ros.recording.message_types import JOINT_STATE, STRING
+from armid_ros.recording.qos import LATCHED
+from armid_ros.recording.source import IntArray
+from armid_ros.recording.string_message import string_cdr
+from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
+import numpy as np
+import numpy.typing as npt
+
+_BATCH = 4096
+
+
+class Measured(Protocol):
+    """Joint measurements: a Recording, or a Motion with or without torque."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joint names, n of them."""
+
+    @property
+    def t(self) -> FloatArray:
+        """Time [s], shape (N,)."""
+
+    @property
+    def q(self) -> FloatArray:
+        """Positions, shape (N, n)."""
+
+    @property
+    def dq(self) -> FloatArray | None:
+        """Velocities, shape (N, n)."""
+
+    @property
+    def tau(self) -> FloatArray | None:
+        """Torques, shape (N, n)."""
+
+
+def joint_state_cdr(
+    joints: Sequence[str],
+    stamps_ns: npt.ArrayLike,
+    q: npt.ArrayLike | None,
+    dq: npt.ArrayLike | None = None,
+    tau: npt.ArrayLike | None = None,
+    *,
+    frame_id: str = '',
+) -> list[bytes]:
+    """
+    Serialise joint measurements, one message a sample.
+
+    Parameters
+    ----------
+    joints : sequence of str
+        Joint names, n of them.
+    stamps_ns : array_like, shape (N,)
+        Stamps of the headers [ns].
+    q, dq, tau : array_like, shape (N, n), or None
+        Positions, velocities, efforts; None leaves the field empty.
+    frame_id : str
+        Of the headers.
+
+    Returns
+    -------
+    list of bytes
+        N messages in CDR, little endian.
+
+    """
+    stamps = np.asarray(stamps_ns, np.int64)
+    fields = [None if v is None else np.asarray(v, np.float64) for v in (q, dq, tau)]
+    messages: list[bytes] = []
+    for rows in _encoded(tuple(joints), stamps, fields, frame_id):
+        messages += rows.tolist()
+    return messages
+
+
+def write_joint_states(
+    writer: BagWriter,
+    topic: str,
+    joints: Sequence[str],
+    stamps_ns: npt.ArrayLike,
+    q: npt.ArrayLike | None,
+    dq: npt.ArrayLike | None = None,
+    tau: npt.ArrayLike | None = None,
+    *,
+    frame_id: str = '',
+) -> None:
+    """
+    Write joint measurements to a topic of a bag, logged at their stamps.
+
+    Parameters are those of ``joint_state_cdr``.
+
+    """
+    stamps = np.asarray(stamps_ns, np.int64)
+    writer.add_topic(topic, JOINT_STATE)
+    fields = [None if v is None else np.asarray(v, np.float64) for v in (q, dq, tau)]
+    at = 0
+    for rows in _encoded(tuple(joints), stamps, fields, frame_id):
+        writer.write_many(topic, rows, stamps[at : at + len(rows)])
+        at += len(rows)
+
+
+def write_recording(
+    path: str | Path,
+    measured: Measured,
+    *,
+    joint_names: Sequence[str] | None = None,
+    topic: str = '/joint_states',
+    start_ns: int | None = None,
+    robot_description: str | None = None,
+    compression: Compression = 'zstd',
+    chunk_size: int = DEFAULT_CHUNK_SIZE,
+) -> None:
+    """
+    Write a recording or a motion as a bag of JointState messages.
+
+    Parameters
+    ----------
+    path : str or Path
+        The bag directory to be made; it must not exist.
+    measured : Recording, Motion or alike
+        What was measured or simulated; velocities and torques may be None.
+    joint_names : sequence of str, optional
+        Names for the columns; by default those of ``measured``.
+    topic : str
+        Topic of the messages.
+    start_ns : int, optional
+        What is added to the times [ns]; by default that of a recording, else 1 s, as a stamp of
+        zero means that there is none.
+    robot_description : str, optional
+        URDF to be written to /robot_description.
+    compression : {'zstd', 'lz4', 'none'}
+        Of the chunks.
+    chunk_size : int
+        Bytes of messages a chunk holds.
+
+    Raises
+    ------
+    RecordingError
+        The bag exists already, or names and columns do not agree.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> run = ar.read_recording('log.csv', 'my_arm.urdf', effort='amps_{}', effort_scale=4.0)
+    >>> ar.write_recording('log_bag', run)
+    >>> len(ar.read_recording('log_bag', 'my_arm.urdf')) == len(run)
+    True
+
+    """
+    joints = tuple(measured.joints if joint_names is None else joint_names)
+    if measured.q.shape != (len(measured.t), len(joints)):
+        raise RecordingError(
+            f'{path}: {len(measured.t)} samples of {len(joints)} joints ({", ".join(joints)}) '
+            f'cannot be written from an array of shape {measured.q.shape}'
+        )
+    if start_ns is None:
+        start_ns = int(getattr(measured, 'start_ns', 0)) or 10**9
+    stamps = start_ns + np.rint(np.asarray(measured.t) * 1e9).astype(np.int64)
+    if len(stamps) and stamps.min() < 0:
+        raise RecordingError(
+            f'{path}: the first stamp is {stamps.min() * 1e-9:g} s; ROS time cannot be negative'
+        )
+    with whole_bag(path, compression=compression, chunk_size=chunk_size) as writer:
+        if robot_description is not None:
+            first = int(stamps[0]) if len(stamps) else start_ns
+            writer.add_topic('/robot_description', STRING, qos=[LATCHED])
+            writer.write('/robot_description', string_cdr(robot_description), first)
+        write_joint_states(writer, topic, joints, stamps, measured.q, measured.dq, measured.tau)
+
+
+def _encoded(
+    joints: tuple[str, ...],
+    stamps: IntArray,
+    fields: list[FloatArray | None],
+    frame_id: str,
+) -> Iterator[npt.NDArray[np.void]]:
+    """Yield messages as records, some thousand at a time."""
+    n = len(joints)
+    for name, values in zip(('q', 'dq', 'tau'), fields, strict=True):
+        if values is not None and values.shape != (len(stamps), n):
+            raise RecordingError(
+                f'{name} has shape {values.shape}, but {len(stamps)} stamps of {n} joints need '
+                f'{(len(stamps), n)}'
+            )
+    counts = tuple(0 if values is None else n for values in fields)
+    layout = JointStateLayout.make(joints, frame_id, (counts[0], counts[1], counts[2]))
+    template = np.zeros(1, layout.dtype(layout.end))
+    frame = np.frombuffer(frame_id.encode(), np.uint8)
+    template.view(np.uint8)[16 : 16 + len(frame)] = frame
+    template['encapsulation'] = 1
+    template['frame_length'] = layout.frame_length
+    template['names'] = layout.names_pattern[0]
+    for name, count in zip(('position', 'velocity', 'effort'), counts, strict=True):
+        template['n_' + name] = count
+    for at in range(0, len(stamps), _BATCH):
+        batch = slice(at, at + _BATCH)
+        rows = np.repeat(template, len(stamps[batch]))
+        rows['sec'], rows['nanosec'] = np.divmod(stamps[batch], 10**9)
+        for name, values in zip(('position', 'velocity', 'effort'), fields, strict=True):
+            if values is not None and n:
+                rows[name] = values[batch]
+        yield rows.view(np.dtype((np.void, layout.end)))

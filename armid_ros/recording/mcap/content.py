@@ -1,0 +1,159 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The messages in the content of MCAP chunks, and their way to blocks for array code."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import mmap
+import struct
+
+from armid_ros.recording.mcap.records import MESSAGE, MESSAGE_HEADER, RECORD_HEADER
+from armid_ros.recording.source import Block, IntArray, records_at
+from mcap.opcode import Opcode
+import numpy as np
+import numpy.typing as npt
+
+# Chunks are put together to blocks of about this size, for small chunks would leave array code
+# little to do at a time, and large blocks fall out of the processor's cache.
+_BLOCK_BYTES = 1 << 20
+BLOCK_MESSAGES = 4096
+
+
+class Gathered:
+    """Messages of chunks on the way to a block."""
+
+    def __init__(self, data: bytes | mmap.mmap) -> None:
+        self._file = data
+        self._parts: list[bytes] = []
+        self._offsets: list[IntArray] = []
+        self._size = self._count = 0
+
+    def add(self, content: bytes, offsets: IntArray) -> Iterator[Block]:
+        """Add messages of a content of their own."""
+        if not self._parts:
+            yield from self.flush()
+        self._parts.append(content)
+        self._offsets.append(offsets + self._size)
+        self._size += len(content)
+        self._count += len(offsets)
+        if self._size > _BLOCK_BYTES:
+            yield from self.flush()
+
+    def add_in_place(self, offsets: IntArray) -> Iterator[Block]:
+        """Add messages that lie in the file as they are."""
+        if self._parts:
+            yield from self.flush()
+        self._offsets.append(offsets)
+        self._count += len(offsets)
+        if self._count > BLOCK_MESSAGES:
+            yield from self.flush()
+
+    def flush(self) -> Iterator[Block]:
+        """Yield what was added, if it is something."""
+        data = self._parts[0] if len(self._parts) == 1 else b''.join(self._parts)
+        if self._count:
+            yield message_block(data if self._parts else self._file, np.concatenate(self._offsets))
+        self._parts, self._offsets, self._size, self._count = [], [], 0, 0
+
+
+def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> Block:
+    """Return the messages whose records begin there."""
+    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
+    return Block(
+        data,
+        offsets + MESSAGE.itemsize,
+        rows['length'].astype(np.int64) - MESSAGE_HEADER,
+        rows['log_time'].astype(np.int64),
+        rows['publish_time'].astype(np.int64),
+    )
+
+
+def tiled(
+    data: bytes | mmap.mmap, offsets: IntArray, begin: int, end: int
+) -> npt.NDArray[np.void] | None:
+    """
+    Return the heads of messages, if they and definitions fill a chunk without a gap.
+
+    That shows the index of a chunk to be complete and right: the first record begins where the
+    content does, and every other one where the one before it ends.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        What holds the content.
+    offsets : ndarray, shape (N,)
+        Where messages begin, by the index; in ascending order.
+    begin, end : int
+        Where the content of the chunk is.
+
+    Returns
+    -------
+    ndarray of `MESSAGE`, shape (N,), or None
+        None if the index is not to be trusted.
+
+    """
+    if not len(offsets) or offsets[0] < begin or offsets[-1] + MESSAGE.itemsize > end:
+        return None
+    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
+    lengths = rows['length'].astype(np.uint64)
+    if (rows['opcode'] != Opcode.MESSAGE).any():
+        return None
+    if lengths.min() < MESSAGE_HEADER or lengths.max() > end - begin:
+        return None
+    ends = offsets + RECORD_HEADER + lengths.astype(np.int64)
+    gaps = np.flatnonzero(ends[:-1] != offsets[1:])
+    around = [(begin, int(offsets[0])), (int(ends[-1]), end)]
+    between = zip(ends[gaps].tolist(), offsets[gaps + 1].tolist(), strict=True)
+    for start, stop in (*around, *between):
+        if start > stop or (start < stop and not _are_definitions(data, start, stop)):
+            return None
+    return rows
+
+
+def walk(
+    content: bytes | mmap.mmap, begin: int = 0, end: int | None = None
+) -> tuple[IntArray, list[tuple[int, int, int]], int]:
+    """
+    Find the records in the content of a chunk, one by one.
+
+    Parameters
+    ----------
+    content : bytes or mmap
+        What holds the content.
+    begin, end : int
+        Where the content is; all of it by default.
+
+    Returns
+    -------
+    offsets : ndarray, shape (N,)
+        Where messages begin.
+    definitions : list of (int, int, int)
+        Opcode, beginning and end of schemas and channels.
+    position : int
+        Where the last record ends; before ``end`` if what follows is none.
+
+    """
+    offsets: list[int] = []
+    definitions: list[tuple[int, int, int]] = []
+    head = struct.Struct('<BQ')
+    position, size = begin, len(content) if end is None else end
+    while position + RECORD_HEADER <= size:
+        opcode, length = head.unpack_from(content, position)
+        stop = position + RECORD_HEADER + length
+        if stop > size:
+            break
+        if opcode == Opcode.MESSAGE and length >= MESSAGE_HEADER:
+            offsets.append(position)
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            definitions.append((opcode, position + RECORD_HEADER, stop))
+        else:  # a chunk has nothing else
+            break
+        position = stop
+    return np.array(offsets, np.int64), definitions, position
+
+
+def _are_definitions(data: bytes | mmap.mmap, begin: int, end: int) -> bool:
+    """Tell whether schemas and channels fill a stretch."""
+    offsets, _, position = walk(data, begin, end)
+    return position == end and not len(offsets)

@@ -1,0 +1,304 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Messages of an MCAP file, with or without its index, chunked or not, compressed or not.
+
+What the file says of its messages - checksums, indexes, counts - is compared with them. A chunk
+that is damaged is left out as a whole, for no message in it can be told from a whole one.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+import heapq
+import mmap
+from pathlib import Path
+
+from armid_ros.errors import RecordingError
+from armid_ros.files import open_regular
+from armid_ros.recording.mcap.chunks import Content, Contents
+from armid_ros.recording.mcap.content import (
+    BLOCK_MESSAGES,
+    Gathered,
+    message_block,
+    tiled,
+    walk,
+)
+from armid_ros.recording.mcap.records import (
+    add_definition,
+    Chunk,
+    FileMap,
+    map_file,
+    MESSAGE,
+    RECORD_HEADER,
+)
+from armid_ros.recording.message_types import MessageType
+from armid_ros.recording.qos import parse_qos
+from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.source import Block, IntArray, RawMessage, records_at, Topic
+from mcap.records import Channel
+import numpy as np
+import numpy.typing as npt
+
+_Rows = npt.NDArray[np.void]
+#: Of a message that is kept as an object [bytes].
+_OVERHEAD = 400
+
+
+class McapSource:
+    """One MCAP file."""
+
+    def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
+        """
+        Open a file.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        settings : ReadSettings
+            What to check, and how much memory to take.
+
+        Raises
+        ------
+        RecordingError
+            It cannot be read, or is no MCAP file.
+
+        """
+        self._settings = settings
+        self._found = map_file(_map(path), path, check=settings.check_crc)
+        self._counts: dict[int, int] | None = None
+        self._contents = Contents(self._found, settings)
+
+    @property
+    def damage(self) -> str:
+        """What is wrong with the file, as far as it was read; empty for a whole one."""
+        return str(self._found.damage)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._found = FileMap(b'')
+        self._contents = Contents(self._found, self._settings)
+
+    def topics(self) -> tuple[Topic, ...]:
+        """Return the topics, in order of appearance."""
+        message_counts = self._survey()
+        described: dict[str, Topic] = {}
+        counts: dict[str, int] = {}
+        for channel in self._found.channels.values():
+            name = channel.topic
+            counts[name] = counts.get(name, 0) + message_counts.get(channel.id, 0)
+            described[name] = self._describe(channel, counts[name])
+        return tuple(described.values())
+
+    def blocks(self, topic: str) -> Iterator[Block]:
+        """Yield the messages of a topic, in the order they are stored."""
+        self._survey()
+        wanted = sorted(c.id for c in self._found.channels.values() if c.topic == topic)
+        gathered, count = Gathered(self._found.data), 0
+        read = [chunk for chunk in self._found.chunks if not self._is_without(chunk, wanted)]
+        for chunk, unpacked in self._contents.of(read):
+            content, offsets, rows = self._messages_in(chunk, unpacked)
+            offsets = self._possible(offsets, rows, wanted)
+            count += len(offsets)
+            if isinstance(content, bytes):
+                yield from gathered.add(content, offsets)
+            else:
+                yield from gathered.add_in_place(offsets)
+        loose = self._loose()
+        if len(loose):
+            rows = records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)
+            loose = self._possible(loose, rows, wanted)
+            count += len(loose)
+            for at in range(0, len(loose), BLOCK_MESSAGES):
+                yield from gathered.add_in_place(loose[at : at + BLOCK_MESSAGES])
+        yield from gathered.flush()
+        self._compare_count(topic, wanted, count)
+
+    def messages(self) -> Iterator[RawMessage]:
+        """Yield all messages in the order they were logged."""
+        self._survey()
+        names = {channel.id: channel.topic for channel in self._found.channels.values()}
+        pending: list[tuple[int, int, RawMessage]] = []
+        number = size = 0
+        for start_time, block, channels in self._pieces(sorted(names)):
+            while pending and pending[0][0] < start_time:
+                raw = heapq.heappop(pending)[2]
+                size -= len(raw.cdr) + _OVERHEAD
+                yield raw
+            times = zip(
+                channels.tolist(),
+                block.log_time.tolist(),
+                block.publish_time.tolist(),
+                strict=True,
+            )
+            for at, (channel, log_time, publish_time) in enumerate(times):
+                raw = RawMessage(names[channel], log_time, publish_time, block.message(at))
+                heapq.heappush(pending, (log_time, number, raw))
+                number += 1
+                size += len(raw.cdr) + _OVERHEAD
+            # Chunks that overlap in time have to be kept until it is clear which message is first.
+            self._settings.require(size, 'what has to be put in order of time')
+        while pending:
+            yield heapq.heappop(pending)[2]
+        self._compare_count('all topics', list(names), number)
+
+    def _pieces(
+        self, channels: Sequence[int]
+    ) -> Iterator[tuple[int, Block, npt.NDArray[np.uint16]]]:
+        """Yield messages of all channels by chunk, chunks by their first log time."""
+        in_order = sorted(self._found.chunks, key=lambda chunk: chunk.start_time)
+        for chunk, unpacked in self._contents.of(in_order):
+            content, offsets, rows = self._messages_in(chunk, unpacked)
+            offsets = self._possible(offsets, rows, channels)
+            if len(offsets):
+                yield chunk.start_time, *_piece(content, offsets)
+        loose = self._loose()
+        if len(loose):
+            data = self._found.data
+            rows = records_at(data, loose, MESSAGE.itemsize).view(MESSAGE)
+            loose = self._possible(loose, rows, channels)
+            rows = records_at(data, loose, MESSAGE.itemsize).view(MESSAGE)
+            loose = loose[np.argsort(rows['log_time'], kind='stable')]
+            for at in range(0, len(loose), BLOCK_MESSAGES):
+                block, of = _piece(data, loose[at : at + BLOCK_MESSAGES])
+                yield int(block.log_time[0]), block, of
+
+    def _survey(self) -> dict[int, int]:
+        """Make sure all channels are known, and return the number of messages of each."""
+        if self._counts is not None:
+            return self._counts
+        found, summary = self._found, self._found.statistics
+        if found.finished and summary and summary.channel_count == len(found.channels):
+            self._counts = dict(summary.channel_message_counts)
+            return self._counts
+        counts: dict[int, int] = {}
+        inside = (self._channels_in(unpacked) for _, unpacked in self._contents.of(found.chunks))
+        for rows in (self._loose_channels(), *inside):
+            for channel, count in zip(*np.unique(rows, return_counts=True), strict=True):
+                counts[int(channel)] = counts.get(int(channel), 0) + int(count)
+        self._counts = counts
+        return self._counts
+
+    def _channels_in(self, unpacked: Content) -> npt.NDArray[np.uint16]:
+        """Return the channel of each message in a chunk, and note its definitions."""
+        content, begin, end = unpacked
+        offsets, definitions, _ = walk(content, begin, end)
+        for opcode, start, stop in definitions:
+            add_definition(self._found, opcode, content[start:stop])
+        return records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)['channel'].copy()
+
+    def _is_without(self, chunk: Chunk, wanted: Collection[int]) -> bool:
+        """Tell whether a chunk has no message of some channels, by an index that is compared."""
+        # A damaged index shows in the count, which a file that was not finished does not have.
+        return bool(
+            self._found.finished
+            and self._found.statistics
+            and chunk.whole
+            and chunk.indexes
+            and not any(channel in chunk.indexes for channel in wanted)
+        )
+
+    def _messages_in(
+        self, chunk: Chunk, unpacked: Content
+    ) -> tuple[bytes | mmap.mmap, IntArray, _Rows]:
+        """Return the content of a chunk, where messages begin in it, and their heads."""
+        content, begin, end = unpacked
+        if chunk.indexes and chunk.whole and end > begin:
+            offsets = self._indexed(chunk) + begin
+            rows = tiled(content, offsets, begin, end)
+            if rows is not None:
+                return content, offsets, rows
+        offsets, _, position = walk(content, begin, end)
+        if chunk.whole and position != end:
+            self._found.damage.add(
+                f'the chunk at byte {chunk.begin} is damaged: '
+                f'some messages {self._found.span(chunk)} are lost'
+            )
+        return content, offsets, records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
+
+    def _indexed(self, chunk: Chunk) -> IntArray:
+        """
+        Return where the index of a chunk says that messages begin in its content.
+
+        What lies beyond the content is put at its end, where no message can begin.
+
+        """
+        parts = [
+            np.minimum(
+                np.frombuffer(self._found.data, '<u8', 2 * count, at)[1::2], chunk.size
+            ).astype(np.int64)
+            for at, count in chunk.indexes.values()
+        ]
+        if len(parts) == 1:
+            offsets = parts[0]
+            return offsets if (np.diff(offsets) > 0).all() else np.sort(offsets)
+        return np.sort(np.concatenate(parts), kind='stable')
+
+    def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
+        """Return those of messages that are of some channels and have a time."""
+        channels = rows['channel']
+        chosen = np.isin(channels, wanted) if len(wanted) != 1 else channels == wanted[0]
+        late = (rows['log_time'] < 0) | (rows['publish_time'] < 0)
+        if late.any():
+            self._found.damage.add(
+                f'{int((late & chosen).sum())} messages are left out, for their time is after the '
+                'year 2262'
+            )
+            chosen &= ~late
+        return offsets if chosen.all() else offsets[chosen]
+
+    def _compare_count(self, what: str, channels: Collection[int], count: int) -> None:
+        """Hold the number of messages against the one that the writer counted."""
+        summary = self._found.statistics
+        if not (self._found.finished and summary and summary.channel_message_counts):
+            return
+        expected = sum(summary.channel_message_counts.get(channel, 0) for channel in channels)
+        if count != expected:
+            self._found.damage.add(
+                f'{count} messages of {what} where the writer counted {expected}'
+            )
+
+    def _describe(self, channel: Channel, count: int) -> Topic:
+        """Describe the topic of a channel."""
+        schema = self._found.schemas.get(channel.schema_id)
+        described = MessageType(
+            name=_full_name(schema.name) if schema else '',
+            definition=schema.data.decode('utf-8', 'replace') if schema else '',
+            encoding=schema.encoding if schema else '',
+            type_hash=channel.metadata.get('topic_type_hash', ''),
+        )
+        qos = parse_qos(channel.metadata.get('offered_qos_profiles'))
+        return Topic(channel.topic, described, qos, count, channel.message_encoding)
+
+    def _loose(self) -> IntArray:
+        """Return where records of messages outside chunks begin."""
+        return np.array([begin - RECORD_HEADER for begin, _ in self._found.loose], np.int64)
+
+    def _loose_channels(self) -> npt.NDArray[np.uint16]:
+        """Return the channel of each message outside chunks."""
+        loose = self._loose()
+        return records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)['channel']
+
+
+def _piece(data: bytes | mmap.mmap, offsets: IntArray) -> tuple[Block, npt.NDArray[np.uint16]]:
+    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
+    return message_block(data, offsets), rows['channel']
+
+
+def _full_name(name: str) -> str:
+    """Return a type name with its namespace, which some writers leave out."""
+    package, _, rest = name.partition('/')
+    return f'{package}/msg/{rest}' if rest and '/' not in rest else name
+
+
+def _map(path: Path) -> bytes | mmap.mmap:
+    """Return the bytes of a file without reading them."""
+    with open_regular(path, RecordingError) as stream:
+        if not stream.seek(0, 2):
+            raise RecordingError(f'{path}: the file is empty')
+        try:
+            return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+        except OSError as error:
+            raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error

@@ -1,0 +1,35 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recorded experiments with the two-link arm, from MuJoCo, so that no code tests itself."""
+
+from __future__ import annotations
+
+from armid_ros.elastic.plant.run import ElasticRun
+from armid_ros.elastic.plant.signals import WEAK
+from armid_ros.elastic.plant.two_link import two_link_loop
+from armid_ros.robots.two_link import two_link_set, TwoLinkParameters
+import numpy as np
+import pytest
+
+from benchmarks.elastic import excitation, MANY, mujoco_arm, run_mujoco, SENSORS, steps
+
+
+@pytest.fixture(scope='session')
+def truth() -> TwoLinkParameters:
+    """Return the parameters of the arm that was recorded."""
+    return two_link_set('after').parameters
+
+
+@pytest.fixture(scope='session')
+def clean_steps(truth) -> list[ElasticRun]:
+    """Return step responses without noise."""
+    loop, engine = two_link_loop(two_link_set('after')), mujoco_arm(truth, MANY)
+    return [run_mujoco(engine, loop, experiment) for experiment in steps()]
+
+
+@pytest.fixture(scope='session')
+def runs(truth) -> list[ElasticRun]:
+    """Return twelve noisy experiments of 4 s through the resonances."""
+    rng = np.random.default_rng(3)
+    loop, engine = two_link_loop(two_link_set('after'), WEAK), mujoco_arm(truth)
+    return [SENSORS.measure(run_mujoco(engine, loop, e), rng) for e in excitation(12)]

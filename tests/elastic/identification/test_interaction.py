@@ -1,0 +1,84 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Decoupling: what one link does to the other, and what is left of each joint without it."""
+
+from __future__ import annotations
+
+from armid_ros.elastic.identification import (
+    decibel_error,
+    decouple,
+    fit_joint,
+    ideal_response,
+    interaction_torques,
+    joint_signals,
+    measured_response,
+)
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import Motion
+from armid_ros.robots import load_robot
+import control
+import numpy as np
+import pytest
+
+FREQUENCY = np.geomspace(5.0, 60.0, 200)
+
+
+def test_interaction_is_what_inverse_dynamics_has_beside_the_own_inertia(truth) -> None:
+    """The equations against Pinocchio on the shipped description."""
+    rng = np.random.default_rng(0)
+    robot = load_robot('two_link_elastic')
+    q, dq, ddq = rng.standard_normal((3, 50, 2))
+    link = Motion(robot.joints, np.arange(50.0), q, dq, ddq)
+    tau = inverse_dynamics(robot, link) - ddq * truth.inertia
+    np.testing.assert_allclose(interaction_torques(link, truth), tau, atol=1e-10)
+
+
+@pytest.mark.parametrize('joint', [0, 1])
+def test_ideal_response_is_that_of_python_control(truth, joint) -> None:
+    s = control.tf('s')
+    spring = truth.stiffness[joint] / s + truth.spring_damping[joint]
+    motor = truth.rotor[joint] * s + truth.joint_motor_damping[joint]
+    link = truth.inertia[joint] * s + truth.link_damping[joint]
+    plant = (link + spring) / ((motor + spring) * (link + spring) - spring * spring)
+    theirs = control.frequency_response(plant, 2 * np.pi * FREQUENCY).complex
+    np.testing.assert_allclose(ideal_response(truth, joint, FREQUENCY)[:, 0, 0], theirs, rtol=1e-9)
+
+
+def test_decoupled_joints_are_one_link_systems(truth, runs) -> None:
+    for joint, found in enumerate(decouple(runs, truth)):
+        ideal = ideal_response(truth, joint, FREQUENCY)
+        response = found.system.response(FREQUENCY)
+        assert decibel_error(response[:, 0, 0], ideal[:, 0, 0]) < 0.1
+        assert decibel_error(response[:, 1, 0], ideal[:, 1, 0]) < 0.1
+
+
+def test_motor_torque_alone_shows_another_system_and_more_so_at_link_2(truth, runs) -> None:
+    wrong = []
+    for joint in range(2):
+        frequency, found = measured_response(
+            joint_signals(runs, truth, joint, decoupled=False), 1e-3
+        )
+        band = (frequency >= 5.0) & (frequency <= 60.0)
+        ideal = ideal_response(truth, joint, frequency[band])
+        wrong.append(decibel_error(found[band, 0, 0], ideal[:, 0, 0]))
+    assert 3.0 < wrong[0] < wrong[1]
+
+
+def test_physical_parameters_follow_from_the_responses(truth, runs) -> None:
+    for joint, found in enumerate(decouple(runs, truth)):
+        fit = fit_joint(found)
+        assert fit.rotor == pytest.approx(truth.rotor[joint], rel=0.02)
+        assert fit.inertia == pytest.approx(truth.inertia[joint], rel=0.02)
+        assert fit.stiffness == pytest.approx(truth.stiffness[joint], rel=0.02)
+        assert fit.spring_damping == pytest.approx(truth.spring_damping[joint], rel=0.05)
+        total = fit.motor_damping + fit.link_damping
+        assert total == pytest.approx(truth.total_damping[joint], rel=0.05)
+        assert fit.interaction_gain == pytest.approx(1.0, abs=0.01)
+
+
+def test_antiresonance_and_resonance_are_those_of_the_literature(truth, runs) -> None:
+    wanted = ((22.7, 35.5), (29.4, 42.2))
+    for found, (anti, resonance) in zip(decouple(runs, truth), wanted, strict=True):
+        fit = fit_joint(found)
+        assert fit.antiresonance == pytest.approx(anti, abs=0.25)
+        assert fit.resonance == pytest.approx(resonance, abs=0.35)

@@ -1,0 +1,136 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Springs of any arm are found joint by joint, where encoders are on both sides."""
+
+from __future__ import annotations
+
+import json
+
+from armid_ros.arm import ArmModel
+from armid_ros.cli.elastic import elastic
+from armid_ros.effects import make_effect, parse_effect
+from armid_ros.elastic.identification import write_runs
+from armid_ros.elastic.identification.files import read_sides
+from armid_ros.elastic.identification.joints import fit_springs
+from armid_ros.elastic.identification.output import springs_document
+from armid_ros.elastic.plant.arm import record
+from armid_ros.elastic.plant.setup import make_elastic_arm
+from armid_ros.elastic.report.springs_page import springs_report
+from armid_ros.errors import ArmidError
+from armid_ros.files import json_text
+from armid_ros.motion import Motion
+from armid_ros.recording import write_recording
+from armid_ros.robots import load_robot
+from armid_ros.robots.two_link import planar_pair
+from armid_ros.simulation import Reference, Sensors, simulate
+from click.testing import CliRunner
+import numpy as np
+import pytest
+
+from docsite.schemas import faults
+
+ROBOT = load_robot('humanoid_arm')
+STIFFNESS = np.array([2000.0, 3000.0, 1500.0, 1000.0, 500.0, 500.0])
+GAP = np.array([0.0, 0.0, 0.0, 5e-4, 0.0, 0.0])
+
+
+def swing(seed):
+    """Return a motion of all joints over 8 s."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, 8.0, 4001)
+    rate, phase = 2.0 * np.pi * rng.uniform(0.3, 0.6, 6), rng.uniform(0.0, 2.0 * np.pi, 6)
+    size = 0.6 * np.minimum((ROBOT.upper - ROBOT.lower) / 2.0, 1.0)
+    size = np.minimum(size, 0.8 * ROBOT.velocity_limit / rate)
+    middle = (ROBOT.upper + ROBOT.lower) / 2.0
+    angle = rate * t[:, np.newaxis] + phase
+    q, dq = middle + size * np.sin(angle), size * rate * np.cos(angle)
+    return Motion(ROBOT.joints, t, q, dq, -size * rate**2 * np.sin(angle))
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    """Record the humanoid arm under gravity on springs, with free play in its elbow."""
+    arm = ArmModel(ROBOT).with_effect(make_effect('joint_elasticity', ROBOT), 1.0 / STIFFNESS)
+    arm = arm.with_effect(make_effect('backlash', ROBOT), GAP)
+    for text in (
+        'rotor_inertia:rotor_inertia=0.02',
+        'viscous_friction:viscous_coefficient=0.2',
+        'coulomb_friction:coulomb_torque=0.15',
+    ):
+        arm = arm.with_effect(*parse_effect(text, ROBOT))
+    sensors = Sensors(torque_noise=0.01, resolution=2.0 * np.pi / 2**20)
+    live = make_elastic_arm(arm, rng=np.random.default_rng(0), sensors=sensors)
+    runs = [record(live, Reference.of(swing(seed)), rate=500.0) for seed in (1, 2)]
+    path = tmp_path_factory.mktemp('springs') / 'bag'
+    write_runs(path, runs, live.plant.robot, live.accelerometers)
+    return path
+
+
+@pytest.fixture(scope='module')
+def found(bag):
+    """Fit the springs."""
+    return fit_springs(ROBOT, [read_sides(bag, ROBOT)], np.random.default_rng(0))
+
+
+def test_stiffness_of_every_joint_that_carries_a_load(found):
+    for one, wanted in list(zip(found, STIFFNESS, strict=True))[:3]:
+        assert one.told, one.joint
+        assert one.transmission.stiffness[0] == pytest.approx(wanted, rel=0.01), one.joint
+
+
+def test_free_play_is_told_from_the_spring(found):
+    fit = found[3].transmission
+    assert fit.backlash_seen
+    assert fit.backlash[0] == pytest.approx(GAP[3], rel=0.1)
+    assert fit.stiffness[0] == pytest.approx(STIFFNESS[3], rel=0.05)
+    assert abs(fit.stiffness_alone[0] / STIFFNESS[3] - 1.0) > 0.15  # a spring alone would be wrong
+    assert not found[0].transmission.backlash[0] > 2e-4
+
+
+def test_rotor_and_friction_are_what_the_motor_keeps_for_itself(found):
+    for one in found:
+        np.testing.assert_allclose(one.motor, [0.02, 0.2, 0.15], rtol=0.08)
+
+
+def test_frequencies_are_those_of_a_motor_and_a_link_on_a_spring(found):
+    one = found[0]
+    k, link, rotor = one.transmission.stiffness[0], one.inertia, one.motor[0]
+    assert one.antiresonance == pytest.approx(np.sqrt(k / link) / (2.0 * np.pi))
+    assert one.resonance == pytest.approx(np.sqrt(k / link + k / rotor) / (2.0 * np.pi))
+
+
+def test_the_document_is_as_its_schema_says(found):
+    document = json.loads(json_text(springs_document(found, 'humanoid_arm')))
+    assert faults('springs', document) == []
+
+
+def test_the_report_names_every_joint_and_its_stiffness(found):
+    page = springs_report(found, 'humanoid_arm')
+    for one in found:
+        assert one.joint in page
+    assert f'{found[0].transmission.stiffness[0]:.4g}' in page
+
+
+def test_armid_elastic_takes_any_arm(bag, tmp_path):
+    arguments = [str(bag), '--robot', 'humanoid_arm', '--out', str(tmp_path / 'out')]
+    result = CliRunner().invoke(elastic, arguments, catch_exceptions=False)
+    assert result.exit_code == 0
+    assert 'N m/rad' in result.stdout
+    assert {p.name for p in (tmp_path / 'out').iterdir()} == {'elastic.json', 'report.html'}
+
+
+def test_a_bag_without_links_is_refused_with_what_to_do(tmp_path):
+    run = simulate(ArmModel(ROBOT), swing(3), rng=np.random.default_rng(0), duration=0.5)
+    write_recording(tmp_path / 'bag', run)
+    arguments = [str(tmp_path / 'bag'), '--robot', 'humanoid_arm', '--out', str(tmp_path / 'out')]
+    result = CliRunner().invoke(elastic, arguments)
+    assert isinstance(result.exception, ArmidError)
+    assert '/link/joint_states' in str(result.exception)
+    assert 'armid diagnose' in str(result.exception)
+
+
+def test_two_links_are_a_planar_pair_where_they_bear_no_weight():
+    assert planar_pair(load_robot('two_link_elastic'))
+    assert not planar_pair(load_robot('two_link_elastic', gravity='0,-9.81,0'))
+    assert not planar_pair(ROBOT)
+    assert not planar_pair(load_robot('humanoid_arm', joints=ROBOT.joints[:2]))

@@ -1,0 +1,173 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""An arm with elastic joints takes trajectories, and is read on both sides of its springs."""
+
+from __future__ import annotations
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import parse_effect
+from armid_ros.elastic.plant.arm import record
+from armid_ros.elastic.plant.run import run_elastic
+from armid_ros.elastic.plant.setup import elastic_joints, make_elastic_arm, shipped_arm
+from armid_ros.elastic.plant.signals import step_experiments
+from armid_ros.elastic.plant.two_link import two_link_loop, two_link_plant
+from armid_ros.errors import TrajectoryError
+from armid_ros.motion import Motion
+from armid_ros.robots import load_robot
+from armid_ros.robots.two_link import two_link_set
+from armid_ros.simulation import Reference, Sensors
+from armid_ros.simulation.accelerometers import LinkAccelerometers
+import numpy as np
+import pytest
+
+SHIPPED = two_link_set('after')
+TWO_LINKS = load_robot('two_link_elastic')
+HUMANOID = load_robot('humanoid_arm')
+
+
+def two_links(**options):
+    """Return the shipped arm with its drives."""
+    arm, drives = shipped_arm(TWO_LINKS)
+    return make_elastic_arm(arm, rng=np.random.default_rng(0), drives=drives, **options)
+
+
+def humanoid(*more, **options):
+    """Return the humanoid arm under gravity with a spring in every joint."""
+    arm = ArmModel(HUMANOID)
+    for text in (
+        'rotor_inertia:rotor_inertia=0.02',
+        'viscous_friction:viscous_coefficient=0.1',
+        'coulomb_friction:coulomb_torque=0.2',
+        'joint_elasticity:compliance=0.0005',
+        *more,
+    ):
+        arm = arm.with_effect(*parse_effect(text, HUMANOID))
+    return make_elastic_arm(arm, rng=np.random.default_rng(0), **options)
+
+
+def ramp(q, velocity, duration, tau=None):
+    """Return the way from a pose at constant velocity."""
+    q = np.array([q, q + duration * np.asarray(velocity)])
+    return Reference(TWO_LINKS.joints, np.array([0.0, duration]), q, tau=tau)
+
+
+def test_a_ramp_of_position_is_a_step_of_velocity():
+    """The loop is that of the source, so that its step responses are those that are tuned to."""
+    pose, velocity = np.array([0.0, np.pi / 4]), np.array([1.0, -1.0])
+    (step,) = step_experiments([pose], [velocity])
+    wanted = run_elastic(two_link_plant(SHIPPED.parameters), two_link_loop(SHIPPED), step)
+    arm = two_links(start=pose)
+    arm.set_trajectory(ramp(pose, velocity, 0.5))
+    samples = [arm.advance() for _ in range(500)]
+    for side, name in ((wanted.motor.dq, 'dq'), (wanted.link.dq, 'link_dq')):
+        found = [getattr(sample, name) for sample in samples]
+        np.testing.assert_allclose(found, side[:500], atol=1e-10)
+    np.testing.assert_allclose([s.tau for s in samples], wanted.motor.tau[:500], atol=1e-8)
+    np.testing.assert_allclose([s.asked_dq for s in samples], np.tile(velocity, (500, 1)))
+
+
+def test_torque_of_a_trajectory_comes_on_top_of_the_loop():
+    pose, torque = np.zeros(2), np.array([[20.0, 0.0], [20.0, 0.0]])
+    loop = make_elastic_arm(
+        shipped_arm(TWO_LINKS)[0], rng=np.random.default_rng(0), drives=SHIPPED, gain=1e-9,
+        start=pose,
+    )  # fmt: skip
+    loop.set_trajectory(ramp(pose, np.zeros(2), 0.1, torque))
+    for _ in range(99):
+        sample = loop.advance()
+        np.testing.assert_allclose(sample.tau, torque[0], atol=1e-6)
+    assert sample.dq[0] > 0.1
+
+
+def test_it_holds_its_links_where_they_were_and_its_springs_carry_their_weight():
+    arm = humanoid()
+    home = arm.state.q.copy()
+    for _ in range(500):
+        sample = arm.advance()
+    np.testing.assert_allclose(sample.link_q, home, atol=1e-9)
+    np.testing.assert_allclose(sample.q - sample.link_q, 0.0005 * sample.tau, atol=1e-9)
+
+
+def test_links_of_any_arm_follow_a_trajectory():
+    arm = humanoid()
+    goal = arm.state.q + 0.3
+    still = np.zeros((1, 6))
+    arm.set_trajectory(Reference(HUMANOID.joints, np.array([1.0]), goal[np.newaxis], still, still))
+    for _ in range(1500):
+        sample = arm.advance()
+    np.testing.assert_allclose(sample.link_q, goal, atol=2e-4)
+    np.testing.assert_allclose(sample.link_dq, 0.0, atol=1e-4)
+    arm.reset(7)
+    assert arm.state.steps == 7
+    np.testing.assert_allclose(arm.read().link_q, goal - 0.3)
+
+
+def test_a_trajectory_beyond_a_limit_is_refused_and_the_arm_stays():
+    arm = humanoid()
+    home = arm.state.q.copy()
+    far = (HUMANOID.upper + 0.1)[np.newaxis]
+    with pytest.raises(TrajectoryError, match='upper limit'):
+        arm.set_trajectory(Reference(HUMANOID.joints, np.array([5.0]), far))
+    np.testing.assert_allclose(arm.advance(100).link_q, home, atol=1e-9)
+
+
+def test_offsets_are_read_at_the_motors_alone():
+    plain, offset = humanoid().advance(), humanoid('encoder_offset:encoder_offset=0.01').advance()
+    np.testing.assert_allclose(np.abs(offset.q - plain.q), 0.01)
+    np.testing.assert_allclose(offset.link_q, plain.link_q, atol=1e-12)
+
+
+def test_noise_has_the_size_that_was_asked_for():
+    sensors = Sensors(position_noise=1e-4, velocity_noise=2e-3, acceleration_noise=0.1)
+    arm = two_links(sensors=sensors, start=[0.0, 0.0])
+    samples = [arm.advance() for _ in range(2000)]
+    for name, std in (('q', 1e-4), ('link_q', 1e-4), ('dq', 2e-3), ('link_dq', 2e-3)):
+        values = np.array([getattr(sample, name) for sample in samples])
+        np.testing.assert_allclose(values.std(axis=0), std, rtol=0.1)
+    felt = np.array([sample.acceleration for sample in samples])
+    np.testing.assert_allclose(felt.std(axis=0), 0.1, rtol=0.1)
+    np.testing.assert_allclose(felt.mean(axis=0), [[0.0, 0.0, 9.81]] * 2, atol=0.02)
+
+
+def test_a_run_is_recorded_from_the_first_point_of_its_reference():
+    t = np.linspace(0.0, 1.0, 1001)
+    q = 0.3 * np.sin(2.0 * np.pi * t)[:, np.newaxis] * np.array([1.0, -1.0])
+    dq = 0.3 * 2.0 * np.pi * np.cos(2.0 * np.pi * t)[:, np.newaxis] * np.array([1.0, -1.0])
+    run = record(two_links(), Reference(TWO_LINKS.joints, t, q, dq), rate=500.0)
+    assert len(run.motor) == 501
+    np.testing.assert_allclose(run.motor.dq[0], dq[0])
+    np.testing.assert_allclose(run.reference, dq[::2], atol=0.02)
+    np.testing.assert_allclose(run.link.q, q[::2], atol=0.15)
+
+
+def test_accelerometers_feel_what_their_places_do():
+    """Numerical second derivative of where they are, and gravity, in the frames of the links."""
+    import pinocchio as pin
+
+    rng = np.random.default_rng(1)
+    places = rng.uniform(-0.2, 0.2, (6, 3))
+    sensors = LinkAccelerometers(HUMANOID, places)
+    q, dq, ddq = rng.uniform(-1.0, 1.0, (3, 6))
+    model = HUMANOID.model
+    data = model.createData()
+    where = []
+    for t in (-1e-4, 0.0, 1e-4):
+        pin.forwardKinematics(model, data, q + t * dq + t**2 / 2 * ddq)
+        where.append([data.oMi[j].act(place) for j, place in enumerate(places, 1)])
+    world = np.diff(np.array(where), 2, axis=0)[0] / 1e-8 + [0.0, 0.0, 9.81]
+    pin.forwardKinematics(model, data, q)
+    wanted = [data.oMi[j].rotation.T @ a for j, a in enumerate(world, 1)]
+    np.testing.assert_allclose(sensors.read(q, dq, ddq), wanted, atol=1e-5)
+    motion = Motion(HUMANOID.joints, np.arange(2.0), *(np.array([x, x]) for x in (q, dq, ddq)))
+    np.testing.assert_allclose(sensors.readings(motion)[:, 1], sensors.read(q, dq, ddq))
+
+
+def test_springs_need_rotors_to_move_on_their_own():
+    arm = ArmModel(HUMANOID).with_effect(
+        *parse_effect('joint_elasticity:compliance=0.001', HUMANOID)
+    )
+    assert elastic_joints(arm) == ((), HUMANOID.joints)
+    elbow = HUMANOID.joints[3]
+    effect = parse_effect(f'rotor_inertia@{elbow}:rotor_inertia=0.1', HUMANOID)
+    assert elastic_joints(arm.with_effect(*effect))[0] == (elbow,)
+    assert elastic_joints(ArmModel(HUMANOID)) == ((), ())

@@ -1,0 +1,213 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Motors that drive links through springs: frequencies, energy, friction, stiff limits, misuse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.elastic.plant.integrator import elastic_step
+from armid_ros.elastic.plant.plant import ElasticPlant
+from armid_ros.elastic.plant.run import Experiment, run_elastic, VelocityLoop
+from armid_ros.elastic.plant.signals import step_experiments
+from armid_ros.elastic.plant.two_link import modes, two_link_loop, two_link_plant
+from armid_ros.errors import ModelError, TrajectoryError
+from armid_ros.robots import load_robot
+from armid_ros.robots.two_link import two_link_set
+from armid_ros.simulation import Plant, step
+import numpy as np
+import pytest
+
+FREE = {0: (31.5, 63.0), 45: (31.9, 55.7), 90: (33.3, 47.0), 135: (36.4, 42.9), 180: (38.9, 42.2)}
+LOCKED = {0: (14.6, 55.5), 45: (15.5, 47.1), 90: (18.3, 36.4), 180: (27.7, 29.4)}
+SHIPPED = two_link_set('after')
+
+
+def lossless():
+    """Return the shipped parameters without any friction or damping."""
+    zero = np.zeros(2)
+    return replace(
+        SHIPPED.parameters,
+        link_damping=zero,
+        motor_damping=zero,
+        spring_damping=zero,
+        coulomb=zero,
+    )
+
+
+def energy(plant, state):
+    """Return kinetic and spring energy of the two-link arm [J]."""
+    p, (d, m, v) = SHIPPED.parameters, state.x.reshape(3, 2)
+    mass = p.mass_matrix(state.q[1])
+    return (v @ mass @ v + m @ (p.rotor * m) + d @ (p.stiffness * d)) / 2
+
+
+@pytest.mark.parametrize('pose, wanted', FREE.items())
+def test_coupled_modes_are_those_of_the_literature(pose, wanted) -> None:
+    found = modes(two_link_plant(SHIPPED.parameters), np.array([0.0, np.radians(pose)]))
+    np.testing.assert_allclose(found[:, 0], wanted, atol=0.05)
+
+
+@pytest.mark.parametrize('pose, wanted', LOCKED.items())
+def test_modes_with_locked_motors_are_those_of_the_literature(pose, wanted) -> None:
+    plant = two_link_plant(SHIPPED.parameters)
+    found = modes(plant, np.array([0.0, np.radians(pose)]), locked=True)
+    np.testing.assert_allclose(found[:, 0], wanted, atol=0.05)
+
+
+def test_vibration_has_the_frequency_of_the_linear_system_at_1_khz() -> None:
+    """One substep of 1 ms, 16 samples a period: what is left is a few 1e-5."""
+    plant = two_link_plant(lossless(), substeps=1)
+    q = np.array([0.0, np.pi / 2])
+    inertia = np.diag([*SHIPPED.parameters.rotor, 0.0, 0.0])
+    inertia[2:, 2:] = SHIPPED.parameters.mass_matrix(q[1])
+    spring = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.diag(SHIPPED.parameters.stiffness))
+    squared, shapes = np.linalg.eig(np.linalg.solve(inertia, spring))
+    highest = int(np.argmax(squared))
+    omega, shape = np.sqrt(squared[highest]), 1e-6 * shapes[:, highest]
+    state = plant.state(q)
+    state.x[:2] = shape[:2] - shape[2:]
+    twist = []
+    for _ in range(1000):
+        state = elastic_step(plant, state, np.zeros(2))
+        twist.append(state.x[0])
+    t = 1e-3 * np.arange(1, 1001)
+    wanted = (shape[0] - shape[2]) * np.cos(omega * t)
+    assert np.abs(np.array(twist) - wanted).max() < 0.03 * np.abs(wanted).max()
+
+
+def test_energy_stays_without_friction() -> None:
+    plant = two_link_plant(lossless())
+    state = plant.state([0.0, 0.5], [1.0, -2.0])
+    state.x[:2] = [1e-3, -5e-4]
+    before = energy(plant, state)
+    for _ in range(2000):
+        state = elastic_step(plant, state, np.zeros(2))
+    assert energy(plant, state) == pytest.approx(before, rel=2e-3)
+
+
+@pytest.mark.parametrize('stiffness', [1e6, 1e9])
+def test_no_spring_is_too_stiff_for_1_khz(stiffness) -> None:
+    """A spring far beyond what a step resolves makes the arm rigid, not unstable."""
+    robot = load_robot('two_link_elastic')
+    rotor = np.array([1.5, 0.7])
+    drives = ArmModel(robot).with_effect(make_effect('rotor_inertia', robot), rotor)
+    springs = make_effect('joint_elasticity', robot).with_shape([[1e-3]])
+    arm = drives.with_effect(springs, np.full(2, 1.0 / stiffness))
+    elastic, rigid = ElasticPlant(arm), Plant(drives)
+    soft, hard = elastic.state([0.0, 1.0]), rigid.state([0.0, 1.0])
+    for k in range(1000):
+        torque = np.array([20.0, -10.0]) * np.cos(0.01 * k)
+        soft, hard = elastic_step(elastic, soft, torque), step(rigid, hard, torque)
+    np.testing.assert_allclose(soft.q, hard.q, atol=1e-3)
+    np.testing.assert_allclose(soft.x[4:], hard.dq, atol=2e-3)
+
+
+def test_any_arm_may_be_elastic_in_some_joints() -> None:
+    """The humanoid arm under gravity hangs its springs by torque over stiffness."""
+    robot = load_robot('humanoid_arm')
+    joints = robot.joints[1], robot.joints[3]
+    names = '+'.join(joints)
+    springs = make_effect(f'joint_elasticity@{names}', robot).with_shape([[2e-3]])
+    stiffness = np.array([2000.0, 500.0])
+    arm = ArmModel(robot).with_effect(springs, 1.0 / stiffness)
+    arm = arm.with_effect(make_effect('rotor_inertia', robot), np.full(6, 0.02))
+    arm = arm.with_effect(make_effect('viscous_friction', robot), np.full(6, 0.3))
+    arm = arm.with_effect(make_effect('coulomb_friction', robot), np.full(6, 50.0))
+    plant = ElasticPlant(arm)
+    q = np.full(6, 0.3)
+    state = plant.state(q)
+    for _ in range(300):
+        state = elastic_step(plant, state, np.zeros(6))
+    motor, speed = plant.motor(state)
+    load = arm.load(_at_rest(robot, state.q))[0]
+    np.testing.assert_array_equal(speed, 0.0)
+    elastic = [robot.index(joint) for joint in joints]
+    np.testing.assert_allclose((motor - state.q)[elastic], load[elastic] / stiffness, atol=1e-7)
+
+
+def _at_rest(robot, q):
+    from armid_ros.motion import Motion
+
+    zero = np.zeros((1, robot.n_joints))
+    return Motion(robot.joints, np.zeros(1), q[np.newaxis], zero, zero)
+
+
+def test_a_motor_that_friction_holds_stands_while_its_link_vibrates() -> None:
+    plant = two_link_plant(SHIPPED.parameters)
+    state = plant.state([0.0, 0.5])
+    state.x[:2] = [1e-4, 1e-4]
+    start, moved = plant.motor(state)[0], 0.0
+    for _ in range(500):
+        state = elastic_step(plant, state, np.zeros(2))
+        position, speed = plant.motor(state)
+        moved = max(moved, np.abs(state.x[4:]).max())
+        np.testing.assert_array_equal(speed, 0.0)
+    np.testing.assert_allclose(position, start, atol=1e-12)
+    assert moved > 1e-3
+
+
+def test_backlash_lets_the_link_fly_between_its_flanks() -> None:
+    """Within the gap no torque reaches the link."""
+    robot = load_robot('two_link_elastic')
+    arm = ArmModel(robot)
+    for name, values in (
+        ('rotor_inertia', np.full(2, 1.0)),
+        ('joint_elasticity', np.full(2, 1e-5)),
+        ('backlash', np.full(2, 0.02)),
+    ):
+        arm = arm.with_effect(make_effect(name, robot), values)
+    plant = ElasticPlant(arm)
+    state = plant.state([0.0, 0.0])
+    for _ in range(40):
+        state = elastic_step(plant, state, np.array([5.0, 5.0]))
+    assert np.all(np.abs(state.x[:2]) < 0.01)
+    np.testing.assert_array_equal(state.x[4:], 0.0)
+    for _ in range(100):
+        state = elastic_step(plant, state, np.array([5.0, 5.0]))
+    assert np.abs(state.x[4:]).max() > 1e-3
+
+
+def test_step_response_is_that_of_the_literature() -> None:
+    (experiment,) = step_experiments([[0.0, 0.0]], [[0.5, 0.0]])
+    run = run_elastic(two_link_plant(SHIPPED.parameters), two_link_loop(SHIPPED), experiment)
+    first, second = run.link.dq.T
+    assert 1e3 * run.link.t[np.argmax(first > 0.45)] == pytest.approx(68.0, abs=3.0)
+    assert 100.0 * (first.max() / 0.5 - 1.0) == pytest.approx(24.7, abs=2.0)
+    assert np.abs(second).max() == pytest.approx(0.1, abs=0.02)
+
+
+def test_a_rigid_arm_is_refused() -> None:
+    robot = load_robot('two_link_elastic')
+    with pytest.raises(ModelError, match='no joint gives way; add joint_elasticity'):
+        ElasticPlant(ArmModel(robot))
+
+
+def test_a_motor_without_inertia_is_refused_by_name() -> None:
+    robot = load_robot('two_link_elastic')
+    arm = ArmModel(robot).with_effect(make_effect('joint_elasticity@joint2', robot), [1e-4])
+    with pytest.raises(ModelError, match="'joint2' gives way, but its motor has no inertia"):
+        ElasticPlant(arm)
+
+
+def test_a_link_beyond_its_limit_is_reported_by_name() -> None:
+    plant = two_link_plant(SHIPPED.parameters)
+    loop = VelocityLoop(np.full(2, 100.0), np.zeros(2))
+    experiment = Experiment(np.array([12.4, 0.0]), np.tile([4.0, 0.0], (200, 1)))
+    with pytest.raises(TrajectoryError, match="'joint1' reaches"):
+        run_elastic(plant, loop, experiment)
+
+
+def test_a_link_that_is_pushed_against_its_limit_is_held_there() -> None:
+    plant = two_link_plant(SHIPPED.parameters)
+    limit = plant.robot.upper[0]
+    state = plant.state([limit - 0.2, 0.3])
+    farthest = 0.0
+    for _ in range(3000):
+        state = elastic_step(plant, state, np.array([50.0, 0.0]))
+        farthest = max(farthest, state.q[0])
+    assert limit < farthest < limit + 0.02
+    np.testing.assert_allclose(plant.link(state)[1], 0.0, atol=1e-3)
+    assert state.x[0] > 0.0  # the spring is wound up by what the motor still gives

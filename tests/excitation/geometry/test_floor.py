@@ -1,0 +1,164 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where the floor of an arm is, who says so, and how low a motion comes."""
+
+import re
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation import (
+    ClearanceModel,
+    find_floor,
+    Floor,
+    floor_obstacles,
+    Obstacle,
+    with_obstacles,
+)
+from armid_ros.excitation.geometry.floor import touching_links
+from armid_ros.excitation.geometry.heights import link_heights, lowest_point, vertical
+from armid_ros.motion import Motion
+from armid_ros.robots import collision_model, load_robot, robot_from_urdf, shipped_robots
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from ..conftest import urdf
+
+Z = np.array([0.0, 0.0, 1.0])
+ABOVE = ('shoulder', 'revolute', 'base', 'upper', '0 0 0.3', '0 1 0', -2.5, 2.5, 60)
+LOW = ('shoulder', 'revolute', 'base', 'upper', '0 0 0.15', '0 1 0', -2.5, 2.5, 60)
+BELOW = ('shoulder', 'revolute', 'base', 'upper', '0 0 -0.5', '0 1 0', -2.5, 2.5, 60)
+TURRET = ('turn', 'revolute', 'base', 'upper', '0 0 0.0', '0 0 1', -3, 3, 60)
+ON_TURRET = ('lift', 'revolute', 'upper', 'lower', '0 0 0.3', '0 1 0', -2.5, 2.5, 30)
+
+
+def bodies(*joints, **options):
+    return collision_model(robot_from_urdf(urdf(*joints), **options))
+
+
+def test_an_arm_that_stands_has_a_floor_at_its_base_plane():
+    floor = find_floor(bodies(ABOVE))
+    assert (floor.height, floor.source) == (0.0, 'base plane')
+    np.testing.assert_array_equal(floor.up, Z)
+
+
+@pytest.mark.parametrize('name', ['ur3_robot', 'ur5_robot', 'ur10_robot', 'panda', 'kinova'])
+def test_arms_of_other_people_that_stand_have_one_too(example_robot, name):
+    collision = collision_model(load_robot(example_robot(f'{name}.urdf')))
+    assert find_floor(collision).height == 0.0
+
+
+@pytest.mark.parametrize('name', ['talos_left_arm', 'baxter'])
+def test_arms_that_hang_or_reach_below_their_base_are_asked_for(example_robot, name):
+    collision = collision_model(load_robot(example_robot(f'{name}.urdf')))
+    with pytest.raises(TrajectoryError, match=r'below it.*--floor Z, or --floor none'):
+        find_floor(collision)
+    assert find_floor(collision, 'none').height is None
+    assert find_floor(collision, '-0.93').height == -0.93
+
+
+@pytest.mark.parametrize('gravity', [(9.81, 0.0, 0.0), (0.0, 0.0, 9.81)], ids=['wall', 'ceiling'])
+def test_an_arm_on_a_wall_or_a_ceiling_is_asked_for(gravity):
+    with pytest.raises(TrajectoryError, match='gravity does not pull it onto its base plane'):
+        find_floor(bodies(ABOVE, gravity=gravity))
+
+
+def test_an_arm_whose_only_link_is_below_its_base_is_asked_for():
+    with pytest.raises(TrajectoryError, match=r'0\.\d+ m below it \(upper\)'):
+        find_floor(bodies(BELOW))
+
+
+@pytest.mark.parametrize('name', shipped_robots())
+def test_shipped_robots_say_where_their_floor_is(name):
+    floor = find_floor(collision_model(load_robot(name)))
+    assert floor.source == f'{name}.mounting.yaml'
+
+
+def test_what_is_given_counts_most_and_an_environment_more_than_a_guess():
+    collision, table = bodies(ABOVE), Obstacle('table', 'box', (1, 1, 0.1))
+    assert find_floor(collision, '0.1', [table]).height == 0.1
+    assert find_floor(collision, None, [table]).source == 'environment'
+    with pytest.raises(TrajectoryError, match="not 'low'"):
+        find_floor(collision, 'low')
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_the_floor_is_where_its_height_and_normal_say(seed):
+    """The clearance of every link is its height above the floor, whatever way is up."""
+    rng = np.random.default_rng(seed)
+    collision, up = bodies(ABOVE, ON_TURRET), rng.normal(size=3)
+    up /= np.linalg.norm(up)
+    floor = Floor(-3.0, up, 'given')
+    model = ClearanceModel.of(
+        with_obstacles(collision_without_pairs(collision), floor_obstacles(collision, floor, 0.0))
+    )
+    q = rng.uniform(-2.0, 2.0, (20, 2))
+    lowest = np.min([low for _, low, _ in link_heights(collision, up, q)], axis=0)
+    np.testing.assert_allclose(model.smallest(q), lowest + 3.0, atol=1e-6)
+    assert np.all(model._bound(q).min(axis=1) <= lowest + 3.0 + 1e-9)
+    assert np.all(np.isfinite(model._bound(q)))
+
+
+def collision_without_pairs(collision):
+    geometry = collision.geometry.copy()
+    geometry.removeAllCollisionPairs()
+    return type(collision)(collision.robot, geometry)
+
+
+def test_a_turret_may_stand_on_the_floor_and_what_it_carries_may_not():
+    collision = bodies(TURRET, ON_TURRET)
+    floor = find_floor(collision)
+    assert touching_links(collision, floor, 0.01) == ('upper',)
+    (obstacle,) = floor_obstacles(collision, floor, 0.01)
+    assert obstacle.ignore == ('upper',)
+
+
+@pytest.mark.parametrize('bare', [('lower',), ('upper', 'lower')])
+def test_a_pose_that_is_clear_of_the_floor_is_above_it_with_links_that_have_no_body(bare):
+    """What is said of a run is what a search has kept."""
+    text = urdf(LOW, ON_TURRET)
+    for link in bare:
+        body = rf'(<link name="{link}">.*?)<collision>.*?</collision>'
+        text = re.sub(body, r'\1', text, count=1, flags=re.DOTALL)
+    collision = collision_model(robot_from_urdf(text))
+    assert len(collision.geometry.geometryObjects) == 2 - len(bare)
+    floor = find_floor(collision)
+    around = floor_obstacles(collision, floor, 0.01)
+    model = ClearanceModel.of(with_obstacles(collision, around))
+    clear = []
+    for pose in np.random.default_rng(0).uniform(-2.5, 2.5, (200, 1, 2)):
+        motion = Motion(collision.robot.joints, np.zeros(1), pose, 0.0 * pose, 0.0 * pose)
+        above = lowest_point(collision, floor.up, motion, around[0].ignore).height > 0.0
+        clear.append(model.closest(motion).distance > 0.0)
+        assert above or not clear[-1]
+    assert 20 < sum(clear) < 180
+
+
+def test_heights_are_those_of_points_on_the_bodies():
+    """Points drawn on a cylinder never leave the heights, and come near them."""
+    collision, rng = bodies(ABOVE, ON_TURRET), np.random.default_rng(0)
+    angle, along = rng.uniform(0, 2 * np.pi, 20000), rng.uniform(-0.15, 0.15, 20000)
+    ring = np.column_stack([0.04 * np.cos(angle), 0.04 * np.sin(angle), 0.15 + along])
+    up = vertical(np.array([1.0, -2.0, -3.0]))
+    q = rng.uniform(-2.0, 2.0, (10, 2))
+    model = collision.robot.model
+    data = model.createData()
+    heights = {name: (low, high) for name, low, high in link_heights(collision, up, q)}
+    for sample, pose in enumerate(q):
+        pin.forwardKinematics(model, data, pose)
+        for joint, link in ((1, 'upper'), (2, 'lower')):
+            points = ring @ data.oMi[joint].rotation.T + data.oMi[joint].translation
+            low, high = (values[sample] for values in heights[link])
+            drawn = points @ up
+            assert low - 1e-9 <= drawn.min() <= low + 0.01
+            assert high + 1e-9 >= drawn.max() >= high - 0.01
+
+
+def test_the_lowest_point_is_that_of_the_link_and_the_time():
+    collision = bodies(ABOVE)
+    t = np.linspace(0.0, 1.0, 101)
+    q = (2.0 * np.sin(np.pi * t))[:, np.newaxis]
+    motion = Motion(collision.robot.joints, t, q, 0.0 * q, 0.0 * q)
+    lowest = lowest_point(collision, Z, motion)
+    assert lowest.link == 'upper' and lowest.time == pytest.approx(0.5)
+    assert lowest.height < 0.2
+    assert lowest_point(collision, Z, motion, exempt=['upper']).link == ''

@@ -1,0 +1,192 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the criteria mean."""
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.estimate import ParameterName
+from armid_ros.excitation import DesignSettings, Information, Problem
+from armid_ros.excitation.search.criteria import RivalCriterion, SpectralCriterion, SubsetCriterion
+from armid_ros.model import random_motion
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def w():
+    return np.random.default_rng(0).normal(size=(40, 5)) @ np.diag([1.0, 2.0, 5.0, 0.3, 1.0])
+
+
+def names(count):
+    return tuple(ParameterName(f'p{i}', '', '-') for i in range(count))
+
+
+def test_information_predicts_the_scatter_of_least_squares(w):
+    rng = np.random.default_rng(1)
+    estimates = np.linalg.lstsq(w, rng.normal(size=(40, 4000)), rcond=None)[0]
+    std = Information(names(5), w.T @ w, np.ones(5)).std
+    np.testing.assert_allclose(std, estimates.std(axis=1), rtol=0.05)
+
+
+def test_parameter_that_is_not_seen_has_infinite_deviation(w):
+    blind = w.copy()
+    blind[:, 2] = 0.0
+    std = Information(names(5), blind.T @ blind, np.ones(5)).std
+    assert np.isinf(std[2])
+    assert np.all(np.isfinite(np.delete(std, 2)))
+
+
+def test_confounded_parameters_have_infinite_deviation(w):
+    twins = w.copy()
+    twins[:, 1] = 3.0 * twins[:, 0]
+    std = Information(names(5), twins.T @ twins, np.ones(5)).std
+    assert np.all(np.isinf(std[:2]))
+    assert np.all(np.isfinite(std[2:]))
+
+
+def test_condition_number_is_that_of_the_regressor_not_of_its_square(w):
+    information = Information(names(5), w.T @ w, np.ones(5))
+    assert information.condition == pytest.approx(np.linalg.cond(w))
+    cost = SpectralCriterion('condition', np.ones(5)).cost(w.T @ w)
+    assert cost == pytest.approx(np.log(np.linalg.cond(w)))
+
+
+def test_costs_are_those_of_the_covariance(w):
+    covariance = np.linalg.inv(w.T @ w)
+    scale = np.array([1.0, 0.5, 0.2, 3.0, 1.0])
+    scaled = covariance / np.outer(scale, scale)
+    expected = {
+        'D': np.linalg.slogdet(covariance)[1] / 5,
+        'A': np.log(np.trace(scaled) / 5),
+        'E': np.log(np.linalg.eigvalsh(scaled)[-1]),
+    }
+    for name, value in expected.items():
+        assert SpectralCriterion(name, scale).cost(w.T @ w) == pytest.approx(value)
+
+
+def test_balance_adds_the_condition_number_to_d(w):
+    plain, balanced = (SpectralCriterion('D', np.ones(5), b).cost(w.T @ w) for b in (0.0, 2.0))
+    assert balanced - plain == pytest.approx(2.0 * np.log(np.linalg.cond(w)))
+
+
+@pytest.mark.parametrize('name', ['A', 'E'])
+def test_units_of_the_parameters_do_not_matter(w, name):
+    scale = np.array([1.0, 0.5, 0.2, 3.0, 1.0])
+    other = np.array([1e3, 1.0, 1e-3, 1.0, 7.0])
+    converted = w / other
+    cost = SpectralCriterion(name, scale).cost(w.T @ w)
+    again = SpectralCriterion(name, scale * other).cost(converted.T @ converted)
+    assert again == pytest.approx(cost)
+
+
+@pytest.mark.parametrize('name', ['E', 'condition'])
+def test_smooth_cost_is_just_above_the_cost(w, name):
+    criterion = SpectralCriterion(name, np.ones(5))
+    cost, smooth = criterion.cost(w.T @ w), criterion.smooth(w.T @ w)[0]
+    assert cost <= smooth <= cost + np.log(5) / 12.0
+
+
+def test_more_data_never_costs_more(w):
+    once, twice = w.T @ w, 2.0 * w.T @ w
+    for name in ('D', 'A', 'E'):
+        criterion = SpectralCriterion(name, np.ones(5))
+        assert criterion.cost(twice) < criterion.cost(once)
+
+
+def test_subset_is_judged_with_the_others_fitted(w):
+    wanted = np.array([0.0, 1.0, 0.0, 1.0, 0.0])
+    covariance = np.linalg.inv(w.T @ w)[np.ix_([1, 3], [1, 3])]
+    cost = SubsetCriterion(wanted, np.array([1.0, 9.0, 2.0, 1.0, 1.0])).cost(w.T @ w)
+    assert cost == pytest.approx(np.linalg.slogdet(covariance)[1] / 2)
+
+
+def test_rival_is_judged_by_its_best_fit(w):
+    rival = np.array([1.0, 1.0, 1.0, 0.0, 0.0])
+    values = np.array([0.0, 0.0, 0.0, 0.7, -2.0])
+    torque = w @ values
+    _, residual, *_ = np.linalg.lstsq(w[:, :3], torque, rcond=None)
+    assert RivalCriterion(rival, values).cost(w.T @ w) == pytest.approx(-np.log(residual[0]))
+
+
+@pytest.mark.parametrize('spoil', ['equal', 'idle', 'all idle'])
+def test_rival_columns_that_a_motion_does_not_tell_apart_are_no_reason_to_stop(w, spoil):
+    """One joint that moves slowly: of the rival's columns some are equal, or nothing happens."""
+    w = w.copy()
+    w[:, 1] = w[:, 0] if spoil == 'equal' else 0.0
+    if spoil == 'all idle':
+        w[:, :3] = 0.0
+    values = np.array([0.0, 0.0, 0.0, 0.7, -2.0])
+    torque = w @ values
+    fitted = w[:, :3] @ np.linalg.lstsq(w[:, :3], torque, rcond=None)[0]
+    criterion = RivalCriterion(np.array([1.0, 1.0, 1.0, 0.0, 0.0]), values)
+    cost, gradient = criterion.smooth(w.T @ w)
+    assert cost == pytest.approx(-np.log(np.sum((torque - fitted) ** 2)))
+    assert np.all(np.isfinite(gradient))
+
+
+def test_models_that_no_motion_can_tell_apart_are_refused(two_link, with_effects):
+    arm = with_effects(two_link, 'torque_offset')
+    with pytest.raises(TrajectoryError, match=r'no motion can tell .* torque_offset'):
+        Problem.of(
+            arm, DesignSettings(criterion='T'), np.random.default_rng(0), with_effects(two_link)
+        )
+
+
+def test_rival_needs_criterion_t_and_the_other_way_round(two_link_arm, two_link, with_effects):
+    rng = np.random.default_rng(0)
+    with pytest.raises(TrajectoryError, match="criterion 'T'"):
+        Problem.of(two_link_arm, DesignSettings(), rng, with_effects(two_link))
+    with pytest.raises(TrajectoryError, match='needs a rival'):
+        Problem.of(two_link_arm, DesignSettings(criterion='T'), rng)
+
+
+def test_gravity_target_has_the_gravity_composites_only(humanoid, with_effects):
+    settings = DesignSettings(target='gravity')
+    problem = Problem.of(with_effects(humanoid), settings, np.random.default_rng(0))
+    assert problem.base.rank == 12
+    assert not any(p.name.startswith('I') for p in problem.base.parameters)
+
+
+def test_payload_is_visible_when_the_arm_is_known(humanoid, with_effects):
+    arm = with_effects(humanoid, 'payload')
+    rng = np.random.default_rng(0)
+    assert Problem.of(arm, DesignSettings(target='effects'), rng).base.rank == 10
+    with pytest.raises(TrajectoryError, match=r"payload cannot be told.*target 'effects'"):
+        Problem.of(arm, DesignSettings(focus=('payload',)), rng)
+
+
+def test_unknown_names_are_refused_with_those_that_exist(two_link_arm):
+    for kind, settings in (
+        ('criterion', {'criterion': 'X'}),
+        ('target', {'target': 'X'}),
+    ):
+        with pytest.raises(TrajectoryError, match=f"no {kind} 'X'; there are"):
+            DesignSettings(**settings)
+    with pytest.raises(TrajectoryError, match='it has viscous_friction, coulomb_friction'):
+        Problem.of(two_link_arm, DesignSettings(focus=('backlash',)), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(
+    'settings',
+    [
+        {'period': 0.0},
+        {'harmonics': 0},
+        {'starts': 0},
+        {'clearance': -1.0},
+        {'samples': 30, 'harmonics': 5},
+        {'focus': ('payload',), 'criterion': 'A'},
+    ],
+)
+def test_settings_out_of_range_are_refused(settings):
+    with pytest.raises(TrajectoryError, match=next(iter(settings))):
+        DesignSettings(**settings)
+
+
+def test_information_of_two_recordings_adds_up(two_link_arm):
+    rng = np.random.default_rng(0)
+    problem = Problem.of(two_link_arm, DesignSettings(), rng)
+    motion = random_motion(two_link_arm.robot, 60, rng)
+    whole = problem.information(motion).matrix
+    parts = [problem.information(motion.select(s)).matrix for s in (slice(0, 20), slice(20, 60))]
+    np.testing.assert_allclose(sum(parts), whole, rtol=1e-10, atol=1e-9)
+    repeated = problem.information(motion, n_recorded=180).matrix
+    np.testing.assert_allclose(repeated, 3.0 * whole, rtol=1e-10, atol=1e-9)

@@ -1,0 +1,240 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+import json
+
+from armid_ros.errors import ModelError
+from armid_ros.estimate import ParameterName
+from armid_ros.identification.assess.comparison import compare
+from armid_ros.identification.parameters_file import Parameters, read_parameters
+import numpy as np
+import pytest
+
+SYMBOLS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
+
+
+def parameters(values, std, source='a'):
+    names = [ParameterName(f'Izz{k + 1}', f'joint_{k + 1}', 'kg m^2') for k in range(len(values))]
+    table = {name: (float(v), float(s)) for name, v, s in zip(names, values, std, strict=True)}
+    return Parameters(source, 'arm', table, 5.0)
+
+
+def test_a_list_of_changes_is_free_of_chance_finds_in_19_of_20_cases():
+    rng = np.random.default_rng(0)
+    std = rng.uniform(0.1, 1.0, 50)
+    found = 0
+    for _ in range(400):
+        first, second = (parameters(std * rng.normal(size=50), std) for _ in range(2))
+        found += bool(compare(first, second).changed)
+    assert 0.02 < found / 400 < 0.085
+
+
+def test_a_real_change_is_found_and_sized():
+    before = parameters([1.0, 2.0, 3.0], [0.01, 0.01, 0.01])
+    after = parameters([1.0, 2.2, 3.01], [0.01, 0.02, 0.01])
+    (change,) = compare(before, after).changed
+    assert change.parameter.joint == 'joint_2'
+    assert change.deviations == pytest.approx(0.2 / np.hypot(0.01, 0.02))
+
+
+def test_a_difference_beyond_all_numbers_of_deviations_is_a_change():
+    before = parameters([1.0, 2.0], [1e-320, 1e-320])
+    after = parameters([1e100, 2.0], [1e-320, 1e-320])
+    covariance = np.diag([1e-318, 1e-318])
+    for one, other in (
+        (before, after),
+        (drawn_as(before, covariance), drawn_as(after, covariance)),
+    ):
+        (change,) = compare(one, other).changed
+        assert change.parameter.joint == 'joint_1'
+
+
+def drawn_as(parameters, covariance):
+    """Return parameters with a covariance."""
+    return replace(parameters, covariance=covariance)
+
+
+def test_what_only_one_has_is_listed():
+    comparison = compare(parameters([1.0], [0.1]), parameters([1.0, 2.0], [0.1, 0.1]))
+    assert [name.joint for name in comparison.only_after] == ['joint_2']
+    assert comparison.only_before == ()
+
+
+def correlated(rng, size):
+    """Return a covariance whose parameters are hard to tell apart."""
+    factors = rng.normal(size=(size, size)) * np.logspace(0, -2, size)
+    return factors @ factors.T
+
+
+def drawn(rng, names, truth, covariance, terms=None):
+    """Return an estimate of some parameters with its covariance."""
+    values = rng.multivariate_normal(truth, covariance)
+    std = np.sqrt(np.diag(covariance))
+    table = {n: (float(v), float(s)) for n, v, s in zip(names, values, std, strict=True)}
+    return Parameters('a', 'arm', table, 5.0, covariance, terms or {})
+
+
+FRICTION = [ParameterName(f'coefficient_{k}', 'elbow', 'N m') for k in range(4)]
+LINKS = [ParameterName(f'{s}{k}', f'joint_{k}', 'kg') for k in (1, 2) for s in SYMBOLS]
+
+
+def test_with_covariances_too_19_of_20_lists_are_free_of_chance_finds():
+    rng = np.random.default_rng(0)
+    names = [*FRICTION, *LINKS]
+    covariance = correlated(rng, len(names))
+    truth = np.zeros(len(names))
+    alarms = 0
+    for _ in range(400):
+        alarms += compare(*(drawn(rng, names, truth, covariance) for _ in range(2))).anything
+    assert 0.02 < alarms / 400 < 0.085
+
+
+def test_what_no_parameter_shows_alone_all_of_a_joint_do():
+    """Two coefficients that only their sum is known of, which changes."""
+    covariance = np.array([[1.0, -0.9999], [-0.9999, 1.0]])
+    before, after = (
+        Parameters(source, 'arm', dict.fromkeys(FRICTION[:2], (value, 1.0)), 5.0, covariance)
+        for source, value in (('a', 0.0), ('b', 0.1))
+    )
+    comparison = compare(before, after)
+    assert not comparison.changed
+    (group,) = comparison.changed_together
+    assert group.joint == 'elbow'
+    assert group.p_value < 1e-6
+
+
+def test_a_load_is_found_on_its_link_with_its_mass_and_centre():
+    rng = np.random.default_rng(0)
+    terms = {name: {name.name: 1.0} for name in LINKS}
+    truth = np.zeros(len(LINKS))
+    load = truth.copy()
+    load[10:14] = 0.5, 0.0, 0.05, 0.1
+    covariance = 1e-6 * np.eye(len(LINKS))
+    comparison = compare(
+        drawn(rng, LINKS, truth, covariance, terms), drawn(rng, LINKS, load, covariance, terms)
+    )
+    found = comparison.load
+    assert found.link == 2
+    assert not found.rivals
+    assert abs(found.mass - 0.5) < 4.0 * found.mass_std < 0.01
+    np.testing.assert_allclose(found.center, [0.0, 0.1, 0.2], atol=0.02)
+
+
+def test_a_motion_that_shows_less_is_compared_with_one_that_shows_more():
+    """One that shows a sum only, against one that shows both; and the other way round."""
+    both = [ParameterName(name, 'elbow', 'kg m') for name in ('mx1', 'my1')]
+    together = ParameterName('mx1 + 2 my1', 'elbow', 'kg m')
+    rich = Parameters(
+        'a',
+        'arm',
+        {both[0]: (1.0, 0.1), both[1]: (2.0, 0.1)},
+        5.0,
+        0.01 * np.eye(2),
+        {name: {name.name: 1.0} for name in both},
+    )
+    poor = Parameters(
+        'b',
+        'arm',
+        {together: (7.0, 0.3)},
+        5.0,
+        np.array([[0.09]]),
+        {together: {'mx1': 1, 'my1': 2}},
+    )
+    for pair, sign in (((rich, poor), 1.0), ((poor, rich), -1.0)):
+        (change,) = compare(*pair).changes
+        assert change.parameter == together
+        assert change.difference == pytest.approx(sign * 2.0)
+        assert change.std == pytest.approx(np.sqrt(0.09 + 0.05))
+
+
+def test_a_change_of_two_links_is_no_load():
+    rng = np.random.default_rng(0)
+    terms = {name: {name.name: 1.0} for name in LINKS}
+    covariance = 1e-6 * np.eye(len(LINKS))
+    truth, other = np.zeros(len(LINKS)), np.ones(len(LINKS))
+    comparison = compare(
+        drawn(rng, LINKS, truth, covariance, terms), drawn(rng, LINKS, other, covariance, terms)
+    )
+    assert comparison.changed
+    assert comparison.load is None
+
+
+def test_known_exactly_and_equal_is_no_change():
+    assert compare(parameters([1.0], [0.0]), parameters([1.0], [0.0])).changed == ()
+
+
+class TestRefusals:
+    """What cannot be compared is refused by name."""
+
+    def test_nothing_in_common(self):
+        other = Parameters('b', 'arm', {ParameterName('x', '', 'm'): (0.0, 1.0)}, None)
+        with pytest.raises(ModelError, match='a and b have no identified parameter in common'):
+            compare(parameters([1.0], [0.1]), other)
+
+    def test_an_empty_folder(self, tmp_path):
+        with pytest.raises(ModelError, match=r'neither identification\.json nor model\.yaml'):
+            read_parameters(tmp_path)
+
+    def test_no_file(self, tmp_path):
+        with pytest.raises(ModelError, match='No such file'):
+            read_parameters(tmp_path / 'identification.json')
+
+    def test_another_document(self, tmp_path):
+        path = tmp_path / 'identification.json'
+        path.write_text(json.dumps({'schema': 'other'}))
+        with pytest.raises(ModelError, match='schema'):
+            read_parameters(path)
+
+    def test_a_broken_document(self, tmp_path):
+        path = tmp_path / 'identification.json'
+        path.write_text('{"schema":')
+        with pytest.raises(ModelError, match='neither JSON nor YAML'):
+            read_parameters(path)
+
+    def test_a_covariance_of_another_size(self, tmp_path):
+        path = tmp_path / 'identification.json'
+        rows = [{'name': 'm1', 'joint': 'a', 'value': 1, 'std': 1, 'unit': 'kg'}]
+        document = {'schema': 'armid/identification/1', 'robot': 'x', 'parameters': rows}
+        path.write_text(json.dumps({**document, 'covariance': [[1.0], [0.0, 1.0]]}))
+        with pytest.raises(ModelError, match='no triangle of 1 rows'):
+            read_parameters(path)
+
+    def test_a_row_without_a_name(self, tmp_path):
+        path = tmp_path / 'identification.json'
+        rows = [{'joint': 'a', 'value': 1, 'std': 1, 'unit': ''}]
+        document = {'schema': 'armid/identification/1', 'robot': 'x', 'parameters': rows}
+        path.write_text(json.dumps(document))
+        with pytest.raises(ModelError, match='name'):
+            read_parameters(path)
+
+
+def written(tmp_path, **changes):
+    """Write an identification of one parameter, with some of its numbers changed."""
+    row = {'name': 'Izz1', 'joint': 'a', 'value': 1.0, 'std': 0.1, 'unit': 'kg m^2'}
+    document = {
+        'schema': 'armid/identification/1',
+        'robot': 'arm',
+        'parameters': [{**row, **{k: v for k, v in changes.items() if k in row}}],
+        'covariance': [[changes.get('variance', 0.01)]],
+        'training': {'relative_error_percent': changes.get('error', 5.0)},
+    }
+    (tmp_path / 'identification.json').write_text(json.dumps(document))
+    return tmp_path / 'identification.json'
+
+
+@pytest.mark.parametrize(
+    ('changes', 'message'),
+    [
+        ({'value': float('nan')}, 'Izz1 of joint a has to be a finite number'),
+        ({'value': 10**400}, 'has to be a finite number'),
+        ({'std': float('inf')}, 'the std of Izz1 of joint a has to be a finite number'),
+        ({'std': -0.1}, 'the std of Izz1 of joint a is negative'),
+        ({'variance': -0.01}, 'a negative variance'),
+        ({'variance': float('nan')}, 'not finite'),
+        ({'error': 'x'}, 'relative_error_percent'),
+    ],
+)
+def test_numbers_that_no_estimate_has_are_refused(tmp_path, changes, message):
+    assert read_parameters(written(tmp_path)).std == [0.1]
+    with pytest.raises(ModelError, match=rf'identification.json: .*{message}'):
+        read_parameters(written(tmp_path, **changes))

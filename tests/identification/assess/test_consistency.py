@@ -1,0 +1,62 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+from armid_ros.errors import IdentificationError
+from armid_ros.identification import IdentificationSettings, identify, SignalSettings
+from armid_ros.identification.assess.consistency import check_noise
+import numpy as np
+import pytest
+
+from ..conftest import multisine, recorded
+
+SETTINGS = IdentificationSettings(signals=SignalSettings(20.0, 4))
+
+
+@pytest.fixture(scope='module')
+def motion(arm):
+    return multisine(arm.robot.joints, 15.0, 200.0, seed=1)
+
+
+def checked(arm, structure, motion, torque_noise, position_noise, seed=0):
+    recording = recorded(arm, motion, seed, torque_noise, position_noise)
+    result = identify(structure, [recording], SETTINGS, rng=np.random.default_rng(0))
+    check = check_noise(result, [recording], rng=np.random.default_rng(seed), repeats=3)
+    return result, check
+
+
+def test_without_encoder_noise_the_test_finds_nothing(arm, structure, motion):
+    p_values = [checked(arm, structure, motion, 0.05, 0.0, seed)[1].p_value for seed in range(4)]
+    assert np.median(p_values) > 0.1
+    assert min(p_values) > 1e-3
+
+
+def test_encoder_noise_that_matters_is_found_and_sized(arm, structure, motion):
+    _, check = checked(arm, structure, motion, 0.05, 3e-4)
+    assert not check.consistent
+    assert check.p_value < 1e-6
+    np.testing.assert_allclose(check.position_noise, 3e-4, rtol=0.1)
+    assert np.abs(check.relative_bias).max() > 1.0
+    assert 'a sign that encoder noise' in check.sentences()[0]
+
+
+def test_simulated_bias_is_the_error_of_a_fit_without_torque_noise(arm, structure, motion):
+    result, check = checked(arm, structure, motion, 0.0, 3e-4)
+    error = result.estimate.values - result.base.values(arm.theta)
+    large = np.abs(check.bias) > 5.0 * check.bias_std
+    large &= np.abs(error) > 0.5 * result.estimate.std
+    assert large.sum() >= 5
+    assert 0.75 < np.median(check.bias[large] / error[large]) < 1.35
+
+
+def test_instruments_take_most_of_the_bias_away(arm, structure, motion):
+    result, check = checked(arm, structure, motion, 0.0, 3e-4)
+    truth = result.base.values(arm.theta)
+    weights = 1.0 / result.estimate.std
+    plain = np.linalg.norm(weights * (result.estimate.values - truth))
+    assert np.linalg.norm(weights * (check.instrumental.values - truth)) < 0.5 * plain
+
+
+def test_one_simulation_is_not_enough(arm, structure, motion):
+    recording = recorded(arm, motion, 0, 0.05)
+    result = identify(structure, [recording], SETTINGS, rng=np.random.default_rng(0))
+    with pytest.raises(IdentificationError, match='1 simulations'):
+        check_noise(result, [recording], rng=np.random.default_rng(0), repeats=1)

@@ -1,0 +1,175 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The grade of an identification: what a person would stop at, and nothing else."""
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.identification import grade, identification_document, identify
+from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.recording import read_recording, ReadReport
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+from benchmarks import real_recordings
+
+from ..conftest import FRICTION, multisine, recorded
+
+RATE = 100.0
+
+
+def record(arm, seed, duration=20.0, source='run'):
+    motion = multisine(arm.robot.joints, duration, RATE, seed=seed, base_hz=0.12)
+    return recorded(arm, motion, seed, torque_noise=0.02, source=source)
+
+
+def graded(structure, recordings, held_out=()):
+    result = identify(structure, recordings, rng=np.random.default_rng(0))
+    validation = {recording.source: result.predict([recording]) for recording in held_out}
+    return grade(result, structure, recordings, validation, held_out), result
+
+
+@pytest.fixture(scope='module')
+def run(arm):
+    return record(arm, 1)
+
+
+@pytest.fixture(scope='module')
+def other(arm):
+    return record(arm, 2, source='other')
+
+
+@pytest.fixture(scope='module')
+def sound(structure, run, other):
+    return graded(structure, [run], [other])
+
+
+def test_a_sound_recording_is_good_with_its_held_out_error(sound):
+    found, _ = sound
+    assert found.word == 'good'
+    assert len(found.reasons) == 1
+    assert 'The predicted torque of other, held out, is off by' in found.reasons[0]
+
+
+def test_the_document_has_the_grade_and_the_reasons(sound):
+    found, result = sound
+    document = identification_document(result, 'humanoid_arm', {}, grade=found)
+    assert document['grade'] == 'good'
+    assert document['reasons'] == list(found.reasons)
+
+
+@pytest.mark.parametrize(
+    ('share', 'word'), [(0.0, 'good'), (0.3, 'poor'), (0.8, 'unusable'), (1.59, 'unusable')]
+)
+def test_the_word_follows_the_held_out_error(structure, run, other, sound, share, word):
+    """Torques that no motion explains, as large as a share of the torque."""
+    _, result = sound
+    fits = result.predict([other])
+    rng = np.random.default_rng(0)
+    off = [
+        replace(fit, predicted=fit.predicted + share * rng.permutation(fit.motion.tau))
+        for fit in fits
+    ]
+    found = grade(result, structure, [run], {'other': off}, [other])
+    assert found.word == word
+    error = float(found.reasons[0].split('off by ')[1].split(' %')[0])
+    assert error == pytest.approx(100.0 * share, abs=8.0)
+
+
+def test_one_bad_recording_among_good_ones_is_not_averaged_away(structure, run, other, sound):
+    _, result = sound
+    good = result.predict([other])
+    bad = [replace(fit, predicted=-fit.predicted) for fit in good]
+    found = grade(result, structure, [run], {'a': good, 'b': good, 'c': bad}, [])
+    assert found.word == 'unusable'
+    assert 'of c, held out' in found.reasons[0]
+
+
+def test_without_held_out_data_halves_of_the_recording_judge_each_other(structure, run):
+    found, result = graded(structure, [run])
+    assert found.word == 'good'
+    assert 'No recording was held out' in found.reasons[0]
+    assert result.halves_error < 5.0
+
+
+def test_two_seconds_of_data_are_too_little(arm, structure):
+    """The fit is as close as any; what it is fitted to does not repeat."""
+    found, result = graded(structure, [record(arm, 1, duration=2.0)])
+    assert found.word != 'good'
+    assert 's of this motion do not determine' in found.reasons[0]
+    assert 'record longer' in found.reasons[0]
+    assert result.halves_error > LIMITS.poor
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_recordings_drawn_at_random_are_good(arm, structure, seed):
+    found, _ = graded(structure, [record(arm, 10 + seed, duration=15.0 + 5.0 * seed)])
+    assert found.word == 'good'
+
+
+def test_a_mistake_of_all_recordings_is_said_once(structure, run, other):
+    turned = [replace(part, q=part.q * [1, -1, 1, 1, 1, 1]) for part in (run, other)]
+    found, _ = graded(structure, turned[:1], turned[1:])
+    assert found.word == 'unusable'
+    assert found.reasons[0].startswith('The position of shoulder_roll seems to have the opposite')
+    assert sum('opposite sign' in reason for reason in found.reasons) == 1
+
+
+def test_a_mistake_of_one_recording_names_it(structure, run, other):
+    turned = replace(other, q=other.q * [1, -1, 1, 1, 1, 1])
+    found, _ = graded(structure, [run], [turned])
+    assert found.word == 'unusable'
+    (said,) = (reason for reason in found.reasons if 'opposite sign' in reason)
+    assert said.startswith('In other: the position of shoulder_roll')
+
+
+def test_torques_that_come_late_are_not_good(structure, run):
+    """A free fit takes them for friction and inertia, and is not far off."""
+    late = replace(run, t=run.t[:-10], q=run.q[10:], tau=run.tau[:-10])
+    found, _ = graded(structure, [late])
+    assert found.word == 'poor'
+    assert 'about 100 ms later than the position' in found.reasons[0]
+
+
+def test_currents_for_torques_are_asked_about(structure, run):
+    """A free fit is as good in any unit; it may be the masses of the description."""
+    found, _ = graded(structure, [replace(run, tau=0.1 * run.tau)])
+    assert found.word == 'poor'
+    assert 'seem to be 0.1 times the torque in N m' in found.reasons[0]
+
+
+def test_gravity_of_the_earth_on_a_recording_from_the_moon_is_unusable(arm, structure):
+    moon = replace(arm, robot=arm.robot.with_gravity((0.0, 0.0, -1.62)))
+    found, _ = graded(structure, [record(moon, 1)])
+    assert found.word == 'unusable'
+    assert '--gravity moon' in found.reasons[0]
+
+
+def test_a_clock_that_was_set_back_is_said(structure, run):
+    report = ReadReport(messages=3000, samples=2000, restarted=1000)
+    found, _ = graded(structure, [replace(run, report=report)])
+    assert found.word == 'good'
+    assert any('The clock of run jumped back; 1000 of 3000' in line for line in found.reasons)
+
+
+def test_what_goes_down_gives_out_energy_and_is_no_wrong_sign(arm, structure):
+    """Three seconds in which the arm sinks were refused as torques of the opposite sign."""
+    motion = multisine(arm.robot.joints, 3.0, 200.0, seed=1)
+    found, _ = graded(structure, [recorded(arm, motion, torque_noise=0.02)])
+    assert found.word in ('good', 'poor', 'unusable')
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize('machine', ['emps', 'tx40', 'ur10'])
+def test_real_recordings_are_good(machine, real_data, tmp_path):
+    maker = getattr(real_recordings, machine)
+    data = maker(real_data) if machine == 'ur10' else maker(real_data, tmp_path)
+    robot = load_robot(str(data.robot))
+    structure = ArmModel(robot)
+    for name in FRICTION:
+        structure = structure.with_effect(make_effect(name, robot))
+    recordings = [read_recording(bag, joints=robot.joints) for bag in data.bags]
+    found, _ = graded(structure, recordings[:1], recordings[1:])
+    assert found.word == 'good'

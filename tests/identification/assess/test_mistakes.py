@@ -1,0 +1,252 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Mistakes of recordings are found and named; recordings without any are left in peace."""
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.identification.assess.faulty_samples import faulty_samples
+from armid_ros.identification.assess.hypotheses import hypotheses, known_gravity
+from armid_ros.identification.assess.mistakes import find_mistake
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.recording import read_recording
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+from benchmarks import real_recordings
+
+from ..conftest import FRICTION, multisine, recorded
+
+RATE = 100.0
+
+
+def recording_of(robot, seed, gravity=None, duration=20.0):
+    """Record an arm whose links are up to a fifth lighter or heavier than described."""
+    rng = np.random.default_rng(seed)
+    body = robot if gravity is None else robot.with_gravity(gravity)
+    links = body.rigid_parameters.reshape(-1, 10) * rng.uniform(0.8, 1.2, (robot.n_joints, 1))
+    arm = ArmModel(body.with_inertias(links.ravel()))
+    for name, value in FRICTION.items():
+        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
+    motion = multisine(robot.joints, duration, RATE, seed=100 + seed, base_hz=0.12)
+    exact = recorded(arm, motion)
+    noise = 0.02 * np.sqrt(np.mean(exact.tau**2, axis=0)) * rng.normal(size=exact.tau.shape)
+    return replace(exact, tau=exact.tau + noise)
+
+
+def mistake_in(robot, recording):
+    """Return what is said of a recording; nothing if nothing is."""
+    used = conditioning([recording], SignalSettings())
+    found = find_mistake(robot, recording, used)
+    return '' if found is None else found.sentence(robot)
+
+
+def with_column(values, joint, change):
+    """Change one column."""
+    changed = np.array(values)
+    changed[:, joint] = change(changed[:, joint])
+    return changed
+
+
+def exchanged(values, first, second):
+    """Exchange two columns."""
+    order = np.arange(values.shape[1])
+    order[[first, second]] = second, first
+    return values[:, order]
+
+
+def late(recording, samples):
+    """Report every torque some samples after its position; before it, if negative."""
+    count = len(recording.t) - abs(samples)
+    early, after = slice(0, count), slice(abs(samples), None)
+    positions, torques = (after, early) if samples > 0 else (early, after)
+    q, tau = recording.q[positions], recording.tau[torques]
+    return replace(recording, t=recording.t[:count], q=q, dq=None, tau=tau)
+
+
+@pytest.fixture(scope='module')
+def robot():
+    return load_robot('humanoid_arm')
+
+
+@pytest.fixture(scope='module')
+def sound(robot):
+    return recording_of(robot, 1)
+
+
+def test_a_sound_recording_has_no_mistake(robot, sound):
+    assert mistake_in(robot, sound) == ''
+
+
+@pytest.mark.parametrize('name', ['humanoid_arm', 'ur10', 'panda'])
+@pytest.mark.parametrize('seed', range(4))
+def test_recordings_of_arms_drawn_at_random_have_none(name, seed):
+    paths = {
+        'ur10': 'ur_description/urdf/ur10_robot.urdf',
+        'panda': 'panda_description/urdf/panda.urdf',
+    }
+    source = str(real_recordings.example_robot(paths[name])) if name in paths else name
+    robot = load_robot(source)
+    assert mistake_in(robot, recording_of(robot, seed)) == ''
+
+
+@pytest.mark.parametrize('joint', [0, 1, 2, 3])
+def test_a_position_of_the_opposite_sign(robot, sound, joint):
+    turned = replace(sound, q=with_column(sound.q, joint, np.negative))
+    expected = f'the position of {robot.joints[joint]} seems to have the opposite sign'
+    assert expected in mistake_in(robot, turned)
+
+
+@pytest.mark.parametrize('joint', [0, 1, 2, 3])
+def test_an_axis_that_points_the_other_way(robot, sound, joint):
+    turned = replace(
+        sound,
+        q=with_column(sound.q, joint, np.negative),
+        tau=with_column(sound.tau, joint, np.negative),
+    )
+    expected = f'position and torque of {robot.joints[joint]} seem to have the opposite sign'
+    assert expected in mistake_in(robot, turned)
+
+
+@pytest.mark.parametrize('joint', [0, 1, 2, 3])
+@pytest.mark.parametrize('degrees', [-90.0, 90.0, 180.0])
+def test_a_zero_that_is_off(robot, sound, joint, degrees):
+    off = replace(sound, q=with_column(sound.q, joint, lambda q: q + np.deg2rad(degrees)))
+    said = mistake_in(robot, off)
+    assert f'the zero of {robot.joints[joint]} seems to be off by about {degrees:.0f} ' in said
+
+
+@pytest.mark.parametrize('pair', [(0, 1), (1, 2), (2, 3), (0, 3)])
+@pytest.mark.parametrize('what', ['position and torque', 'position'])
+def test_exchanged_joints(robot, sound, pair, what):
+    tau = exchanged(sound.tau, *pair) if 'torque' in what else sound.tau
+    mixed = replace(sound, q=exchanged(sound.q, *pair), tau=tau)
+    first, second = (robot.joints[joint] for joint in pair)
+    expected = f'the {what} of {first} and of {second} seem to be exchanged'
+    assert expected in mistake_in(robot, mixed)
+
+
+@pytest.mark.parametrize('milliseconds', [100, -100, 200])
+def test_torque_that_comes_late_or_early(robot, sound, milliseconds):
+    said = mistake_in(robot, late(sound, round(1e-3 * milliseconds * RATE)))
+    side = 'later' if milliseconds > 0 else 'earlier'
+    assert f'about {abs(milliseconds)} ms {side} than the position' in said
+
+
+@pytest.mark.parametrize('factor', [0.08, 0.3, 5.0])
+def test_currents_for_torques(robot, sound, factor):
+    said = mistake_in(robot, replace(sound, tau=factor * sound.tau))
+    assert 'the efforts of all joints seem to be' in said
+    stated = float(said.split('seem to be ')[1].split()[0])
+    assert stated == pytest.approx(factor, rel=0.2)
+
+
+def test_degrees(robot, sound):
+    assert 'in degrees' in mistake_in(robot, replace(sound, q=np.rad2deg(sound.q)))
+
+
+def test_gravity_of_the_earth_on_a_recording_from_the_moon(robot):
+    said = mistake_in(robot, recording_of(robot, 1, (0.0, 0.0, -1.62)))
+    assert '--gravity moon' in said
+
+
+@pytest.mark.parametrize(
+    'vector', [(9.81, 0.0, 0.0), (-9.81, 0.0, 0.0), (0.0, 9.81, 0.0), (0.0, 0.0, 9.81)]
+)
+def test_gravity_along_another_axis(robot, vector):
+    """Where the first axis is level, its zero being off by a quarter turn looks the same."""
+    said = mistake_in(robot, recording_of(robot, 1, vector))
+    assert '--gravity ' + ','.join(f'{part:g}' for part in vector) in said
+    direction = ', '.join(f'{part / 9.81:g}' for part in vector)
+    assert f'along ({direction}) of the base' in said
+
+
+def test_one_torque_out_of_all_proportion(robot, sound):
+    tau = np.array(sound.tau)
+    tau[700, 2] = 1e6
+    said = mistake_in(robot, replace(sound, tau=tau))
+    assert said.startswith('the torque of upper_arm_yaw is 1e+06 at 7.000 s')
+
+
+def test_a_position_that_jumps_by_a_turn(robot, sound):
+    q = np.array(sound.q)
+    q[700:720, 1] += 2.0 * np.pi
+    said = mistake_in(robot, replace(sound, q=q))
+    assert said.startswith('the position of shoulder_roll jumps by 6.2')
+
+
+def test_reversals_of_friction_are_no_faulty_samples(sound):
+    assert faulty_samples(sound) is None
+
+
+def test_a_description_without_masses_does_not_hide_an_opposite_sign(robot, sound):
+    """The body is fitted where every link is said to weigh a kilogram in its joint."""
+    link = np.array([1.0, 0.0, 0.0, 0.0, 1e-3, 0.0, 1e-3, 0.0, 0.0, 1e-3])
+    nominal = robot.with_inertias(np.tile(link, robot.n_joints))
+    turned = replace(sound, q=with_column(sound.q, 1, np.negative))
+    assert 'unless it is the masses of the description' in mistake_in(nominal, sound)
+    said = mistake_in(nominal, turned)
+    assert 'the position of shoulder_roll seems to have the opposite sign' in said
+    assert 'the arm as fitted' in said
+
+
+def test_every_hypothesis_has_a_sentence_with_its_joints(robot):
+    for one in hypotheses(robot):
+        said = one.settled(np.ones(3)).sentence(robot)
+        places = (getattr(one, name, None) for name in ('joint', 'first', 'second'))
+        named = [robot.joints[place] for place in places if place is not None]
+        assert 'seem' in said and all(name in said for name in named)
+
+
+@pytest.mark.parametrize(
+    ('found', 'told', 'option'),
+    [
+        ((0.1, -0.2, -1.7), (0.0, 0.0, -9.81), 'moon'),
+        ((10.7, -0.9, -0.2), (0.0, 0.0, -9.81), '9.81,0,0'),
+        ((0.0, 0.0, 9.7), (0.0, 0.0, -9.81), '0,0,9.81'),
+        ((0.0, 0.0, -3.7), (0.0, 0.0, -9.81), '0,0,-3.7'),
+    ],
+)
+def test_a_gravity_that_was_found_is_written_as_a_person_would(found, told, option):
+    assert known_gravity(np.array(found), np.array(told))[1] == option
+
+
+class TestRealRecordings:
+    """Real machines have friction, noise and loads that no description has."""
+
+    pytestmark = pytest.mark.real_data
+
+    @pytest.fixture
+    def machine(self, request, real_data, tmp_path):
+        maker = getattr(real_recordings, request.param)
+        found = maker(real_data) if request.param == 'ur10' else maker(real_data, tmp_path)
+        robot = load_robot(str(found.robot))
+        return robot, [read_recording(bag, joints=robot.joints) for bag in found.bags]
+
+    @pytest.mark.parametrize('machine', ['emps', 'tx40', 'ur10'], indirect=True)
+    def test_none_has_a_mistake(self, machine):
+        robot, recordings = machine
+        assert [mistake_in(robot, recording) for recording in recordings] == [''] * len(recordings)
+
+    @pytest.mark.parametrize('machine', ['tx40', 'ur10'], indirect=True)
+    def test_mistakes_made_of_them_are_found(self, machine):
+        robot, (sound,) = machine
+        second, third = robot.joints[1:3]
+        tenth = round(0.1 / sound.period)
+        for changed, expected in (
+            (replace(sound, q=with_column(sound.q, 1, np.negative)), f'position of {second} '),
+            (
+                replace(sound, q=with_column(sound.q, 2, lambda q: q + np.pi / 2)),
+                f'zero of {third} seems to be off by about 90 ',
+            ),
+            (
+                replace(sound, q=exchanged(sound.q, 1, 2), tau=exchanged(sound.tau, 1, 2)),
+                f'position and torque of {second} and of {third} ',
+            ),
+            (replace(sound, tau=0.1 * sound.tau), 'efforts of all joints'),
+            (late(sound, tenth), ' ms later than the position'),
+        ):
+            assert expected in mistake_in(robot, changed)
+        assert '--gravity earth' in mistake_in(robot.with_gravity((9.81, 0.0, 0.0)), sound)

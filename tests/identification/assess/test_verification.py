@@ -1,0 +1,66 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+from armid_ros.arm import ArmModel
+from armid_ros.identification import IdentificationSettings, identify, PhysicalSettings, verify
+import numpy as np
+import pytest
+
+from ..conftest import multisine, recorded
+
+
+@pytest.fixture(scope='module')
+def recordings(arm):
+    """Return training and held-out data."""
+    motions = [
+        multisine(arm.robot.joints, seconds, 200.0, seed) for seconds, seed in ((15, 1), (5, 2))
+    ]
+    return [
+        recorded(arm, motion, seed, 0.02, 1e-5, name)
+        for motion, seed, name in zip(motions, (1, 2), ('train', 'held_out'), strict=True)
+    ]
+
+
+@pytest.fixture(scope='module')
+def result(structure, recordings):
+    settings = IdentificationSettings(physical=PhysicalSettings())
+    return identify(structure, recordings[:1], settings, rng=np.random.default_rng(0))
+
+
+def verified(result, description, recordings, held_out):
+    return verify(result, description, recordings, held_out, rng=np.random.default_rng(0))
+
+
+def test_identified_arm_moves_more_like_the_recorded_one_than_the_description(
+    result, structure, recordings
+):
+    found = verified(result, structure, recordings[:1], recordings[1:])
+    (pair,) = found.forward
+    assert np.all(pair.after.position_error < 0.2 * pair.before.position_error)
+    assert np.all(pair.after.torque_error < pair.before.torque_error)
+    assert found.noise.harmless
+    assert not found.left_out
+    assert any('mrad' in sentence and 'held_out' in sentence for sentence in found.sentences())
+
+
+def test_progress_reaches_the_end_of_each_part(result, structure, recordings):
+    told = []
+    verify(
+        result,
+        structure,
+        recordings[:1],
+        (),
+        rng=np.random.default_rng(0),
+        progress=lambda share, what: told.append((share, what)),
+    )
+    assert told[-1] == (1.0, 'testing for encoder noise')
+
+
+def test_what_is_not_done_is_said(result, recordings):
+    bare = ArmModel(result.arm.robot.with_inertias(0.0 * result.arm.robot.rigid_parameters))
+    assert verified(result, bare, recordings[:1], ()).left_out == (
+        'not simulated: no recording was held out',
+    )
+    found = verified(result, bare, recordings[:1], recordings[1:])
+    assert found.forward[0].before is None
+    assert 'the description is not simulated' in found.left_out[0]
+    assert found.forward[0].document()['before'] is None

@@ -1,0 +1,43 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Torques tell which part of a position is motion."""
+
+from dataclasses import replace
+
+from armid_ros.identification.fitting.cutoff import cutoff_of_torques
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
+import numpy as np
+from scipy import signal
+
+from ..conftest import multisine, recorded
+
+
+def recordings(arm, shake=0.0):
+    """Return motion whose positions shake at 8 to 15 Hz, which no torque makes [rad]."""
+    made = []
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        motion = multisine(arm.robot.joints, 20.0, 200.0, seed)
+        recording = recorded(arm, motion, seed, torque_noise=0.02)
+        band = signal.butter(2, (8.0, 15.0), 'band', fs=1.0 / recording.period, output='sos')
+        slack = signal.sosfiltfilt(band, rng.normal(size=recording.q.shape), axis=0)
+        made.append(replace(recording, q=recording.q + shake * slack / slack.std()))
+    return made
+
+
+def chosen(arm, data):
+    """Return the cut-off that spectra ask for, and the one that torques ask for [Hz]."""
+    used = conditioning(data, SignalSettings())
+    columns = arm.base_parameters(np.random.default_rng(0)).independent
+    return used.cutoff_hz, cutoff_of_torques(arm, columns, data, used).cutoff_hz
+
+
+def test_clean_data_keep_the_cutoff_of_their_spectra(arm):
+    spectra, torques = chosen(arm, recordings(arm))
+    assert torques == spectra
+
+
+def test_what_no_torque_makes_is_cut_off(arm):
+    spectra, torques = chosen(arm, recordings(arm, shake=1e-3))
+    assert spectra > 15.0
+    assert torques < 15.0

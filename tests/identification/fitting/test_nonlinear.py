@@ -1,0 +1,166 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every effect of the catalogue, alone and in pairs, is fitted as the arm has it."""
+
+from itertools import pairwise
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import CATALOGUE, make_effect
+from armid_ros.identification import (
+    IdentificationSettings,
+    identify,
+    PhysicalSettings,
+    Score,
+    SignalSettings,
+)
+from armid_ros.identification.assess.consistency import check_noise
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+from ..conftest import multisine, recorded
+
+NOISE = 0.002
+#: Sizes that are far from zero where the typical ones would not do.
+SIZES = {'link_inertia': 0.02, 'payload': 0.05, 'interface_slack': 300.0, 'soft_limit': 20.0}
+#: Effects that change the columns of others.
+NONLINEAR = (
+    'load_dependent_friction torque_gain torque_crosstalk torque_lag time_delay encoder_offset '
+    'gravity_magnitude base_tilt joint_elasticity backlash'
+).split()
+_ORDER = np.random.default_rng(0).permutation(list(CATALOGUE)).tolist()
+#: Every effect with two others.
+PAIRS = list(pairwise([*_ORDER, _ORDER[0]]))
+
+
+@pytest.fixture(scope='module')
+def robot():
+    return load_robot('humanoid_arm')
+
+
+def with_sizes(robot, names, seed):
+    """Return an arm that is 10 % heavier than described, with effects as large as is typical."""
+    rng = np.random.default_rng(seed)
+    arm = ArmModel(robot.with_inertias(1.1 * robot.rigid_parameters))
+    for name in dict.fromkeys(['viscous_friction', *names]):
+        effect = make_effect(name, robot)
+        if name == 'presliding_hysteresis':  # what it was bent by before is soon forgotten
+            effect = effect.with_shape(0.001)
+        typical = [np.sqrt(np.prod(q.typical)) if q.typical else 0.1 for q in effect.quantities]
+        size = np.resize(SIZES.get(name, typical), len(effect.parameters(robot)))
+        lower = np.resize([q.lower for q in effect.quantities], len(size))
+        if name == 'actuator_saturation':  # a report that is clipped is not what was asked for
+            size[1::2] = 0.0
+        sign = np.where(lower < 0.0, rng.choice([-1.0, 1.0], len(size)), 1.0)
+        arm = arm.with_effect(effect, sign * size * rng.uniform(0.7, 1.3, len(size)))
+    return arm
+
+
+def fitted(robot, names, seed=0, **settings):
+    """Return the true arm, what was recorded of it, and its identification."""
+    truth = with_sizes(robot, names, seed)
+    recording = recorded(truth, multisine(robot.joints, 12.0, 200.0, seed=1), seed, NOISE)
+    structure = ArmModel(robot, truth.effects)
+    asked = IdentificationSettings(**settings)
+    result = identify(structure, [recording], asked, rng=np.random.default_rng(0))
+    return truth, recording, result
+
+
+def error(fits):
+    return Score.of(fits).relative_error_percent
+
+
+def agrees(robot, names, seed=0):
+    """Check the prediction of the training data, and the truth along another motion."""
+    truth, recording, result = fitted(robot, names, seed)
+    training = error(result.training)
+    assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
+    np.testing.assert_allclose(
+        result.joint_std, NOISE * np.linalg.norm(result.used.taps()), rtol=0.3
+    )
+    other = recorded(truth, multisine(robot.joints, 6.0, 200.0, seed=7))
+    assert error(result.predict([other])) < 1.0
+    return truth, result
+
+
+@pytest.mark.parametrize('name', CATALOGUE)
+def test_the_training_data_given_again_have_the_training_error_and_the_truth_comes_back(
+    robot, name
+):
+    truth, result = agrees(robot, [name])
+    there = truth.base_parameters(np.random.default_rng(0))
+    own = {
+        p for p, row in zip(there.parameters, there.grouping, strict=True) if sum(row != 0) == 1
+    }
+    alone = [parameter in own for parameter in result.base.parameters]
+    off = (result.estimate.values - result.base.values(truth.theta)) / result.estimate.std
+    assert np.abs(off[alone]).max(initial=0.0) < 5.0
+    assert (result.passes > 1) == (name in NONLINEAR)
+
+
+@pytest.mark.parametrize('pair', PAIRS, ids='+'.join)
+def test_pairs_too(robot, pair):
+    agrees(robot, pair, seed=1)
+
+
+@pytest.mark.parametrize('name', ['load_dependent_friction', 'torque_gain'])
+def test_bodies_are_fitted_to_what_the_torque_is(robot, name):
+    _, recording, result = fitted(robot, [name], physical=PhysicalSettings(weights=(1e-5, 1e-3)))
+    training = error(result.training)
+    assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
+    np.testing.assert_allclose(
+        result.joint_std, NOISE * np.linalg.norm(result.used.taps()), rtol=0.3
+    )
+    assert result.physical is not None
+    assert min(link.eigenvalues[0] for link in result.physical.links) > 0.0
+
+
+def test_what_is_known_of_a_nonlinear_effect_is_where_the_fit_begins(robot):
+    """An arm that has the values already is at its own torque, not at that of its columns."""
+    truth, recording, _ = fitted(robot, ['torque_gain', 'encoder_offset'])
+    result = identify(truth, [recording], rng=np.random.default_rng(0))
+    training = error(result.training)
+    assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
+    np.testing.assert_allclose(
+        result.joint_std, NOISE * np.linalg.norm(result.used.taps()), rtol=0.3
+    )
+
+
+def test_the_check_for_encoder_noise_is_about_the_identified_arm(robot):
+    """Exact positions: neither a bias, nor a difference to the fit with instruments."""
+    _, recording, result = fitted(robot, ['encoder_offset', 'load_dependent_friction'])
+    check = check_noise(result, [recording], rng=np.random.default_rng(1), repeats=2)
+    assert check.p_value > 1e-3
+    assert check.harmless
+
+
+def test_a_fit_that_does_not_settle_says_so(robot, monkeypatch):
+    monkeypatch.setattr('armid_ros.identification.fitting.nonlinear.MOST_PASSES', 1)
+    _, recording, result = fitted(robot, ['torque_gain'])
+    assert any('has not settled' in note for note in result.notes)
+    training = error(result.training)
+    assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
+
+
+def test_chunks_of_a_long_stretch_join(robot):
+    """The torque is taken in parts of a long stretch, which an encoder zero makes overlap."""
+    truth = with_sizes(robot, ['encoder_offset', 'torque_gain'], 0)
+    recording = recorded(truth, multisine(robot.joints, 45.0, 500.0, seed=1))
+    signals = SignalSettings(cutoff_hz=20.0, decimation=25)
+    result = identify(
+        ArmModel(robot, truth.effects),
+        [recording],
+        IdentificationSettings(signals=signals),
+        rng=np.random.default_rng(0),
+    )
+    assert error(result.training) < 1e-3
+
+
+def test_what_the_described_torque_never_reaches_is_found_where_the_fitted_one_does(robot):
+    """Springs that the description does not know of take drives beyond their level."""
+    truth, _, result = fitted(robot, ['actuator_saturation', 'joint_spring'], seed=1)
+    levels = np.array(truth.effects[1].shape)
+    assert np.any(np.abs(result.training[0].motion.tau).max(axis=0) > levels)
+    np.testing.assert_allclose(
+        result.joint_std, NOISE * np.linalg.norm(result.used.taps()), rtol=0.3
+    )

@@ -1,0 +1,228 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Changes of an arm at work: seen soon, named, and nothing else forgotten."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.estimate import ParameterName
+from armid_ros.identification.online.change import Candidate, change_candidates
+from armid_ros.identification.online.change_evidence import Block, evidence
+from armid_ros.identification.online.change_watch import ChangeWatch
+from armid_ros.identification.online.recursive import RecursiveLeastSquares
+from armid_ros.identification.online.usual_size import UsualSize, Weighed
+import numpy as np
+import pytest
+from scipy import stats
+
+from benchmarks import changes
+from benchmarks.change_information import Noise, visibility
+from tests.identification.conftest import multisine
+
+NAMES = tuple(ParameterName(f'p{k}', '', '') for k in range(5))
+TRUTH = np.array([1.0, -2.0, 0.5, 3.0, 0.0])
+CHANGED = np.array([[0.0], [0.0], [1.0], [0.0], [0.5]])
+
+
+def learned_and_block(
+    rng, delta: float, seen: int = 4
+) -> tuple[RecursiveLeastSquares, Block, np.ndarray, np.ndarray]:
+    """Learn from 400 rows of `seen` parameters, then take in 60 rows after a change."""
+    estimator = RecursiveLeastSquares(NAMES, [1.0])
+    rows = rng.normal(size=(400, 5)) * (np.arange(5) < seen)
+    for row in rows:
+        estimator.update(row[np.newaxis], np.atleast_1d(row @ TRUTH + rng.normal()))
+    w = rng.normal(size=(60, 5))
+    tau = w @ (TRUTH + delta * CHANGED[:, 0]) + rng.normal(size=60)
+    known = estimator.learned()
+    block = Block(0.0, 1.0, w.T @ w, w.T @ tau, known, known, ())
+    return estimator, block, w, tau
+
+
+def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows():
+    """Before and after in one problem, with a column for the change: the same answer."""
+    rng = np.random.default_rng(0)
+    _, block, w, tau = learned_and_block(rng, 0.7, seen=5)
+    found, covariance = evidence([block], block.before, CHANGED).size(slice(0, 1))
+    top = np.hstack([block.before.root, np.zeros((5, 1))])
+    both = np.vstack([top, np.hstack([w, w @ CHANGED])])
+    aim = np.concatenate([block.before.root @ block.before.values, tau])
+    expected = np.linalg.lstsq(both, aim, rcond=None)[0][-1]
+    assert found[0] == pytest.approx(expected, rel=1e-6)
+    assert covariance[0, 0] == pytest.approx(np.linalg.inv(both.T @ both)[-1, -1], rel=1e-6)
+
+
+def test_what_was_learned_in_another_unit_of_noise_is_as_certain():
+    rng = np.random.default_rng(6)
+    _, block, w, tau = learned_and_block(rng, 0.7, seen=5)
+    loud = replace(block, information=w.T @ w / 9.0, right=w.T @ tau / 9.0)
+    found, covariance = evidence([loud], block.before, CHANGED, 3.0).size(slice(0, 1))
+    expected, certain = evidence([block], block.before, CHANGED).size(slice(0, 1))
+    assert found[0] == pytest.approx(expected[0], rel=1e-6)
+    assert covariance[0, 0] == pytest.approx(9.0 * certain[0, 0], rel=1e-6)
+
+
+def test_without_a_change_the_ratio_is_chi_square():
+    rng = np.random.default_rng(1)
+    ratios = []
+    for _ in range(150):
+        _, block, _, _ = learned_and_block(rng, 0.0, seen=5)
+        ratios.append(evidence([block], block.before, CHANGED).ratio(slice(0, 1)))
+    assert stats.kstest(ratios, stats.chi2(1).cdf).pvalue > 1e-3
+
+
+def test_what_was_never_known_cannot_be_seen_to_change():
+    rng = np.random.default_rng(2)
+    _, block, _, _ = learned_and_block(rng, 5.0)
+    unknown = np.eye(5)[:, [4]]
+    assert evidence([block], block.before, unknown).ratio(slice(0, 1)) < 1e-3
+
+
+def test_reopening_forgets_one_direction_and_nothing_else():
+    rng = np.random.default_rng(3)
+    estimator, _, _, _ = learned_and_block(rng, 0.0, seen=5)
+    before, root = estimator.values, estimator.learned().root
+    information = root.T @ root
+    estimator.reopen(CHANGED)
+    np.testing.assert_allclose(estimator.values, before, rtol=1e-6)
+    after = estimator.learned().root.T @ estimator.learned().root
+    unit = CHANGED / np.linalg.norm(CHANGED)
+    assert (unit.T @ after @ unit).item() < 1e-6
+    lost = information @ unit
+    np.testing.assert_allclose(
+        after, information - lost @ lost.T / (unit.T @ lost), atol=1e-6 * information.max()
+    )
+
+
+def test_a_statistic_that_is_usually_large_is_not_surprising():
+    rng = np.random.default_rng(4)
+    usual, strength = UsualSize([1, 3], 1, 2), np.ones(4)
+    for _ in range(400):
+        usual.learn(Weighed(100.0 * np.array([rng.chisquare(1), rng.chisquare(3)]), strength))
+    np.testing.assert_allclose(usual.factors, 100.0, rtol=0.3)
+    assert np.all(usual.excess(Weighed(np.array([2000.0, 2500.0]), strength), 1e-8) < 1.0)
+    large = np.array([8000.0, 9000.0])
+    assert np.all(usual.excess(Weighed(large, strength), 1e-8) > 1.0)
+    assert np.all(usual.excess(Weighed(large, 9.0 * strength), 1e-8) < 1.0)  # a faster motion
+
+
+def test_candidates_are_every_effect_the_friction_of_a_joint_and_a_load():
+    online = changes.watch(iter(()))
+    found = change_candidates(online.arm, online.base)
+    names = {(c.name, c.joint) for c in found}
+    assert ('payload', 'wrist_pitch') in names and ('friction', 'elbow_pitch') in names
+    assert ('torque_offset', 'shoulder_roll') in names
+    payload = next(c for c in found if c.name == 'payload')
+    assert payload.parameters[0].name == 'payload_m'
+    np.testing.assert_allclose(
+        payload.directions[:, 0],
+        online.base.values(
+            np.eye(len(online.arm.theta))[[p.name for p in online.arm.parameters].index('m6')]
+        ),
+    )
+
+
+#: The simulation of the benchmark, at a rate that takes a fifth of its time [Hz].
+RATE = 200.0
+
+
+@pytest.mark.parametrize(
+    ('change', 'before', 'name', 'truth'),
+    [
+        ('payload:' + changes.ball(0.3), 30.0, 'payload', 0.3),
+        ('coulomb_friction@shoulder_pitch:coulomb_torque=0.1', 30.0, 'coulomb_friction', 0.1),
+        ('coulomb_friction@elbow_pitch:coulomb_torque=0.08', 60.0, 'coulomb_friction', 0.08),
+    ],
+)
+def test_a_change_in_mid_motion_is_seen_and_nothing_else_forgotten(change, before, name, truth):
+    seen_at, known = None, None
+    online = changes.watch(iter(()))
+    for t, q, tau in changes.changing(change, 0, before, 3.0, RATE):
+        online.update(t, q, None, tau)
+        if known is None and t >= before:
+            known = online.estimate()
+        if seen_at is None and online.changes:
+            seen_at = t
+    (found,) = online.changes
+    assert before < seen_at < before + changes.WANTED
+    assert abs(found.t - before) < 0.5
+    assert found.candidate.name == name
+    lower, upper = found.size.interval(0.999)[0]
+    assert 0.0 < lower < truth < upper
+    still = online.estimate()
+    others = [
+        k
+        for k, p in enumerate(known.parameters)
+        if p.name == 'viscous_coefficient' and p.joint != found.candidate.joint
+    ]
+    assert np.all(still.std[others] < 1.5 * known.std[others])
+    moved = np.abs(still.values[others] - known.values[others])
+    assert np.all(moved < 4.0 * known.std[others])
+
+
+def test_work_without_a_change_raises_no_alarm():
+    assert not changes.watch(changes.unchanging(2, 1, RATE)).changes
+
+
+def test_a_motion_without_noise_raises_no_alarm(arm):
+    """What filtering leaves of it is anything but normal: nothing, and much at reversals."""
+    motion = multisine(arm.robot.joints, 20.0, 250.0, seed=0)
+    online = changes.watch(zip(motion.t, motion.q, arm.torque(motion), strict=True))
+    assert not online.changes
+
+
+def test_the_best_test_sees_a_step_in_white_noise_when_theory_says():
+    """Means of 0.1 s at 1 kHz: d^2 t / (sigma^2 T) reaches the square of the quantile."""
+    noise, step = Noise(0.1, 0.0, 0.0), np.full((3000, 1), 0.01)
+    chance = 1e-6
+    needed = stats.norm.isf(chance) ** 2
+    seconds = needed * 0.1**2 * 1e-3 / 0.01**2
+    can = visibility(step, 1e-3, noise, 2.0, chance)
+    assert seconds <= can.delay < seconds + 0.1 + 1e-9
+    assert can.smallest == pytest.approx(np.sqrt(seconds / 2.0), rel=1e-6)
+
+
+def test_noise_that_lasts_hides_a_step_better():
+    step = np.full((3000, 1), 0.05)
+    white, lasting = Noise(0.05, 0.0, 0.0), Noise(0.0, 0.05, 0.98)
+    shares = [visibility(step, 1e-3, n, 2.0, 1e-6).smallest for n in (white, lasting)]
+    # its spectrum at zero is (1 + keep) / (1 - keep) times that of white noise
+    assert shares[1] / shares[0] == pytest.approx(np.sqrt(1.98 / 0.02), rel=0.1)
+
+
+def test_a_statistic_with_rare_large_values_is_judged_by_those():
+    """One joint in the six has a spike in one window of thirty."""
+    rng = np.random.default_rng(5)
+    plain, spiky, strength = UsualSize([1] * 6, 2, 6), UsualSize([1] * 6, 2, 6), np.ones(6)
+    for k in range(600):
+        ratios = rng.chisquare(1, 6)
+        plain.learn(Weighed(ratios, strength))
+        spike = 30.0 * (k % 30 == 0) * (np.arange(6) == k // 30 % 6)
+        spiky.learn(Weighed(ratios + spike, strength))
+    large = Weighed(np.full(6, 65.0), strength)
+    assert np.all(plain.excess(large, 1e-8) > 1.0)
+    assert np.all(spiky.excess(large, 1e-8) < plain.excess(large, 1e-8))
+
+
+def test_a_window_that_the_model_fits_worse_than_usual_says_less_of_the_size():
+    """The same change, and noise three times as loud from then on."""
+    rng, truth = np.random.default_rng(7), np.array([1.0, -2.0, 0.5])
+    parameters = tuple(ParameterName(f'p{k}', '', '') for k in range(3))
+    step = np.array([[0.0], [0.0], [1.0]])
+    candidate = Candidate('payload', 'hand', parameters[2:], step, step)
+    widths = []
+    rows, noise = rng.normal(size=(6000, 4, 3)), rng.normal(size=(6000, 4))
+    for louder in (1.0, 3.0):
+        watch = ChangeWatch(RecursiveLeastSquares(parameters, np.ones(4)), (), [candidate])
+        for k in range(6000):
+            after = k >= 5000
+            now = truth + 5.0 * after * step[:, 0]
+            tau = rows[k] @ now + noise[k] * (louder if after else 1.0)
+            watch.update(0.005 * k, rows[k], tau, np.ones(4))
+        (change,) = watch.changes
+        assert change.t == pytest.approx(25.0, abs=0.26)
+        lower, upper = change.size.interval()[0]
+        assert lower < 5.0 < upper
+        widths.append(upper - lower)
+    assert 2.0 < widths[1] / widths[0] < 4.0  # one window may be a block longer

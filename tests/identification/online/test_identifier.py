@@ -1,0 +1,353 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import IdentificationError, RecordingError
+from armid_ros.identification import identify, Score
+from armid_ros.identification.identify import Fit
+from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
+from armid_ros.identification.rows.causal import MOTION_FILTER_RATIO
+from armid_ros.identification.rows.regression import regressions
+from armid_ros.identification.samples.joint_order import JointOrder
+from armid_ros.motion import Motion
+from armid_ros.recording import read_recording
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+import scipy.stats
+
+from benchmarks import real_recordings
+
+PENDULUM = """<robot name="pendulum">
+  <link name="base"/>
+  <link name="bob">
+    <inertial>
+      <origin xyz="0 0 -0.3"/><mass value="2"/>
+      <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/>
+    </inertial>
+  </link>
+  <joint name="hinge" type="continuous">
+    <parent link="base"/><child link="bob"/><axis xyz="0 1 0"/>
+  </joint>
+</robot>
+"""
+NOISE = 0.02
+SETTINGS = OnlineSettings(torque_noise=(NOISE,) * 6)
+
+
+def multisine(robot, duration, seed=0, rate=500.0):
+    """Return three harmonics per joint, up to 1.5 rad/s and 6 rad/s^2."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(duration * rate)) / rate
+    w = 2.0 * np.pi * np.array([0.1, 0.3, 0.7])[:, None, None]
+    size = np.array([0.5, 0.3, 0.15])[:, None, None]
+    phase = w * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, (3, 1, robot.n_joints))
+    q, dq, ddq = np.sin(phase), w * np.cos(phase), -w * w * np.sin(phase)
+    return Motion(robot.joints, t, *((size * x).sum(axis=0) for x in (q, dq, ddq)))
+
+
+def identifier(arm, settings=SETTINGS):
+    """Return an identifier that knows the kinematics but none of the values."""
+    nothing = replace(arm, values=())
+    return OnlineIdentifier(nothing, settings, rng=np.random.default_rng(0))
+
+
+def feed(online, t, q, tau):
+    samples = (online.update(a, b, None, c) for a, b, c in zip(t, q, tau, strict=True))
+    return [sample for sample in samples if sample is not None]
+
+
+def torque_error(arm, online, motion):
+    """Return the error of predicted torques on true motion, relative, all joints."""
+    columns = arm.columns(motion.select(slice(0, None, 50)))[:, :, online.base.independent]
+    truth = columns @ online.base.values(arm.theta)
+    return np.linalg.norm(columns @ online.estimate().values - truth) / np.linalg.norm(truth)
+
+
+@pytest.fixture(scope='module')
+def motion(arm):
+    return multisine(arm.robot, 20.0)
+
+
+@pytest.fixture(scope='module')
+def tau(arm, motion):
+    return arm.torque(motion)
+
+
+@pytest.fixture(scope='module')
+def clean(arm, motion, tau):
+    online = identifier(arm)
+    feed(online, motion.t, motion.q, tau)
+    return online
+
+
+def test_filtering_does_not_bias_a_rigid_arm(arm, motion):
+    """
+    Without noise the truth is found, and a single filter before the regressor would not do.
+
+    The second identifier has F where the first has G, so all of its low-pass is before the
+    regressor: its bias is about the square of MOTION_FILTER_RATIO as large.
+
+    """
+    rigid = ArmModel(arm.robot)
+    tau = rigid.torque(motion)
+    behind, before = (
+        identifier(rigid, OnlineSettings(cutoff=cutoff, row_rate=200.0))
+        for cutoff in (5.0, 5.0 / MOTION_FILTER_RATIO)
+    )
+    for online in (behind, before):
+        feed(online, motion.t, motion.q, tau)
+    error, coarse = (torque_error(rigid, online, motion) for online in (behind, before))
+    assert error < 1e-4
+    assert coarse > 0.5 * MOTION_FILTER_RATIO**2 * error
+
+
+def test_friction_is_found_without_noise(arm, clean, motion):
+    assert torque_error(arm, clean, motion) < 1e-3
+    estimate = clean.estimate()
+    for joint in arm.robot.joints:
+        for name, value in (('viscous_coefficient', 0.08), ('coulomb_torque', 0.05)):
+            found = estimate.values[estimate.index(name, joint)]
+            assert found == pytest.approx(value, rel=0.02), (name, joint)
+
+
+def test_estimates_scatter_as_their_covariance_says(arm, motion, tau):
+    """Chi-square of the errors of 8 noises, and every parameter within its own interval."""
+    total, outside, count = 0.0, 0, 0
+    rigid = ArmModel(arm.robot)
+    rigid_tau = rigid.torque(motion)
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        online = identifier(rigid, OnlineSettings(torque_noise=(0.1,) * 6, row_rate=100.0))
+        feed(online, motion.t, motion.q, rigid_tau + 0.1 * rng.normal(size=tau.shape))
+        estimate = online.estimate()
+        error = estimate.values - online.base.values(rigid.theta)
+        total += error @ np.linalg.solve(estimate.covariance, error)
+        outside += int(np.sum(np.abs(error) > 3.0 * estimate.std))
+        count += len(error)
+    low, high = scipy.stats.chi2(count).ppf([1e-4, 1.0 - 1e-4])
+    assert low < total < high
+    assert outside <= 0.01 * count + 2
+
+
+def test_unknown_noise_is_found_from_the_residuals(arm, motion, tau):
+    rng = np.random.default_rng(1)
+    noisy = tau + NOISE * rng.normal(size=tau.shape)
+    known, unknown = identifier(arm), identifier(arm, OnlineSettings())
+    for online in (known, unknown):
+        feed(online, motion.t, motion.q, noisy)
+    ratio = unknown.estimate().std / known.estimate().std
+    assert 0.6 < np.median(ratio) < 1.7
+
+
+def test_predictions_are_made_before_the_sample_is_seen_and_get_good(arm, motion, tau):
+    rng = np.random.default_rng(2)
+    online = identifier(arm)
+    samples = feed(online, motion.t, motion.q, tau + NOISE * rng.normal(size=tau.shape))
+    late = samples[len(samples) // 2 :]
+    rms = np.sqrt(np.mean([s.residual**2 for s in late], axis=0))
+    assert np.all(rms < 0.3 * NOISE)  # what the low-pass leaves of the noise
+    # the stamp is the time of the motion, so that the curve lies on the unfiltered torque
+    stamps = np.array([s.t for s in late])
+    measured = np.array([s.measured for s in late])
+    shifted = [
+        np.linalg.norm(measured[:, 1] - np.interp(stamps + shift, motion.t, tau[:, 1]))
+        for shift in (-0.02, 0.0, 0.02)
+    ]
+    assert np.argmin(shifted) == 1
+
+
+def test_rows_are_thinned_to_the_rate_that_the_filter_passes(arm, motion, clean):
+    assert clean.samples == pytest.approx(200.0 * 20.0, rel=0.05)
+    assert clean.delay == pytest.approx(0.061, abs=0.002)
+    assert clean.condition_number < 1e5
+
+
+def test_an_arm_at_rest_teaches_nothing_it_could_unlearn(arm, motion, tau):
+    """20 s held by friction, with torques anywhere within it, after 20 s of motion."""
+    rng = np.random.default_rng(3)
+    online = identifier(arm, replace(SETTINGS, forgetting=0.999))
+    feed(online, motion.t, motion.q, tau)
+    before = online.estimate()
+    t = motion.t[-1] + 1.0 + np.arange(10_000) * 2e-3
+    q = motion.q[-1] + 1e-5 * rng.normal(size=(len(t), 6))
+    held = tau[-1] + 0.05 * rng.uniform(-1.0, 1.0, 6) + NOISE * rng.normal(size=(len(t), 6))
+    samples = feed(online, t, q, held)
+    assert samples and not np.any([s.used for s in samples])
+    after = online.estimate()
+    np.testing.assert_array_equal(after.values, before.values)
+    np.testing.assert_array_equal(after.covariance, before.covariance)
+
+
+def test_an_arm_without_dry_friction_learns_at_rest_and_does_not_drift(arm, motion):
+    rng = np.random.default_rng(4)
+    rigid = ArmModel(arm.robot)
+    online = identifier(rigid, replace(SETTINGS, forgetting=0.999))
+    noisy = rigid.torque(motion) + NOISE * rng.normal(size=motion.q.shape)
+    feed(online, motion.t, motion.q, noisy)
+    before = online.estimate()
+    t = motion.t[-1] + 1.0 + np.arange(5_000) * 2e-3
+    still = Motion(
+        motion.joints, motion.t[:1], motion.q[-1:], 0.0 * motion.q[:1], 0.0 * motion.q[:1]
+    )
+    held = rigid.torque(still) + NOISE * rng.normal(size=(len(t), 6))
+    samples = feed(online, t, np.broadcast_to(motion.q[-1], held.shape), held)
+    assert all(s.used.all() for s in samples[100:])
+    after = online.estimate()
+    assert np.all(after.std <= 1.3 * before.std)  # the noise of these seconds is another one
+    assert np.all(np.abs(after.values - before.values) < 3.5 * before.std)
+
+
+def test_forgetting_follows_friction_that_rises(arm, motion):
+    """Viscous friction of all joints up by half within 20 s, memory 4 s."""
+    robot = arm.robot
+    motion = multisine(robot, 40.0, seed=1)
+    rise = 1.0 + 0.5 * np.clip((motion.t - 10.0) / 20.0, 0.0, 1.0)
+    tau = arm.torque(motion) + 0.08 * (rise - 1.0)[:, None] * motion.dq
+    errors = {}
+    for forgetting in (1.0, 1.0 - 1.0 / (4.0 * 200.0)):
+        online = identifier(arm, replace(SETTINGS, forgetting=forgetting, changes=None))
+        feed(online, motion.t, motion.q, tau)
+        estimate = online.estimate()
+        found = [estimate.values[estimate.index('viscous_coefficient', j)] for j in robot.joints]
+        errors[forgetting] = np.abs(np.array(found) - 0.12).max()
+    assert errors.pop(1.0) > 0.015
+    assert max(errors.values()) < 0.005
+
+
+def test_bad_samples_gaps_and_jumps_do_not_corrupt_the_estimate(arm, motion, tau):
+    online = identifier(arm)
+    offset = 0.0
+    for k in range(len(motion)):
+        if k % 2000 == 1500:
+            offset += 2.0  # a dropout of two seconds
+        if k % 2000 == 1999:
+            offset -= 50.0  # the clock is set back
+        t, q, torque = motion.t[k] + offset, motion.q[k], tau[k]
+        if k % 250 == 100:
+            q = q * np.nan
+        if k % 250 == 200:
+            torque = torque[:3]
+        if k % 250 == 225:
+            t -= 8e-3
+        online.update(t, q, None, torque)
+    assert dict(online.rejected) == {'not_finite': 40, 'wrong_length': 40, 'out_of_order': 40}
+    # the last sample alone is back in time: that may be its stamp
+    assert dict(online.restarts) == {'dropout': 5, 'jump_back': 4}
+    assert torque_error(arm, online, motion) < 1e-3
+
+
+def test_jitter_does_not_spoil_the_estimate(arm):
+    rng = np.random.default_rng(5)
+    regular = multisine(arm.robot, 20.0)
+    fine = multisine(arm.robot, 20.0, rate=5000.0)
+    picks = np.arange(len(regular)) * 10 + rng.integers(0, 7, len(regular))
+    jittered = fine.select(picks)
+    online = identifier(arm)
+    feed(online, jittered.t, jittered.q, arm.torque(jittered))
+    assert torque_error(arm, online, regular) < 2e-3
+    assert not online.rejected and not online.restarts
+
+
+@pytest.mark.parametrize('rate', [125.0, 2000.0])
+def test_other_sampling_rates(arm, rate):
+    motion = multisine(arm.robot, 20.0, rate=rate)
+    online = identifier(arm)
+    feed(online, motion.t, motion.q, arm.torque(motion))
+    assert torque_error(arm, online, motion) < 5e-3
+
+
+def test_an_arm_may_have_a_single_joint():
+    """A pendulum of 2 kg at 0.3 m: its moment is found from its weight."""
+    robot = load_robot(PENDULUM)
+    motion = multisine(robot, 20.0)
+    online = OnlineIdentifier(ArmModel(robot), rng=np.random.default_rng(0))
+    feed(online, motion.t, motion.q, ArmModel(robot).torque(motion))
+    estimate = online.estimate()
+    moment = estimate.values[estimate.index('mz1', 'hinge')]
+    assert moment == pytest.approx(-0.6, rel=1e-4)
+
+
+@pytest.mark.real_data
+def test_a_real_arm_is_identified_online_as_well_as_offline(real_data):
+    """UR10, one pass at 125 Hz: within a tenth of the offline fit of the same bag."""
+    data = real_recordings.ur10(real_data)
+    robot = load_robot(str(data.robot))
+    arm = ArmModel(robot)
+    for name in ('viscous_friction', 'coulomb_friction', 'torque_offset'):
+        arm = arm.with_effect(make_effect(name, robot))
+    recording = read_recording(data.bags[0], joints=robot.joints)
+    offline = identify(arm, [recording], rng=np.random.default_rng(0))
+    online = OnlineIdentifier(arm, rng=np.random.default_rng(0))
+    feed(online, recording.t, recording.q, recording.tau)
+    assert not online.rejected and not online.restarts
+    problem = regressions(arm, online.base.independent, [recording], offline.used)
+    values = online.estimate().values
+    fits = [Fit(p.source, p.motion, p.columns @ values, p.informative) for p in problem]
+    error = Score.of(fits).relative_error_percent
+    assert error <= 6.6
+    assert error <= 1.1 * Score.of(offline.training).relative_error_percent
+
+
+def test_model_predicts_what_the_arm_does(arm, clean, motion, tau):
+    some = motion.select(slice(0, None, 100))
+    error = np.linalg.norm(clean.model().torque(some) - tau[::100]) / np.linalg.norm(tau[::100])
+    assert error < 1e-3
+
+
+def test_before_any_motion_the_model_is_the_one_given(arm):
+    online = OnlineIdentifier(arm, rng=np.random.default_rng(0))
+    np.testing.assert_allclose(online.model().theta, arm.theta, atol=1e-9)
+    assert online.samples == 0
+    assert online.delay is None
+
+
+def test_reset_forgets_everything(arm, motion, tau, clean):
+    online = identifier(arm)
+    feed(online, motion.t[:2000], motion.q[:2000], tau[:2000])
+    online.update(0.0, motion.q[0], None, tau[0])
+    online.reset()
+    assert online.samples == 0
+    assert not online.rejected and not online.restarts
+    feed(online, motion.t, motion.q, tau)
+    np.testing.assert_array_equal(online.estimate().values, clean.estimate().values)
+
+
+def test_prior_from_an_earlier_run_is_kept(arm, clean):
+    settings = replace(SETTINGS, prior=clean.estimate())
+    online = identifier(arm, settings)
+    np.testing.assert_allclose(online.estimate().values, clean.estimate().values, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ('settings', 'message'),
+    [
+        (OnlineSettings(torque_noise=(1.0, 2.0)), 'torque_noise has 2 values'),
+        (OnlineSettings(row_rate=3.0), 'rows per second'),
+        (OnlineSettings(forgetting=0.5), 'forgetting factor'),
+        (OnlineSettings(cutoff=-1.0), 'cut-off'),
+    ],
+)
+def test_settings_that_do_not_fit_are_refused(arm, settings, message):
+    with pytest.raises(IdentificationError, match=message):
+        identifier(arm, settings)
+
+
+def test_joints_are_found_by_name_in_any_order():
+    order = JointOrder(('b', 'a'))
+    np.testing.assert_array_equal(order.map(['a', 'gripper', 'b']), [2, 0])
+    with pytest.raises(RecordingError, match=r'without b; they name a, c'):
+        order.map(['a', 'c'])
+    with pytest.raises(RecordingError, match='name a twice'):
+        order.map(['a', 'b', 'a'])
+
+
+def test_effects_that_remember_are_refused(arm):
+    robot = arm.robot
+    with pytest.raises(IdentificationError, match=r'presliding_hysteresis.*from a recording'):
+        OnlineIdentifier(
+            ArmModel(robot).with_effect(make_effect('presliding_hysteresis', robot)),
+            rng=np.random.default_rng(0),
+        )

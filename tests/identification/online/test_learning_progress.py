@@ -1,0 +1,77 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a motion does not teach is said, with the joint and how to move it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.estimate import Estimate
+from armid_ros.identification.online.identifier import OnlineIdentifier
+from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
+import numpy as np
+import pytest
+
+from tests.identification.conftest import multisine
+
+
+@pytest.fixture(scope='module')
+def motion(arm):
+    return multisine(arm.robot.joints, 30.0, 250.0, seed=0)
+
+
+def learn(arm, motion, look_every=1.0):
+    """Identify online, look every second, and return what was said last."""
+    rng = np.random.default_rng(0)
+    tau = arm.torque(motion) + 0.02 * rng.normal(size=motion.q.shape)
+    online = OnlineIdentifier(replace(arm, values=()), rng=np.random.default_rng(0))
+    progress = LearningProgress(online.arm, online.base, np.random.default_rng(0))
+    said, due = (), look_every
+    for t, q, torque in zip(motion.t, motion.q, tau, strict=True):
+        online.update(t, q, None, torque)
+        if t > due and online.samples:
+            said, due = progress.look(t, online.estimate()), due + look_every
+    return said
+
+
+def test_a_joint_that_stands_still_is_named(arm, motion):
+    elbow = list(arm.robot.joints).index('elbow_pitch')
+    parts = [np.array(part) for part in (motion.q, motion.dq, motion.ddq)]
+    parts[0][:, elbow], parts[1][:, elbow], parts[2][:, elbow] = 0.4, 0.0, 0.0
+    still = replace(motion, q=parts[0], dq=parts[1], ddq=parts[2])
+    said = learn(arm, still)
+    assert said[0].joint == 'elbow_pitch' or 'elbow_pitch' in [part.joint for part in said]
+    text = too_little_motion([part for part in said if part.joint == 'elbow_pitch'])
+    assert text.startswith('too little motion to learn from: elbow_pitch (')
+    assert 'viscous friction' in text and 'move it both ways at several speeds' in text
+
+
+def test_a_rich_motion_leaves_the_strong_joints_with_nothing_to_ask_for(arm, motion):
+    named = {part.joint for part in learn(arm, motion)}
+    assert not named & {'shoulder_pitch', 'shoulder_roll', 'upper_arm_yaw', 'elbow_pitch'}
+
+
+def test_while_the_estimate_gets_better_nothing_is_asked_for(arm):
+    online = OnlineIdentifier(arm, rng=np.random.default_rng(0))
+    progress = LearningProgress(online.arm, online.base, np.random.default_rng(0))
+    start = online.estimate()
+    for second in range(30):
+        better = Estimate(start.parameters, start.values, start.covariance * 0.8**second)
+        assert not progress.look(float(second), better)
+    worse = [progress.look(30.0 + second, better) for second in range(30)]
+    assert worse[-1]
+
+
+@pytest.mark.parametrize(('friction', 'named'), [(0.2, False), (0.0, True)])
+def test_what_a_joint_takes_includes_its_friction(arm, friction, named):
+    """The links beyond the wrist take 0.007 N m; 0.005 N m is much of that, little of 0.2 N m."""
+    online = OnlineIdentifier(arm, rng=np.random.default_rng(0))
+    progress = LearningProgress(online.arm, online.base, np.random.default_rng(0))
+    start = online.estimate()
+    values, std = 0.0 * start.values, np.full(len(start.values), 1e-9)
+    wrist = start.index('coulomb_torque', 'wrist_pitch')
+    values[wrist], std[wrist] = friction, 0.005
+    said = ()
+    for second in range(12):
+        said = progress.look(float(second), Estimate(start.parameters, values, np.diag(std**2)))
+    assert [part.joint for part in said] == (['wrist_pitch'] if named else [])

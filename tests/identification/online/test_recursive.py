@@ -1,0 +1,265 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.fitting.least_squares import solve
+from armid_ros.identification.online.recursive import RecursiveLeastSquares
+from armid_ros.identification.online.square_root import PRIOR_STD
+from armid_ros.identification.rows.regression import regressions
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.motion import Motion
+from armid_ros.recording import Recording
+import numpy as np
+import pytest
+import scipy.stats
+
+NOISE = np.array([0.1, 1.0, 3.0])
+
+
+def names(count):
+    return tuple(ParameterName(f'p{number}', '', 'kg') for number in range(count))
+
+
+def linear_data(rng, samples=300, count=8):
+    """Return rows of columns from 1e-3 to 10 in size, torques with noise, and the truth."""
+    theta = rng.normal(size=count)
+    rows = rng.normal(size=(samples, len(NOISE), count)) * np.logspace(-3, 1, count)
+    tau = rows @ theta + NOISE * rng.normal(size=(samples, len(NOISE)))
+    return rows, tau, theta
+
+
+def weighted(rows, tau, weights=1.0):
+    """Return the stacked problem that a batch solver takes."""
+    scale = np.sqrt(weights) / NOISE * np.ones(tau.shape)
+    return (rows * scale[:, :, None]).reshape(-1, rows.shape[2]), (tau * scale).ravel()
+
+
+def feed(estimator, rows, tau):
+    for row, torque in zip(rows, tau, strict=True):
+        estimator.update(row, torque)
+    return estimator
+
+
+def test_equals_weighted_batch_least_squares():
+    rows, tau, _ = linear_data(np.random.default_rng(0))
+    estimate = feed(RecursiveLeastSquares(names(8), NOISE), rows, tau).estimate
+    w, y = weighted(rows, tau)
+    np.testing.assert_allclose(estimate.values, np.linalg.lstsq(w, y)[0], rtol=1e-6)
+    np.testing.assert_allclose(estimate.covariance, np.linalg.inv(w.T @ w), rtol=2e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize('method', ['ols', 'wls'])
+def test_equals_offline_identification_of_the_same_rows(arm, method):
+    rng = np.random.default_rng(1)
+    t = np.arange(0.0, 20.0, 0.005)
+    w = 2.0 * np.pi * np.array([0.2, 0.5, 1.0])[:, None, None]
+    phase = w * t[:, None] + rng.uniform(0.0, 6.0, (3, 1, 6))
+    q, dq, ddq = np.sin(phase), w * np.cos(phase), -w * w * np.sin(phase)
+    motion = Motion(arm.robot.joints, t, *(0.3 * x.sum(axis=0) for x in (q, dq, ddq)))
+    tau = arm.torque(motion) + 0.05 * rng.normal(size=motion.q.shape)
+    recording = Recording(joints=motion.joints, t=t, q=motion.q, tau=tau, source='bag')
+    base = arm.base_parameters(rng)
+    used = conditioning([recording], SignalSettings())
+    (problem,) = regressions(arm, base.independent, [recording], used)
+    offline = solve([problem], method)
+    estimator = RecursiveLeastSquares(
+        base.parameters, offline.joint_std if method == 'wls' else np.ones(6)
+    )
+    for rows, torque, moving in zip(
+        problem.columns, problem.tau, problem.informative, strict=True
+    ):
+        estimator.update(rows, torque, moving)
+    np.testing.assert_allclose(estimator.values, offline.values, rtol=1e-6, atol=1e-8)
+    # the weights of the offline fit settle to 1e-6 and are those of the round before
+    assert estimator.condition_number == pytest.approx(offline.condition_number, rel=1e-4)
+
+
+def test_weights_count_as_repeated_observations_and_zero_leaves_a_row_out():
+    rng = np.random.default_rng(2)
+    rows, tau, _ = linear_data(rng)
+    weights = rng.choice([0.0, 0.3, 2.0], size=tau.shape)
+    estimator = RecursiveLeastSquares(names(8), NOISE)
+    for row, torque, weight in zip(rows, tau, weights, strict=True):
+        estimator.update(row, torque, weight)
+    w, y = weighted(rows, tau, weights)
+    np.testing.assert_allclose(estimator.values, np.linalg.lstsq(w, y)[0], rtol=1e-6)
+    assert estimator.samples == np.sum(weights.any(axis=1))
+
+
+def test_prior_counts_as_earlier_data():
+    rows, tau, _ = linear_data(np.random.default_rng(3))
+    first = feed(RecursiveLeastSquares(names(8), NOISE), rows[:100], tau[:100]).estimate
+    second = feed(RecursiveLeastSquares(names(8), NOISE, prior=first), rows[100:], tau[100:])
+    whole = feed(RecursiveLeastSquares(names(8), NOISE), rows, tau)
+    np.testing.assert_allclose(second.values, whole.values, rtol=1e-8)
+    np.testing.assert_allclose(second.covariance, whole.covariance, rtol=1e-8, atol=1e-12)
+
+
+def test_covariance_is_the_scatter_of_the_estimates():
+    """The squared errors, measured by the covariance, are chi-square over 60 noises."""
+    total = 0.0
+    for seed in range(60):
+        rows, tau, theta = linear_data(np.random.default_rng(seed))
+        estimate = feed(RecursiveLeastSquares(names(8), NOISE), rows, tau).estimate
+        error = estimate.values - theta
+        assert np.all(np.abs(error) < 4.5 * estimate.std)
+        total += error @ np.linalg.solve(estimate.covariance, error)
+    low, high = scipy.stats.chi2(60 * 8).ppf([1e-3, 1.0 - 1e-3])
+    assert low < total < high
+
+
+def test_unknown_noise_is_taken_from_the_residuals():
+    rng = np.random.default_rng(4)
+    rows = rng.normal(size=(2000, 3, 5))
+    tau = rows @ np.arange(5.0) + 0.02 * rng.normal(size=(2000, 3))
+    estimator = feed(RecursiveLeastSquares(names(5)), rows, tau)
+    assert np.sqrt(estimator.variance_factor) == pytest.approx(0.02, rel=0.05)
+    w = rows.reshape(-1, 5)
+    np.testing.assert_allclose(
+        np.diag(estimator.covariance), 0.02**2 * np.diag(np.linalg.inv(w.T @ w)), rtol=0.1
+    )
+
+
+def test_what_is_never_excited_stays_at_the_start_and_looks_unknown():
+    rows, tau, theta = linear_data(np.random.default_rng(5))
+    rows[:, :, 3] = 0.0
+    tau = rows @ theta
+    start = np.full(8, 7.0)
+    estimate = feed(RecursiveLeastSquares(names(8), NOISE, start=start), rows, tau).estimate
+    assert estimate.values[3] == pytest.approx(7.0)
+    assert estimate.std[3] == pytest.approx(PRIOR_STD)
+    excited = np.arange(8) != 3
+    np.testing.assert_allclose(estimate.values[excited], theta[excited], rtol=1e-4)
+
+
+def test_condition_number_is_that_of_the_weighted_regressor():
+    rows, tau, _ = linear_data(np.random.default_rng(6))
+    estimator = feed(RecursiveLeastSquares(names(8), NOISE), rows, tau)
+    assert estimator.condition_number == pytest.approx(np.linalg.cond(weighted(rows, tau)[0]))
+
+
+def test_forgetting_follows_a_slow_change():
+    rng = np.random.default_rng(7)
+    keeping = RecursiveLeastSquares(names(4), NOISE)
+    forgetting = RecursiveLeastSquares(names(4), NOISE, forgetting=0.99)
+    errors = {keeping: [], forgetting: []}
+    for k in range(6000):
+        theta = np.array([1.0 + np.sin(2 * np.pi * k / 6000), 2.0, 3.0, 4.0])
+        rows = rng.normal(size=(3, 4))
+        tau = rows @ theta + NOISE * rng.normal(size=3)
+        for estimator, log in errors.items():
+            estimator.update(rows, tau)
+            log.append(estimator.values - theta)
+    late = {e: np.sqrt(np.mean(np.square(log[1000:]), axis=0)) for e, log in errors.items()}
+    change = np.sqrt(0.5)
+    assert late[forgetting][0] < 0.2 * change
+    assert late[keeping][0] > 0.8 * change
+    assert np.all(late[forgetting][1:] < 0.05)
+
+
+def test_forgetting_keeps_the_window_it_promises():
+    """Excited all the time, the variance is that of about 1 / (1 - forgetting) samples."""
+    rng = np.random.default_rng(8)
+    estimator = RecursiveLeastSquares(names(12), np.ones(3), forgetting=0.995)
+    for _ in range(8000):
+        rows = rng.normal(size=(3, 12))
+        estimator.update(rows, rows @ np.arange(12.0) + rng.normal(size=3))
+    samples_worth = 1.0 / (3.0 * np.diag(estimator.covariance))
+    assert np.all((samples_worth > 100.0) & (samples_worth < 400.0))
+
+
+def test_information_never_falls():
+    rng = np.random.default_rng(9)
+    prior = Estimate(names(5), np.zeros(5), 1e4 * np.eye(5))
+    estimator = RecursiveLeastSquares(names(5), NOISE, forgetting=0.95, prior=prior)
+    before = estimator.covariance
+    for _ in range(500):
+        rows = rng.normal(size=(3, 5)) * 10.0 ** rng.uniform(-4, 2)
+        estimator.update(rows, rows @ np.ones(5))
+        after = estimator.covariance
+        assert np.linalg.eigvalsh(before - after).min() > -1e-9 * np.linalg.eigvalsh(before).max()
+        before = after
+
+
+@pytest.mark.parametrize('size', [1.0, 1e-3])
+@pytest.mark.parametrize('forgetting', [1.0, 0.99])
+def test_resting_arm_neither_forgets_nor_drifts(forgetting, size):
+    """The same rows for 20 s at 1 kHz, at full strength or as weak as sensor noise."""
+    rng = np.random.default_rng(10)
+    theta = np.array([1.0, -2.0, 0.5, 3.0])
+    estimator = RecursiveLeastSquares(names(4), NOISE[:2], forgetting=forgetting)
+    for _ in range(3000):
+        rows = rng.normal(size=(2, 4))
+        estimator.update(rows, rows @ theta + NOISE[:2] * rng.normal(size=2))
+    moved = estimator.estimate
+    rows = size * rng.normal(size=(2, 4))
+    tau = rows @ theta + NOISE[:2] * rng.normal(size=(20_000, 2))
+    for torque in tau:
+        estimator.update(rows, torque)
+    rested = estimator.estimate
+    assert np.all(rested.std <= moved.std * (1.0 + 1e-9))
+    assert np.all(np.abs(rested.values - moved.values) < 3.5 * moved.std)
+    # directions that no row touches have not been moved or sharpened at all
+    silent = np.linalg.svd(rows)[2][2:]
+    whitened = np.linalg.inv(moved.covariance) @ (rested.values - moved.values)
+    assert np.abs(silent @ whitened).max() < 1e-6 * np.linalg.norm(whitened) + 1e-9
+    if forgetting < 1.0:
+        assert np.all(rested.std > 1e-3 * moved.std)
+
+
+@pytest.mark.parametrize(
+    ('rows', 'tau', 'weights', 'message'),
+    [
+        (np.full((3, 8), np.nan), np.zeros(3), None, 'finite'),
+        (np.zeros((3, 8)), np.array([0.0, np.inf, 0.0]), None, 'finite'),
+        (np.zeros((3, 7)), np.zeros(3), None, r'shape \(3, 7\)'),
+        (np.zeros((2, 8)), np.zeros(2), None, r'\(3, 8\)'),
+        (np.zeros((3, 8)), np.zeros(3), [1.0, -1.0, 1.0], 'weights'),
+        (np.zeros((3, 8)), np.zeros(3), [1.0, np.nan, 1.0], 'weights'),
+    ],
+)
+def test_bad_update_is_refused_and_changes_nothing(rows, tau, weights, message):
+    good_rows, good_tau, _ = linear_data(np.random.default_rng(11))
+    estimator = feed(RecursiveLeastSquares(names(8), NOISE), good_rows, good_tau)
+    before = estimator.estimate
+    with pytest.raises(IdentificationError, match=message):
+        estimator.update(rows, tau, weights)
+    np.testing.assert_array_equal(estimator.values, before.values)
+    np.testing.assert_array_equal(estimator.covariance, before.covariance)
+
+
+def test_reset_returns_to_the_prior():
+    rows, tau, _ = linear_data(np.random.default_rng(12))
+    estimator = feed(RecursiveLeastSquares(names(8), NOISE), rows, tau)
+    once = estimator.estimate
+    estimator.reset()
+    assert estimator.samples == 0
+    np.testing.assert_allclose(estimator.estimate.std, PRIOR_STD)
+    again = feed(estimator, rows, tau).estimate
+    np.testing.assert_array_equal(again.values, once.values)
+    np.testing.assert_array_equal(again.covariance, once.covariance)
+
+
+def test_bad_settings_are_refused():
+    with pytest.raises(IdentificationError, match='forgetting factor'):
+        RecursiveLeastSquares(names(2), forgetting=1.1)
+    with pytest.raises(IdentificationError, match='standard deviation'):
+        RecursiveLeastSquares(names(2), [1.0, 0.0])
+    with pytest.raises(IdentificationError, match='other parameters'):
+        RecursiveLeastSquares(names(2), prior=Estimate(names(1), np.zeros(1), np.eye(1)))
+    with pytest.raises(IdentificationError, match='positive definite'):
+        RecursiveLeastSquares(names(2), prior=Estimate(names(2), np.zeros(2), np.zeros((2, 2))))
+    with pytest.raises(IdentificationError, match='start'):
+        RecursiveLeastSquares(names(2), start=[1.0, 2.0, 3.0])
+
+
+def test_with_more_parameters_it_begins_anew_and_equals_batch_of_all():
+    """Whatever it had learned, and its own estimate is not touched."""
+    rows, tau, _ = linear_data(np.random.default_rng(13))
+    estimator = feed(RecursiveLeastSquares(names(8)[:5], NOISE), rows[:, :, :5], tau)
+    before = estimator.estimate
+    wider = feed(estimator.with_more(names(8)[5:]), rows, tau)
+    assert wider.parameters == names(8)
+    w, y = weighted(rows, tau)
+    np.testing.assert_allclose(wider.values, np.linalg.lstsq(w, y)[0], rtol=1e-6)
+    np.testing.assert_array_equal(estimator.values, before.values)

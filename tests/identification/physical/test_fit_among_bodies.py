@@ -1,0 +1,230 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+import json
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.errors import IdentificationError, RobotError
+from armid_ros.identification import IdentificationSettings, identify, Score
+from armid_ros.identification.physical.fit_among_bodies import bodily_prior, PhysicalSettings
+from armid_ros.identification.physical.physical_program import box_conditions
+from armid_ros.model.pseudo_inertia import link_parameters, pseudo_inertia
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+from ..conftest import multisine, recorded
+
+
+@pytest.fixture(scope='module')
+def drawing(arm):
+    """Return the structure with inertias as wrong as those of a drawing."""
+    rng = np.random.default_rng(0)
+    matrices = pseudo_inertia(arm.robot.rigid_parameters.reshape(-1, 10))
+    stretch = np.exp(0.25 * rng.normal(size=(len(matrices), 4)))
+    matrices = stretch[:, :, np.newaxis] * matrices * stretch[:, np.newaxis, :]
+    return ArmModel(arm.robot.with_inertias(link_parameters(matrices).ravel()), arm.effects)
+
+
+@pytest.fixture(scope='module')
+def recording(arm):
+    return recorded(arm, multisine(arm.robot.joints, 20.0, 250.0, seed=1), 0, 0.02, 1e-5)
+
+
+def run(structure, recording, physical):
+    settings = IdentificationSettings(physical=physical)
+    return identify(structure, [recording], settings, rng=np.random.default_rng(0))
+
+
+@pytest.fixture(scope='module')
+def free(drawing, recording):
+    return run(drawing, recording, None)
+
+
+@pytest.fixture(scope='module')
+def bodies(drawing, recording):
+    return run(drawing, recording, PhysicalSettings())
+
+
+def eigenvalues(result):
+    return np.linalg.eigvalsh(pseudo_inertia(result.arm.robot.rigid_parameters.reshape(-1, 10)))
+
+
+def test_every_link_is_a_body_and_without_constraints_it_is_not(free, bodies):
+    assert eigenvalues(free).min() < 0.0
+    assert eigenvalues(bodies).min() > 0.0
+    assert bodies.physical.consistent
+    np.testing.assert_allclose(
+        [link.eigenvalues for link in bodies.physical.links], eigenvalues(bodies), rtol=1e-6
+    )
+
+
+def test_held_out_torque_error_is_that_of_the_unconstrained_fit(arm, free, bodies):
+    other = recorded(arm, multisine(arm.robot.joints, 10.0, 250.0, seed=7), 3, 0.02, 1e-5)
+    errors = [Score.of(r.predict([other])).relative_error_percent for r in (free, bodies)]
+    assert errors[1] < 1.03 * errors[0]
+    assert bodies.physical.held_out_ratio < 1.03
+
+
+def test_estimate_and_arm_say_the_same(bodies):
+    values = bodies.base.values(bodies.arm.theta)
+    np.testing.assert_allclose(bodies.estimate.values, values, rtol=1e-12)
+
+
+def test_without_noise_and_with_a_true_description_nothing_changes(arm):
+    exact = recorded(arm, multisine(arm.robot.joints, 20.0, 250.0, seed=1))
+    result = run(arm, exact, PhysicalSettings())
+    truth = result.base.values(arm.theta)
+    np.testing.assert_allclose(result.estimate.values, truth, atol=2e-4 * np.abs(truth).max())
+
+
+def test_friction_is_not_negative(arm, recording):
+    """Data of an arm that friction drives on: the nearest that can be has none."""
+    values = list(arm.values)
+    values[0] = np.full(6, -0.05)
+    smooth = ArmModel(arm.robot, arm.effects, tuple(values))
+    motion = multisine(arm.robot.joints, 20.0, 250.0, seed=1)
+    recording = recorded(smooth, motion, 5, 0.5)
+    structure = ArmModel(arm.robot, arm.effects)
+    result = run(structure, recording, PhysicalSettings())
+    assert result.arm.values[0].min() >= 0.0
+    assert any(name.name == 'viscous_coefficient' for name in result.physical.at_bound)
+    assert any('held by their bounds' in note for note in result.notes)
+
+
+def test_total_mass_is_kept_and_improves_what_torques_do_not_say(arm, drawing, recording, bodies):
+    true = arm.robot.rigid_parameters
+    total = float(true[::10].sum())
+    weighed = run(drawing, recording, PhysicalSettings(total_mass=total))
+    found = weighed.arm.robot.rigid_parameters
+    assert abs(found[::10].sum() - total) < 1e-6 * total
+    plain = bodies.arm.robot.rigid_parameters
+    assert np.linalg.norm(found - true) < np.linalg.norm(plain - true)
+
+
+def test_no_mass_is_beyond_its_range_and_held_out_torques_hardly_suffer(
+    drawing, recording, bodies
+):
+    described = drawing.robot.rigid_parameters[::10]
+    free = bodies.arm.robot.rigid_parameters[::10] / described
+    factor = 1.0 + 0.5 * float(np.max(np.maximum(free, 1.0 / free)) - 1.0)
+    held = run(drawing, recording, PhysicalSettings(mass_range=factor))
+    ratio = held.arm.robot.rigid_parameters[::10] / described
+    assert np.all(ratio > (1.0 - 1e-6) / factor)
+    assert np.all(ratio < (1.0 + 1e-6) * factor)
+    assert held.physical.at_mass
+    assert held.physical.consistent
+    assert not bodies.physical.at_mass
+    assert held.physical.held_out_ratio < 1.03
+
+
+@pytest.mark.parametrize('factor', [1.0, 0.5, np.inf, np.nan])
+def test_a_mass_range_is_a_factor_above_one(factor):
+    with pytest.raises(IdentificationError, match='a factor above 1'):
+        PhysicalSettings(mass_range=factor)
+
+
+def test_a_mass_that_is_not_the_arms_is_said_to_cost(drawing, recording, bodies):
+    """A tenth of what it weighs."""
+    assert not any('constraints cost' in line for line in bodies.physical.activity)
+    total = 0.1 * float(drawing.robot.rigid_parameters[::10].sum())
+    certificate = run(drawing, recording, PhysicalSettings(total_mass=total)).physical
+    assert certificate.held_out_ratio > 1.03
+    assert 'not that of the arm' in certificate.activity[0]
+
+
+def test_links_stay_in_their_boxes(drawing, recording):
+    lower, upper = np.array([-0.05, -0.05, -0.02]), np.array([0.05, 0.05, 0.12])
+    settings = PhysicalSettings(boxes={'wrist_pitch': (lower, upper)})
+    result = run(drawing, recording, settings)
+    pi = result.arm.robot.rigid_parameters[50:]
+    assert np.min(box_conditions((lower, upper)) @ pi) > -1e-8
+    center = pi[1:4] / pi[0]
+    assert np.all(center > lower)
+    assert np.all(center < upper)
+
+
+def test_a_box_too_small_is_said_to_hold_the_link(drawing, recording, bodies):
+    """Half as wide as the body that torques show."""
+    assert not bodies.physical.at_wall
+    settings = PhysicalSettings(boxes={'wrist_pitch': ([-0.02] * 3, [0.02, 0.02, 0.03])})
+    certificate = run(drawing, recording, settings).physical
+    assert certificate.at_wall
+    assert all(wall.startswith('wrist_pitch at ') for wall in certificate.at_wall)
+    assert any('at the limit of the box' in line for line in certificate.activity)
+
+
+def test_certificate_is_for_programs_too(bodies):
+    document = json.loads(json.dumps(bodies.physical.document()))
+    assert document['consistent']
+    np.testing.assert_array_equal(
+        [link['eigenvalues'] for link in document['links']],
+        [link.eigenvalues for link in bodies.physical.links],
+    )
+    assert document['held_out_ratio'] in [row['held_out_ratio'] for row in document['tried']]
+
+
+def test_box_conditions_hold_for_mass_inside_and_fail_outside():
+    def point(x):
+        return link_parameters(np.outer([*x, 1.0], [*x, 1.0]))
+
+    box = (np.zeros(3), np.ones(3))
+    assert np.min(box_conditions(box) @ point([0.2, 0.9, 0.5])) > 0.0
+    assert np.min(box_conditions(box) @ point([0.2, 1.1, 0.5])) < 0.0
+
+
+def test_a_description_without_masses_gets_a_prior(arm, recording):
+    bare = ArmModel(arm.robot.with_inertias(0.0 * arm.robot.rigid_parameters), arm.effects)
+    theta, notes = bodily_prior(bare)
+    assert np.linalg.eigvalsh(pseudo_inertia(theta[:60].reshape(-1, 10))).min() > 0.0
+    assert len(notes) == 6
+    result = run(bare, recording, PhysicalSettings())
+    assert result.physical.consistent
+    assert Score.of(result.training).relative_error_percent < 1.0
+
+
+class TestRefusals:
+    """What cannot be is refused, with the reason."""
+
+    def test_negative_mass(self):
+        with pytest.raises(IdentificationError, match=r'total mass -1.*positive'):
+            PhysicalSettings(total_mass=-1.0)
+
+    def test_box_inside_out(self):
+        with pytest.raises(IdentificationError, match=r"joint 'elbow'.*below"):
+            PhysicalSettings(boxes={'elbow': ((0, 0, 0), (1, -1, 1))})
+
+    def test_unknown_joint(self, drawing, recording):
+        settings = PhysicalSettings(boxes={'elbow': ((0, 0, 0), (1, 1, 1))})
+        with pytest.raises(RobotError, match='elbow_pitch'):
+            run(drawing, recording, settings)
+
+
+def test_links_of_a_robot_are_named(bodies):
+    assert tuple(link.link for link in bodies.physical.links) == load_robot('humanoid_arm').links
+
+
+@pytest.fixture(scope='module')
+def geared(arm):
+    """Return a fit without the rotors of an arm whose rotors are most of its inertia."""
+    rotors = np.array([0.3, 0.3, 0.1, 0.1, 0.003, 0.003])
+    truth = arm.with_effect(make_effect('rotor_inertia', arm.robot), rotors)
+    recording = recorded(truth, multisine(arm.robot.joints, 20.0, 100.0, seed=1), 0, 0.02)
+    return run(ArmModel(arm.robot, arm.effects), recording, PhysicalSettings())
+
+
+def test_an_inertia_that_is_not_of_the_links_takes_no_mass_along(arm, geared):
+    """The torques do not show the mass of the first link at all."""
+    masses, described = (r.rigid_parameters[::10] for r in (geared.arm.robot, arm.robot))
+    assert masses[0] == pytest.approx(described[0], rel=0.3)
+    assert np.max(masses / described) < 5.0
+
+
+def test_masses_far_beyond_the_described_are_said(arm, recording):
+    light = arm.robot.rigid_parameters.reshape(-1, 10).copy()
+    light[5] *= 0.02
+    structure = ArmModel(arm.robot.with_inertias(light.ravel()), arm.effects)
+    result = run(structure, recording, PhysicalSettings())
+    (note,) = (n for n in result.notes if 'times as heavy as described' in n)
+    assert arm.robot.links[5] in note
+    assert arm.robot.links[0] not in note

@@ -1,0 +1,122 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.rows.signals import (
+    Conditioning,
+    conditioning,
+    decimate,
+    decimated_samples,
+    segments,
+    SignalSettings,
+)
+from armid_ros.recording import Recording
+import numpy as np
+import pytest
+
+from ..conftest import multisine, recorded
+
+
+def sine(rate=1000.0, duration=10.0, hz=1.0):
+    t = np.arange(round(rate * duration)) / rate
+    return t, np.sin(2 * np.pi * hz * t)[:, None]
+
+
+def test_derivatives_of_a_sine_have_no_phase():
+    t, q = sine()
+    recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
+    (whole,) = segments(recording, Conditioning(1000.0, 50.0, 10))
+    motion = whole.select(slice(100, -100))
+    w = 2 * np.pi
+    np.testing.assert_allclose(motion.dq[:, 0], w * np.cos(w * motion.t), atol=1e-4 * w)
+    np.testing.assert_allclose(motion.ddq[:, 0], -w * w * np.sin(w * motion.t), atol=1e-4 * w * w)
+
+
+def test_decimation_passes_the_band_and_stops_what_would_alias():
+    used = Conditioning(1000.0, 50.0, 20)
+    t, slow = sine(hz=2.0)
+    kept = np.array(decimated_samples(len(t), used))
+    np.testing.assert_allclose(decimate(slow, used), slow[kept], atol=3e-3)
+    _, fast = sine(hz=47.0)  # would alias to 3 Hz
+    assert np.abs(decimate(fast, used)).max() < 5e-3
+
+
+def test_decimation_in_chunks_is_seamless():
+    used = Conditioning(1000.0, 50.0, 7)
+    x = np.random.default_rng(0).normal(size=(5003, 3, 2))
+    whole = decimate(x, used)
+    kept = decimated_samples(len(x), used)
+    assert len(whole) == len(kept)
+    taps = used.taps()
+    for row in (0, 17, len(kept) - 1):
+        window = x[kept[row] - len(taps) // 2 : kept[row] + len(taps) // 2 + 1]
+        np.testing.assert_allclose(whole[row], np.tensordot(taps, window, axes=1), atol=1e-12)
+
+
+def test_jittered_stamps_are_used_as_they_are(arm):
+    """Samples taken 0.3 periods early or late still give the velocities of the motion."""
+    rng = np.random.default_rng(1)
+    t = np.arange(5000) / 500.0 + rng.uniform(-0.3, 0.3, 5000) / 500.0
+    q = np.sin(2 * np.pi * t)[:, None]
+    recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
+    (motion,) = segments(recording, Conditioning(500.0, 25.0, 5))
+    truth = 2 * np.pi * np.cos(2 * np.pi * motion.t)
+    np.testing.assert_allclose(motion.dq[:, 0], truth, atol=2e-3)
+
+
+def test_a_recording_at_another_rate_goes_through_the_same_filter():
+    """Validation data at 200 Hz, training data at 1 kHz."""
+    t, q = sine(rate=200.0)
+    recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
+    (motion,) = segments(recording, Conditioning(1000.0, 50.0, 10))
+    inner = motion.select(slice(100, -100))
+    assert len(motion) > 5 * len(t) * 0.9
+    truth = 2 * np.pi * np.cos(2 * np.pi * inner.t)
+    np.testing.assert_allclose(inner.dq[:, 0], truth, atol=1e-3)
+
+
+def test_a_gap_splits_a_recording(arm):
+    t, q = sine()
+    keep = (t < 4.0) | (t > 4.5)
+    recording = Recording(joints=('a',), t=t[keep], q=q[keep], tau=q[keep], source='bag')
+    parts = list(segments(recording, Conditioning(1000.0, 50.0, 10)))
+    assert len(parts) == 2
+    assert parts[0].t[-1] < 4.0 < 4.5 < parts[1].t[0]
+
+
+def test_cutoff_is_where_positions_meet_their_noise(arm):
+    motion = multisine(arm.robot.joints, 40.0, 1000.0, seed=2)
+    quiet = conditioning([recorded(arm, motion, position_noise=1e-6)], SignalSettings())
+    noisy = conditioning([recorded(arm, motion, position_noise=1e-3)], SignalSettings())
+    assert noisy.cutoff_hz < quiet.cutoff_hz <= 200.0
+    assert noisy.cutoff_hz >= 0.5  # the fastest harmonic
+    assert noisy.decimation == quiet.decimation
+
+
+@pytest.mark.parametrize('settings', [{'cutoff_hz': -1.0}, {'decimation': 0}])
+def test_settings_that_cannot_filter_are_refused(settings):
+    with pytest.raises(IdentificationError, match=r'positive|1 or more'):
+        SignalSettings(**settings)
+
+
+def test_a_cutoff_beyond_the_rate_is_refused(arm):
+    t, q = sine(rate=100.0)
+    recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
+    with pytest.raises(IdentificationError, match='needs more than 160 samples/s'):
+        conditioning([recording], SignalSettings(cutoff_hz=80.0))
+
+
+def test_torque_is_needed():
+    t, q = sine()
+    recording = Recording(joints=('a',), t=t, q=q, source='run.mcap')
+    with pytest.raises(IdentificationError, match=r'run.mcap.*no effort'):
+        list(segments(recording, Conditioning(1000.0, 50.0, 10)))
+
+
+@pytest.mark.parametrize(('factor', 'unit'), [(1e3, 'milliseconds'), (1e6, 'microseconds')])
+def test_stamps_that_are_no_seconds_are_named(factor, unit):
+    t, q = sine()
+    recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
+    with pytest.raises(IdentificationError, match=f'bag: .* seem to be {unit}.*1000 samples/s'):
+        conditioning([replace(recording, t=factor * t)], SignalSettings())

@@ -1,0 +1,70 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A bag larger than the memory: its rows come piece by piece, and are those of the whole."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.identification.fitting.triangle import fit_triangle, Triangle
+from armid_ros.identification.rows.regression import regressions
+from armid_ros.identification.rows.signals import Conditioning
+from armid_ros.identification.rows.streaming import streamed
+from armid_ros.recording import read_recording, ReadSettings, write_recording
+import numpy as np
+import pytest
+
+from ..conftest import multisine, recorded
+
+USED = Conditioning(200.0, 20.0, 8)
+
+
+@pytest.fixture(scope='module')
+def smooth(arm):
+    """Return the arm without dry friction, whose rest is judged piece by piece."""
+    return ArmModel.of(arm.robot, effects='viscous_friction,torque_offset')
+
+
+def bag(folder, arm, gaps=()):
+    """Write a minute in small chunks, with holes from one time to another [s]."""
+    motion = multisine(arm.robot.joints, 60.0, 200.0, 3)
+    measured = recorded(arm, motion, 3, torque_noise=0.02)
+    keep = np.ones(len(motion), dtype=bool)
+    for start, stop in gaps:
+        keep &= (motion.t < start) | (motion.t > stop)
+    path = folder / f'bag_{len(gaps)}'
+    write_recording(path, measured.select(keep), chunk_size=40_000, start_ns=10**18)
+    return path
+
+
+def rows_of(path, arm, samples):
+    """Return the rows of a bag by pieces, and how many pieces there were."""
+    columns = arm.base_parameters(np.random.default_rng(0)).independent
+    pieces = list(
+        streamed(path, arm, columns, lambda piece: USED, samples, settings=ReadSettings())
+    )
+    return [rows for _, parts in pieces for rows in parts], len(pieces), columns
+
+
+@pytest.mark.parametrize('gaps', [(), ((21.3, 22.0), (40.0, 40.5))])
+@pytest.mark.parametrize('samples', [1700, 4000])
+def test_rows_of_pieces_are_those_of_the_whole(tmp_path, smooth, gaps, samples):
+    path = bag(tmp_path, smooth, gaps)
+    parts, count, columns = rows_of(path, smooth, samples)
+    recording = read_recording(path, joints=smooth.robot.joints)
+    whole = regressions(smooth, columns, [recording], USED)
+    assert count >= 12_000 // samples
+    assert sum(len(part.motion) for part in parts) == sum(len(part.motion) for part in whole)
+    stacked, expected = (np.concatenate([p.columns for p in some]) for some in (parts, whole))
+    np.testing.assert_allclose(stacked, expected, rtol=1e-9, atol=1e-9)
+    one, other = fit_triangle(Triangle.of(parts)), fit_triangle(Triangle.of(whole))
+    np.testing.assert_allclose(one.values, other.values, rtol=1e-9, atol=1e-11)
+
+
+def test_pieces_are_no_longer_than_they_may_be(tmp_path, smooth):
+    path = bag(tmp_path, smooth)
+    columns = smooth.base_parameters(np.random.default_rng(0)).independent
+    pieces = streamed(path, smooth, columns, lambda piece: USED, 2000, settings=ReadSettings())
+    assert max(len(piece) for piece, _ in pieces) < 2000 + 700
+
+
+def test_an_hour_in_pieces_of_a_shorter_reach_than_the_filters_still_ends(tmp_path, smooth):
+    parts, _, _ = rows_of(bag(tmp_path, smooth), smooth, 150)
+    assert sum(len(part.motion) for part in parts) > 1400

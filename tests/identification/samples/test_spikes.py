@@ -1,0 +1,271 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Damage costs the samples that are damaged; what the arm really does always passes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
+from armid_ros.identification.samples.spikes import FIRST, SpikeGate
+import numpy as np
+import pytest
+
+from tests.identification.conftest import multisine
+
+RATE = 500.0
+NOISE = 0.02
+COUNT = 2000
+DAMAGED = COUNT // 2
+
+
+def stream(rng, count=COUNT):
+    """Return stamps, and a smooth signal beside a noisy one with steps, as friction makes them."""
+    t = np.arange(count) / RATE
+    smooth = np.sin(3.0 * t)
+    steps = np.sign(np.cos(3.0 * t)) + NOISE * rng.normal(size=count)
+    return t, np.stack([np.round(smooth / 1e-4) * 1e-4, steps], axis=1)
+
+
+def passed(t, x, **kwargs):
+    """Return the gate and the stamps that it passes on."""
+    gate = SpikeGate([True, False], **kwargs)
+    good = [s.t for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
+    return gate, np.array(good)
+
+
+def test_good_samples_all_pass_in_order():
+    t, x = stream(np.random.default_rng(0))
+    gate, good = passed(t, x)
+    np.testing.assert_array_equal(good, t)
+    assert not gate.rejected
+
+
+@pytest.mark.parametrize('length', [1, 2, 5, 10])
+@pytest.mark.parametrize(('signal', 'size'), [(1, 100.0), (1, 1.5), (0, 0.5), (0, 3e-3)])
+def test_damage_costs_the_damaged_samples_alone(signal, size, length):
+    t, x = stream(np.random.default_rng(1))
+    damaged = slice(DAMAGED, DAMAGED + length)
+    x[damaged, signal] += size
+    gate, good = passed(t, x)
+    np.testing.assert_array_equal(good, np.delete(t, damaged))
+    assert gate.spikes == {signal: length}
+
+
+@pytest.mark.parametrize('where', [630, 880, DAMAGED])
+@pytest.mark.parametrize('sign', [-1.0, 1.0])
+def test_a_glitch_of_a_smooth_signal_does_not_hide_in_its_acceleration(where, sign):
+    """Its line may be missed by twice what acceleration does, whichever way it turns."""
+    t, x = stream(np.random.default_rng(18))
+    x[:, 0] = np.sin(9.0 * t)
+    x[where, 0] += sign * 2.5 * (9.0 / RATE) ** 2
+    gate, good = passed(t, x)
+    assert t[where] not in good
+    assert len(good) >= COUNT - 2  # so near its line, the next one may seem to go on from it
+    assert set(gate.spikes) == {0}
+
+
+@pytest.mark.parametrize('where', [0, 1, 2, 7, FIRST - 1, FIRST, FIRST + 1])
+def test_damage_among_the_first_samples_is_no_measure_of_noise(where):
+    t, x = stream(np.random.default_rng(2))
+    x[where, 1] += 50.0
+    _, good = passed(t, x)
+    assert t[where] not in good
+    missing = np.delete(t, where)[~np.isin(np.delete(t, where), good)]
+    assert len(missing) <= 2 and np.all(missing < t[where])  # a line needs two samples
+
+
+@pytest.mark.parametrize('size', [0.3, 1.0, 30.0, 1e4])
+def test_a_step_that_lasts_passes_whole(size):
+    t, x = stream(np.random.default_rng(3))
+    x[DAMAGED:, 1] += size
+    gate, good = passed(t, x)
+    np.testing.assert_array_equal(good, t)
+    assert not gate.rejected
+
+
+def test_a_collision_passes_whole():
+    """The velocity of a joint turns round from one sample to the next."""
+    t, x = stream(np.random.default_rng(4))
+    x[:, 0] += 2.0 * np.minimum(t, 2.0 * t[DAMAGED] - t)
+    gate, good = passed(t, x)
+    np.testing.assert_array_equal(good, t)
+    assert not gate.rejected
+
+
+@pytest.mark.parametrize('late', [2, 4, 9])
+def test_a_clock_that_is_set_a_little_begins_a_new_stretch(late):
+    """Set forth, positions stand still for some samples; set back, they jump."""
+    t, x = stream(np.random.default_rng(13))
+    back = np.concatenate([t[:DAMAGED], t[DAMAGED:] - late / RATE])
+    forth = np.concatenate([t[:DAMAGED], t[DAMAGED:] + late / RATE])
+    for stamps, first in ((back, DAMAGED + late), (forth, DAMAGED)):
+        gate = SpikeGate([True, False], continuous=[True, False])
+        good = [s for a, b in zip(stamps, x, strict=True) for s in gate.take(float(a), b)]
+        assert [s.t for s in good if s.begins] == [stamps[first]]
+        assert len(good) >= COUNT - late - 1
+
+
+def test_a_step_of_a_torque_and_a_collision_begin_no_new_stretch():
+    t, x = stream(np.random.default_rng(14))
+    x[DAMAGED:, 1] += 30.0
+    x[:, 0] += 2.0 * np.minimum(t, 2.0 * (t[DAMAGED // 2] + 0.3 / RATE) - t)
+    gate = SpikeGate([True, False], continuous=[True, False])
+    good = [s for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
+    assert len(good) == COUNT and not any(s.begins for s in good)
+
+
+@pytest.mark.parametrize(('height', 'reason'), [(-1.7, 'pulse'), (-20.0, 'spike')])
+def test_a_torque_that_jumps_to_where_it_often_is_may_be_of_the_arm(height, reason):
+    t, x = stream(np.random.default_rng(15))
+    x[400:1900:100, 1] += height * np.sign(x[400:1900:100, 1])
+    gate = SpikeGate([True, False], pulsing=[False, True])
+    good = [s for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
+    assert len(good) == COUNT - 15
+    assert gate.rejected == {reason: 15}
+    assert sum(gate.spikes.values()) == 15 * (reason == 'spike')
+
+
+@pytest.mark.parametrize('lost', [1, 2, 5])
+def test_noise_after_lost_samples_is_judged_as_noise(lost):
+    """What a glitch may be does not grow with the square of the time that nothing came."""
+    t, x = stream(np.random.default_rng(16))
+    x[DAMAGED, 1] += 1.5
+    kept = np.delete(np.arange(COUNT), slice(DAMAGED - lost, DAMAGED))
+    _, good = passed(t[kept], x[kept])
+    assert t[DAMAGED] not in good and len(good) == len(kept) - 1
+
+
+def test_full_turns_are_no_damage():
+    t, x = stream(np.random.default_rng(5))
+    x[:, 0] = 4.0 * t
+    x[:, 0] = np.angle(np.exp(1j * x[:, 0]))
+    gate, good = passed(t, x)
+    np.testing.assert_array_equal(good, t)
+    assert not gate.rejected
+
+
+@pytest.mark.parametrize('where', [0, 1, 5, DAMAGED])
+@pytest.mark.parametrize('angle', [3.3, 9.7, 16.0, 1e5])
+def test_a_damaged_angle_turns_nothing_after_it(where, angle):
+    t, x = stream(np.random.default_rng(17))
+    spoiled = x.copy()
+    spoiled[where, 0] += angle
+    gate = SpikeGate([True, False])
+    good = [s for a, b in zip(t, spoiled, strict=True) for s in gate.take(float(a), b)]
+    assert all(np.array_equal(s.x, x[round(s.t * RATE)]) for s in good)
+    assert len(good) >= COUNT - 3
+
+
+def test_an_arm_that_rested_may_begin_to_move():
+    t, x = stream(np.random.default_rng(6))
+    x[:DAMAGED] = 0.0
+    x[DAMAGED:, 0] = np.round(0.5 * (t[DAMAGED:] - t[DAMAGED]) ** 2 / 1e-4) * 1e-4
+    _, good = passed(t, x)
+    np.testing.assert_array_equal(good, t)
+
+
+@pytest.mark.parametrize('apart', [1.0, 3.0, 20.0])
+def test_of_two_senders_that_contradict_each_other_one_is_followed(apart):
+    t, x = stream(np.random.default_rng(7))
+    other = x + np.array([0.3, apart])
+    end = DAMAGED + 300  # before friction steps as well
+    x[DAMAGED:end:2] = other[DAMAGED:end:2]
+    gate, good = passed(t[:end], x[:end])
+    assert gate.rejected['spike'] >= 0.9 * (end - DAMAGED) / 2
+    kept = np.isin(t[:end], good)
+    assert np.count_nonzero(kept[DAMAGED + 100 :: 2]) in (0, len(kept[DAMAGED + 100 :: 2]))
+
+
+def test_a_stamp_from_elsewhere_costs_one_sample_and_a_new_clock_none():
+    t, x = stream(np.random.default_rng(8))
+    stamps = t.copy()
+    stamps[500] += 1000.0
+    stamps[700] = -5.0
+    stamps[DAMAGED:] -= 300.0
+    gate, good = passed(stamps, x)
+    np.testing.assert_array_equal(good, np.delete(stamps, [500, 700]))
+    assert gate.rejected == {'stamp': 2}
+
+
+@pytest.mark.parametrize('ahead', [2, 5, 9])
+@pytest.mark.parametrize('where', [DAMAGED, COUNT - 3])
+def test_a_stamp_a_little_ahead_costs_its_own_sample_and_none_after_it(ahead, where):
+    t, x = stream(np.random.default_rng(19))
+    stamps = t.copy()
+    stamps[where] = t[where] + (ahead + 0.5) / RATE
+    gate, good = passed(stamps, x)
+    np.testing.assert_array_equal(good, np.delete(t, where))
+    assert gate.rejected.total() == 1
+
+
+def test_what_follows_nothing_is_left_out():
+    rng = np.random.default_rng(9)
+    t, x = stream(rng)
+    garbage = slice(DAMAGED, DAMAGED + 33)
+    x[garbage, 1] = rng.uniform(-1e5, 1e5, 33)
+    gate, good = passed(t, x)
+    assert gate.rejected['erratic'] + gate.rejected['spike'] >= 25
+    assert np.all(np.isin(t[garbage.stop + FIRST :], good))
+
+
+def test_errors_without_consequence_are_let_through():
+    t, x = stream(np.random.default_rng(10))
+    x[DAMAGED, 1] += 5.0
+    gate = SpikeGate([True, False])
+    for stamp, row in zip(t, x, strict=True):
+        gate.take(float(stamp), row, np.array([0.0, 6.0]))
+    assert not gate.rejected
+
+
+@pytest.fixture(scope='module')
+def recorded(arm):
+    """Return a motion of 12 s and torques with noise."""
+    motion = multisine(arm.robot.joints, 12.0, RATE, seed=3)
+    rng = np.random.default_rng(11)
+    return motion, arm.torque(motion) + NOISE * rng.normal(size=motion.q.shape)
+
+
+def learned(arm, motion, q, tau):
+    online = OnlineIdentifier(
+        replace(arm, values=()), OnlineSettings(changes=None), rng=np.random.default_rng(0)
+    )
+    for sample in zip(motion.t, q, tau, strict=True):
+        online.update(float(sample[0]), sample[1], None, sample[2])
+    return online
+
+
+@pytest.fixture(scope='module')
+def undamaged(arm, recorded):
+    motion, tau = recorded
+    return learned(arm, motion, motion.q, tau).estimate()
+
+
+@pytest.mark.parametrize(
+    ('row', 'torque', 'angle'),
+    [(3000, 100.0, 0.0), (3000, 1e4, 0.0), (150, 100.0, 0.0), (3000, 0.0, 0.1)],
+)
+def test_a_spike_neither_moves_the_estimate_nor_widens_it(
+    arm, recorded, undamaged, row, torque, angle
+):
+    motion, tau = recorded
+    q, tau = motion.q.copy(), tau.copy()
+    q[row, 3] += angle
+    tau[row, 5] += torque
+    online = learned(arm, motion, q, tau)
+    estimate = online.estimate()
+    assert np.all(np.abs(estimate.values - undamaged.values) < 0.2 * undamaged.std)
+    np.testing.assert_allclose(estimate.std, undamaged.std, rtol=0.05)
+    assert online.rejected == {'spike': 1}
+    assert sum(online.spikes.values()) == 1
+
+
+@pytest.mark.parametrize('number', [1e6 + 1.0, 1e100, 1e154, 1e308, np.inf, np.nan])
+def test_no_number_ends_the_identifier(arm, recorded, undamaged, number):
+    motion, tau = recorded
+    q, tau = motion.q.copy(), tau.copy()
+    tau[3000, 0], q[2000, 2] = number, -number
+    online = learned(arm, motion, q, tau)
+    assert sum(online.rejected.values()) == 2
+    estimate = online.estimate()
+    assert np.all(np.abs(estimate.values - undamaged.values) < 0.2 * undamaged.std)

@@ -1,0 +1,68 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Springs found while both move, and slack where there is some."""
+
+from __future__ import annotations
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.ties.online import InteractionSettings, OnlineInteraction
+from armid_ros.pair.leg_pair import leg_pair
+from armid_ros.pair.simulated_pair import PairSensors, SimulatedPair
+import numpy as np
+import pytest
+
+SENSORS = PairSensors(angle_noise=np.radians(0.05), torque_noise=0.5)
+SETTINGS = InteractionSettings(memory=4.0, period=2.0)
+
+
+def identified(slack: float = 0.0, seconds: float = 4.2) -> OnlineInteraction:
+    pair = leg_pair(1e4).with_slack(slack)
+    walking = SimulatedPair(pair, sensors=SENSORS, rate=500.0, rng=np.random.default_rng(0))
+    online = OnlineInteraction(pair.robot, pair.other, pair.ties, SETTINGS)
+    for _ in range(round(500.0 * seconds)):
+        sample = walking.advance()
+        online.take_other(sample.t, sample.other_q)
+        online.take(sample.t, sample.q, sample.tau)
+    return online
+
+
+def test_stiffness_is_found_while_they_walk():
+    online = identified()
+    assert online.together is not None and online.separate is not None
+    assert online.together.stiffness[0] == pytest.approx(1e4, rel=0.01)
+    np.testing.assert_allclose(online.separate.stiffness, 1e4, rtol=0.08)
+    lower, upper = online.together.interval(0.999)[0]
+    assert lower < 1e4 < upper
+    assert online.slack is None
+
+
+def test_slack_is_seen_and_measured():
+    """Without it the springs seem a fifth too soft; with it they are what they are."""
+    online = identified(slack=0.002)
+    assert online.together.stiffness[0] < 0.9e4
+    assert online.slack is not None and online.slack.seen
+    assert online.slack.value == pytest.approx(0.002, abs=1e-4)
+    assert online.slack.interaction.stiffness[0] == pytest.approx(1e4, rel=0.01)
+
+
+def test_one_machine_alone_is_not_enough():
+    pair = leg_pair()
+    online = OnlineInteraction(pair.robot, pair.other, pair.ties, SETTINGS)
+    online.take(0.0, np.zeros(6), np.zeros(6))
+    with pytest.raises(IdentificationError, match='joint states of both'):
+        online.take(5.0, np.zeros(6), np.zeros(6))
+
+
+def test_what_comes_after_an_interruption_is_not_mixed_with_what_was_before():
+    online = identified()
+    before = online.separate
+    online.interrupt()
+    for k in range(100):
+        online.take_other(10.0 + 0.01 * k, np.zeros(6))
+        assert not online.take(10.0 + 0.01 * k, np.zeros(6), np.zeros(6))
+    assert online.separate is before
+
+
+def test_settings_that_do_not_fit_are_refused():
+    with pytest.raises(IdentificationError, match='memory of 1 s'):
+        InteractionSettings(memory=1.0)

@@ -1,0 +1,239 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Springs between two machines, found from the torques of one and noisy angles of both."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.ties.poses import choose_poses, stiffness_bound
+from armid_ros.identification.ties.problem import interaction_problem, InteractionProblem
+from armid_ros.identification.ties.recorded import recorded_interaction_problem
+from armid_ros.identification.ties.search import find_interaction
+from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
+from armid_ros.motion import Motion
+from armid_ros.pair.gait import read_gait
+from armid_ros.pair.leg_pair import leg_pair, PairMotion, stepping, TiedPair
+from armid_ros.recording import Recording
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from benchmarks.exo_noise import find_springs, measured, recorded, TORQUE_NOISE, with_torques
+
+STATE = ('q', 'dq', 'ddq')
+STIFFNESS = 1.0e4
+
+
+@pytest.fixture(scope='module')
+def pair() -> TiedPair:
+    return leg_pair(STIFFNESS)
+
+
+@pytest.fixture(scope='module')
+def poses(pair) -> PairMotion:
+    """Return 200 poses, with exact torques."""
+    motions = stepping(pair, read_gait(), np.linspace(0.0, 1.8, 201)[:-1])
+    return with_torques(pair, motions)
+
+
+@pytest.fixture(scope='module')
+def seconds(pair) -> PairMotion:
+    """Return 6 s at 1 kHz, with exact torques."""
+    return with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 6.0, 1e-3)))
+
+
+def percent(found: Interaction) -> np.ndarray:
+    return np.asarray(100.0 * (found.stiffness / STIFFNESS - 1.0))
+
+
+@pytest.mark.parametrize('inertias', ['known', 'free'])
+@pytest.mark.parametrize('separate', [False, True])
+def test_exact_data_give_exact_stiffness(pair, poses, inertias, separate) -> None:
+    problem = interaction_problem(
+        pair.robot,
+        poses.own,
+        pair.other,
+        poses.other,
+        pair.ties,
+        inertias=inertias,
+        separate=separate,
+    )
+    found = identify_interaction(problem, 1e-3)
+    np.testing.assert_allclose(found.stiffness, STIFFNESS, rtol=1e-5)
+
+
+def test_noise_of_a_tenth_of_a_degree_leaves_no_bias_in_200_poses(pair, poses) -> None:
+    """The mean over draws, to the error of that mean; plain least squares is off by much more."""
+    found = [find_springs(pair, poses, 0.1, seed) for seed in range(8)]
+    biased = np.mean([100.0 * part.bias[0] / STIFFNESS for part in found])
+    mean, scatter = np.mean([percent(f) for f in found]), np.std([percent(f) for f in found])
+    assert biased < -3.0
+    assert abs(mean) < 1.0
+    assert abs(mean) < 3.0 * scatter / np.sqrt(len(found)) + 0.1
+
+
+def test_intervals_hold(pair, poses) -> None:
+    found = [find_springs(pair, poses, 0.05, seed, separate=True) for seed in range(8)]
+    inside = [
+        (part.interval()[:, 0] <= STIFFNESS) & (part.interval()[:, 1] >= STIFFNESS)
+        for part in found
+    ]
+    assert np.mean(inside) >= 0.85
+
+
+@pytest.mark.parametrize(('inertias', 'one', 'each'), [('known', 0.5, 5.0), ('free', 1.0, 5.0)])
+def test_a_recording_gives_them_within_per_cent(pair, seconds, inertias, one, each) -> None:
+    overall = find_springs(pair, seconds, 0.05, 0, inertias=inertias)
+    assert abs(percent(overall)[0]) < one
+    apart = find_springs(pair, seconds, 0.05, 0, inertias=inertias, separate=True)
+    assert np.abs(percent(apart)).max() < each
+
+
+def test_a_recording_with_a_tenth_of_a_degree(pair, seconds) -> None:
+    assert abs(percent(find_springs(pair, seconds, 0.1, 1))[0]) < 1.0
+
+
+def test_recordings_need_not_begin_together(pair, seconds) -> None:
+    own, other = measured(seconds, 0.05, np.random.default_rng(0))
+    late = other.select(slice(700, None))
+    late = recorded(replace(late, t=late.t - late.t[0]), start_ns=700 * 10**6)
+    found = identify_interaction(
+        recorded_interaction_problem(pair.robot, recorded(own), pair.other, late, pair.ties)
+    )
+    assert abs(percent(found)[0]) < 0.5
+
+
+def test_the_noise_of_the_angles_is_measured(pair, seconds) -> None:
+    found = [find_springs(pair, seconds, d, 0).position_noise for d in (0.05, 0.1)]
+    np.testing.assert_allclose(found[1] / found[0], 2.0, rtol=0.2)
+
+
+def test_without_springs_none_are_found(pair) -> None:
+    loose = pair.with_stiffness(0.0)
+    still = with_torques(loose, stepping(loose, read_gait(), np.linspace(0.0, 1.8, 200)))
+    found = find_springs(loose, still, 0.05, 0)
+    lower, upper = found.interval(0.999)[0]
+    assert lower < 0.0 < upper
+    assert upper < 100.0
+
+
+def test_data_that_cannot_tell_are_refused(pair, poses) -> None:
+    same = replace(poses.own, q=poses.other.q)
+    problem = interaction_problem(pair.robot, same, pair.other, poses.other, pair.ties[:1])
+    with pytest.raises(IdentificationError, match='nothing shows it'):
+        identify_interaction(problem)
+    with pytest.raises(IdentificationError, match='no torques'):
+        interaction_problem(
+            pair.robot, poses.own.with_torque(None), pair.other, poses.other, pair.ties
+        )
+    with pytest.raises(IdentificationError, match='one time base'):
+        shifted = replace(poses.other, t=poses.other.t + 0.1)
+        interaction_problem(pair.robot, poses.own, pair.other, shifted, pair.ties)
+
+
+def two_sides(pair: TiedPair, seed: int) -> tuple[Recording, Recording]:
+    motions = with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 4.0, 1e-3)))
+    own, other = measured(motions, 0.05, np.random.default_rng(seed))
+    return recorded(own), recorded(other)
+
+
+def test_hidden_springs_are_found_where_they_are(pair) -> None:
+    real = leg_pair(3e3, ('swing_thigh', 'stance_shank'))
+    found = find_interaction(
+        pair.robot, pair.other, pair.ties, two_sides(real, 0), two_sides(real, 1)
+    )
+    assert set(found.segments) == {'swing_thigh', 'stance_shank'}
+    assert found.interaction is not None
+    np.testing.assert_allclose(found.interaction.stiffness, 3e3, rtol=0.1)
+    assert found.closed_fraction > 0.5
+
+
+def test_no_springs_no_name(pair) -> None:
+    loose = pair.with_stiffness(0.0)
+    found = find_interaction(
+        pair.robot, pair.other, pair.ties, two_sides(loose, 2), two_sides(loose, 3)
+    )
+    assert found.segments == ()
+    assert found.interaction is None
+
+
+def test_deviations_that_are_stated_are_those_of_repeats(pair) -> None:
+    """The scatter of one stiffness over 150 draws, within what so many draws can tell."""
+    poses = with_torques(pair, stepping(pair, read_gait(), np.linspace(0.0, 1.8, 101)[:-1]))
+    found = [find_springs(pair, poses, 0.05, seed) for seed in range(150)]
+    values = np.array([part.stiffness[0] for part in found])
+    stated = np.mean([part.std[0] ** 2 for part in found])
+    ratio = values.var(ddof=1) / stated
+    low, high = chi2.ppf([0.0005, 0.9995], len(found) - 1) / (len(found) - 1)
+    assert low < ratio < high
+
+
+def test_deviations_of_a_recording_allow_for_samples_that_filters_make_alike(pair) -> None:
+    """As if rows were independent they would be a third too small, half of the variance."""
+    short = with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 3.0, 1e-3)))
+    found = [find_springs(pair, short, 0.05, seed) for seed in range(60)]
+    values = np.array([part.stiffness[0] for part in found])
+    stated = np.mean([part.std[0] ** 2 for part in found])
+    low, high = chi2.ppf([0.0005, 0.9995], len(found) - 1) / (len(found) - 1)
+    assert low < values.var(ddof=1) / stated < high
+
+
+def test_inertias_of_links_that_hardly_turn_stay_near_their_description(pair) -> None:
+    """The trunk's inertia is a column of noise: without a belief its best value is infinite."""
+    real = leg_pair(3e3, ('stance_thigh',))
+    own, other = two_sides(real, 9)
+    problem = recorded_interaction_problem(
+        pair.robot, own, pair.other, other, pair.ties, inertias='free', separate=True
+    )
+    found = identify_interaction(problem)
+    away = found.estimate.values - problem.described
+    spread = np.sqrt(np.diag(np.linalg.inv(problem.precision[4:, 4:])))
+    assert np.all(np.abs(away[4:]) < 3.0 * spread)
+
+
+def test_no_estimate_is_better_than_the_bound_and_chosen_poses_lower_it(pair) -> None:
+    """Four springs of 200 poses: 5.5 per cent at best, of poses of quick steps chosen 2.4."""
+    gait = read_gait()
+    parts = [
+        stepping(pair, gait, np.linspace(0.0, period, 301)[:-1], period)
+        for period in (1.8, 1.2, 0.9)
+    ]
+    even = stepping(pair, gait, np.linspace(0.0, 1.8, 201)[:-1])
+    own, other = (
+        Motion(
+            parts[0][side].joints,
+            np.arange(900.0),
+            *(np.concatenate([getattr(p[side], name) for p in parts]) for name in STATE),
+        )
+        for side in (0, 1)
+    )
+    planned, theta = exact(pair, PairMotion(own, other))
+    rows = choose_poses(planned, theta, TORQUE_NOISE, 200)
+    assert len(set(rows.tolist())) == 200
+    chosen = exact(pair, PairMotion(own.select(rows), other.select(rows)))
+    bounds = [stiffness_bound(*case, TORQUE_NOISE) for case in (exact(pair, even), chosen)]
+    assert 0.05 < bounds[0].max() / STIFFNESS < 0.06
+    assert bounds[1].max() / STIFFNESS < 0.03
+    assert np.all(bounds[1] < bounds[0])
+    with pytest.raises(IdentificationError, match='cannot be chosen'):
+        choose_poses(planned, theta, TORQUE_NOISE, 901)
+
+
+def exact(pair: TiedPair, motions: PairMotion) -> tuple[InteractionProblem, np.ndarray]:
+    """Return the regression of four springs and free inertias, and its exact solution."""
+    own, other = with_torques(pair, motions)
+    problem = interaction_problem(
+        pair.robot,
+        own,
+        pair.other,
+        other,
+        pair.ties,
+        position_noise=np.radians(0.05),
+        inertias='free',
+        separate=True,
+    )
+    columns = problem.columns.reshape(-1, problem.columns.shape[2])
+    size = np.linalg.norm(columns, axis=0)
+    return problem, np.linalg.lstsq(columns / size, problem.tau.ravel(), rcond=None)[0] / size

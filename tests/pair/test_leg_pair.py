@@ -1,0 +1,158 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Two machines tied by springs: statics, the source's own recursion, the catalogue's effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects.interaction import HumanInteraction, RecordedPoint
+from armid_ros.errors import ModelError
+from armid_ros.model import inverse_dynamics, random_motion
+from armid_ros.pair.gait import read_gait
+from armid_ros.pair.leg_pair import (
+    leg_pair,
+    pair_torques,
+    PairMotion,
+    stepping,
+    TiedPair,
+    walking,
+)
+from armid_ros.robots import Robot
+import numpy as np
+import pytest
+
+from tests.model.newton_euler import joint_torques, Segment
+
+SIGNS = (1.0, -1.0, 1.0, -1.0, 1.0, -1.0)
+#: Position of the tied segments among stance shank ... swing foot, in the order F1 to F4.
+TIED = (4, 3, 1, 0)
+STIFFNESS = np.array([1.0e4, 2.0e4, 5.0e3, 3.0e4])
+
+
+@pytest.fixture(scope='module')
+def pair() -> TiedPair:
+    return leg_pair(STIFFNESS)
+
+
+@pytest.fixture(scope='module')
+def motions(pair) -> PairMotion:
+    rng = np.random.default_rng(0)
+    own, other = (random_motion(robot, 40, rng) for robot in (pair.robot, pair.other))
+    return PairMotion(own, other)
+
+
+def planar(robot: Robot) -> list[Segment]:
+    ahead = [np.array(p.translation)[[0, 2]] for p in list(robot.model.jointPlacements)[2:]]
+    return [
+        Segment(body.mass, body.inertia[1, 1], np.array(body.lever)[[0, 2]], following, sign)
+        for body, following, sign in zip(
+            list(robot.model.inertias)[1:], [*ahead, np.zeros(2)], SIGNS, strict=True
+        )
+    ]
+
+
+@pytest.mark.parametrize('foot_force', [None, (30.0, 400.0)])
+def test_the_recursion_of_the_source_is_rigid_body_dynamics_plus_springs(
+    pair, motions, foot_force
+) -> None:
+    ground = None if foot_force is None else np.array(foot_force)
+    spatial = None if ground is None else np.tile([ground[0], 0.0, ground[1]], (40, 1))
+    torques = pair_torques(pair, *motions, foot_force=spatial)
+    bodies = [planar(robot) for robot in (pair.robot, pair.other)]
+    base = np.array([-0.2572, 0.0])
+    for k in range(40):
+        states = [(m.q[k], m.dq[k], m.ddq[k]) for m in motions]
+        centroids = [
+            joint_torques(body, base, *state, {})[1]
+            for body, state in zip(bodies, states, strict=True)
+        ]
+        push = {
+            segment: stiffness * (centroids[1][segment] - centroids[0][segment])
+            for segment, stiffness in zip(TIED, STIFFNESS, strict=True)
+        }
+        tau, _ = joint_torques(bodies[0], base, *states[0], push, ground)
+        back, _ = joint_torques(bodies[1], base, *states[1], {s: -f for s, f in push.items()})
+        np.testing.assert_allclose(torques.tau[k], tau, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(torques.other_tau[k], back, rtol=0.0, atol=1e-9)
+
+
+def test_action_equals_reaction(pair, motions) -> None:
+    """What the springs do to both, force and moment about the base, is nothing in all."""
+    geometry = pair.geometry(*motions)
+    forces = pair.forces(*motions)
+    shift = np.cross(geometry.position - geometry.other_position, forces)
+    np.testing.assert_allclose(shift / np.abs(forces).max(), 0.0, atol=1e-12)
+    both = pair_torques(pair, *motions)
+    without = pair_torques(pair.with_stiffness(0.0), *motions)
+    own = np.einsum('nsxj,nsx->nj', geometry.jacobian, forces)
+    other = np.einsum('nsxj,nsx->nj', geometry.other_jacobian, -forces)
+    np.testing.assert_allclose(without.tau - both.tau, own, atol=1e-9)
+    np.testing.assert_allclose(without.other_tau - both.other_tau, other, atol=1e-9)
+
+
+def test_springs_are_the_gradient_of_their_energy(pair, motions) -> None:
+    step = 1e-6 * np.random.default_rng(1).normal(size=motions.own.q.shape)
+
+    def energy(q: np.ndarray) -> np.ndarray:
+        way = pair.geometry(replace(motions.own, q=q), motions.other).way
+        return np.asarray(np.sum(STIFFNESS * np.sum(way**2, axis=2), axis=1) / 2.0)
+
+    work = energy(motions.own.q + step) - energy(motions.own.q - step)
+    torque = pair_torques(pair, *motions).tau - inverse_dynamics(pair.robot, motions.own)
+    np.testing.assert_allclose(work, 2.0 * np.sum(torque * step, axis=1), rtol=1e-5, atol=1e-9)
+
+
+def test_same_posture_no_interaction(pair, motions) -> None:
+    """The exoskeleton fits its wearer: springs are relaxed where all angles agree."""
+    same = replace(motions.own, q=motions.other.q)
+    assert np.abs(pair.forces(same, motions.other)).max() < 1e-9
+
+
+def test_slack_and_dampers(pair, motions) -> None:
+    way = np.array([[[0.003, 0.0, 0.0], [0.0, 0.0, 0.02]]])
+    two = leg_pair([1e4, 1e4], ('swing_shank', 'swing_thigh'))
+    loose = replace(two, slack=np.array([0.005, 0.005]), damping=np.array([0.0, 10.0]))
+    force = loose.law(way, np.full((1, 2, 3), 0.1))
+    np.testing.assert_allclose(force[0], [[0.0, 0.0, 0.0], [-1.0, -1.0, -151.0]], atol=1e-9)
+
+
+def test_the_effect_of_the_catalogue_is_the_same_spring(pair) -> None:
+    t = np.linspace(0.0, 0.456, 229)
+    motions = walking(pair, read_gait(), t)
+    arm = ArmModel(pair.robot)
+    for tie, stiffness in zip(pair.ties, STIFFNESS, strict=True):
+        anchor = RecordedPoint(pair.other, motions.other, tie.other_joint, tie.other_point)
+        spring = HumanInteraction((tie.joint,), tie.point, anchor)
+        arm = arm.with_effect(spring, [stiffness, 0.0, 0.0, 0.0, 0.0])
+    expected = pair_torques(pair, *motions).tau
+    np.testing.assert_allclose(arm.torque(motions.own), expected, rtol=0.0, atol=1e-8)
+
+
+def test_the_shipped_pair_feels_tens_to_hundreds_of_newtons() -> None:
+    pair = leg_pair()
+    forces = pair.forces(*walking(pair, read_gait(), np.linspace(0.0, 0.456, 100)))
+    mean = np.linalg.norm(forces, axis=2).mean(axis=0)
+    assert np.all((mean > 10.0) & (mean < 200.0))
+
+
+def test_stepping_never_ends_and_has_its_own_derivatives(pair) -> None:
+    t = np.linspace(0.0, 3.6, 7201)
+    for motion in stepping(pair, read_gait(), t):
+        np.testing.assert_allclose(motion.q[0], motion.q[3600], atol=1e-9)
+        np.testing.assert_allclose(
+            np.gradient(motion.q, t, axis=0)[1:-1], motion.dq[1:-1], atol=1e-3
+        )
+        np.testing.assert_allclose(
+            np.gradient(motion.dq, t, axis=0)[1:-1], motion.ddq[1:-1], atol=0.02
+        )
+
+
+def test_a_segment_that_is_none_is_refused() -> None:
+    with pytest.raises(ModelError, match='swing_shank'):
+        leg_pair(segments=('left_arm',))
+    with pytest.raises(ModelError, match='4 ties'):
+        leg_pair([1.0, 2.0])
+    with pytest.raises(ModelError, match='not negative'):
+        leg_pair(-1.0)

@@ -1,0 +1,68 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Joints that follow torques, in this package's engine and in MuJoCo."""
+
+from __future__ import annotations
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.pair.gait import read_gait
+from armid_ros.pair.leg_pair import leg_pair, pair_torques, PairMotion, TiedPair, walking
+from armid_ros.pair.torque_driven import check_gait, drive_by_torque, splined
+import numpy as np
+import pytest
+
+from benchmarks.leg_pair_in_mujoco import drive_in_mujoco
+
+RATE = 100.0
+DRIVEN = {'exo_swing_hip': (0.05, 0.61), 'exo_swing_knee': (0.1, 1.71)}
+
+
+@pytest.fixture(scope='module')
+def pair() -> TiedPair:
+    return leg_pair()
+
+
+@pytest.fixture(scope='module')
+def motions(pair) -> PairMotion:
+    return walking(pair, read_gait(), np.linspace(0.0, 0.456, 229))
+
+
+def most(error: np.ndarray) -> float:
+    return float(np.degrees(np.abs(error).max()))
+
+
+@pytest.mark.parametrize('joint', DRIVEN)
+def test_mujoco_walks_by_the_torques(pair, motions, joint) -> None:
+    column = [pair.robot.index(joint)]
+    torque = splined(motions.own.t, pair_torques(pair, *motions).tau[:, column], RATE)
+    path = drive_in_mujoco(pair, motions, [joint], torque)
+    assert most(path - motions.own.q[:, column]) < DRIVEN[joint][0] / 10.0
+
+
+@pytest.mark.parametrize('joint', DRIVEN)
+def test_springs_believed_too_soft_lead_both_engines_astray_alike(pair, motions, joint) -> None:
+    soft = pair.with_stiffness(0.8 * pair.stiffness)
+    check = check_gait(pair, motions, joint, RATE, soft)
+    assert most(check.error) == pytest.approx(DRIVEN[joint][1], abs=0.02)
+    column = [pair.robot.index(joint)]
+    torque = splined(motions.own.t, pair_torques(soft, *motions).tau[:, column], RATE)
+    path = drive_in_mujoco(pair, motions, [joint], torque)[::2, 0]
+    assert most(path - check.followed) < 0.01
+
+
+def test_all_joints_by_torque_fall_when_it_is_one_per_cent_wrong(pair) -> None:
+    """An inverted pendulum without feedback: exact torques hold it for a cycle, others do not."""
+    whole = walking(pair, read_gait(), np.linspace(0.0, 1.2, 601), 0.0)
+    tau = pair_torques(pair, *whole).tau
+    exact, wrong = (
+        drive_by_torque(pair, *whole, pair.robot.joints, splined(whole.own.t, share * tau, 400.0))
+        for share in (1.0, 1.01)
+    )
+    assert most(exact.q - whole.own.q[::2]) < 0.01
+    assert most(wrong.q - whole.own.q[::2]) > 20.0
+
+
+def test_an_even_number_of_samples_is_refused(pair) -> None:
+    even = walking(pair, read_gait(), np.linspace(0.0, 0.4, 20))
+    with pytest.raises(TrajectoryError, match='odd'):
+        drive_by_torque(pair, *even, ['exo_swing_hip'], lambda t: np.zeros(1))
