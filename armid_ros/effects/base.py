@@ -75,6 +75,8 @@ class Effect(ABC):
     summary: ClassVar[str]
     quantities: ClassVar[tuple[Quantity, ...]]
     shapes: ClassVar[tuple[Shape, ...]] = ()
+    #: The experiment that shows it best, as an engineer would do it.
+    shown_by: ClassVar[str] = 'faster motion'
     #: Whether the torque of a joint at rest is anything between two levels, and so says nothing.
     holds_at_rest: ClassVar[bool] = False
     #: Whether the torque is linear in the quantities; to the first order only where it is not.

@@ -37,6 +37,7 @@ class RotorInertia(Effect):
 
     name = 'rotor_inertia'
     summary = 'inertia of rotor and gear, seen by its own joint only'
+    shown_by = 'fast motion of the joint in two postures of the arm'
     mjcf_attribute = 'armature'
     quantities = (Quantity('rotor_inertia', 'kg m^2', lower=0.0, typical=(0.001, 1.1)),)
 
@@ -69,6 +70,7 @@ class TorqueRipple(Effect):
 
     name = 'torque_ripple'
     summary = 'torque that repeats at a fixed angle of the joint: cogging, gear error'
+    shown_by = 'slow constant velocity at three speeds'
     quantities = (
         Quantity('ripple_sine', 'N m', typical=(0.002, 2.0)),
         Quantity('ripple_cosine', 'N m', typical=(0.002, 2.0)),
@@ -114,6 +116,7 @@ class ActuatorSaturation(TorqueReading):
 
     name = 'actuator_saturation'
     summary = 'torque beyond a level that the drive does not give, or does not report'
+    shown_by = 'the same motion at rising amplitudes'
     separate = ((0,), (1,))  # together they are measured minus modelled torque: anything
     quantities = (
         Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),

@@ -75,6 +75,7 @@ class Payload(_LinkBody):
 
     name = 'payload'
     summary = 'a body fixed to a link'
+    shown_by = 'the same motion with and without the tool'
     familiar = True
     comes_and_goes = True
     quantities = tuple(
@@ -118,6 +119,7 @@ class LinkInertia(_LinkBody):
 
     name = 'link_inertia'
     summary = 'mass, centre or inertia of a link other than described'
+    shown_by = 'fast motion beside static holds'
     quantities = tuple(
         Quantity(f'{name}_difference', unit)
         for name, unit in zip(LINK_PARAMETERS, _UNITS, strict=True)

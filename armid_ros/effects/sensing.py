@@ -29,6 +29,7 @@ class TorqueOffset(Effect):
 
     name = 'torque_offset'
     summary = 'constant torque, in motion and at rest'
+    shown_by = 'static holds over the range of positions'
     familiar = True
     usual = True
     everywhere = True
@@ -66,6 +67,7 @@ class TorqueGain(TorqueReading):
 
     name = 'torque_gain'
     summary = 'torque readings too large or too small by a share'
+    shown_by = 'the same motion with and without a known payload'
     familiar = True
     quantities = (Quantity('gain_error', '', lower=-0.95, typical=(0.005, 0.3)),)
 
@@ -102,6 +104,7 @@ class TorqueDrift(TorqueReading):
 
     name = 'torque_drift'
     summary = 'torque reading that drifts with time, whatever the motion'
+    shown_by = 'the same static hold, repeated for half an hour'
     quantities = (Quantity('drift', 'N m', typical=(0.01, 5.0)),)
     shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
@@ -136,6 +139,7 @@ class EncoderOffset(Displacing):
 
     name = 'encoder_offset'
     summary = 'zero of a position encoder that is off'
+    shown_by = 'hard stops, or a payload at two poses'
     familiar = True
     quantities = (Quantity('encoder_offset', 'rad', typical=(0.001, 0.1)),)
     linear = False

@@ -37,6 +37,7 @@ class JointSpring(Effect):
 
     name = 'joint_spring'
     summary = 'spring on a joint: cable, hose, balancer'
+    shown_by = 'static holds over the range, with and without a payload'
     familiar = True
     quantities = (
         Quantity('spring_stiffness', 'N m/rad', typical=(0.05, 50.0)),
@@ -73,6 +74,7 @@ class SoftLimit(Effect):
 
     name = 'soft_limit'
     summary = 'bumper or end stop that gives way'
+    shown_by = 'slow motion into and out of the end of the range'
     separate = ((0,), (1,))
     quantities = (
         Quantity('lower_stiffness', 'N m/rad', lower=0.0, typical=(2.0, 2000.0)),

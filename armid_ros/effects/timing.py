@@ -53,6 +53,7 @@ class TimeDelay(Late):
 
     name = 'time_delay'
     summary = 'torque readings older than the positions they are recorded with'
+    shown_by = 'the same motion at two speeds, and a sweep of frequency'
     quantities = (Quantity('delay', 's', lower=-0.1, upper=0.1, typical=(0.0005, 0.02)),)
     linear = False
     instantaneous = False
@@ -110,6 +111,7 @@ class TorqueLag(Late):
 
     name = 'torque_lag'
     summary = 'torque readings behind a low-pass: sensor filter, current loop'
+    shown_by = 'a sweep of frequency up to half of the bandwidth'
     quantities = (Quantity('lag', 's', lower=0.0, upper=0.2, typical=(0.0005, 0.02)),)
     linear = False
     instantaneous = False
