@@ -228,10 +228,11 @@ def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
 
 
 def _helps(explanation: Explanation, unseen: Evidence | None) -> bool:
-    """Return whether names make all joints together better on data they were not fitted to."""
+    """Return whether data that names were not fitted to leave any of them."""
     if unseen is None:
         return True
-    return attribute(explanation, unseen).share(range(len(explanation.steps))) > 0.0
+    seen = attribute(explanation, unseen)
+    return not all(seen.denied(k) for k in range(len(explanation.steps)))
 
 
 def _second_choice(chosen: Chosen, asked: _Asked) -> Chosen:

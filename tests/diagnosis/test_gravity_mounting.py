@@ -4,6 +4,8 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose
+from armid_ros.effects import make_effect
+from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
@@ -66,3 +68,22 @@ def test_fifty_values_of_a_body_and_a_person_are_no_better_than_a_wall():
     cosine = seen @ true / np.linalg.norm(seen) / np.linalg.norm(true)
     assert np.rad2deg(np.arccos(min(1.0, cosine))) < 1.0
     assert np.linalg.norm(seen) == pytest.approx(np.linalg.norm(true), rel=0.02)
+
+
+def test_a_tilt_of_which_the_day_before_told_little_is_not_put_down_to_a_person():
+    """A change shows less of itself the less the baseline tells of what it was before."""
+    case = lived_case('development', 50)
+    before, after = ([recording_of(one) for one in day] for day in (case.day_1, case.day_2))
+    arm = ArmModel(robot_of(case))
+    for name in ('viscous_friction', 'coulomb_friction', 'torque_offset'):
+        arm = arm.with_effect(make_effect(name, arm.robot))
+    rng = np.random.default_rng(0)
+    model = identify(arm, before, rng=rng).arm
+    found = diagnose(
+        model, after, validate=[recording_of(case.held_out)], baseline=before, rng=rng
+    )
+    (tilt,) = found.findings
+    assert tilt.name == 'base_tilt', found.summary
+    true = {one.name: one.value for one in case.truth[0].parameters}
+    for parameter, value, std in zip(tilt.parameters, tilt.values, tilt.std, strict=True):
+        assert abs(value - true[parameter.name]) < 3.0 * std

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.rows import fold_rows, weighted_rows
-from armid_ros.diagnosis.search.candidates import effect_rows
 from armid_ros.diagnosis.search.fit import excited, Told
 from armid_ros.effects import Effect
 from armid_ros.model import BaseParameters
@@ -97,7 +96,7 @@ class Baseline:
 
     def columns(self, arm: ArmModel, effect: Effect, kept: Sequence[int]) -> FloatArray:
         """Return the columns of an effect over the misfit, one row a row and joint, (S, p)."""
-        rows = [effect_rows(arm, effect, part)[:, :, list(kept)] for part in self.data]
+        rows = [part.columns(arm, effect)[:, :, list(kept)] for part in self.data]
         return np.concatenate([part.reshape(-1, len(kept)) for part in self._weighted(rows)])
 
     def _weighted(self, rows: Sequence[FloatArray]) -> tuple[FloatArray, ...]:

@@ -18,6 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.period import find_period
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.sensor_noise import SensorNoise
+from armid_ros.effects import Effect
 from armid_ros.effects.timing import smoothed
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.signals import (
@@ -99,6 +100,12 @@ class Trajectory:
         """Return measured torque minus that of a model, in rows, shape (M, n) [N m]."""
         assert self.motion.tau is not None
         return self.reduce(self.motion.tau - arm.torque(self.motion))
+
+    def columns(self, arm: ArmModel, effect: Effect) -> FloatArray:
+        """Return the columns of an effect of an arm, in rows, shape (M, n, P)."""
+        if effect.smooth:
+            return arm.columns_of(effect, self.at_rows)
+        return self.reduce(arm.columns_of(effect, self.motion))
 
     @property
     def t(self) -> FloatArray:

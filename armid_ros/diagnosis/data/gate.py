@@ -17,7 +17,6 @@ from itertools import product
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
-from armid_ros.diagnosis.search.candidates import effect_rows
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -113,7 +112,7 @@ def _changes(bare: ArmModel, data: Sequence[Trajectory]) -> Iterator[tuple[Float
     for kind in CATALOGUE.values():
         if kind.comes_and_goes:
             load = kind.on(bare.robot)
-            rows = [effect_rows(bare, load, part) for part in data]
+            rows = [part.columns(bare, load) for part in data]
             yield np.concatenate(rows), partial(_loaded, bare, load)
 
 

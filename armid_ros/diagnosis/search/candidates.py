@@ -15,7 +15,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
-from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
@@ -149,7 +148,7 @@ def candidates(
     for effect, members in group_effects(arm.robot, kinds):
         for whole, singles in shaped(effect, members, fitted, data, sigma):
             for block, part in zip(blocks, data, strict=True):
-                block.append(effect_rows(arm, whole, part))
+                block.append(part.columns(arm, whole))
             for single in singles:
                 size = len(single.parameters(arm.robot))
                 if (single.name, single.joints) not in taken:
@@ -158,10 +157,3 @@ def candidates(
                         groups.append(Group.of(single, span, kept, arm.robot))
                 start += size
     return Candidates(tuple(groups), tuple(np.concatenate(block, axis=2) for block in blocks))
-
-
-def effect_rows(arm: ArmModel, effect: Effect, part: Trajectory) -> FloatArray:
-    """Return the columns of an effect in the rows of a trajectory, shape (M, n, P)."""
-    if effect.smooth:
-        return arm.columns_of(effect, part.at_rows)
-    return part.reduce(arm.columns_of(effect, part.motion))

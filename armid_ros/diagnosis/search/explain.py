@@ -168,7 +168,6 @@ def _forward(
     values = [row[2] for row in start]
     arm, base = question.beside, question.beside_base
     current = fit(arm, named, data, sigma, base, values, question.beside_told)
-    least = 0.0 if baseline is None else settings.thresholds.headline
     total: float | None = None
     survey: Survey | None = None
     look: Survey | None = None
@@ -186,7 +185,7 @@ def _forward(
         here = Round(evidence, work, settings, total, before, width)
         step, look, problem = next_step(problem, beside, found.groups, here)
         total, survey = look.total, survey or look
-        if step is None or step.trial.gain < least * total:
+        if step is None:
             break
         group = step.trial.group
         starts = np.zeros(len(group.effect.parameters(arm.robot)))

@@ -236,22 +236,19 @@ def with_group(known: Products, problem: Problem, beside: FloatArray, own: Float
     )
 
 
-def with_own_again(known: Products) -> Products:
-    """Return the products of one group that is free as well, ahead of what else is free."""
-    inner, border = known.own[0], known.border
-    across = np.swapaxes(border, 1, 2)
-    free = np.concatenate(
-        [
-            np.concatenate([inner, across], axis=2),
-            np.concatenate([border, known.free], axis=2),
-        ],
-        axis=1,
-    )
-    return replace(
-        known,
-        free=free,
-        aim=np.concatenate([known.target, known.aim], axis=1),
-        border=np.concatenate([inner, border], axis=1),
+def products_of(problem: Problem, free: FloatArray) -> Products:
+    """Return the products of columns (R, n, f) that are free, without any group."""
+    blocks = int(problem.block.max()) + 1
+    own, aim, power = [], [], []
+    for block in range(blocks):
+        rows = problem.block == block
+        x, y = free[rows].reshape(-1, free.shape[2]), problem.y[rows].ravel()
+        own.append(x.T @ x)
+        aim.append(x.T @ y)
+        power.append(y @ y)
+    none = np.zeros((blocks, free.shape[2], 0))
+    return Products(
+        np.array(own), np.array(aim), none, none[:, 0], none[:, 0], (), np.array(power)
     )
 
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.rows import Problem, Projection
-from armid_ros.diagnosis.search.candidates import effect_rows, Group
+from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.effects import Effect, Shape
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
@@ -36,7 +36,7 @@ class Workspace:
 
     def columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
         """Return the columns of an effect in rows, shape (R, n, p)."""
-        blocks = [effect_rows(self.arm, effect, part) for part in self.data]
+        blocks = [part.columns(self.arm, effect) for part in self.data]
         return np.asarray(np.concatenate(blocks)[:, :, list(kept)])
 
     def smooth_columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:

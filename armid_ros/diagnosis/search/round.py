@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
@@ -73,20 +74,23 @@ class Before:
     told: Told
     change: FloatArray
 
-    def beside(self, group: Group, arm: ArmModel, beside: Beside) -> Beside:
+    def beside(self, groups: Sequence[Group], arm: ArmModel, beside: Beside) -> Beside:
         """
-        Return what is fitted beside a group: also the values that it had before already.
+        Return what is fitted beside a cause: also the values that some had before already.
 
         Their columns are ahead of the others.
 
         """
-        own = self.baseline.columns(arm, group.effect, group.kept)
+        own = np.concatenate(
+            [self.baseline.columns(arm, group.effect, group.kept) for group in groups], axis=1
+        )
+        precision = np.concatenate([group.precision for group in groups])
         left = self.told.left - self.told.columns @ self.change
         size, known = own.shape[1], self.told.columns.shape[1]
         whole = size + len(beside.pull)
         hold, pull = np.zeros((whole, whole)), np.zeros(whole)
         hold[size:, size:], pull[size:] = beside.hold, beside.pull
-        hold[:size, :size] = own.T @ own + np.diag(group.precision)
+        hold[:size, :size] = own.T @ own + np.diag(precision)
         hold[:size, size : size + known] = own.T @ self.told.columns
         hold[size : size + known, :size] = hold[:size, size : size + known].T
         pull[:size] = own.T @ left

@@ -12,10 +12,10 @@ from armid_ros.diagnosis.data.rows import Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.held_out import (
     products,
+    products_of,
     Trial,
     tried_beside,
     with_group,
-    with_own_again,
 )
 from armid_ros.diagnosis.search.own_noise import made_of_noise
 from armid_ros.diagnosis.search.patch import room
@@ -29,6 +29,8 @@ import numpy.typing as npt
 #: Best groups that are looked at row by row; shapes of this many are refined, of groups that have
 #: this share of the best worth.
 _LOOKED_AT, _REFINED, _PROMISING = 30, 6, 0.4
+#: Causes that are compared with each other beside what each of them was before.
+_COMPARED = 8
 #: Rivals that are told of a name: the likeliest; more than two help nobody.
 _RIVALS = 2
 #: Causes in the small print.
@@ -128,10 +130,9 @@ def next_step(
     ranking = _best_per_key(seen, here)
     survey = _survey(groups, ranking, total, len(seen))
     ranking, problem = _with_refined_shapes(problem, beside, ranking, here)
-    ranking, gains = _examined(ranking, problem, beside, here, max(len(seen), 1))
-    there = [t for t in ranking if id(t) in gains and acceptable(t, here, max(len(seen), 1))]
+    ranking, there, gains = _examined(ranking, problem, beside, here, max(len(seen), 1))
     survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
-    passing = _passing(ranking, gains, problem, beside, here, max(len(seen), 1))
+    passing = _passing(ranking, gains, problem, beside, here)
     if not passing:
         return None, survey, problem
     first = passing[0]
@@ -227,7 +228,7 @@ def _with_refined_shapes(
             bounded = _alone(problem, beside, group, own, here)
             if bounded is None:
                 continue
-            trial = replace(bounded[0], group=group)
+            trial = replace(bounded, group=group)
             refined.append(trial)
         if not effect.shapes:
             continue
@@ -240,50 +241,116 @@ def _with_refined_shapes(
         weighted = columns * problem.weight[:, :, np.newaxis]
         better = _alone(problem, beside, group, weighted, here)
         own_group = replace(group, columns=span)
-        refined += [] if better is None else [replace(better[0], group=own_group)]
+        refined += [] if better is None else [replace(better, group=own_group)]
     if found:
         problem = problem.with_columns(np.concatenate(found, axis=2))
     return _best_per_key([*ranking, *refined], here), problem
 
 
 def _examined(
-    ranking: list[Trial], problem: Problem, beside: Beside, here: Round, tried: int
-) -> tuple[list[Trial], dict[int, FloatArray]]:
+    ranking: Sequence[Trial], problem: Problem, beside: Beside, here: Round, tried: int
+) -> tuple[list[Trial], list[Trial], dict[int, FloatArray]]:
     """
-    Return the ranking, and what the causes that could be taken take of every joint.
+    Return the ranking, what is there beyond chance, and what each that matters takes of joints.
 
-    Where there are recordings from before, the values that a cause had in those already are free
-    beside it: what is judged is the change.
+    Where there are recordings from before, what has to be beyond chance and to matter is the
+    change: the values that a cause had in those already are free beside it. Causes are compared
+    beside all such values of one another, since each may have been there before whichever of them
+    changed.
 
     """
-    result, gains = [], {}
+    assert here.total is not None
+    least = 0.0 if here.before is None else here.settings.thresholds.headline * here.total
+    there, large = [], []
     for trial in ranking[:_LOOKED_AT]:
-        if acceptable(trial, here, tried):
-            group = trial.group
-            found = _alone(problem, beside, group, problem.x[:, :, group.columns], here)
-            if found is None:
-                continue
-            trial, taken = replace(found[0], group=group), found[1]
-            gains[id(trial)] = taken
-        result.append(trial)
-    return sorted(result, key=lambda t: -worth(t, here)), gains
+        if not acceptable(trial, here, tried):
+            continue
+        found = _changed(problem, beside, trial, [trial], here)
+        if found is None or not acceptable(found, here, tried):
+            continue
+        there.append(found)
+        if found.gain >= least and material(_size(found, trial, problem, beside, here), here):
+            large.append(trial)
+    best = large[:_COMPARED]
+    result = [trial for trial in ranking if trial not in best]
+    gains = {}
+    for trial, compared in zip(best, _compared(problem, beside, best, here), strict=True):
+        own = problem.x[:, :, trial.group.columns]
+        gains[id(compared)] = trial.joint_gains(problem, own, beside.rows(problem))
+        result.append(compared)
+    result.sort(key=lambda t: -worth(t, here))
+    there.sort(key=lambda t: -worth(t, here))
+    return result, there, gains
+
+
+def _compared(
+    problem: Problem, beside: Beside, trials: Sequence[Trial], here: Round
+) -> list[Trial]:
+    """
+    Return the changes of causes beside what each of them was before, on the scale of the gap.
+
+    What the recordings from before leave open hides a part of any change. The one that takes most
+    is given what it takes alone, and the others in proportion.
+
+    """
+    if here.before is None or len(trials) < 2:
+        return list(trials)
+    found = [_changed(problem, beside, trial, trials, here) for trial in trials]
+    changes = [trial if one is None else one for trial, one in zip(trials, found, strict=True)]
+    first = max(range(len(trials)), key=lambda k: changes[k].gain)
+    if changes[first].gain <= 0.0:
+        return list(trials)
+    scale = trials[first].gain / changes[first].gain
+    return [replace(one, cross=scale * one.cross, square=scale * one.square) for one in changes]
 
 
 def _alone(
     problem: Problem, beside: Beside, group: Group, own: FloatArray, here: Round
-) -> tuple[Trial, FloatArray] | None:
+) -> Trial | None:
     """Try a group with weighted columns beside what is free."""
     group = replace(group, columns=slice(0, group.size))
-    free, held = beside.rows(problem), beside
     assert here.known is not None
-    known = with_group(here.known, problem, free, own)
-    if here.before is not None:
-        free = np.concatenate([own, free], axis=2)
-        known, held = with_own_again(known), here.before.beside(group, here.work.arm, beside)
+    known = with_group(here.known, problem, beside.rows(problem), own)
+    trials, _ = tried_beside(known, problem, [group], beside.hold, beside.pull)
+    return trials[0] if trials else None
+
+
+def _changed(
+    problem: Problem, beside: Beside, trial: Trial, before: Sequence[Trial], here: Round
+) -> Trial | None:
+    """
+    Return the change of a cause since the recordings from before.
+
+    The values that some causes had before, itself among them, are free beside it.
+
+    """
+    if here.before is None:
+        return trial
+    group = replace(trial.group, columns=slice(0, trial.group.size))
+    own = problem.x[:, :, trial.group.columns]
+    had = [problem.x[:, :, one.group.columns] for one in before]
+    held = here.before.beside([one.group for one in before], here.work.arm, beside)
+    free = np.concatenate([*had, beside.rows(problem)], axis=2)
+    known = with_group(products_of(problem, free), problem, free, own)
     trials, _ = tried_beside(known, problem, [group], held.hold, held.pull)
-    if not trials:
-        return None
-    return trials[0], trials[0].joint_gains(problem, own, free)
+    return replace(trials[0], group=trial.group) if trials else None
+
+
+def _size(
+    change: Trial, trial: Trial, problem: Problem, beside: Beside, here: Round
+) -> FloatArray:
+    """
+    Return the squares that a change makes in every joint, and no more than the cause takes, (n,).
+
+    What the change takes beside the values from before is less where these are hardly known.
+
+    """
+    own = problem.x[:, :, trial.group.columns]
+    takes = trial.joint_gains(problem, own, beside.rows(problem))
+    if here.before is None:
+        return takes
+    made = np.sum((own @ change.values) ** 2, axis=0)
+    return np.asarray(np.minimum(takes, made))
 
 
 def _passing(
@@ -292,16 +359,12 @@ def _passing(
     problem: Problem,
     beside: Beside,
     here: Round,
-    tried: int,
 ) -> list[Trial]:
     """Return the causes that could be taken, best first."""
     projection: Projection | None = None
     result: list[Trial] = []
     for trial in ranking:
-        possible_name = id(trial) in gains and acceptable(trial, here, tried)
-        if not (possible_name and material(gains[id(trial)], here)):
-            continue
-        if result and beaten(trial, result[0], here):
+        if id(trial) not in gains or (result and beaten(trial, result[0], here)):
             continue
         projection = projection or project(problem, beside.free, beside.hold)
         if not made_of_noise(trial, problem, projection, here.work):

@@ -18,7 +18,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.data.rows import make_problem, project
-from armid_ros.diagnosis.search.candidates import effect_rows
 from armid_ros.diagnosis.search.fit import fit, Fitted
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
@@ -168,7 +167,7 @@ class Ties:
 
         def solved(slack: float) -> tuple[float, FloatArray, FloatArray]:
             straps = self.partner.slack.on(self.arm.robot, tuple(joints)).with_shape([slack])
-            rows = np.concatenate([effect_rows(arm, straps, part) for part in self.data])
+            rows = np.concatenate([part.columns(arm, straps) for part in self.data])
             own = projection.rest(rows * problem.weight[:, :, np.newaxis]).reshape(len(left), -1)
             scale = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
             inverse = np.linalg.pinv((own / scale).T @ (own / scale), hermitian=True)

@@ -56,9 +56,12 @@ class Attribution:
         Return whether data deny a name: no more follows it than noise would.
 
         The slope of what is left on what the name predicts is one for a cause, zero for none.
+        Data in which it does nothing do not deny it.
 
         """
         made = self.made[name]
+        if not made.any():
+            return False
         cross = (self.taken[name] + made) / 2.0
         slope = float(cross.sum() / max(float(made.sum()), 1e-300))
         scatter = cross - slope * made
