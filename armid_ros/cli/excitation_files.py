@@ -41,6 +41,30 @@ BAG = 'trajectory'
 
 
 @dataclass(frozen=True)
+class Workspace:
+    """
+    What a motion must not touch.
+
+    Attributes
+    ----------
+    collision : CollisionModel
+        Bodies of the robot.
+    floor : Floor
+        What it stands on.
+    obstacles : sequence of Obstacle
+        What stands around it, the floor among it.
+    clearance : float
+        Between bodies [m].
+
+    """
+
+    collision: CollisionModel
+    floor: Floor
+    obstacles: Sequence[Obstacle]
+    clearance: float
+
+
+@dataclass(frozen=True)
 class Plan:
     """
     What a design was made for.
@@ -51,12 +75,8 @@ class Plan:
         Prior model.
     robot : str
         Shipped name or path.
-    collision : CollisionModel
-        Bodies of the robot.
-    floor : Floor
-        What it stands on.
-    obstacles : sequence of Obstacle
-        What stands around it, the floor among it.
+    workspace : Workspace
+        What it must not touch.
     start : ndarray, shape (n,)
         Pose to leave from and to return to [rad or m].
     after : sequence of Path
@@ -70,9 +90,7 @@ class Plan:
 
     arm: ArmModel
     robot: str
-    collision: CollisionModel
-    floor: Floor
-    obstacles: Sequence[Obstacle]
+    workspace: Workspace
     start: FloatArray
     after: Sequence[Path]
     files: Sequence[Path]
@@ -127,7 +145,8 @@ def write_plan(folder: Path, plan: Plan, result: Design, planner: TransferPlanne
     result = replace(result, excitation=run.excitation)
     _save_coefficients(folder, result.excitation)
     write_joint_trajectory(folder / BAG, run.motion(), robot_description=plan.arm.robot.urdf)
-    checked = fitness(run, result.limits, plan.collision, plan.floor, plan.obstacles)
+    space = plan.workspace
+    checked = fitness(run, result.limits, space.collision, space.floor, space.obstacles)
     document = _document(plan, result, run, checked)
     write_file(folder / 'excitation.json', json_text(document, indent=1))
     _write_page(folder / 'report.html', plan, result, run, checked)
@@ -146,8 +165,8 @@ def _write_page(path: Path, plan: Plan, result: Design, run: Run, checked: Fitne
             result,
             plan.arm,
             robot=plan.robot,
-            collision=plan.collision,
-            obstacles=plan.obstacles,
+            collision=plan.workspace.collision,
+            obstacles=plan.workspace.obstacles,
             after=[str(bag) for bag in plan.after],
             provenance=Provenance(
                 files=hash_files([plan.robot, *plan.after, *plan.files]),
@@ -166,7 +185,7 @@ def _document(plan: Plan, result: Design, run: Run, checked: Fitness) -> dict[st
     information, settings = result.information, result.settings
     motion = result.excitation.motion(WAYPOINT_RATE)
     shares = used_shares(result.limits, motion, plan.arm.joint_torque(motion))
-    nearest = checked.nearest
+    nearest, floor = checked.nearest, plan.workspace.floor
     return {
         'schema': SCHEMA,
         'robot': plan.robot,
@@ -179,7 +198,7 @@ def _document(plan: Plan, result: Design, run: Run, checked: Fitness) -> dict[st
         'start': plan.start.tolist(),
         'approach': run.approach.duration,
         'trajectory_duration': run.duration,
-        'floor': {'height': plan.floor.height, 'source': plan.floor.source},
+        'floor': {'height': floor.height, 'source': floor.source},
         'lowest_point': {
             'height': _finite(checked.lowest.height),
             'link': checked.lowest.link,

@@ -51,6 +51,25 @@ class Tie:
     other_point: tuple[float, float, float]
 
 
+@dataclass(frozen=True)
+class TiedMachines:
+    """
+    Two machines and where springs tie them.
+
+    Attributes
+    ----------
+    robot, other : Robot
+        The machine whose torques are measured, and the one it is tied to.
+    ties : sequence of Tie
+        Where the springs are.
+
+    """
+
+    robot: Robot
+    other: Robot
+    ties: Sequence[Tie]
+
+
 class TieGeometry(NamedTuple):
     """
     Ties along a motion.

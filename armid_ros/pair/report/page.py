@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
@@ -75,16 +75,54 @@ class WholeCycle:
     rate: float
 
 
+@dataclass(frozen=True)
+class ShownMotion:
+    """
+    The motion that is shown.
+
+    Attributes
+    ----------
+    motions : PairMotion
+        Of both.
+    abscissa : ndarray, shape (N,)
+        What it is drawn over.
+    name : str
+        Name and unit of the abscissa.
+
+    """
+
+    motions: PairMotion
+    abscissa: FloatArray
+    name: str
+
+
+@dataclass(frozen=True)
+class SimulatedWalk:
+    """
+    What is known of a pair that was simulated; nothing of one that was recorded.
+
+    Attributes
+    ----------
+    truth : mapping of str to float
+        True stiffnesses [N/m].
+    gait : GaitChecks or None
+        Joints driven by torque in single support.
+    whole : WholeCycle or None
+        The same over a whole cycle of walking.
+
+    """
+
+    truth: Mapping[str, float] = field(default_factory=dict)
+    gait: GaitChecks | None = None
+    whole: WholeCycle | None = None
+
+
 def exo_report(
     pair: TiedPair,
-    motions: PairMotion,
-    abscissa: FloatArray,
-    abscissa_name: str,
+    shown: ShownMotion,
     found: Sequence[Interaction],
+    walked: SimulatedWalk | None = None,
     *,
-    truth: Mapping[str, float] | None = None,
-    gait: GaitChecks | None = None,
-    whole: WholeCycle | None = None,
     assumptions: Mapping[str, Assumption] | None = None,
     provenance: Provenance | None = None,
 ) -> str:
@@ -95,31 +133,26 @@ def exo_report(
     ----------
     pair : TiedPair
         Both machines, with the stiffness that was found.
-    motions : PairMotion
+    shown : ShownMotion
         The motion that is shown.
-    abscissa : ndarray, shape (N,)
-        What it is drawn over.
-    abscissa_name : str
-        Its name and unit.
     found : sequence of Interaction
         One stiffness for all, then one for each.
-    truth : mapping of str to float, optional
-        True stiffnesses of simulated data [N/m].
-    gait : GaitChecks, optional
-        Joints driven by torque in single support.
-    whole : WholeCycle, optional
-        The same over a whole cycle of walking.
+    walked : SimulatedWalk, optional
+        What is known of simulated data.
     assumptions : mapping, optional
         What was assumed.
     provenance : Provenance, optional
         Files, versions, settings, seed.
 
     """
+    motions, abscissa = shown.motions, shown.abscissa
+    walked = walked or SimulatedWalk()
+    gait, whole = walked.gait, walked.whole
     torques = pair_torques(pair, *motions)
     alone = pair_torques(pair.with_stiffness(0.0), *motions)
     samples = np.linspace(0, len(abscissa) - 1, _POSES).astype(int).tolist()
     captions = [f'{abscissa[k]:.2f}' for k in samples]
-    sections: list[Section] = [_verdict(found, gait, whole), Stiffness(found, truth or {})]
+    sections: list[Section] = [_verdict(found, gait, whole), Stiffness(found, walked.truth)]
     if whole is not None:
         sections += [
             Walk(whole.cycle, whole.driven),
@@ -131,7 +164,7 @@ def exo_report(
     sections += [
         Forces(
             abscissa,
-            abscissa_name,
+            shown.name,
             torques.forces,
             pair.segments,
             torques.tau,
