@@ -161,6 +161,7 @@ def test_a_change_in_mid_motion_is_seen_and_nothing_else_forgotten(change, befor
     assert np.all(moved < 4.0 * known.std[others])
 
 
+@pytest.mark.slow
 def test_work_without_a_change_raises_no_alarm():
     assert not changes.watch(changes.unchanging(2, 1, RATE)).changes
 

@@ -113,6 +113,7 @@ def test_friction_is_found_without_noise(arm, clean, motion):
             assert found == pytest.approx(value, rel=0.02), (name, joint)
 
 
+@pytest.mark.slow
 def test_estimates_scatter_as_their_covariance_says(arm, motion, tau):
     """Chi-square of the errors of 8 noises, and every parameter within its own interval."""
     total, outside, count = 0.0, 0, 0
