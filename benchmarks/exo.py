@@ -18,7 +18,7 @@ from armid_ros.identification.ties.problem import (
     Inertias,
     interaction_problem,
     InteractionProblem,
-    SensorNoise,
+    MachineNoise,
 )
 from armid_ros.identification.ties.search import find_interaction, InteractionFinding
 from armid_ros.identification.ties.stiffness import Interaction
@@ -158,7 +158,7 @@ def _planned(
         pair.machines,
         motions.own,
         motions.other,
-        noise=SensorNoise(np.radians(degrees)),
+        noise=MachineNoise(np.radians(degrees)),
         inertias=inertias,
         separate=separate,
     )

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.ties.poses import stiffness_bound
-from armid_ros.identification.ties.problem import interaction_problem, SensorNoise
+from armid_ros.identification.ties.problem import interaction_problem, MachineNoise
 from armid_ros.motion import FloatArray
 from armid_ros.pair.exercises import exercise, EXERCISES
 from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
@@ -32,7 +32,7 @@ def bound(name: str, samples: int = 200) -> FloatArray:
         pair.machines,
         motions.own,
         motions.other,
-        noise=SensorNoise(np.radians(DEGREES)),
+        noise=MachineNoise(np.radians(DEGREES)),
         inertias='free',
         separate=True,
     )

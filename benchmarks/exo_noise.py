@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armid_ros.identification.ties.problem import Inertias, interaction_problem, SensorNoise
+from armid_ros.identification.ties.problem import Inertias, interaction_problem, MachineNoise
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import Motion
@@ -33,7 +33,7 @@ def find_springs(
             pair.machines,
             own,
             other,
-            noise=SensorNoise(np.radians(degrees)),
+            noise=MachineNoise(np.radians(degrees)),
             inertias=inertias,
             separate=separate,
         )

@@ -10,8 +10,8 @@ from pathlib import Path
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.cli import columns, options
 from armid_ros.cli import partner as partner_options
-from armid_ros.cli.diagnosis_files import Case, Extras, make_extras, write_results
-from armid_ros.cli.groups import Filters, gathered, RobotChoice
+from armid_ros.cli.diagnosis_files import DiagnosisCase, Extras, make_extras, write_results
+from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.diagnosis import diagnose as run
@@ -49,7 +49,7 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
 
 
 @dataclass(frozen=True)
-class DataOptions:
+class DiagnosisData:
     """
     What is read.
 
@@ -170,18 +170,18 @@ class AskedOptions:
 @options.reading
 @options.as_json
 @gathered(
-    data=DataOptions,
+    data=DiagnosisData,
     robot=RobotChoice,
     asked=AskedOptions,
-    filters=Filters,
+    filters=FilterOptions,
     partner=partner_options.PartnerOptions,
 )
 def diagnose(
-    data: DataOptions,
+    data: DiagnosisData,
     robot: RobotChoice,
     out: Path,
     asked: AskedOptions,
-    filters: Filters,
+    filters: FilterOptions,
     partner: partner_options.PartnerOptions,
     seed: int,
     as_json: bool,
@@ -213,7 +213,7 @@ def diagnose(
             rng=np.random.default_rng(seed),
             progress=tick,
         )
-        case = Case(
+        case = DiagnosisCase(
             arm,
             robot.robot_source,
             options.kept_source(robot.robot_source, loaded, out),

@@ -53,7 +53,7 @@ STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_ac
 
 
 @dataclass(frozen=True)
-class DataOptions:
+class ElasticData:
     """
     What is read.
 
@@ -166,9 +166,9 @@ class DriveOptions:
 @options.reading
 @options.seed
 @options.as_json
-@gathered(data=DataOptions, demo=DemoOptions, drives=DriveOptions)
+@gathered(data=ElasticData, demo=DemoOptions, drives=DriveOptions)
 def elastic(
-    data: DataOptions,
+    data: ElasticData,
     demo: DemoOptions,
     robot_source: str,
     drives: DriveOptions,
@@ -233,7 +233,7 @@ def elastic(
     say(f'{out}: {", ".join(["elastic.json", "report.html", *files])}')
 
 
-def _provenance(data: DataOptions, begin: str, seed: int | None) -> Provenance:
+def _provenance(data: ElasticData, begin: str, seed: int | None) -> Provenance:
     """Return what the result was made from."""
     return Provenance(
         files=hash_files([*data.bags, *data.steps]),
@@ -244,7 +244,7 @@ def _provenance(data: DataOptions, begin: str, seed: int | None) -> Provenance:
 
 
 def _identify(
-    pair: _Machine, data: DataOptions, start: TwoLinkParameters | None, tick: Tick
+    pair: _Machine, data: ElasticData, start: TwoLinkParameters | None, tick: Tick
 ) -> TwoInertiaIdentification:
     """Read the bags, and find the parameters in three steps."""
     how = options.read_settings(), options.tell_damage
@@ -270,7 +270,7 @@ def _two_numbers(text: str | None, what: str, default: Any) -> FloatArray:
     return values
 
 
-def _simulate(pair: _Machine, out: Path, experiments: int, seed: int, tick: Tick) -> DataOptions:
+def _simulate(pair: _Machine, out: Path, experiments: int, seed: int, tick: Tick) -> ElasticData:
     """Write bags of the simulated arm: through the resonances, and steps."""
     rng, shipped = np.random.default_rng(seed), pair.shipped
     plant = two_link_plant(shipped.parameters)
@@ -287,7 +287,7 @@ def _simulate(pair: _Machine, out: Path, experiments: int, seed: int, tick: Tick
         tick(0.0, f'simulating {path.name}')
         runs = [noise.measure(run, rng) for run in run_all(plant, loop, plan, tick)]
         write_runs(path, runs, pair.robot, pair.sensors.on_links(pair.robot))
-    return DataOptions((out / 'resonances',), (out / 'steps',))
+    return ElasticData((out / 'resonances',), (out / 'steps',))
 
 
 def _known(robot: Robot, shipped: TwoLinkSet, begin: str) -> tuple[TwoLinkParameters | None, str]:

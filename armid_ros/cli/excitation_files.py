@@ -41,7 +41,7 @@ BAG = 'trajectory'
 
 
 @dataclass(frozen=True)
-class Workspace:
+class CollisionScene:
     """
     What a motion must not touch.
 
@@ -65,7 +65,7 @@ class Workspace:
 
 
 @dataclass(frozen=True)
-class Plan:
+class ExcitationPlan:
     """
     What a design was made for.
 
@@ -75,7 +75,7 @@ class Plan:
         Prior model.
     robot : str
         Shipped name or path.
-    workspace : Workspace
+    workspace : CollisionScene
         What it must not touch.
     start : ndarray, shape (n,)
         Pose to leave from and to return to [rad or m].
@@ -90,7 +90,7 @@ class Plan:
 
     arm: ArmModel
     robot: str
-    workspace: Workspace
+    workspace: CollisionScene
     start: FloatArray
     after: Sequence[Path]
     files: Sequence[Path]
@@ -124,7 +124,9 @@ def require_free(folder: Path) -> None:
         raise RecordingError(f'{folder / BAG} exists already; name another --out, or delete it')
 
 
-def write_plan(folder: Path, plan: Plan, result: Design, planner: TransferPlanner) -> Written:
+def write_plan(
+    folder: Path, plan: ExcitationPlan, result: Design, planner: TransferPlanner
+) -> Written:
     """
     Fill a folder with a design; what took longest to find is written first.
 
@@ -158,7 +160,9 @@ def _save_coefficients(folder: Path, excitation: Excitation) -> None:
         save_excitation(excitation, folder / name)
 
 
-def _write_page(path: Path, plan: Plan, result: Design, run: Run, checked: Fitness) -> None:
+def _write_page(
+    path: Path, plan: ExcitationPlan, result: Design, run: Run, checked: Fitness
+) -> None:
     """Write the report; what goes wrong there is said, and costs nothing else."""
     try:
         page = excitation_report(
@@ -181,7 +185,7 @@ def _write_page(path: Path, plan: Plan, result: Design, run: Run, checked: Fitne
         click.echo(f'{path}: not written: {type(error).__name__}: {error}', err=True)
 
 
-def _document(plan: Plan, result: Design, run: Run, checked: Fitness) -> dict[str, Any]:
+def _document(plan: ExcitationPlan, result: Design, run: Run, checked: Fitness) -> dict[str, Any]:
     information, settings = result.information, result.settings
     motion = result.excitation.motion(WAYPOINT_RATE)
     shares = used_shares(result.limits, motion, plan.arm.joint_torque(motion))

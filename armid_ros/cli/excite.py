@@ -11,10 +11,10 @@ from pathlib import Path
 from armid_ros.arm import ArmModel
 from armid_ros.cli import options
 from armid_ros.cli.excitation_files import (
-    Plan,
+    CollisionScene,
+    ExcitationPlan,
     require_free,
     SCHEMA,
-    Workspace,
     write_plan,
     Written,
 )
@@ -35,9 +35,9 @@ from armid_ros.excitation import (
     CRITERIA,
     Design,
     design_speeds,
+    DesignProgress,
     DesignSettings,
     Problem,
-    Progress,
     SPEED_CLASSES,
     TARGETS,
     transfer_limits,
@@ -201,7 +201,7 @@ def excite(
     given = options.per_joint(limits.start, loaded, '--start')
     start, zero_fault = _start(given, planners[motion.speeds[0]])
     files = tuple(filter(None, (model.model, limits.environment)))
-    plan = Plan(arm, robot.robot_source, space, start, search.after, files, search.seed)
+    plan = ExcitationPlan(arm, robot.robot_source, space, start, search.after, files, search.seed)
     folders = {s: out if len(motion.speeds) == 1 else out / f'{s}' for s in motion.speeds}
     for folder in folders.values():
         options.hold(folder, SCHEMA, robot.robot_source)
@@ -225,10 +225,10 @@ def excite(
         click.echo(f'interrupted before {", ".join(map(str, missing))}', err=True)
 
 
-def _share(tick: Tick, number: int, count: int) -> Callable[[str | float, Progress], None]:
+def _share(tick: Tick, number: int, count: int) -> Callable[[str | float, DesignProgress], None]:
     """Return what shows the progress of one design of several."""
 
-    def told(speed: str | float, now: Progress) -> None:
+    def told(speed: str | float, now: DesignProgress) -> None:
         tick((number + now.done) / count, f'designing {speed}, cost {now.cost:.2f}')
 
     return told
@@ -238,12 +238,14 @@ def _share(tick: Tick, number: int, count: int) -> Callable[[str | float, Progre
 class _Task:
     """What is designed at every speed: for which plan, beside what is known already."""
 
-    plan: Plan
+    plan: ExcitationPlan
     settings: DesignSettings
     rival: ArmModel | None
     known: FloatArray | None
 
-    def design(self, speed: str | float, told: Callable[[str | float, Progress], None]) -> Design:
+    def design(
+        self, speed: str | float, told: Callable[[str | float, DesignProgress], None]
+    ) -> Design:
         """Return the design for one speed."""
         return design_speeds(
             self.plan.arm,
@@ -262,7 +264,7 @@ def _planner(
     arm: ArmModel,
     settings: DesignSettings,
     speed: str | float,
-    space: Workspace,
+    space: CollisionScene,
 ) -> TransferPlanner:
     """Return what plans the ways to a run of some speed, and back."""
     return TransferPlanner(
@@ -302,7 +304,7 @@ def _tell(
     folder: Path,
     result: Design,
     written: Written,
-    plan: Plan,
+    plan: ExcitationPlan,
     zero_fault: str,
     given: bool,
 ) -> None:

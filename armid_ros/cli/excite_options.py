@@ -10,7 +10,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import options
-from armid_ros.cli.excitation_files import WAYPOINT_RATE, Workspace
+from armid_ros.cli.excitation_files import CollisionScene, WAYPOINT_RATE
 from armid_ros.effects import parse_effect
 from armid_ros.excitation import (
     DesignSettings,
@@ -139,13 +139,13 @@ class LimitOptions:
     environment: Path | None
     floor: str | None
 
-    def workspace(self, robot: Robot) -> Workspace:
+    def workspace(self, robot: Robot) -> CollisionScene:
         """Return what the robot must not touch."""
         collision = collision_model(robot)
         around = load_environment(self.environment) if self.environment else ()
         floor = find_floor(collision, self.floor, around)
         around = (*around, *floor_obstacles(collision, floor, self.clearance))
-        return Workspace(collision, floor, around, self.clearance)
+        return CollisionScene(collision, floor, around, self.clearance)
 
 
 @dataclass(frozen=True)

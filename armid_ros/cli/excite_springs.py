@@ -7,7 +7,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from armid_ros.cli import options
-from armid_ros.cli.excitation_files import BAG, require_free, SCHEMA, Workspace
+from armid_ros.cli.excitation_files import BAG, CollisionScene, require_free, SCHEMA
 from armid_ros.cli.excite_options import MotionOptions
 from armid_ros.cli.terminal import say
 from armid_ros.elastic.plant.courses import multisine_course, step_course
@@ -37,7 +37,7 @@ def refuse_other_options(context: click.Context) -> None:
             raise click.UsageError(f'{option.opts[0]} does not go with --kind {kind}')
 
 
-def write_course(motion: MotionOptions, space: Workspace, seed: int, out: Path) -> None:
+def write_course(motion: MotionOptions, space: CollisionScene, seed: int, out: Path) -> None:
     """Write the trajectory as a bag."""
     robot = space.collision.robot
     options.hold(out, SCHEMA, robot.name)

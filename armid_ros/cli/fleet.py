@@ -85,7 +85,7 @@ class ClusterOptions:
 
 
 @dataclass(frozen=True)
-class FitOptions:
+class FleetFitOptions:
     """
     What is fitted to every bag.
 
@@ -177,14 +177,14 @@ def fleet() -> None:
 @click.option('--resume', is_flag=True, help='Leave out what earlier runs have done.')
 @options.reading
 @options.as_json
-@gathered(robots=RobotOptions, cluster=ClusterOptions, fit=FitOptions)
+@gathered(robots=RobotOptions, cluster=ClusterOptions, fit=FleetFitOptions)
 def identify(
     globs: tuple[str, ...],
     arm: str | None,
     robots: RobotOptions,
     out: str,
     cluster: ClusterOptions,
-    fit: FitOptions,
+    fit: FleetFitOptions,
     as_json: bool,
 ) -> None:
     """Identify every arm of a fleet from its bags."""

@@ -69,7 +69,7 @@ class RobotChoice:
 
 
 @dataclass(frozen=True)
-class Filters:
+class FilterOptions:
     """
     How signals are filtered.
 

@@ -13,7 +13,7 @@ from typing import Any
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.cli import columns, options
-from armid_ros.cli.groups import Filters, gathered, RobotChoice
+from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_parameters, print_rows, progress, say, Tick
 from armid_ros.errors import IdentificationError
@@ -56,7 +56,7 @@ OUTPUTS = (
 
 
 @dataclass(frozen=True)
-class DataOptions:
+class IdentificationData:
     """
     What is read.
 
@@ -204,17 +204,17 @@ class BodyOptions:
 @options.as_json
 @gathered(
     robot=RobotChoice,
-    data=DataOptions,
+    data=IdentificationData,
     fit=FitOptions,
-    filters=Filters,
+    filters=FilterOptions,
     bodies=BodyOptions,
 )
 def identify(
     robot: RobotChoice,
     out: Path,
-    data: DataOptions,
+    data: IdentificationData,
     fit: FitOptions,
-    filters: Filters,
+    filters: FilterOptions,
     bodies: BodyOptions,
     seed: int,
     as_json: bool,
@@ -276,7 +276,7 @@ class _Work:
 
 def _work(
     arm: ArmModel,
-    data: DataOptions,
+    data: IdentificationData,
     settings: IdentificationSettings,
     compared: Sequence[Estimator],
     verifies: bool,

@@ -39,7 +39,7 @@ from armid_ros.report.sections.plan import (
     PlannedClearance,
     PlannedMotion,
 )
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 from armid_ros.report.silhouettes import draw_silhouettes
 from armid_ros.robots import CollisionModel
 import numpy as np
@@ -132,7 +132,9 @@ def excitation_report(
     return Page(f'Excitation of {arm.robot.name}', subtitle, sections).html()
 
 
-def _verdict(design: Design, motion: Motion, checked: Fitness, notes: Sequence[str]) -> Verdict:
+def _verdict(
+    design: Design, motion: Motion, checked: Fitness, notes: Sequence[str]
+) -> VerdictSection:
     """Say how much is seen, what is known worst, and that nothing is hit."""
     information, settings = design.information, design.settings
     std, names = information.std, information.parameters
@@ -172,7 +174,7 @@ def _verdict(design: Design, motion: Motion, checked: Fitness, notes: Sequence[s
         beware.append('Not all bodies were looked at; see Clearance.')
     tone = 'good' if checked.word == FIT and not design.stopped else 'fair'
     tone = 'bad' if unseen or checked.word == UNFIT else tone
-    return Verdict('blind' if unseen else checked.word, tone, sentences, beware)
+    return VerdictSection('blind' if unseen else checked.word, tone, sentences, beware)
 
 
 def _kept(design: Design, motion: Motion, checked: Fitness) -> str:

@@ -19,17 +19,17 @@ from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.correlations import Correlations
 from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
 from armid_ros.report.sections.encoder_noise import EncoderNoise
-from armid_ros.report.sections.excitation import Excitation
+from armid_ros.report.sections.excitation import ExcitationSection
 from armid_ros.report.sections.facts import Asked
 from armid_ros.report.sections.fit import FitSection
 from armid_ros.report.sections.forward import Forward
 from armid_ros.report.sections.methods import Methods
 from armid_ros.report.sections.next_steps import NextSteps
 from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.parameters import Parameters
+from armid_ros.report.sections.parameters import ParameterSection
 from armid_ros.report.sections.physical import PhysicalSection
 from armid_ros.report.sections.residuals import Residuals
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 from armid_ros.report.sections.whiteness import WhitenessSection
 from armid_ros.report.statistics import directions, torque_reach, torque_scale
 
@@ -103,7 +103,7 @@ def identification_report(
         ),
     ]
     sections: list[Section] = [
-        Verdict(
+        VerdictSection(
             grade.word, TONES[grade.word], _first(grade, judgement.sentences), judgement.beware
         ),
         Asked(_asked(result, robot, list(training), list(validation))),
@@ -111,10 +111,12 @@ def identification_report(
         FitSection(arm.robot, training, validation, torque_reach(result, shown)),
         *_forward(result, verification),
         Residuals(arm.robot, shown, role),
-        Parameters(result.estimate, result.base.values(description.theta), result.unidentified),
+        ParameterSection(
+            result.estimate, result.base.values(description.theta), result.unidentified
+        ),
         *_physical(result, exports or {}),
         Correlations(result.estimate),
-        Excitation(
+        ExcitationSection(
             result.condition_number,
             result.base.rank,
             directions(result.estimate, torque_scale(result)),

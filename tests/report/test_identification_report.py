@@ -11,7 +11,7 @@ from armid_ros.motion import Motion
 from armid_ros.report import hash_files, identification_report, Provenance, versions
 from armid_ros.report.repeatability import Repeatability
 from armid_ros.report.sections.fit import FitSection
-from armid_ros.report.sections.parameters import Parameters
+from armid_ros.report.sections.parameters import ParameterSection
 import numpy as np
 import pytest
 
@@ -188,7 +188,7 @@ def test_what_the_data_do_not_tell_is_no_number(case):
     estimate = case.result.estimate
     values = estimate.values.copy()
     values[0] = 0.5 * estimate.std[0]
-    section = Parameters(replace(estimate, values=values), 0.0 * values)
+    section = ParameterSection(replace(estimate, values=values), 0.0 * values)
     rows = [row for _, _, rows in section.families for row in rows]
     (row,) = (row for row in rows if row.value == values[0])
     assert row.text[0] == 'not told from 0'

@@ -28,7 +28,7 @@ _POINTS = 120
 
 
 @dataclass(frozen=True, eq=False)
-class JointFit:
+class DecoupledFit:
     """
     Physical parameters of a decoupled joint, all at the joint.
 
@@ -61,7 +61,7 @@ class JointFit:
     error_db: float
 
 
-def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> JointFit:
+def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> DecoupledFit:
     """
     Fit a motor and a link on a spring to an identified response.
 
@@ -89,7 +89,7 @@ def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> Joi
     fit = least_squares(residual, start, jac=jacobian, x_scale='jac')
     rotor, inertia, stiffness, between, motor, link, gain = np.exp(fit.x).tolist()
     size = 20.0 * np.log10(np.abs(_response(s, np.exp(fit.x))[0] / found))
-    return JointFit(
+    return DecoupledFit(
         rotor,
         inertia,
         stiffness,

@@ -140,7 +140,7 @@ class InteractionProblem:
 
 
 @dataclass(frozen=True)
-class SensorNoise:
+class MachineNoise:
     """
     What sensors add to the truth.
 
@@ -162,7 +162,7 @@ def interaction_problem(
     motion: Motion,
     other_motion: Motion,
     *,
-    noise: SensorNoise | None = None,
+    noise: MachineNoise | None = None,
     used: Conditioning | None = None,
     inertias: Inertias = 'known',
     separate: bool = False,
@@ -177,7 +177,7 @@ def interaction_problem(
         Both, and where the springs are.
     motion, other_motion : Motion
         On one time base; ``motion`` with torques.
-    noise : SensorNoise, optional
+    noise : MachineNoise, optional
         What sensors add; nothing by default.
     used : Conditioning, optional
         The filters that the positions went through, and by which torques and columns are to be
@@ -223,7 +223,7 @@ def interaction_problem(
     if used is not None:
         tau, known, columns = (decimate(values, used) for values in (tau, known, columns))
         passed, left = _passed(used), _torque_passed(used)
-    noise = noise or SensorNoise()
+    noise = noise or MachineNoise()
     deviation = np.broadcast_to(np.asarray(noise.position, dtype=float), (count,))
     return InteractionProblem(
         tau,

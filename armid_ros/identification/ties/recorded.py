@@ -19,7 +19,7 @@ from armid_ros.identification.ties.problem import (
     Inertias,
     interaction_problem,
     InteractionProblem,
-    SensorNoise,
+    MachineNoise,
     STACKED,
 )
 from armid_ros.model.spring_ties import TiedMachines
@@ -126,7 +126,7 @@ def together_interaction_problem(
     both = _one_machine(recording)
     assert both.tau is not None
     machines = TiedMachines(robot, beside.robot, beside.ties)
-    noise = SensorNoise(_white(both.q), _white(both.tau[:, :n]))
+    noise = MachineNoise(_white(both.q), _white(both.tau[:, :n]))
     problems = []
     for stretch, own in zip(segments(both, used), segments(recording, used), strict=True):
         assert own.tau is not None

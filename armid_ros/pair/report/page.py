@@ -12,13 +12,13 @@ from armid_ros.motion import FloatArray
 from armid_ros.pair.gait_cycle import GaitCycle
 from armid_ros.pair.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.pair.report.poses import draw_poses
-from armid_ros.pair.report.sections import Assumptions, Forces, Gait, Poses, Stiffness
+from armid_ros.pair.report.sections import Assumptions, Forces, GaitSection, Poses, Stiffness
 from armid_ros.pair.report.walk import CycleByTorque, Driven, FootForces, Walk
 from armid_ros.pair.torque_driven import GaitCheck
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 from armid_ros.robots.assumptions import Assumption
 import numpy as np
 
@@ -160,7 +160,7 @@ def exo_report(
             FootForces(whole.cycle),
         ]
     if gait is not None:
-        sections.append(Gait(gait.checks, gait.softer, gait.phase, gait.rate))
+        sections.append(GaitSection(gait.checks, gait.softer, gait.phase, gait.rate))
     sections += [
         Forces(
             abscissa,
@@ -182,7 +182,7 @@ def exo_report(
 
 def _verdict(
     found: Sequence[Interaction], gait: GaitChecks | None, whole: WholeCycle | None
-) -> Verdict:
+) -> VerdictSection:
     """Say what ties the two, how surely, and whether the torques walk."""
     overall = found[0]
     k, reach = overall.stiffness[0], 1.96 * overall.std[0]
@@ -208,6 +208,8 @@ def _verdict(
         )
     beware = [f'{", ".join(weak)}: too slightly drawn out to know within 10 %.'] if weak else []
     if k - reach <= 0.0:
-        return Verdict('no interaction', 'fair', ['No interaction is seen.'], beware)
+        return VerdictSection('no interaction', 'fair', ['No interaction is seen.'], beware)
     sure = reach < _NARROW * k
-    return Verdict('found' if sure else 'uncertain', 'good' if sure else 'fair', sentences, beware)
+    return VerdictSection(
+        'found' if sure else 'uncertain', 'good' if sure else 'fair', sentences, beware
+    )

@@ -12,7 +12,7 @@ import re
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.tables.content import read_content
-from armid_ros.recording.tables.table import Column, Table
+from armid_ros.recording.tables.table import Table, TableColumn
 import numpy as np
 
 _SEPARATORS = {',': 'commas', ';': 'semicolons', '\t': 'tabs', ' ': 'blanks'}
@@ -43,7 +43,7 @@ def read_text(path: Path) -> Table:
     unit_cells += [''] * (len(names) - len(unit_cells))
     values, notes = _numbers(path, rows, separator, names, first + 1)
     columns = tuple(
-        Column(name, column, '' if header else '[]', unit)
+        TableColumn(name, column, '' if header else '[]', unit)
         for name, column, unit in zip(names, values.T, unit_cells, strict=True)
         if np.isfinite(column).any()
     )

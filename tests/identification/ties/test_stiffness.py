@@ -11,7 +11,7 @@ from armid_ros.identification.ties.poses import choose_poses, stiffness_bound
 from armid_ros.identification.ties.problem import (
     interaction_problem,
     InteractionProblem,
-    SensorNoise,
+    MachineNoise,
 )
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.search import find_interaction
@@ -227,7 +227,7 @@ def exact(pair: TiedPair, motions: PairMotion) -> tuple[InteractionProblem, np.n
         pair.machines,
         own,
         other,
-        noise=SensorNoise(np.radians(0.05)),
+        noise=MachineNoise(np.radians(0.05)),
         inertias='free',
         separate=True,
     )
