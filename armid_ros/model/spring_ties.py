@@ -104,11 +104,6 @@ class TieGeometry(NamedTuple):
         share = np.maximum(1.0 - slack / length, 0.0)
         return np.asarray(self.columns * share[:, np.newaxis])
 
-    @property
-    def other_columns(self) -> FloatArray:
-        """Torque of the other machine's per stiffness, -J^T D, shape (N, m, S) [m^2]."""
-        return -np.asarray(np.einsum('nsxj,nsx->njs', self.other_jacobian, self.way))
-
 
 def centroid_ties(robot: Robot, other: Robot, joints: Sequence[tuple[str, str]]) -> list[Tie]:
     """

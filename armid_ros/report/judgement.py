@@ -95,7 +95,7 @@ def judge(
         steps = ['Nothing stands in the way of using this model in the range it was tested in.']
     return Judgement(
         sentences=(
-            *_sentences(result, training, held_out, len(validation), len(recordings)),
+            *_sentences(result, training, held_out, len(validation)),
             *_simulated(verification),
         ),
         beware=tuple(finding.text for finding in findings if finding.text),
@@ -113,7 +113,7 @@ def _notes(result: Identification) -> list[str]:
 
 
 def _sentences(
-    result: Identification, training: Score, held_out: Score | None, n_held_out: int, n_read: int
+    result: Identification, training: Score, held_out: Score | None, n_held_out: int
 ) -> tuple[str, ...]:
     robot = result.arm.robot
     effects = [

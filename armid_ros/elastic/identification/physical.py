@@ -44,8 +44,6 @@ class DecoupledFit:
         Of the interaction torque; 1 when beta and gamma were right.
     antiresonance, resonance : float
         Of the motor's velocity, undamped [Hz].
-    error_db : float
-        Root mean square difference of identified and fitted responses [dB].
 
     """
 
@@ -58,7 +56,6 @@ class DecoupledFit:
     interaction_gain: float
     antiresonance: float
     resonance: float
-    error_db: float
 
 
 def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> DecoupledFit:
@@ -88,7 +85,6 @@ def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> Dec
 
     fit = least_squares(residual, start, jac=jacobian, x_scale='jac')
     rotor, inertia, stiffness, between, motor, link, gain = np.exp(fit.x).tolist()
-    size = 20.0 * np.log10(np.abs(_response(s, np.exp(fit.x))[0] / found))
     return DecoupledFit(
         rotor,
         inertia,
@@ -99,7 +95,6 @@ def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> Dec
         gain,
         float(np.sqrt(stiffness / inertia) / (2.0 * np.pi)),
         float(np.sqrt(stiffness * (1.0 / inertia + 1.0 / rotor)) / (2.0 * np.pi)),
-        float(np.sqrt(np.mean(size**2))),
     )
 
 
