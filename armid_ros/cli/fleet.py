@@ -40,6 +40,13 @@ _workers = click.option(
     type=click.IntRange(min=1),
     help='Processes of this machine; one a core by default.',
 )
+_alpha = click.option(
+    '--alpha',
+    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+    default=0.05,
+    show_default=True,
+    help='Share of healthy arms among those named, in the long run.',
+)
 
 
 @dataclass(frozen=True)
@@ -284,13 +291,7 @@ def _print(outcome: FleetOutcome, out: str, seconds: float, as_json: bool) -> No
 
 @fleet.command(epilog='Example: armid fleet watch --out results')
 @_out
-@click.option(
-    '--alpha',
-    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
-    default=0.05,
-    show_default=True,
-    help='Share of healthy arms among those named, in the long run.',
-)
+@_alpha
 @options.as_json
 def watch(out: str, alpha: float, as_json: bool) -> None:
     """Find changes and wear over time, and draw the overview."""
@@ -327,13 +328,7 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
 @_workers
 @click.option('--arm', 'arms', multiple=True, help='Which arm; those that `watch` names, if none.')
 @click.option('--all', 'everyone', is_flag=True, help='All arms, whether they changed or not.')
-@click.option(
-    '--alpha',
-    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
-    default=0.05,
-    show_default=True,
-    help='Share of healthy arms among those named, in the long run.',
-)
+@_alpha
 @options.as_json
 def diagnose(
     out: str,

@@ -18,7 +18,6 @@ import os
 from pathlib import Path
 import re
 import tempfile
-from types import TracebackType
 from typing import Self
 
 from armid_ros.errors import RecordingError
@@ -108,12 +107,7 @@ class Bag:
         """Return the bag."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Close the files."""
         self.close()
 
