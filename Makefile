@@ -45,7 +45,7 @@ RUN_TESTS = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest \
 	--durations=15 --numprocesses=auto --dist=loadfile
 
 test: lint  ## lint, types, layers, and the tests that a change usually breaks; five minutes on two cores
-	ARMID_FUZZ=50 $(RUN_TESTS) -m 'not slow' $(PYTEST)
+	ARMID_FUZZ=50 $(RUN_TESTS) -m 'not slow and not real_data' $(PYTEST)
 
 test-all: lint  ## lint, types, layers, and every test: what CI runs
 	$(RUN_TESTS) $(PYTEST)

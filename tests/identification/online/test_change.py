@@ -132,7 +132,10 @@ RATE = 200.0
     [
         ('payload:' + changes.ball(0.3), 30.0, 'payload', 0.3),
         ('coulomb_friction@shoulder_pitch:coulomb_torque=0.1', 30.0, 'coulomb_friction', 0.1),
-        ('coulomb_friction@elbow_pitch:coulomb_torque=0.08', 60.0, 'coulomb_friction', 0.08),
+        pytest.param(
+            *('coulomb_friction@elbow_pitch:coulomb_torque=0.08', 60.0, 'coulomb_friction', 0.08),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_change_in_mid_motion_is_seen_and_nothing_else_forgotten(change, before, name, truth):

@@ -158,6 +158,7 @@ def test_no_springs_no_name(pair) -> None:
     assert found.interaction is None
 
 
+@pytest.mark.slow
 def test_deviations_that_are_stated_are_those_of_repeats(pair) -> None:
     """The scatter of one stiffness over 150 draws, within what so many draws can tell."""
     poses = with_torques(pair, stepping(pair, read_gait(), np.linspace(0.0, 1.8, 101)[:-1]))
@@ -169,6 +170,7 @@ def test_deviations_that_are_stated_are_those_of_repeats(pair) -> None:
     assert low < ratio < high
 
 
+@pytest.mark.slow
 def test_deviations_of_a_recording_allow_for_samples_that_filters_make_alike(pair) -> None:
     """As if rows were independent they would be a third too small, half of the variance."""
     short = with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 3.0, 1e-3)))
