@@ -147,6 +147,15 @@ def _numbers(
     return _cell_by_cell(path, rows, separator, names, first_line)
 
 
+def _number(cell: str, separator: str) -> float:
+    """Return a number, NaN for an empty cell; raise a ValueError for a word."""
+    if cell.lower() in _EMPTY:
+        return np.nan
+    if separator != ',' and _DECIMAL_COMMA.fullmatch(cell):
+        cell = cell.replace(',', '.')
+    return float(cell)
+
+
 def _cell_by_cell(
     path: Path, rows: list[str], separator: str, names: list[str], first_line: int
 ) -> tuple[FloatArray, tuple[str, ...]]:
@@ -166,12 +175,8 @@ def _cell_by_cell(
                 f'{path}: line {first_line + k} has {len(cells)} values, the others {len(names)}'
             )
         for j, cell in enumerate(cells):
-            if cell.lower() in _EMPTY:
-                continue
-            if separator != ',' and _DECIMAL_COMMA.fullmatch(cell):
-                cell = cell.replace(',', '.')
             try:
-                values[k, j] = float(cell)
+                values[k, j] = _number(cell, separator)
             except ValueError:
                 words.setdefault(j, (first_line + k, cell))
     for j, (line_number, cell) in words.items():
