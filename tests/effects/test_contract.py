@@ -24,8 +24,8 @@ LOADED = {'joint_elasticity', 'backlash'}
 SIZES = {'link_inertia': 0.02, 'payload': 0.05, 'interface_slack': 300.0, 'soft_limit': 20.0}
 
 
-def test_the_catalogue_has_every_name():
-    assert sorted(CATALOGUE) == sorted(DESIGNED)
+def test_a_name_once_shipped_stays():
+    assert set(DESIGNED) <= set(CATALOGUE)
 
 
 @pytest.mark.parametrize('check', CHECKS, ids=lambda check: check.__name__)
