@@ -40,6 +40,7 @@ from armid_ros.identification.estimators.side_by_side import compare_methods, Me
 from armid_ros.identification.output import SCHEMA
 from armid_ros.recording import Recording
 from armid_ros.report import identification_report
+from armid_ros.report.identification_report import Assessment
 from armid_ros.robots import Robot
 import click
 import numpy as np
@@ -245,10 +246,7 @@ def identify(
         recordings=work.recordings,
         validation=work.validation,
         validation_recordings=work.held_out,
-        verification=work.verification,
-        grade=work.graded,
-        methods=work.scores,
-        exports=exports,
+        assessment=Assessment(work.verification, work.graded, work.scores, exports),
         provenance=provenance([*data.bags, *data.validate], document['settings'], seed),
     )
     write_file(out / 'report.html', page)

@@ -154,7 +154,7 @@ def _check_size(text: str) -> None:
 
 def _written_out(event: yaml.AliasEvent, sizes: Mapping[str, int]) -> int:
     """Return how many nodes an alias stands for."""
-    if event.anchor not in sizes:
+    if event.anchor is None or event.anchor not in sizes:
         raise ValueError(f"line {_line(event)}: the alias '{event.anchor}' has no anchor")
     return sizes[event.anchor]
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification import Fit, Grade, Identification, Verification
@@ -37,6 +38,30 @@ from armid_ros.report.statistics import directions, torque_reach, torque_scale
 TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
 
 
+@dataclass(frozen=True)
+class Assessment:
+    """
+    What an identification was put to, beside predicting recordings.
+
+    Attributes
+    ----------
+    verification : Verification or None
+        Test for encoder noise, and simulations.
+    grade : Grade or None
+        What it is good for; found out where it is not given.
+    methods : sequence of MethodScore
+        Estimators that were compared on the same data.
+    exports : mapping of str to sequence of str
+        Files for other programs, and what each has no place for.
+
+    """
+
+    verification: Verification | None = None
+    grade: Grade | None = None
+    methods: Sequence[MethodScore] = ()
+    exports: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+
 def identification_report(
     result: Identification,
     *,
@@ -45,10 +70,7 @@ def identification_report(
     recordings: Sequence[Recording],
     validation: Mapping[str, Sequence[Fit]],
     validation_recordings: Sequence[Recording] = (),
-    verification: Verification | None = None,
-    grade: Grade | None = None,
-    methods: Sequence[MethodScore] = (),
-    exports: Mapping[str, Sequence[str]] | None = None,
+    assessment: Assessment | None = None,
     provenance: Provenance | None = None,
 ) -> str:
     """
@@ -68,14 +90,8 @@ def identification_report(
         Predictions of recordings that were not used for fitting, by recording.
     validation_recordings : sequence of Recording
         Those recordings.
-    verification : Verification, optional
+    assessment : Assessment, optional
         What the identification was put to.
-    grade : Grade, optional
-        What it is good for; found out where it is not given.
-    methods : sequence of MethodScore
-        Estimators that were compared on the same data.
-    exports : mapping of str to sequence of str, optional
-        Files for other programs, and what each has no place for.
     provenance : Provenance, optional
         Files, versions, settings, seed.
 
@@ -85,7 +101,8 @@ def identification_report(
         One HTML file that loads nothing.
 
     """
-    arm = result.arm
+    arm, assessment = result.arm, assessment or Assessment()
+    verification, grade = assessment.verification, assessment.grade
     training: dict[str, list[Fit]] = {}
     for fit in result.training:
         training.setdefault(fit.source, []).append(fit)
@@ -114,7 +131,7 @@ def identification_report(
         ParameterSection(
             result.estimate, result.base.values(description.theta), result.unidentified
         ),
-        *_physical(result, exports or {}),
+        *_physical(result, assessment.exports),
         Correlations(result.estimate),
         ExcitationSection(
             result.condition_number,
@@ -123,7 +140,7 @@ def identification_report(
         ),
         WhitenessSection(arm.robot, shown, role),
         *_noise(result, verification),
-        *([Methods(methods)] if methods else []),
+        *([Methods(assessment.methods)] if assessment.methods else []),
         NextSteps(judgement.next_steps),
         Origin(provenance or Provenance()),
     ]

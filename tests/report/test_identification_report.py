@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report is one file that is safe to open, complete, and works in a real browser."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from html.parser import HTMLParser
 import re
 
 from armid_ros.identification import IdentificationSettings, identify, PhysicalSettings, verify
 from armid_ros.motion import Motion
 from armid_ros.report import hash_files, identification_report, Provenance, versions
+from armid_ros.report.identification_report import Assessment
 from armid_ros.report.repeatability import Repeatability
 from armid_ros.report.sections.fit import FitSection
 from armid_ros.report.sections.parameters import ParameterSection
@@ -73,7 +74,9 @@ def report_of(case, **changes):
         ),
         **changes,
     }
-    return identification_report(given.pop('result', case.result), **given)
+    named = [field.name for field in fields(Assessment)]
+    assessment = Assessment(**{name: given.pop(name) for name in named if name in given})
+    return identification_report(given.pop('result', case.result), assessment=assessment, **given)
 
 
 @pytest.fixture(scope='module')
