@@ -27,7 +27,7 @@ from armid_ros.excitation import (
 from armid_ros.files import json_text, write_file
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
-from armid_ros.report.excitation_report import excitation_report
+from armid_ros.report.excitation_report import CheckedRun, excitation_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import CollisionModel
 import click
@@ -177,8 +177,7 @@ def _write_page(
                 versions=versions(),
                 seed=plan.seed,
             ),
-            run=run,
-            checked=checked,
+            planned=CheckedRun(run, checked),
         )
         write_file(path, page)
     except Exception as error:  # whatever it is, the trajectory is written and good
