@@ -9,16 +9,7 @@ from setuptools import find_packages, setup
 
 HERE = Path(__file__).resolve().parent  # `colcon build --symlink-install` runs a link to this file
 NAME = 'armid_ros'
-NODES = (
-    'bag_player',
-    'excitation_publisher',
-    'interaction_identifier',
-    'live_diagnosis',
-    'online_identifier',
-    'recorder',
-    'simulated_arm',
-    'simulated_pair',
-)
+NODES = sorted(path.name for path in (HERE / 'scripts').iterdir() if path.name != 'armid')
 
 
 def requirements(group):

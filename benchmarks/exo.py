@@ -18,6 +18,7 @@ from armid_ros.identification.ties.problem import (
     Inertias,
     interaction_problem,
     InteractionProblem,
+    MachineNoise,
 )
 from armid_ros.identification.ties.search import find_interaction, InteractionFinding
 from armid_ros.identification.ties.stiffness import Interaction
@@ -154,12 +155,10 @@ def _planned(
 ) -> tuple[InteractionProblem, FloatArray]:
     """Return the regression on poses with exact torques, and its solution."""
     problem = interaction_problem(
-        pair.robot,
+        pair.machines,
         motions.own,
-        pair.other,
         motions.other,
-        pair.ties,
-        position_noise=np.radians(degrees),
+        noise=MachineNoise(np.radians(degrees)),
         inertias=inertias,
         separate=separate,
     )

@@ -62,11 +62,9 @@ def main() -> None:
 
 def _problem(pair: TiedPair, motions: PairMotion, inertias: Inertias) -> InteractionProblem:
     return recorded_interaction_problem(
-        pair.robot,
+        pair.machines,
         recorded(motions.own),
-        pair.other,
         recorded(motions.other),
-        pair.ties,
         inertias=inertias,
         separate=True,
         settings=SETTINGS,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.ties.poses import stiffness_bound
-from armid_ros.identification.ties.problem import interaction_problem
+from armid_ros.identification.ties.problem import interaction_problem, MachineNoise
 from armid_ros.motion import FloatArray
 from armid_ros.pair.exercises import exercise, EXERCISES
 from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
@@ -29,12 +29,10 @@ def bound(name: str, samples: int = 200) -> FloatArray:
     t = np.linspace(0.0, EXERCISES[name].period, samples + 1)[:-1]
     motions = with_torques(pair, exercise(pair, name, t))
     problem = interaction_problem(
-        pair.robot,
+        pair.machines,
         motions.own,
-        pair.other,
         motions.other,
-        pair.ties,
-        position_noise=np.radians(DEGREES),
+        noise=MachineNoise(np.radians(DEGREES)),
         inertias='free',
         separate=True,
     )

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armid_ros.identification.ties.problem import Inertias, interaction_problem
+from armid_ros.identification.ties.problem import Inertias, interaction_problem, MachineNoise
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import Motion
@@ -30,23 +30,19 @@ def find_springs(
     own, other = measured(motions, degrees, np.random.default_rng(seed))
     if len(own) < 1000:
         problem = interaction_problem(
-            pair.robot,
+            pair.machines,
             own,
-            pair.other,
             other,
-            pair.ties,
-            position_noise=np.radians(degrees),
+            noise=MachineNoise(np.radians(degrees)),
             inertias=inertias,
             separate=separate,
         )
         return identify_interaction(problem, TORQUE_NOISE)
     return identify_interaction(
         recorded_interaction_problem(
-            pair.robot,
+            pair.machines,
             recorded(own),
-            pair.other,
             recorded(other),
-            pair.ties,
             inertias=inertias,
             separate=separate,
         )

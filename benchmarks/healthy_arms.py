@@ -15,7 +15,7 @@ small or too large; errors have heavy tails; bags are missing. Some arms change,
 import argparse
 
 from armid_ros.fleet.changes import judge, named
-from armid_ros.fleet.scatter import Series, without_days
+from armid_ros.fleet.scatter import ParameterHistory, without_days
 import numpy as np
 
 JOINTS = ('waist', 'shoulder', 'elbow')
@@ -71,7 +71,7 @@ def draw(arms, bags, sick, rng):
                 if change is not None and (name, joint) == change[0]:
                     values = values + change[1] * abs(mean)
                 found.append(
-                    Series(
+                    ParameterHistory(
                         f'arm_{arm}',
                         name,
                         joint,

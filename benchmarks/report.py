@@ -24,6 +24,7 @@ from armid_ros.identification import (
 )
 from armid_ros.recording import Recording
 from armid_ros.report import identification_report, Provenance, versions
+from armid_ros.report.identification_report import Assessment
 import numpy as np
 
 from benchmarks.browser import Browser, BROWSERS, find_browser
@@ -74,8 +75,10 @@ def report(minutes):
         recordings=recordings,
         validation={'held out': result.predict(held_out)},
         validation_recordings=held_out,
-        verification=verification,
-        exports={name: made.without_place for name, made in exports.items()},
+        assessment=Assessment(
+            verification,
+            exports={name: made.without_place for name, made in exports.items()},
+        ),
         provenance=Provenance(versions=versions(), seed=0),
     )
     seconds.append(time.process_time())

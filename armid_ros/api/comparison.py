@@ -14,7 +14,7 @@ from armid_ros.api.table import Shown, Summary
 from armid_ros.files import write_file
 from armid_ros.identification.assess.comparison import compare as run
 from armid_ros.identification.assess.comparison import Comparison
-from armid_ros.identification.parameters_file import Parameters, parameters_of, read_parameters
+from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
@@ -139,7 +139,7 @@ def compare(
     return ComparisonResult(run(_parameters('before', before), _parameters('after', after)))
 
 
-def _parameters(name: str, one: IdentificationResult | str | Path) -> Parameters:
+def _parameters(name: str, one: IdentificationResult | str | Path) -> ParameterFile:
     if isinstance(one, IdentificationResult):
         return parameters_of(name, one.document())
     return read_parameters(one)

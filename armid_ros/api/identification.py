@@ -210,7 +210,7 @@ class IdentificationResult(Shown):
     def sections(self) -> list[Section]:
         """Return the errors of the joints, and all parameters."""
         from armid_ros.report.sections.fit import JointErrors
-        from armid_ros.report.sections.parameters import Parameters
+        from armid_ros.report.sections.parameters import ParameterSection
 
         training: dict[str, list[Fit]] = {}
         for fit in self.core.training:
@@ -218,7 +218,7 @@ class IdentificationResult(Shown):
         described = self.core.base.values(self.description.theta)
         return [
             JointErrors(self.arm.robot, training, self.validation),
-            Parameters(self.estimate, described, self.core.unidentified),
+            ParameterSection(self.estimate, described, self.core.unidentified),
         ]
 
     @property

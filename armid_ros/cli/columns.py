@@ -12,7 +12,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.recording import Recording
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.tables import ColumnSettings, numbers, Plan
+from armid_ros.recording.tables import ColumnSettings, numbers, TablePlan
 from armid_ros.recording.tables.settings import number, TIME_UNITS
 from armid_ros.robots import Robot
 import click
@@ -119,7 +119,7 @@ def read(
     context = click.get_current_context(silent=True)
     shown: set[str] = set() if context is None else context.meta.setdefault(_SHOWN, set())
 
-    def show(plan: Plan) -> None:
+    def show(plan: TablePlan) -> None:
         lines = plan.lines()
         body = '\n'.join(lines[1:])
         if plan.guessed or plan.notes:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 import shutil
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.arm import ArmModel, save_model
 from armid_ros.cli import options
@@ -31,6 +31,9 @@ from armid_ros.robots import collision_model, load_robot, Robot
 from armid_ros.simulation import Sensors, SimulatedArm
 import click
 import numpy as np
+
+if TYPE_CHECKING:
+    from armid_ros.nodes.lockstep import Progress
 
 ROBOT = 'humanoid_arm'
 
@@ -63,7 +66,7 @@ OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'repor
 @options.as_json
 def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bool) -> None:
     """Excite, move, identify online and offline; then find what was hidden in the arm."""
-    from armid_ros.nodes.lockstep import Progress, replay_lockstep, run_lockstep
+    from armid_ros.nodes.lockstep import replay_lockstep
 
     rng = np.random.default_rng(seed)
     robot = load_robot(ROBOT, gravity=gravity)
@@ -76,17 +79,8 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     save_excitation(excitation, out / 'excitation.yaml')
     identifier = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
     target = identifier.base.values(truth.theta)
-    history: list[Progress] = []
-    with ConvergenceTable(target) as table:
-
-        def watch(now: Progress) -> None:
-            history.append(now)
-            table.show(now.t, now.duration, now.estimate, now.real_time_factor)
-
-        plant = SimulatedArm(truth, rng=rng, sensors=SENSORS)
-        end = run_lockstep(
-            plant, excitation, identifier, out / 'bag', rate=rate, on_progress=watch
-        )
+    plant = SimulatedArm(truth, rng=rng, sensors=SENSORS)
+    history, end = _run(plant, excitation, identifier, target, out / 'bag', rate)
     again = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
     with progress('playing the bag back') as tick:
         replay = replay_lockstep(
@@ -118,15 +112,9 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
         say(f'online:  {online.sentence()}')
         say(f'offline: {offline.sentence()}')
         _tell(out, document, Score.of(result.training).relative_error_percent)
+    rng = np.random.default_rng([seed, 1])
     told = tell_story(
-        out / 'story',
-        truth,
-        result.arm,
-        recording,
-        sensors=SENSORS,
-        rng=np.random.default_rng([seed, 1]),
-        hide=hide,
-        rate=rate,
+        out / 'story', truth, result.arm, recording, sensors=SENSORS, rng=rng, hide=hide, rate=rate
     )
     document['story'] = told.document()
     write_document(out / 'identification.json', document)
@@ -134,6 +122,28 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
         click.echo(json_text(document))
     else:
         show_story(told, out / 'story')
+
+
+def _run(
+    plant: SimulatedArm,
+    excitation: Excitation,
+    identifier: OnlineIdentifier,
+    target: FloatArray,
+    bag: Path,
+    rate: float,
+) -> tuple[list[Progress], Progress]:
+    """Move the arm and identify it online, in a table; return what was said, and the end."""
+    from armid_ros.nodes.lockstep import run_lockstep
+
+    history: list[Progress] = []
+    with ConvergenceTable(target) as table:
+
+        def watch(now: Progress) -> None:
+            history.append(now)
+            table.show(now.t, now.duration, now.estimate, now.real_time_factor)
+
+        end = run_lockstep(plant, excitation, identifier, bag, rate=rate, on_progress=watch)
+    return history, end
 
 
 def true_arm(robot: Robot) -> ArmModel:

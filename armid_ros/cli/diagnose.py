@@ -4,22 +4,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.cli import columns, options
 from armid_ros.cli import partner as partner_options
-from armid_ros.cli.diagnosis_files import Case, Extras, make_extras, write_results
+from armid_ros.cli.diagnosis_files import DiagnosisCase, Extras, make_extras, write_results
+from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, Finding
 from armid_ros.diagnosis.verdict.document import SCHEMA
+from armid_ros.effects.tied import Partner
 from armid_ros.files import json_text
-from armid_ros.identification import SignalSettings
 from armid_ros.identification.fitting.identifiability import told_from_zero
+from armid_ros.recording import Recording
 from armid_ros.report.notation import percent, probability, with_interval
 from armid_ros.residual import require_libraries, TABLE_FILE
+from armid_ros.robots import Robot
 import click
 import numpy as np
 
@@ -42,6 +46,70 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
         if not 0.0 <= share < 1.0:
             self.fail(f"'{value}' is not a percentage from 0% to 100%", param, ctx)
         return share
+
+
+@dataclass(frozen=True)
+class DiagnosisData:
+    """
+    What is read.
+
+    Attributes
+    ----------
+    bags, validate, baseline : tuple of Path
+        Recordings to look at, those that are only predicted, and those from before.
+    topic : str or None
+        Of the joint states.
+
+    """
+
+    bags: tuple[Path, ...]
+    validate: tuple[Path, ...]
+    baseline: tuple[Path, ...]
+    topic: str | None
+
+    def read(
+        self, robot: Robot, partner: Partner | None, partner_topic: str | None
+    ) -> tuple[list[Recording], list[Recording], list[Recording]]:
+        """Return the three kinds of recordings, the first two with the partner beside."""
+        recordings, held_out, before = (
+            options.read(paths, robot, self.topic)
+            for paths in (self.bags, self.validate, self.baseline)
+        )
+        options.tell_damage(*recordings, *held_out, *before)
+        if partner is not None:
+            how = options.read_settings()
+            recordings, held_out = (
+                partner_options.read_together(named, some, partner, partner_topic, how)
+                for named, some in ((self.bags, recordings), (self.validate, held_out))
+            )
+        return recordings, held_out, before
+
+
+@dataclass(frozen=True)
+class AskedOptions:
+    """
+    What is known of the arm, and what is asked.
+
+    Attributes
+    ----------
+    model : Path or None
+        A model.yaml.
+    effects : str
+        Effects that are fitted anew.
+    material : float
+        Share of the torque below which an effect does not matter.
+    everything : bool
+        Whether those get into the model, too.
+    residual : str or None
+        How what is left without a name is learned.
+
+    """
+
+    model: Path | None
+    effects: str
+    material: float
+    everything: bool
+    residual: str | None
 
 
 @click.command(epilog='Example: armid diagnose slow.mcap fast.mcap --robot ur10.urdf --out found')
@@ -101,55 +169,40 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
 @options.seed
 @options.reading
 @options.as_json
+@gathered(
+    data=DiagnosisData,
+    robot=RobotChoice,
+    asked=AskedOptions,
+    filters=FilterOptions,
+    partner=partner_options.PartnerOptions,
+)
 def diagnose(
-    bags: tuple[Path, ...],
-    robot_source: str,
+    data: DiagnosisData,
+    robot: RobotChoice,
     out: Path,
-    validate: tuple[Path, ...],
-    model: Path | None,
-    baseline: tuple[Path, ...],
-    material: float,
-    everything: bool,
-    effects: str,
-    residual: str | None,
-    cutoff: float | None,
-    decimation: int | None,
-    topic: str | None,
-    partner: str | None,
-    partner_topic: str | None,
-    ties: tuple[str, ...],
-    gravity: str,
-    joints: str | None,
+    asked: AskedOptions,
+    filters: FilterOptions,
+    partner: partner_options.PartnerOptions,
     seed: int,
     as_json: bool,
 ) -> None:
     """Find which effect a model lacks, and add it."""
-    if residual is not None:
+    if asked.residual is not None:
         require_libraries()
-    options.hold(out, SCHEMA, robot_source)
-    robot = options.open_robot(robot_source, gravity, joints, bags)
-    arm = ArmModel(robot) if model is None else load_model(model, robot)
-    arm = options.with_effects(arm, effects)
-    beside = partner_options.open_partner(partner, ties, robot, gravity)
+    options.hold(out, SCHEMA, robot.robot_source)
+    loaded = robot.load(data.bags)
+    arm = ArmModel(loaded) if asked.model is None else load_model(asked.model, loaded)
+    arm = options.with_effects(arm, asked.effects)
+    beside = partner_options.open_partner(partner.partner, partner.ties, loaded, robot.gravity)
     settings = DiagnosisSettings(
-        signals=SignalSettings(cutoff, decimation),
+        signals=filters.settings(),
         partner=beside,
-        material=material,
-        everything=everything,
+        material=asked.material,
+        everything=asked.everything,
     )
-    misfit = None if model is None or baseline else load_misfit(model)
+    misfit = None if asked.model is None or data.baseline else load_misfit(asked.model)
     with progress('reading') as tick:
-        recordings, held_out, before = (
-            options.read(paths, robot, topic) for paths in (bags, validate, baseline)
-        )
-        options.tell_damage(*recordings, *held_out, *before)
-        if beside is not None:
-            recordings, held_out = (
-                partner_options.read_together(
-                    named, some, beside, partner_topic, options.read_settings()
-                )
-                for named, some in ((bags, recordings), (validate, held_out))
-            )
+        recordings, held_out, before = data.read(loaded, beside, partner.partner_topic)
         result = run(
             arm,
             recordings,
@@ -160,17 +213,17 @@ def diagnose(
             rng=np.random.default_rng(seed),
             progress=tick,
         )
-        case = Case(
+        case = DiagnosisCase(
             arm,
-            robot_source,
-            options.kept_source(robot_source, robot, out),
+            robot.robot_source,
+            options.kept_source(robot.robot_source, loaded, out),
             recordings,
             held_out,
             before,
             settings,
             misfit,
-            provenance([*bags, *validate, *baseline], seed=seed),
-            residual is not None,
+            provenance([*data.bags, *data.validate, *data.baseline], seed=seed),
+            asked.residual is not None,
         )
         write_results(out, result, case, Extras())
         extras = make_extras(result, case, seed, tick)

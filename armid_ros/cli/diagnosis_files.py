@@ -45,7 +45,7 @@ _Made = TypeVar('_Made')
 
 
 @dataclass(frozen=True)
-class Case:
+class DiagnosisCase:
     """
     What was diagnosed.
 
@@ -104,7 +104,9 @@ class Extras:
     residual: Residual | None = None
 
 
-def write_results(out: Path, result: Diagnosis, case: Case, extras: Extras) -> dict[str, Any]:
+def write_results(
+    out: Path, result: Diagnosis, case: DiagnosisCase, extras: Extras
+) -> dict[str, Any]:
     """Fill a folder, numbers before pictures; return what diagnosis.json holds."""
     out.mkdir(parents=True, exist_ok=True)
     estimate = None if result.explanation is None else result.explanation.fitted.estimate
@@ -137,7 +139,7 @@ def write_results(out: Path, result: Diagnosis, case: Case, extras: Extras) -> d
     return document
 
 
-def make_extras(result: Diagnosis, case: Case, seed: int, tick: Tick) -> Extras:
+def make_extras(result: Diagnosis, case: DiagnosisCase, seed: int, tick: Tick) -> Extras:
     """Simulate the held-out recordings and plan a next run, as far as that can be done."""
     extras = Extras()
     if case.learns:
@@ -167,7 +169,7 @@ def _learned(result: Diagnosis, seed: int) -> Extras:
 
 
 def _simulated(
-    arm: ArmModel, case: Case, tick: Tick
+    arm: ArmModel, case: DiagnosisCase, tick: Tick
 ) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
     used = conditioning(list(case.recordings), case.settings.signals)
     return simulate_held_out(

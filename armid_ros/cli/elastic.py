@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from armid_ros.cli import options
+from armid_ros.cli.groups import gathered
 from armid_ros.cli.springs import identify_springs
-from armid_ros.cli.terminal import print_parameters, progress, say
+from armid_ros.cli.terminal import print_parameters, progress, say, Tick
 from armid_ros.elastic.identification import (
     Accelerometers,
     identify_two_inertia,
@@ -20,7 +21,7 @@ from armid_ros.elastic.identification import (
 )
 from armid_ros.elastic.identification.output import elastic_document, SCHEMA
 from armid_ros.elastic.identification.story import TuningStory
-from armid_ros.elastic.plant.run import ElasticSensors, run_all
+from armid_ros.elastic.plant.run import ElasticSensors, run_all, VelocityLoop
 from armid_ros.elastic.plant.signals import (
     EXCITATION_RMS,
     resonance_experiments,
@@ -49,6 +50,87 @@ import numpy as np
 #: Noise of the simulated sensors: rates in rad/s, accelerations in rad/s^2, at the joints.
 SENSORS = ElasticSensors(motor_velocity=0.006, link_velocity=0.003, link_acceleration=0.2)
 STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_acceleration=0.2)
+
+
+@dataclass(frozen=True)
+class ElasticData:
+    """
+    What is read.
+
+    Attributes
+    ----------
+    bags, steps : tuple of Path
+        Recordings through the resonances, and of step responses.
+
+    """
+
+    bags: tuple[Path, ...]
+    steps: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
+class DemoOptions:
+    """
+    What is simulated.
+
+    Attributes
+    ----------
+    demo : bool
+        Whether anything is.
+    experiments : int
+        How many, of 4 s each.
+    start : str or None
+        What the tuning begins with.
+
+    """
+
+    demo: bool
+    experiments: int
+    start: str | None
+
+
+@dataclass(frozen=True)
+class _Machine:
+    """A planar pair of links with its sensors, motors and velocity loop."""
+
+    robot: Robot
+    shipped: TwoLinkSet
+    sensors: Accelerometers
+    drives: TwoLinkParameters
+    loop: VelocityLoop
+
+
+@dataclass(frozen=True)
+class DriveOptions:
+    """
+    What is known of sensors and motors, two numbers each.
+
+    Attributes
+    ----------
+    accelerometers, gear, kp, ki : str or None
+        Distances [m], gear ratios, gains of the velocity loop.
+
+    """
+
+    accelerometers: str | None
+    gear: str | None
+    kp: str | None
+    ki: str | None
+
+    def pair(self, robot: Robot) -> _Machine:
+        """Return the pair that has them, and what is shipped for the rest."""
+        shipped = two_link_set('after')
+        usual = shipped.assumptions['accelerometer_radius']
+        radius = _two_numbers(self.accelerometers, 'accelerometers', usual)
+        sensors = Accelerometers.on(robot, radius)
+        gear = _two_numbers(self.gear, 'gear', shipped.parameters.gear)
+        loop = two_link_loop(shipped)
+        loop = replace(
+            loop,
+            proportional=_two_numbers(self.kp, 'kp', loop.proportional),
+            integral=_two_numbers(self.ki, 'ki', loop.integral),
+        )
+        return _Machine(robot, shipped, sensors, replace(shipped.parameters, gear=gear), loop)
 
 
 @click.command(epilog='Example: armid elastic run.mcap --steps steps.mcap --out result')
@@ -84,17 +166,12 @@ STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_ac
 @options.reading
 @options.seed
 @options.as_json
+@gathered(data=ElasticData, demo=DemoOptions, drives=DriveOptions)
 def elastic(
-    bags: tuple[Path, ...],
-    steps: tuple[Path, ...],
-    demo: bool,
-    experiments: int,
+    data: ElasticData,
+    demo: DemoOptions,
     robot_source: str,
-    start: str | None,
-    accelerometers: str | None,
-    gear: str | None,
-    kp: str | None,
-    ki: str | None,
+    drives: DriveOptions,
     model: Path | None,
     out: Path,
     seed: int,
@@ -108,67 +185,43 @@ def elastic(
     are found joint by joint.
 
     """
-    begin = start or ('before' if demo else 'found')
+    begin = demo.start or ('before' if demo.demo else 'found')
     printed = None if begin == 'found' else two_link_set(begin).parameters
     robot = load_robot(robot_source)
     if not planar_pair(robot):
-        if demo or steps:
+        if demo.demo or data.steps:
             raise RobotError(
                 f'{robot.name} is no pair of links that move in a horizontal plane: --demo and '
                 '--steps are for such; without them its springs are found joint by joint'
             )
-        identify_springs(bags, robot, robot_source, model, out, seed, as_json)
+        identify_springs(data.bags, robot, robot_source, model, out, seed, as_json)
         return
     if model is not None:
         raise RobotError('--model has no place in the three steps, which find the inertias')
-    shipped = two_link_set('after')
-    sensors = Accelerometers.on(
-        robot, _pair(accelerometers, 'accelerometers', shipped.assumptions['accelerometer_radius'])
-    )
-    drives = replace(shipped.parameters, gear=_pair(gear, 'gear', shipped.parameters.gear))
-    loop = two_link_loop(shipped)
-    loop = replace(
-        loop,
-        proportional=_pair(kp, 'kp', loop.proportional),
-        integral=_pair(ki, 'ki', loop.integral),
-    )
+    pair = drives.pair(robot)
     options.hold(out, SCHEMA, robot_source)
     with progress('reading') as tick:
-        if demo:
-            bags, steps = _simulate(shipped, robot, sensors, out, experiments, seed, tick)
-        elif not bags:
+        if demo.demo:
+            data = _simulate(pair, out, demo.experiments, seed, tick)
+        elif not data.bags:
             raise RecordingError('no bag is named; give one, or --demo to simulate one')
-        how = options.read_settings(), options.tell_damage
-        runs = [run for path in bags for run in read_runs(path, robot, sensors, *how)]
-        responses = [run for path in steps for run in read_runs(path, robot, sensors, *how)]
-        result = identify_two_inertia(
-            runs,
-            drives,
-            steps=responses,
-            loop=loop,
-            start=printed,
-            progress=tick,
-        )
+        result = _identify(pair, data, printed, tick)
         tick(1.0, 'drawing')
-        known, table = _known(robot, shipped, begin)
+        known, table = _known(robot, pair.shipped, begin)
         files = _draw(result, known, out)
         page = elastic_report(
             result,
             robot.name,
             known=known,
             source=table,
-            provenance=Provenance(
-                files=hash_files([*bags, *steps]),
-                versions=versions(),
-                settings={'start of the tuning': begin},
-                seed=seed if demo else None,
-            ),
+            provenance=_provenance(data, begin, seed if demo.demo else None),
         )
         write_file(out / 'report.html', page)
     document = elastic_document(result, robot_source)
     story = None
-    if demo and result.tuning is not None:
-        story = TuningStory.of(result.tuning, printed or result.untuned, shipped.parameters)
+    if demo.demo and result.tuning is not None:
+        start = printed or result.untuned
+        story = TuningStory.of(result.tuning, start, pair.shipped.parameters)
         document['story'] = story.document()
     write_file(out / 'elastic.json', json_text(document, indent=1))
     if as_json:
@@ -180,7 +233,31 @@ def elastic(
     say(f'{out}: {", ".join(["elastic.json", "report.html", *files])}')
 
 
-def _pair(text: str | None, what: str, default: Any) -> FloatArray:
+def _provenance(data: ElasticData, begin: str, seed: int | None) -> Provenance:
+    """Return what the result was made from."""
+    return Provenance(
+        files=hash_files([*data.bags, *data.steps]),
+        versions=versions(),
+        settings={'start of the tuning': begin},
+        seed=seed,
+    )
+
+
+def _identify(
+    pair: _Machine, data: ElasticData, start: TwoLinkParameters | None, tick: Tick
+) -> TwoInertiaIdentification:
+    """Read the bags, and find the parameters in three steps."""
+    how = options.read_settings(), options.tell_damage
+    runs, responses = (
+        [run for path in paths for run in read_runs(path, pair.robot, pair.sensors, *how)]
+        for paths in (data.bags, data.steps)
+    )
+    return identify_two_inertia(
+        runs, pair.drives, steps=responses, loop=pair.loop, start=start, progress=tick
+    )
+
+
+def _two_numbers(text: str | None, what: str, default: Any) -> FloatArray:
     """Read two positive numbers."""
     if text is None:
         return np.asarray(default, dtype=float)
@@ -193,17 +270,9 @@ def _pair(text: str | None, what: str, default: Any) -> FloatArray:
     return values
 
 
-def _simulate(
-    shipped: TwoLinkSet,
-    robot: Robot,
-    sensors: Accelerometers,
-    out: Path,
-    experiments: int,
-    seed: int,
-    tick: Any,
-) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+def _simulate(pair: _Machine, out: Path, experiments: int, seed: int, tick: Tick) -> ElasticData:
     """Write bags of the simulated arm: through the resonances, and steps."""
-    rng = np.random.default_rng(seed)
+    rng, shipped = np.random.default_rng(seed), pair.shipped
     plant = two_link_plant(shipped.parameters)
     plans = (
         (
@@ -217,8 +286,8 @@ def _simulate(
     for path, loop, plan, noise in plans:
         tick(0.0, f'simulating {path.name}')
         runs = [noise.measure(run, rng) for run in run_all(plant, loop, plan, tick)]
-        write_runs(path, runs, robot, sensors.on_links(robot))
-    return (out / 'resonances',), (out / 'steps',)
+        write_runs(path, runs, pair.robot, pair.sensors.on_links(pair.robot))
+    return ElasticData((out / 'resonances',), (out / 'steps',))
 
 
 def _known(robot: Robot, shipped: TwoLinkSet, begin: str) -> tuple[TwoLinkParameters | None, str]:

@@ -27,7 +27,7 @@ from armid_ros.excitation import (
 from armid_ros.files import json_text, write_file
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
-from armid_ros.report.excitation_report import excitation_report
+from armid_ros.report.excitation_report import CheckedRun, excitation_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import CollisionModel
 import click
@@ -41,7 +41,31 @@ BAG = 'trajectory'
 
 
 @dataclass(frozen=True)
-class Plan:
+class CollisionScene:
+    """
+    What a motion must not touch.
+
+    Attributes
+    ----------
+    collision : CollisionModel
+        Bodies of the robot.
+    floor : Floor
+        What it stands on.
+    obstacles : sequence of Obstacle
+        What stands around it, the floor among it.
+    clearance : float
+        Between bodies [m].
+
+    """
+
+    collision: CollisionModel
+    floor: Floor
+    obstacles: Sequence[Obstacle]
+    clearance: float
+
+
+@dataclass(frozen=True)
+class ExcitationPlan:
     """
     What a design was made for.
 
@@ -51,12 +75,8 @@ class Plan:
         Prior model.
     robot : str
         Shipped name or path.
-    collision : CollisionModel
-        Bodies of the robot.
-    floor : Floor
-        What it stands on.
-    obstacles : sequence of Obstacle
-        What stands around it, the floor among it.
+    workspace : CollisionScene
+        What it must not touch.
     start : ndarray, shape (n,)
         Pose to leave from and to return to [rad or m].
     after : sequence of Path
@@ -70,9 +90,7 @@ class Plan:
 
     arm: ArmModel
     robot: str
-    collision: CollisionModel
-    floor: Floor
-    obstacles: Sequence[Obstacle]
+    workspace: CollisionScene
     start: FloatArray
     after: Sequence[Path]
     files: Sequence[Path]
@@ -106,7 +124,9 @@ def require_free(folder: Path) -> None:
         raise RecordingError(f'{folder / BAG} exists already; name another --out, or delete it')
 
 
-def write_plan(folder: Path, plan: Plan, result: Design, planner: TransferPlanner) -> Written:
+def write_plan(
+    folder: Path, plan: ExcitationPlan, result: Design, planner: TransferPlanner
+) -> Written:
     """
     Fill a folder with a design; what took longest to find is written first.
 
@@ -127,7 +147,8 @@ def write_plan(folder: Path, plan: Plan, result: Design, planner: TransferPlanne
     result = replace(result, excitation=run.excitation)
     _save_coefficients(folder, result.excitation)
     write_joint_trajectory(folder / BAG, run.motion(), robot_description=plan.arm.robot.urdf)
-    checked = fitness(run, result.limits, plan.collision, plan.floor, plan.obstacles)
+    space = plan.workspace
+    checked = fitness(run, result.limits, space.collision, space.floor, space.obstacles)
     document = _document(plan, result, run, checked)
     write_file(folder / 'excitation.json', json_text(document, indent=1))
     _write_page(folder / 'report.html', plan, result, run, checked)
@@ -139,34 +160,35 @@ def _save_coefficients(folder: Path, excitation: Excitation) -> None:
         save_excitation(excitation, folder / name)
 
 
-def _write_page(path: Path, plan: Plan, result: Design, run: Run, checked: Fitness) -> None:
+def _write_page(
+    path: Path, plan: ExcitationPlan, result: Design, run: Run, checked: Fitness
+) -> None:
     """Write the report; what goes wrong there is said, and costs nothing else."""
     try:
         page = excitation_report(
             result,
             plan.arm,
             robot=plan.robot,
-            collision=plan.collision,
-            obstacles=plan.obstacles,
+            collision=plan.workspace.collision,
+            obstacles=plan.workspace.obstacles,
             after=[str(bag) for bag in plan.after],
             provenance=Provenance(
                 files=hash_files([plan.robot, *plan.after, *plan.files]),
                 versions=versions(),
                 seed=plan.seed,
             ),
-            run=run,
-            checked=checked,
+            planned=CheckedRun(run, checked),
         )
         write_file(path, page)
     except Exception as error:  # whatever it is, the trajectory is written and good
         click.echo(f'{path}: not written: {type(error).__name__}: {error}', err=True)
 
 
-def _document(plan: Plan, result: Design, run: Run, checked: Fitness) -> dict[str, Any]:
+def _document(plan: ExcitationPlan, result: Design, run: Run, checked: Fitness) -> dict[str, Any]:
     information, settings = result.information, result.settings
     motion = result.excitation.motion(WAYPOINT_RATE)
     shares = used_shares(result.limits, motion, plan.arm.joint_torque(motion))
-    nearest = checked.nearest
+    nearest, floor = checked.nearest, plan.workspace.floor
     return {
         'schema': SCHEMA,
         'robot': plan.robot,
@@ -179,7 +201,7 @@ def _document(plan: Plan, result: Design, run: Run, checked: Fitness) -> dict[st
         'start': plan.start.tolist(),
         'approach': run.approach.duration,
         'trajectory_duration': run.duration,
-        'floor': {'height': plan.floor.height, 'source': plan.floor.source},
+        'floor': {'height': floor.height, 'source': floor.source},
         'lowest_point': {
             'height': _finite(checked.lowest.height),
             'link': checked.lowest.link,

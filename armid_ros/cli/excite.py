@@ -4,41 +4,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from armid_ros.arm import ArmModel, load_model
+from armid_ros.arm import ArmModel
 from armid_ros.cli import options
 from armid_ros.cli.excitation_files import (
-    Plan,
+    CollisionScene,
+    ExcitationPlan,
     require_free,
     SCHEMA,
-    WAYPOINT_RATE,
     write_plan,
     Written,
 )
+from armid_ros.cli.excite_options import (
+    design_settings,
+    LimitOptions,
+    ModelOptions,
+    MotionOptions,
+    SearchOptions,
+    Speeds,
+)
 from armid_ros.cli.excite_springs import COURSES, refuse_other_options, write_course
+from armid_ros.cli.groups import gathered, RobotChoice
 from armid_ros.cli.terminal import progress, say, Tick
-from armid_ros.effects import parse_effect
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
     CRITERIA,
     Design,
     design_speeds,
+    DesignProgress,
     DesignSettings,
-    find_floor,
-    floor_obstacles,
-    load_environment,
-    Obstacle,
     Problem,
-    Progress,
     SPEED_CLASSES,
     TARGETS,
     transfer_limits,
     TransferPlanner,
-    whole_period,
     with_obstacles,
 )
 from armid_ros.excitation.fitness import FIT
@@ -46,32 +49,12 @@ from armid_ros.excitation.search.parallel import INTERRUPTED
 from armid_ros.files import json_text
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.motion import FloatArray
-from armid_ros.robots import collision_model, CollisionModel, Robot
+from armid_ros.robots import Robot
 import click
 import numpy as np
 
 #: The kind of trajectory that is designed.
 FOURIER = 'fourier'
-#: Of the run-in and the run-out [s], and at most this share of the duration.
-_RUN_IN, _RUN_IN_SHARE = 2.0, 0.1
-
-
-class Speeds(click.ParamType[tuple[str | float, ...]]):
-    """Speed classes, or shares of the velocity and acceleration limits, with commas."""
-
-    name = 'speeds'
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str | float, ...]:
-        """Read them."""
-        return tuple(self._one(part.strip()) for part in str(value).split(','))
-
-    def _one(self, text: str) -> str | float:
-        if text in SPEED_CLASSES:
-            return text
-        try:
-            return float(text)
-        except ValueError:
-            self.fail(f"'{text}' is neither one of {', '.join(SPEED_CLASSES)} nor a number")
 
 
 @click.command(epilog='Example: armid excite --robot ur5.urdf --duration 40 --out plan')
@@ -187,135 +170,107 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
 @options.seed
 @options.reading
 @options.as_json
+@gathered(
+    robot=RobotChoice,
+    motion=MotionOptions,
+    model=ModelOptions,
+    limits=LimitOptions,
+    search=SearchOptions,
+)
 def excite(
-    robot_source: str,
+    robot: RobotChoice,
     out: Path,
-    kind: str,
-    share: float,
-    duration: float,
-    periods: int,
-    harmonics: int,
-    speeds: tuple[str | float, ...],
-    criterion: str,
-    target: str,
-    focus: str,
-    effects: str,
-    texts: tuple[str, ...],
-    rival: str | None,
-    model: Path | None,
-    start: str | None,
-    acceleration: str | None,
-    torque_noise: str | None,
-    clearance: float,
-    environment: Path | None,
-    floor: str | None,
-    after: tuple[Path, ...],
-    starts: int,
-    iterations: int,
-    time_budget: float,
-    gravity: str,
-    joints: str | None,
-    seed: int,
+    motion: MotionOptions,
+    model: ModelOptions,
+    limits: LimitOptions,
+    search: SearchOptions,
     as_json: bool,
 ) -> None:
     """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
     refuse_other_options(click.get_current_context())
-    robot = options.open_robot(robot_source, gravity, joints, after)
-    collision = collision_model(robot)
-    around = load_environment(environment) if environment else ()
-    ground = find_floor(collision, floor, around)
-    around = (*around, *floor_obstacles(collision, ground, clearance))
-    if kind in COURSES:
-        write_course(kind, collision, duration, share, clearance, ground, around, seed, out)
+    loaded = robot.load(search.after)
+    space = limits.workspace(loaded)
+    if motion.kind in COURSES:
+        write_course(motion, space, search.seed, out)
         return
-    arm = ArmModel(robot) if model is None else load_model(model, robot)
-    arm = options.with_effects(arm, effects)
-    other = None if rival is None else options.with_effects(arm, rival.removesuffix('none'))
-    arm = options.with_effects(arm, focus)
-    for text in texts:
-        arm = arm.with_effect(*parse_effect(text, robot))
-    run_in = min(_RUN_IN, _RUN_IN_SHARE * duration)
-    settings = DesignSettings(
-        period=whole_period(duration, periods, run_in, WAYPOINT_RATE),
-        n_periods=periods,
-        run_in=run_in,
-        harmonics=harmonics,
-        criterion=criterion,
-        target=target,
-        focus=tuple(name.partition('@')[0] for name in focus.split(',') if name),
-        acceleration=options.per_joint(acceleration, robot, '--acceleration'),
-        noise=options.per_joint(torque_noise, robot, '--torque-noise'),
-        clearance=clearance,
-        starts=starts,
-        iterations=iterations,
-        time_budget=time_budget,
-    )
+    arm, rival = model.arms(loaded)
+    settings = design_settings(loaded, motion, model, limits, search)
     planners = {
-        speed: _planner(arm, settings, speed, collision, around) for speed in dict.fromkeys(speeds)
+        speed: _planner(arm, settings, speed, space) for speed in dict.fromkeys(motion.speeds)
     }
-    begin, zero_fault = _start(options.per_joint(start, robot, '--start'), planners[speeds[0]])
-    plan = Plan(
-        arm,
-        robot_source,
-        collision,
-        ground,
-        around,
-        begin,
-        after,
-        tuple(filter(None, (model, environment))),
-        seed,
-    )
-    folders = {speed: out if len(speeds) == 1 else out / f'{speed}' for speed in speeds}
+    given = options.per_joint(limits.start, loaded, '--start')
+    start, zero_fault = _start(given, planners[motion.speeds[0]])
+    files = tuple(filter(None, (model.model, limits.environment)))
+    plan = ExcitationPlan(arm, robot.robot_source, space, start, search.after, files, search.seed)
+    folders = {s: out if len(motion.speeds) == 1 else out / f'{s}' for s in motion.speeds}
     for folder in folders.values():
-        options.hold(folder, SCHEMA, robot_source)
+        options.hold(folder, SCHEMA, robot.robot_source)
         require_free(folder)
-    known = _known(arm, settings, after, seed) if after else None
+    known = _known(arm, settings, search.after, search.seed) if search.after else None
+    task = _Task(plan, settings, rival, known)
     missing = list(folders)
     for number, (speed, folder) in enumerate(folders.items()):
         with progress('designing') as tick:
-
-            def told(
-                speed: str | float, now: Progress, tick: Tick = tick, number: int = number
-            ) -> None:
-                done = (number + now.done) / len(folders)
-                tick(done, f'designing {speed}, cost {now.cost:.2f}')
-
-            result = design_speeds(
-                arm,
-                settings,
-                np.random.default_rng(seed),
-                speeds=[speed],
-                collision=collision,
-                obstacles=around,
-                prior_information=known,
-                rival=other,
-                progress=told,
-            )[speed]
+            result = task.design(speed, _share(tick, number, len(folders)))
             tick((number + 1.0) / len(folders), 'writing')
             written = write_plan(folder, plan, result, planners[speed])
         missing.remove(speed)
         if as_json:
             click.echo(json_text(written.document))
         else:
-            _tell(folder, result, written, plan.arm.robot, zero_fault, start is not None)
+            _tell(folder, result, written, plan, zero_fault, given is not None)
         if result.stopped == INTERRUPTED:
             break
     if missing:
         click.echo(f'interrupted before {", ".join(map(str, missing))}', err=True)
 
 
+def _share(tick: Tick, number: int, count: int) -> Callable[[str | float, DesignProgress], None]:
+    """Return what shows the progress of one design of several."""
+
+    def told(speed: str | float, now: DesignProgress) -> None:
+        tick((number + now.done) / count, f'designing {speed}, cost {now.cost:.2f}')
+
+    return told
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What is designed at every speed: for which plan, beside what is known already."""
+
+    plan: ExcitationPlan
+    settings: DesignSettings
+    rival: ArmModel | None
+    known: FloatArray | None
+
+    def design(
+        self, speed: str | float, told: Callable[[str | float, DesignProgress], None]
+    ) -> Design:
+        """Return the design for one speed."""
+        return design_speeds(
+            self.plan.arm,
+            self.settings,
+            np.random.default_rng(self.plan.seed),
+            speeds=[speed],
+            collision=self.plan.workspace.collision,
+            obstacles=self.plan.workspace.obstacles,
+            prior_information=self.known,
+            rival=self.rival,
+            progress=told,
+        )[speed]
+
+
 def _planner(
     arm: ArmModel,
     settings: DesignSettings,
     speed: str | float,
-    collision: CollisionModel,
-    obstacles: Sequence[Obstacle],
+    space: CollisionScene,
 ) -> TransferPlanner:
     """Return what plans the ways to a run of some speed, and back."""
     return TransferPlanner(
         arm,
         transfer_limits(arm.robot, speed, settings.acceleration),
-        ClearanceModel.of(with_obstacles(collision, obstacles)),
+        ClearanceModel.of(with_obstacles(space.collision, space.obstacles)),
         settings.clearance,
     )
 
@@ -349,7 +304,7 @@ def _tell(
     folder: Path,
     result: Design,
     written: Written,
-    robot: Robot,
+    plan: ExcitationPlan,
     zero_fault: str,
     given: bool,
 ) -> None:
@@ -364,8 +319,8 @@ def _tell(
     if zero_fault:
         whose = f'the zero of the description is not free: {zero_fault}'
     say(
-        f'starts at rest at {_pose(robot, run.approach.q[0])} ({whose}), is on the trajectory '
-        f'after {run.approach.duration:.1f} s and back after {run.duration:.1f} s'
+        f'starts at rest at {_pose(plan.arm.robot, run.approach.q[0])} ({whose}), is on the '
+        f'trajectory after {run.approach.duration:.1f} s and back after {run.duration:.1f} s'
     )
     if result.stopped:
         say(f'stopped early ({result.stopped}): the best so far, not what the seed would give')

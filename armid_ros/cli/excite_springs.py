@@ -4,17 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from armid_ros.cli import options
-from armid_ros.cli.excitation_files import BAG, require_free, SCHEMA
+from armid_ros.cli.excitation_files import BAG, CollisionScene, require_free, SCHEMA
+from armid_ros.cli.excite_options import MotionOptions
 from armid_ros.cli.terminal import say
 from armid_ros.elastic.plant.courses import multisine_course, step_course
-from armid_ros.excitation import Floor, Limits, not_checked, Obstacle, with_obstacles
+from armid_ros.excitation import Limits, not_checked, with_obstacles
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
-from armid_ros.robots import CollisionModel
 import click
 import numpy as np
 
@@ -38,28 +37,19 @@ def refuse_other_options(context: click.Context) -> None:
             raise click.UsageError(f'{option.opts[0]} does not go with --kind {kind}')
 
 
-def write_course(
-    kind: str,
-    collision: CollisionModel,
-    duration: float,
-    share: float,
-    clearance: float,
-    floor: Floor,
-    obstacles: Sequence[Obstacle],
-    seed: int,
-    out: Path,
-) -> None:
+def write_course(motion: MotionOptions, space: CollisionScene, seed: int, out: Path) -> None:
     """Write the trajectory as a bag."""
-    robot = collision.robot
+    robot = space.collision.robot
     options.hold(out, SCHEMA, robot.name)
     require_free(out)
-    bodies = with_obstacles(collision, obstacles)
+    bodies = with_obstacles(space.collision, space.obstacles)
 
     def clear(q: FloatArray) -> bool:
         inside = np.all((q >= robot.lower) & (q <= robot.upper))
-        return bool(inside) and float(bodies.path_clearance(q).min()) >= clearance
+        return bool(inside) and float(bodies.path_clearance(q).min()) >= space.clearance
 
-    course = COURSES[kind](robot, duration, share, np.random.default_rng(seed), clear)
+    rng = np.random.default_rng(seed)
+    course = COURSES[motion.kind](robot, motion.duration, motion.share, rng, clear)
     write_joint_trajectory(out / BAG, course, robot_description=robot.urdf)
     say(f'{out / BAG}: {len(course.t)} waypoints, {course.duration:.1f} s')
     first = ', '.join(
@@ -67,5 +57,5 @@ def write_course(
         for joint, q, unit in zip(robot.joints, course.q[0], robot.position_units, strict=True)
     )
     say(f'starts at rest in the middle of the ranges, {first}: bring the arm there first')
-    for missing in not_checked(Limits.of(robot), collision, floor, obstacles):
+    for missing in not_checked(Limits.of(robot), space.collision, space.floor, space.obstacles):
         say(f'not checked: {missing}', 'yellow')

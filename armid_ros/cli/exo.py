@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from armid_ros.cli import options
+from armid_ros.cli.groups import gathered
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say, Tick
 from armid_ros.errors import ModelError
@@ -26,7 +29,13 @@ from armid_ros.pair.leg_pair import (
     TiedPair,
     walking,
 )
-from armid_ros.pair.report.page import exo_report, GaitChecks, WholeCycle
+from armid_ros.pair.report.page import (
+    exo_report,
+    GaitChecks,
+    ShownMotion,
+    SimulatedWalk,
+    WholeCycle,
+)
 from armid_ros.pair.report.walk import Driven, SOURCE
 from armid_ros.pair.shares import ground_by_shares
 from armid_ros.pair.torque_driven import check_gait
@@ -36,6 +45,7 @@ from armid_ros.recording.writer import whole_bag
 from armid_ros.robots.assumptions import read_assumptions
 import click
 import numpy as np
+from numpy.random import Generator
 
 #: Joints that the source drives by torque, one at a time.
 _DRIVEN = ('exo_swing_hip', 'exo_swing_knee')
@@ -43,6 +53,48 @@ _DRIVEN_IN_CYCLE = ('exo_right_hip', 'exo_right_knee')
 _SOFTER = 0.2
 SCHEMA = 'armid/exo/1'
 _RATE = 1000.0
+
+
+@dataclass(frozen=True)
+class SimulationOptions:
+    """
+    What is simulated where nothing was recorded.
+
+    Attributes
+    ----------
+    gait_file : Path or None
+        Angles of walking.
+    stiffness : float or None
+        Of the springs [N/m].
+    motion : str
+        What the pair does.
+    duration : float
+        Of the recording [s].
+    torque_noise, angle_noise : float
+        Standard deviations [N m, deg].
+
+    """
+
+    gait_file: Path | None
+    stiffness: float | None
+    motion: str
+    duration: float
+    torque_noise: float
+    angle_noise: float
+
+    def record(
+        self, path: Path, topics: Sequence[str], pair: TiedPair, gait: Gait, rng: Generator
+    ) -> None:
+        """Record a motion of both as their sensors see it."""
+        motions = exercise(pair, self.motion, _times(self.duration), gait)
+        tau = pair_torques(pair, *motions).tau
+        tau = tau + self.torque_noise * rng.normal(size=tau.shape)
+        stamps = 10**9 + np.rint(motions.own.t * 1e9).astype(np.int64)
+        noise = np.radians(self.angle_noise)
+        with whole_bag(path) as writer:
+            for topic, motion, torque in zip(topics, motions, (tau, None), strict=True):
+                q = motion.q + noise * rng.normal(size=motion.q.shape)
+                write_joint_states(writer, topic, motion.joints, stamps, q, None, torque)
 
 
 @click.command(
@@ -78,17 +130,13 @@ _RATE = 1000.0
 @options.seed
 @options.reading
 @options.as_json
+@gathered(simulated=SimulationOptions)
 def exo(
     bag: Path | None,
     out: Path,
     topics: str,
     inertias: Any,
-    gait_file: Path | None,
-    stiffness: float | None,
-    motion: str,
-    duration: float,
-    torque_noise: float,
-    angle_noise: float,
+    simulated: SimulationOptions,
     seed: int,
     as_json: bool,
 ) -> None:
@@ -98,45 +146,28 @@ def exo(
     Without a BAG the shipped pair walks, is recorded with noise, and its springs are found again.
 
     """
-    pair = leg_pair(stiffness)
-    gait = read_gait(gait_file)
+    pair = leg_pair(simulated.stiffness)
+    gait = read_gait(simulated.gait_file)
     names = topics.split(',')
     if len(names) != 2:
         raise ModelError(f'--topics {topics}: give two, of the machine and of its wearer')
     options.hold(out, SCHEMA)
-    simulated = bag is None
     with progress('recording') as tick:
+        path = out / 'recording' if bag is None else bag
         if bag is None:
-            bag = out / 'recording'
-            noise = torque_noise, np.radians(angle_noise)
-            rng = np.random.default_rng(seed)
-            _record(bag, names, pair, exercise(pair, motion, _times(duration), gait), noise, rng)
-        settings = options.read_settings()
-        machine, wearer = both = tuple(
-            read_recording(bag, joints=one.joints, topic=name, settings=settings)
-            for one, name in zip((pair.robot, pair.other), names, strict=True)
-        )
-        options.tell_damage(*both)
-        found = _identify(pair, machine, wearer, inertias, tick)
-        tick(0.6, 'driving joints by torque')
-        checks = _checks(pair, gait) if simulated else None
-        tick(0.75, 'walking a whole cycle')
-        whole = _whole_cycle(stiffness, gait) if simulated else None
-    truth = dict(zip(('all', *pair.segments), [pair.stiffness[0]] * 5, strict=False))
-    document = _document(found, truth if simulated else {}, checks, whole, machine.source)
-    shown, abscissa, name = _shown(pair, gait) if simulated else _recorded(machine, wearer)
+            simulated.record(path, names, pair, gait, np.random.default_rng(seed))
+        both = _read(path, names, pair)
+        found = _identify(pair, *both, inertias, tick)
+        walked = _walk(pair, gait, simulated.stiffness, tick) if bag is None else SimulatedWalk()
+    document = _document(found, walked, both[0].source)
     page = exo_report(
         pair.with_stiffness(found[0].stiffness[0].clip(0.0)),
-        shown,
-        abscissa,
-        name,
+        _shown(pair, gait) if bag is None else _recorded(*both),
         found,
-        truth=truth if simulated else None,
-        gait=checks,
-        whole=whole,
+        walked,
         assumptions=read_assumptions(),
         provenance=provenance(
-            [bag], {'inertias': inertias, 'topics': topics}, seed if simulated else None
+            [path], {'inertias': inertias, 'topics': topics}, seed if bag is None else None
         ),
     )
     write_file(out / 'report.html', page)
@@ -144,6 +175,33 @@ def exo(
     if as_json:
         click.echo(json_text(document))
         return
+    _tell(document)
+    say(f'{out}: exo.json, report.html')
+
+
+def _walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
+    """Let the simulated pair walk, its joints driven by torque."""
+    tick(0.6, 'driving joints by torque')
+    checks = _checks(pair, gait)
+    tick(0.75, 'walking a whole cycle')
+    whole = _whole_cycle(stiffness, gait)
+    truth = dict(zip(('all', *pair.segments), [pair.stiffness[0]] * 5, strict=False))
+    return SimulatedWalk(truth, checks, whole)
+
+
+def _read(bag: Path, topics: Sequence[str], pair: TiedPair) -> tuple[Recording, Recording]:
+    """Read the machine and its wearer; say what is wrong with the bag."""
+    settings = options.read_settings()
+    machine, wearer = (
+        read_recording(bag, joints=one.joints, topic=topic, settings=settings)
+        for one, topic in zip((pair.robot, pair.other), topics, strict=True)
+    )
+    options.tell_damage(machine, wearer)
+    return machine, wearer
+
+
+def _tell(document: dict[str, Any]) -> None:
+    """Print the springs, and how far off joints are that are driven by torque."""
     print_rows(
         [
             {
@@ -168,30 +226,10 @@ def exo(
             f'off (the source: {row["source_deg"]:g}); {row["error_softer_deg"]:.2f} deg with '
             f'springs {100 * _SOFTER:.0f} % too soft'
         )
-    say(f'{out}: exo.json, report.html')
 
 
 def _times(duration: float) -> FloatArray:
     return np.arange(0.0, duration, 1.0 / _RATE)
-
-
-def _record(
-    path: Path,
-    topics: list[str],
-    pair: TiedPair,
-    motions: PairMotion,
-    noise: tuple[float, float],
-    rng: np.random.Generator,
-) -> None:
-    """Record a motion of both as their sensors see it."""
-    t = motions.own.t
-    tau = pair_torques(pair, *motions).tau
-    tau = tau + noise[0] * rng.normal(size=tau.shape)
-    stamps = 10**9 + np.rint(t * 1e9).astype(np.int64)
-    with whole_bag(path) as writer:
-        for topic, motion, torque in zip(topics, motions, (tau, None), strict=True):
-            q = motion.q + noise[1] * rng.normal(size=motion.q.shape)
-            write_joint_states(writer, topic, motion.joints, stamps, q, None, torque)
 
 
 def _identify(
@@ -202,11 +240,9 @@ def _identify(
     for share, separate in ((0.1, False), (0.35, True)):
         tick(share, 'identifying')
         problem = recorded_interaction_problem(
-            pair.robot,
+            pair.machines,
             machine,
-            pair.other,
             wearer,
-            pair.ties,
             inertias=inertias,
             separate=separate,
         )
@@ -214,24 +250,28 @@ def _identify(
     return found
 
 
-def _shown(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
+def _shown(pair: TiedPair, gait: Gait) -> ShownMotion:
     """Return single support of walking, over the gait cycle of the swing leg."""
     known = read_assumptions()
     begin, end = known['single_support'].value
     cycle = known['cycle_time'].value
     t = np.linspace(0.0, (end - begin) * cycle, 2 * round(500 * (end - begin) * cycle) + 1)
-    return walking(pair, gait, t), begin + 0.5 + t / cycle, 'gait cycle of the swing leg'
+    phase = begin + 0.5 + t / cycle
+    return ShownMotion(walking(pair, gait, t), phase, 'gait cycle of the swing leg')
 
 
 def _checks(pair: TiedPair, gait: Gait) -> GaitChecks:
-    motions, phase, _ = _shown(pair, gait)
+    shown = _shown(pair, gait)
     rate = read_assumptions()['torque_rate'].value
     soft = pair.with_stiffness((1.0 - _SOFTER) * pair.stiffness)
     checks = [
-        (check_gait(pair, motions, joint, rate), check_gait(pair, motions, joint, rate, soft))
+        (
+            check_gait(pair, shown.motions, joint, rate),
+            check_gait(pair, shown.motions, joint, rate, soft),
+        )
         for joint in _DRIVEN
     ]
-    return GaitChecks(checks, _SOFTER, phase[::2], rate)
+    return GaitChecks(checks, _SOFTER, shown.abscissa[::2], rate)
 
 
 def _whole_cycle(stiffness: float | None, gait: Gait) -> WholeCycle:
@@ -252,14 +292,14 @@ def _whole_cycle(stiffness: float | None, gait: Gait) -> WholeCycle:
     return WholeCycle(cycle, driven, _SOFTER, rate)
 
 
-def _recorded(machine: Recording, wearer: Recording) -> tuple[PairMotion, FloatArray, str]:
+def _recorded(machine: Recording, wearer: Recording) -> ShownMotion:
     """Return the recorded motion as it is, of which positions alone are shown."""
     shift = 1e-9 * (machine.start_ns - wearer.start_ns)
     t = machine.t[(machine.t + shift >= wearer.t[0]) & (machine.t + shift <= wearer.t[-1])]
     motions = [
         _smooth(recording, times) for recording, times in ((machine, t), (wearer, t + shift))
     ]
-    return PairMotion(motions[0], motions[1]), t, 'time [s]'
+    return ShownMotion(PairMotion(motions[0], motions[1]), t, 'time [s]')
 
 
 def _smooth(recording: Recording, t: FloatArray) -> Motion:
@@ -267,13 +307,7 @@ def _smooth(recording: Recording, t: FloatArray) -> Motion:
     return Motion(recording.joints, t, q, np.zeros_like(q), np.zeros_like(q))
 
 
-def _document(
-    found: list[Interaction],
-    truth: dict[str, float],
-    checks: GaitChecks | None,
-    whole: WholeCycle | None,
-    source: str,
-) -> dict[str, Any]:
+def _document(found: list[Interaction], walked: SimulatedWalk, source: str) -> dict[str, Any]:
     rows = [
         {
             'segment': segment,
@@ -282,7 +316,7 @@ def _document(
             'unit': 'N/m',
             'interval': part.interval()[k].tolist(),
             'bias_of_least_squares': float(part.bias[k]),
-            'truth': truth.get(segment),
+            'truth': walked.truth.get(segment),
         }
         for part in found
         for k, segment in enumerate(part.segments)
@@ -293,7 +327,7 @@ def _document(
             'error_deg': float(np.degrees(np.abs(right.error).max())),
             'error_softer_deg': float(np.degrees(np.abs(wrong.error).max())),
         }
-        for right, wrong in (checks.checks if checks else ())
+        for right, wrong in (walked.gait.checks if walked.gait else ())
     ]
     cycle = [
         dict(
@@ -301,7 +335,7 @@ def _document(
             joint=d.joint,
             source_deg=SOURCE[d.joint.split('_')[-1]],
         )
-        for d in (whole.driven if whole else ())
+        for d in (walked.whole.driven if walked.whole else ())
     ]
     return {
         'schema': SCHEMA,
@@ -309,7 +343,7 @@ def _document(
         'stiffness': rows,
         'gait': gait,
         'cycle': cycle,
-        'feet': _feet(whole) if whole else [],
+        'feet': _feet(walked.whole) if walked.whole else [],
     }
 
 

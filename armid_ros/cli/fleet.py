@@ -6,11 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.util import find_spec
 import time
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import options
+from armid_ros.cli.groups import gathered
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.errors import FleetError
 from armid_ros.files import json_text
@@ -38,6 +40,86 @@ _workers = click.option(
     type=click.IntRange(min=1),
     help='Processes of this machine; one a core by default.',
 )
+_alpha = click.option(
+    '--alpha',
+    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+    default=0.05,
+    show_default=True,
+    help='Share of healthy arms among those named, in the long run.',
+)
+
+
+@dataclass(frozen=True)
+class RobotOptions:
+    """
+    Which robots the arms are.
+
+    Attributes
+    ----------
+    robot_source : str or None
+        That of all arms.
+    table : str or None
+        A CSV with that of each.
+    gravity : str
+        A name, or a vector [m/s^2].
+    joints : str or None
+        Driven joints with commas.
+
+    """
+
+    robot_source: str | None
+    table: str | None
+    gravity: str
+    joints: str | None
+
+
+@dataclass(frozen=True)
+class ClusterOptions:
+    """
+    Where it is done.
+
+    Attributes
+    ----------
+    scheduler : str or None
+        Address of a Dask cluster.
+    workers : int or None
+        Processes of this machine.
+
+    """
+
+    scheduler: str | None
+    workers: int | None
+
+
+@dataclass(frozen=True)
+class FleetFitOptions:
+    """
+    What is fitted to every bag.
+
+    Attributes
+    ----------
+    effects, method : str
+        What acts beside the rigid body, and the least squares.
+    cutoff : float or None
+        Of the position filter [Hz].
+    decimation : int or None
+        One sample of this many is kept.
+    topic : str or None
+        Of the joint states.
+    seed : int
+        Of every random number.
+    resume : bool
+        Whether what is done already is left out.
+
+    """
+
+    effects: str
+    method: str
+    cutoff: float | None
+    decimation: int | None
+    topic: str | None
+    seed: int
+    resume: bool
 
 
 class _Fleet(click.Group):
@@ -102,23 +184,14 @@ def fleet() -> None:
 @click.option('--resume', is_flag=True, help='Leave out what earlier runs have done.')
 @options.reading
 @options.as_json
+@gathered(robots=RobotOptions, cluster=ClusterOptions, fit=FleetFitOptions)
 def identify(
     globs: tuple[str, ...],
-    robot_source: str | None,
-    table: str | None,
-    out: str,
-    scheduler: str | None,
-    workers: int | None,
     arm: str | None,
-    effects: str,
-    method: str,
-    cutoff: float | None,
-    decimation: int | None,
-    topic: str | None,
-    gravity: str,
-    joints: str | None,
-    seed: int,
-    resume: bool,
+    robots: RobotOptions,
+    out: str,
+    cluster: ClusterOptions,
+    fit: FleetFitOptions,
     as_json: bool,
 ) -> None:
     """Identify every arm of a fleet from its bags."""
@@ -127,27 +200,27 @@ def identify(
     from armid_ros.fleet.kinds import read_table
     from armid_ros.fleet.store import Store
 
-    if (robot_source is None) == (table is None):
+    if (robots.robot_source is None) == (robots.table is None):
         raise FleetError('name the robot of all arms with --robot, or a table with --robots')
     settings = FleetSettings(
-        effects=effects,
-        gravity=gravity,
-        joints=joints or '',
-        weighted=method == 'wls',
-        signals=SignalSettings(cutoff, decimation),
-        topic=topic,
-        resume=resume,
-        seed=seed,
+        effects=fit.effects,
+        gravity=robots.gravity,
+        joints=robots.joints or '',
+        weighted=fit.method == 'wls',
+        signals=SignalSettings(fit.cutoff, fit.decimation),
+        topic=fit.topic,
+        resume=fit.resume,
+        seed=fit.seed,
         reading=options.read_settings(),
     )
-    robots = read_table(table) if table is not None else str(robot_source)
+    meant = read_table(robots.table) if robots.table is not None else str(robots.robot_source)
     start = time.monotonic()
     with progress('listing bags') as tick:
         bags = find_bags(globs, arm)
         _hold(Store(out))
-        jobs = plan_fleet(bags, robots, out, settings)
+        jobs = plan_fleet(bags, meant, out, settings)
         tick(0.0, 'starting workers')
-        with _cluster(scheduler, workers) as client:
+        with _cluster(cluster.scheduler, cluster.workers) as client:
             outcome = identify_fleet(
                 client,
                 bags,
@@ -218,13 +291,7 @@ def _print(outcome: FleetOutcome, out: str, seconds: float, as_json: bool) -> No
 
 @fleet.command(epilog='Example: armid fleet watch --out results')
 @_out
-@click.option(
-    '--alpha',
-    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
-    default=0.05,
-    show_default=True,
-    help='Share of healthy arms among those named, in the long run.',
-)
+@_alpha
 @options.as_json
 def watch(out: str, alpha: float, as_json: bool) -> None:
     """Find changes and wear over time, and draw the overview."""
@@ -261,13 +328,7 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
 @_workers
 @click.option('--arm', 'arms', multiple=True, help='Which arm; those that `watch` names, if none.')
 @click.option('--all', 'everyone', is_flag=True, help='All arms, whether they changed or not.')
-@click.option(
-    '--alpha',
-    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
-    default=0.05,
-    show_default=True,
-    help='Share of healthy arms among those named, in the long run.',
-)
+@_alpha
 @options.as_json
 def diagnose(
     out: str,

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 import time
 from typing import Any
@@ -12,8 +13,9 @@ from typing import Any
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.cli import columns, options
+from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
-from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
+from armid_ros.cli.terminal import print_parameters, print_rows, progress, say, Tick
 from armid_ros.errors import IdentificationError
 from armid_ros.files import json_text, write_file
 from armid_ros.identification import (
@@ -26,7 +28,6 @@ from armid_ros.identification import (
     PhysicalCertificate,
     PhysicalSettings,
     Score,
-    SignalSettings,
     Verification,
     verify,
     write_document,
@@ -34,11 +35,13 @@ from armid_ros.identification import (
 from armid_ros.identification import (
     identify as run,
 )
-from armid_ros.identification.estimators.names import ESTIMATORS, estimators_of
-from armid_ros.identification.estimators.side_by_side import compare_methods
+from armid_ros.identification.estimators.names import Estimator, ESTIMATORS, estimators_of
+from armid_ros.identification.estimators.side_by_side import compare_methods, MethodScore
 from armid_ros.identification.output import SCHEMA
 from armid_ros.recording import Recording
 from armid_ros.report import identification_report
+from armid_ros.report.identification_report import Assessment
+from armid_ros.robots import Robot
 import click
 import numpy as np
 
@@ -51,6 +54,88 @@ OUTPUTS = (
     'identified.mjcf.xml',
     'robot.urdf',
 )
+
+
+@dataclass(frozen=True)
+class IdentificationData:
+    """
+    What is read.
+
+    Attributes
+    ----------
+    bags, validate : tuple of Path
+        Recordings to fit, and those that are only predicted.
+    topic : str or None
+        Of the joint states.
+
+    """
+
+    bags: tuple[Path, ...]
+    validate: tuple[Path, ...]
+    topic: str | None
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """
+    What is fitted, and how.
+
+    Attributes
+    ----------
+    effects : str
+        What acts beside the rigid body.
+    method : str
+        The estimator.
+    methods : str or None
+        Estimators to compare.
+    quasi_static : bool
+        Whether only weight and effects are fitted.
+    verifies, strict : bool
+        Whether the result is verified, and whether an unusable one is an error.
+
+    """
+
+    effects: str
+    method: Any
+    methods: str | None
+    quasi_static: bool
+    verifies: bool
+    strict: bool
+
+
+@dataclass(frozen=True)
+class BodyOptions:
+    """
+    What is known of the links as bodies.
+
+    Attributes
+    ----------
+    physical : bool
+        Whether links have to be bodies.
+    total_mass : float or None
+        Of all moving links [kg].
+    mass_range : float or None
+        Factor by which a link is off its described mass at most.
+    boxes : tuple of str
+        What contains a link.
+
+    """
+
+    physical: bool
+    total_mass: float | None
+    mass_range: float | None
+    boxes: tuple[str, ...]
+
+    def settings(self, robot: Robot) -> PhysicalSettings | None:
+        """Return what the fit takes."""
+        known = self.total_mass is not None or self.mass_range is not None or self.boxes
+        if not self.physical and known:
+            raise IdentificationError('--total-mass, --mass-range and --box go with --physical')
+        boxes = dict(options.box(text, robot) for text in self.boxes)
+        made = PhysicalSettings(
+            total_mass=self.total_mass, boxes=boxes, mass_range=self.mass_range
+        )
+        return made if self.physical else None
 
 
 @click.command(epilog='Example: armid identify run.mcap --robot ur10.urdf --out result')
@@ -118,117 +203,123 @@ OUTPUTS = (
 @options.seed
 @options.reading
 @options.as_json
+@gathered(
+    robot=RobotChoice,
+    data=IdentificationData,
+    fit=FitOptions,
+    filters=FilterOptions,
+    bodies=BodyOptions,
+)
 def identify(
-    bags: tuple[Path, ...],
-    robot_source: str,
+    robot: RobotChoice,
     out: Path,
-    validate: tuple[Path, ...],
-    effects: str,
-    method: Any,
-    methods: str | None,
-    cutoff: float | None,
-    decimation: int | None,
-    quasi_static: bool,
-    physical: bool,
-    total_mass: float | None,
-    mass_range: float | None,
-    boxes: tuple[str, ...],
-    verifies: bool,
-    strict: bool,
-    topic: str | None,
-    gravity: str,
-    joints: str | None,
+    data: IdentificationData,
+    fit: FitOptions,
+    filters: FilterOptions,
+    bodies: BodyOptions,
     seed: int,
     as_json: bool,
 ) -> None:
     """Fit a model with uncertainties to recordings."""
-    options.hold(out, SCHEMA, robot_source)
+    options.hold(out, SCHEMA, robot.robot_source)
     options.require_own(out, OUTPUTS, 'identify')
-    robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
-    arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
-    if not physical and (total_mass is not None or mass_range is not None or boxes):
-        raise IdentificationError('--total-mass, --mass-range and --box go with --physical')
-    known = PhysicalSettings(
-        total_mass=total_mass,
-        boxes=dict(options.box(text, robot) for text in boxes),
-        mass_range=mass_range,
-    )
-    settings = IdentificationSettings(
-        method, SignalSettings(cutoff, decimation), known if physical else None
-    )
-    compared = () if methods is None else estimators_of(methods)
-    rng = np.random.default_rng(seed)
+    loaded = robot.load(data.bags, tell=False)
+    arm = options.with_effects(ArmModel(loaded, quasi_static=fit.quasi_static), fit.effects)
+    known = bodies.settings(loaded)
+    settings = IdentificationSettings(fit.method, filters.settings(), known)
+    compared = () if fit.methods is None else estimators_of(fit.methods)
     with progress('reading') as tick:
-        recordings = options.read(bags, robot, topic)
-        held_out = options.read(validate, robot, topic)
-        tick(0.0, 'identifying')
-        result = run(arm, recordings, settings, rng=rng, progress=tick)
-        validation = {r.source: result.predict([r]) for r in held_out}
-        tick(1.0, 'grading')
-        graded = grade(result, arm, recordings, validation, held_out)
-        verification = (
-            verify(result, arm, recordings, held_out, rng=rng, progress=tick) if verifies else None
-        )
-        scores = compare_methods(
-            arm,
-            recordings,
-            held_out,
-            compared,
-            settings.signals,
-            seed=seed,
-            clock=time.process_time,
-            progress=tick,
-        )
-    document = identification_document(result, robot_source, validation, verification, graded)
-    if scores:
-        document['methods'] = [score.document() for score in scores]
-    source = options.kept_source(robot_source, robot, out)
-    held_out_fits = [fit for part in validation.values() for fit in part]
-    misfit = _misfit(result, held_out_fits)
-    save_model(out / 'model.yaml', result.arm, source, result.estimate, misfit)
-    exports = _export(result.arm, out) if physical else {}
+        work = _work(arm, data, settings, compared, fit.verifies, seed, tick)
+    result = work.result
+    document = identification_document(
+        result, robot.robot_source, work.validation, work.verification, work.graded
+    )
+    if work.scores:
+        document['methods'] = [score.document() for score in work.scores]
+    source = options.kept_source(robot.robot_source, loaded, out)
+    save_model(out / 'model.yaml', result.arm, source, result.estimate, _misfit(work))
+    exports = _export(result.arm, out) if bodies.physical else {}
     page = identification_report(
         result,
         description=arm,
-        robot=robot_source,
-        recordings=recordings,
-        validation=validation,
-        validation_recordings=held_out,
-        verification=verification,
-        grade=graded,
-        methods=scores,
-        exports=exports,
-        provenance=provenance([*bags, *validate], document['settings'], seed),
+        robot=robot.robot_source,
+        recordings=work.recordings,
+        validation=work.validation,
+        validation_recordings=work.held_out,
+        assessment=Assessment(work.verification, work.graded, work.scores, exports),
+        provenance=provenance([*data.bags, *data.validate], document['settings'], seed),
     )
     write_file(out / 'report.html', page)
     write_document(out / 'identification.json', document)
     if as_json:
         click.echo(json_text(document))
     else:
-        _print(out, document, result, graded, [*recordings, *held_out], verification, exports)
-    if strict and graded.word == 'unusable':
+        _print(out, document, work, exports)
+    if fit.strict and work.graded.word == 'unusable':
         click.get_current_context().exit(3)
 
 
+@dataclass(frozen=True)
+class _Work:
+    """What was made of the recordings."""
+
+    recordings: Sequence[Recording]
+    held_out: Sequence[Recording]
+    result: Identification
+    validation: dict[str, tuple[Fit, ...]]
+    graded: Grade
+    verification: Verification | None
+    scores: Sequence[MethodScore]
+
+
+def _work(
+    arm: ArmModel,
+    data: IdentificationData,
+    settings: IdentificationSettings,
+    compared: Sequence[Estimator],
+    verifies: bool,
+    seed: int,
+    tick: Tick,
+) -> _Work:
+    """Read, identify, predict what is held out, grade, verify, and compare methods."""
+    rng = np.random.default_rng(seed)
+    recordings = options.read(data.bags, arm.robot, data.topic)
+    held_out = options.read(data.validate, arm.robot, data.topic)
+    tick(0.0, 'identifying')
+    result = run(arm, recordings, settings, rng=rng, progress=tick)
+    validation = {r.source: result.predict([r]) for r in held_out}
+    tick(1.0, 'grading')
+    graded = grade(result, arm, recordings, validation, held_out)
+    verification = None
+    if verifies:
+        verification = verify(result, arm, recordings, held_out, rng=rng, progress=tick)
+    scores = compare_methods(
+        arm,
+        recordings,
+        held_out,
+        compared,
+        settings.signals,
+        seed=seed,
+        clock=time.process_time,
+        progress=tick,
+    )
+    return _Work(recordings, held_out, result, validation, graded, verification, scores)
+
+
 def _print(
-    out: Path,
-    document: dict[str, Any],
-    result: Identification,
-    graded: Grade,
-    recordings: Sequence[Recording],
-    verification: Verification | None,
-    exports: dict[str, tuple[str, ...]],
+    out: Path, document: dict[str, Any], work: _Work, exports: dict[str, tuple[str, ...]]
 ) -> None:
     """Print what a person would stop at, then the table, then the rest."""
-    say(f'{graded.word}:')
-    for reason in graded.reasons:
+    result = work.result
+    say(f'{work.graded.word}:')
+    for reason in work.graded.reasons:
         say(f'  {reason}')
     print_parameters(document['parameters'])
     if result.physical is not None:
         _print_certificate(result.physical)
-    for recording in recordings:
+    for recording in (*work.recordings, *work.held_out):
         say(f'{recording.source}: {recording.report.describe()}')
-    _tell(result, verification, result.arm.robot.notes, exports)
+    _tell(result, work.verification, result.arm.robot.notes, exports)
     if 'methods' in document:
         _print_methods(document['methods'])
     fitted = document['training']['relative_error_percent']
@@ -239,10 +330,11 @@ def _print(
     say(f'{out}: {", ".join(files)}')
 
 
-def _misfit(result: Identification, held_out: Sequence[Fit]) -> Misfit:
+def _misfit(work: _Work) -> Misfit:
     """Return what the model leaves, of held-out recordings where there are any."""
-    score = Score.of(held_out or result.training)
-    rms = dict(zip(result.arm.robot.joints, score.rms.tolist(), strict=True))
+    held_out = [fit for part in work.validation.values() for fit in part]
+    score = Score.of(held_out or work.result.training)
+    rms = dict(zip(work.result.arm.robot.joints, score.rms.tolist(), strict=True))
     data = 'held-out' if held_out else 'training'
     return Misfit(data, rms, score.relative_error_percent)
 

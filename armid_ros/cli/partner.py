@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -38,6 +38,25 @@ _OPTIONS = (
         'links of equal number.',
     ),
 )
+
+
+@dataclass(frozen=True)
+class PartnerOptions:
+    """
+    A machine or a person that was recorded beside the arm.
+
+    Attributes
+    ----------
+    partner, partner_topic : str or None
+        Which, and the topic of its joint states.
+    ties : tuple of str
+        Where they may be tied.
+
+    """
+
+    partner: str | None
+    partner_topic: str | None
+    ties: tuple[str, ...]
 
 
 def options(command: _Command) -> _Command:

@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import options
+from armid_ros.cli.groups import gathered, RobotChoice
 from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.effects import Effect, parse_effect
 from armid_ros.elastic.identification import write_runs
@@ -24,11 +26,72 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import read_waypoints, write_recording
 from armid_ros.recording import recover as recover_bag
 from armid_ros.robots import collision_model, Robot
+from armid_ros.robots.two_link import TwoLinkSet
 from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run
 from armid_ros.simulation.bodies import require_masses
 import click
 import numpy as np
+
+
+@dataclass(frozen=True)
+class ArmOptions:
+    """
+    The arm that is simulated.
+
+    Attributes
+    ----------
+    texts : tuple of str
+        Effects with their sizes.
+    model : Path or None
+        A model.yaml.
+
+    """
+
+    texts: tuple[str, ...]
+    model: Path | None
+
+    def model_and_drives(self, robot: Robot) -> tuple[ArmModel, TwoLinkSet | None]:
+        """Return the model, and the motors of a shipped arm."""
+        if self.model is None:
+            require_masses(robot)
+            arm, drives = shipped_arm(robot)
+        else:
+            arm, drives = load_model(self.model, robot), None
+        for text in self.texts:
+            arm = arm.with_effect(*_of_some_size(text, robot))
+        return arm, drives
+
+
+@dataclass(frozen=True)
+class NoiseOptions:
+    """
+    What the sensors make of the truth.
+
+    Attributes
+    ----------
+    torque_noise, position_noise, velocity_noise, acceleration_noise : float
+        Standard deviations [N m, rad, rad/s, m/s^2].
+    resolution : float
+        Step of the encoders [rad].
+
+    """
+
+    torque_noise: float
+    position_noise: float
+    velocity_noise: float
+    acceleration_noise: float
+    resolution: float
+
+    def sensors(self) -> Sensors:
+        """Return the sensors."""
+        return Sensors(
+            torque_noise=self.torque_noise,
+            position_noise=self.position_noise,
+            velocity_noise=self.velocity_noise,
+            acceleration_noise=self.acceleration_noise,
+            resolution=self.resolution,
+        )
 
 
 @click.command(epilog='Example: armid simulate --robot humanoid_arm --gravity moon --out run')
@@ -63,21 +126,15 @@ import numpy as np
 @options.joints
 @options.seed
 @options.reading
+@gathered(robot=RobotChoice, arm=ArmOptions, noise=NoiseOptions)
 def simulate(
-    robot_source: str,
+    robot: RobotChoice,
     out: Path,
-    texts: tuple[str, ...],
-    model: Path | None,
+    arm: ArmOptions,
     trajectory: Path | None,
     rate: float,
     loop_gain: float,
-    torque_noise: float,
-    position_noise: float,
-    velocity_noise: float,
-    acceleration_noise: float,
-    resolution: float,
-    gravity: str,
-    joints: str | None,
+    noise: NoiseOptions,
     seed: int,
 ) -> None:
     """
@@ -88,35 +145,25 @@ def simulate(
 
     """
     rng = np.random.default_rng(seed)
-    robot = options.open_robot(robot_source, gravity, joints)
-    if model is None:
-        require_masses(robot)
-    arm, drives = (load_model(model, robot), None) if model else shipped_arm(robot)
-    for text in texts:
-        arm = arm.with_effect(*_of_some_size(text, robot))
-    springs, rotorless = elastic_joints(arm)
+    loaded = robot.load()
+    model, drives = arm.model_and_drives(loaded)
+    springs, rotorless = elastic_joints(model)
     if rotorless:
         say(no_rotor(rotorless))
-    sensors = Sensors(
-        torque_noise=torque_noise,
-        position_noise=position_noise,
-        velocity_noise=velocity_noise,
-        acceleration_noise=acceleration_noise,
-        resolution=resolution,
-    )
+    sensors = noise.sensors()
     with progress('designing a trajectory') as tick:
-        reference = _reference(robot, trajectory, rng)
+        reference = _reference(loaded, trajectory, rng)
         tick(0.0, 'simulating')
         if springs and not rotorless:
             elastic = make_elastic_arm(
-                arm, rng=rng, drives=drives, gain=loop_gain, sensors=sensors
+                model, rng=rng, drives=drives, gain=loop_gain, sensors=sensors
             )
             samples, sides = _both_sides(out, elastic, reference, rate, tick), ' on both sides'
         else:
-            measured = run(arm, reference, rng=rng, sensors=sensors, rate=rate, progress=tick)
-            write_recording(out, measured, robot_description=robot.urdf)
+            measured = run(model, reference, rng=rng, sensors=sensors, rate=rate, progress=tick)
+            write_recording(out, measured, robot_description=loaded.urdf)
             samples, sides = len(measured.t), ''
-    say(f'{out}: {samples} samples of {robot.n_joints} joints{sides}, {reference.duration:.1f} s')
+    say(f'{out}: {samples} samples of {loaded.n_joints} joints{sides}, {reference.duration:.1f} s')
 
 
 def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:

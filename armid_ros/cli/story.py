@@ -17,7 +17,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli.diagnose import show
-from armid_ros.cli.diagnosis_files import Case, Extras, write_results
+from armid_ros.cli.diagnosis_files import DiagnosisCase, Extras, write_results
 from armid_ros.cli.terminal import progress, say
 from armid_ros.diagnosis import diagnose, Diagnosis
 from armid_ros.effects import CATALOGUE, Effect, make_effect, parse_effect
@@ -73,7 +73,7 @@ class Hidden:
 
 
 @dataclass(frozen=True)
-class Told:
+class ToldStory:
     """
     A story with its end.
 
@@ -128,7 +128,7 @@ def tell_story(
     rng: np.random.Generator,
     hide: str = '',
     rate: float = 200.0,
-) -> Told:
+) -> ToldStory:
     """
     Hide something in an arm, record it over topics, and diagnose it.
 
@@ -169,12 +169,12 @@ def tell_story(
             progress=tick,
         )
         robot = known.robot.name
-        case = Case(known, robot, robot, recordings[:-1], recordings[-1:], [baseline])
+        case = DiagnosisCase(known, robot, robot, recordings[:-1], recordings[-1:], [baseline])
         write_results(out, found, case, Extras())
-    return Told(hidden, found)
+    return ToldStory(hidden, found)
 
 
-def show_story(told: Told, out: Path) -> None:
+def show_story(told: ToldStory, out: Path) -> None:
     """Print what was found, what it did for a run that was not used, and what was hidden."""
     say('Something was hidden in the arm, and three runs recorded. The diagnosis of two of them:')
     show(told.diagnosis)

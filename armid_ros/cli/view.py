@@ -4,17 +4,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 import json
 from pathlib import Path
 from typing import Any
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns, options
+from armid_ros.cli.groups import gathered, RobotChoice
 from armid_ros.cli.terminal import say
 from armid_ros.errors import ArmidError, OutputError
+from armid_ros.robots import Robot
 from armid_ros.view import log_scene, make_scene, open_stream, rerun
 from armid_ros.view.scene import Scene
 import click
+
+
+@dataclass(frozen=True)
+class OptionalRobot:
+    """
+    The robot that is meant; without a source, that of the model or of the bag.
+
+    Attributes
+    ----------
+    robot_source, gravity, joints
+        As of a ``RobotChoice``.
+
+    """
+
+    robot_source: str | None
+    gravity: str
+    joints: str | None
+
+    def load(self, bags: Sequence[Path]) -> Robot:
+        """Load it; say what is not driven."""
+        source = '-' if self.robot_source is None else self.robot_source
+        return RobotChoice(source, self.gravity, self.joints).load(bags)
 
 
 @click.command(epilog='Example: armid view run.mcap --model found --out run.rrd')
@@ -37,17 +63,16 @@ import click
 @options.gravity
 @options.joints
 @options.reading
+@gathered(robot=OptionalRobot)
 def view(
     bag: Path | None,
     model: Path | None,
-    robot_source: str | None,
+    robot: OptionalRobot,
     out: Path | None,
     mark: str | None,
     live: bool,
     namespace: str,
     topic: str | None,
-    gravity: str,
-    joints: str | None,
 ) -> None:
     """
     Look at a recording in rerun: the moving arm, torques, and what a model does not explain.
@@ -60,8 +85,8 @@ def view(
     if live:
         _live(
             {
-                'robot': robot_source if robot_source != '-' else '',
-                'joints': joints.split(',') if joints else [],
+                'robot': robot.robot_source if robot.robot_source != '-' else '',
+                'joints': robot.joints.split(',') if robot.joints else [],
                 'mark': mark.split(',') if mark else [],
                 'out': str(out or ''),
             },
@@ -69,7 +94,7 @@ def view(
         )
         return
     assert bag is not None
-    arm = _arm(bag, model, robot_source, gravity, joints)
+    arm = _arm(bag, model, robot)
     (recording,) = columns.read([bag], arm.robot, topic)
     marked = tuple(mark.split(',')) if mark else _named(model)
     scene = make_scene(arm, recording, marked)
@@ -108,18 +133,12 @@ def _live(parameters: dict[str, Any], namespace: str) -> None:
     show_topics(parameters, namespace)
 
 
-def _arm(
-    bag: Path, model: Path | None, source: str | None, gravity: str, joints: str | None
-) -> ArmModel:
+def _arm(bag: Path, model: Path | None, robot: OptionalRobot) -> ArmModel:
     """Return the model that is meant; without one, the bodies of the description."""
-    robot = None
-    if source is not None:
-        robot = options.open_robot(source, gravity, joints, [bag])
+    loaded = None if robot.robot_source is None else robot.load([bag])
     if model is not None:
-        return load_model(model / 'model.yaml' if model.is_dir() else model, robot)
-    if robot is None:
-        robot = options.open_robot('-', gravity, joints, [bag])
-    return ArmModel(robot)
+        return load_model(model / 'model.yaml' if model.is_dir() else model, loaded)
+    return ArmModel(robot.load([bag]) if loaded is None else loaded)
 
 
 def _named(model: Path | None) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ In a test of a package that brings an effect::
         check_effect(Hose)
 
 Simulation, identification and diagnosis rely on what is checked, and on nothing else. Each check
-is a function of a ``Trial`` that raises AssertionError; ``CHECKS`` has them all.
+is a function of an ``EffectCase`` that raises AssertionError; ``CHECKS`` has them all.
 
 """
 
@@ -36,7 +36,7 @@ _STEP, _TOLERANCE = 1e-6, 2e-5
 
 
 @dataclass(frozen=True)
-class Trial:
+class EffectCase:
     """
     An effect on a robot, with values and a motion to try it with.
 
@@ -66,7 +66,7 @@ class Trial:
         *,
         size: npt.ArrayLike | None = None,
         seed: int = 3,
-    ) -> Trial:
+    ) -> EffectCase:
         """
         Make the trial of a class.
 
@@ -148,7 +148,7 @@ def check_effect(kind: type[Effect], robot: Robot | None = None, *, seed: int = 
 
     """
     check_kind(kind)
-    trial = Trial.of(kind, robot, seed=seed)
+    trial = EffectCase.of(kind, robot, seed=seed)
     wrong = []
     for check in CHECKS:
         try:
@@ -161,7 +161,7 @@ def check_effect(kind: type[Effect], robot: Robot | None = None, *, seed: int = 
         raise AssertionError(f'{kind.name} breaks the contract of effects: ' + '; '.join(wrong))
 
 
-def it_says_what_it_is(trial: Trial) -> None:
+def it_says_what_it_is(trial: EffectCase) -> None:
     """Fail where docstring, bounds or names are missing."""
     kind = type(trial.effect)
     assert kind.__doc__ and not kind.__doc__.startswith(f'{kind.__name__}('), 'no docstring'
@@ -176,7 +176,7 @@ def it_says_what_it_is(trial: Trial) -> None:
     assert len(names) == len(trial.effect.bounds()[0]), 'not one bound for each parameter'
 
 
-def columns_have_one_place_per_parameter(trial: Trial) -> None:
+def columns_have_one_place_per_parameter(trial: EffectCase) -> None:
     """Fail where columns are not finite, or not of shape (N, n, P)."""
     columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
     wanted = (*trial.motion.q.shape, len(trial.values))
@@ -184,25 +184,25 @@ def columns_have_one_place_per_parameter(trial: Trial) -> None:
     assert np.all(np.isfinite(columns)), 'columns are not finite'
 
 
-def size_zero_changes_nothing(trial: Trial) -> None:
+def size_zero_changes_nothing(trial: EffectCase) -> None:
     """Fail where the effect acts without being there."""
     bare = ArmModel(trial.robot).torque(trial.motion)
     np.testing.assert_allclose(trial.torque(0.0 * trial.values), bare, atol=1e-12)
 
 
-def columns_are_the_derivative_at_zero(trial: Trial) -> None:
+def columns_are_the_derivative_at_zero(trial: EffectCase) -> None:
     """Fail where ``columns`` and ``action`` do not agree for a small effect."""
     columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
     _compare(trial, np.zeros_like(trial.values), columns)
 
 
-def columns_are_the_derivative_at_any_size(trial: Trial) -> None:
+def columns_are_the_derivative_at_any_size(trial: EffectCase) -> None:
     """Fail where they do not agree for an effect of typical size."""
     columns = trial.arm(trial.values).columns(trial.motion)
     _compare(trial, trial.values, columns[:, :, -len(trial.values) :])
 
 
-def linear_means_exact(trial: Trial) -> None:
+def linear_means_exact(trial: EffectCase) -> None:
     """Fail where the torque of an effect that says it is linear is not columns times values."""
     if trial.effect.linear:
         bare = ArmModel(trial.robot)
@@ -212,7 +212,7 @@ def linear_means_exact(trial: Trial) -> None:
         np.testing.assert_allclose(trial.torque(trial.values), expected, atol=1e-9 * size)
 
 
-def instantaneous_means_sample_by_sample(trial: Trial) -> None:
+def instantaneous_means_sample_by_sample(trial: EffectCase) -> None:
     """Fail where columns depend on the samples around, and the effect says they do not."""
     if trial.effect.instantaneous:
         arm, part = ArmModel(trial.robot), slice(40, 60)
@@ -222,7 +222,7 @@ def instantaneous_means_sample_by_sample(trial: Trial) -> None:
         np.testing.assert_allclose(alone, whole, atol=1e-9 * size)
 
 
-def shapes_stay_possible(trial: Trial) -> None:
+def shapes_stay_possible(trial: EffectCase) -> None:
     """Fail where default shapes or the starts of a search are outside of the bounds."""
     effect = trial.effect
     grids = effect.shape_grids(trial.motion, ArmModel(trial.robot))
@@ -234,7 +234,7 @@ def shapes_stay_possible(trial: Trial) -> None:
             assert inside, f'{shape.name}: {value} is beyond its bounds'
 
 
-def smooth_columns_have_their_gradient(trial: Trial) -> None:
+def smooth_columns_have_their_gradient(trial: EffectCase) -> None:
     """Fail where smooth columns, if there are any, are others or have another gradient."""
     motion, width = trial.motion, np.full(trial.robot.n_joints, 1e-9)
     sharp = trial.effect.smooth_columns(motion, width)
@@ -260,12 +260,12 @@ def smooth_columns_have_their_gradient(trial: Trial) -> None:
         np.testing.assert_allclose(gradient[argument][:, joint], difference, atol=1e-4)
 
 
-def it_goes_to_other_processes(trial: Trial) -> None:
+def it_goes_to_other_processes(trial: EffectCase) -> None:
     """Fail where it does not survive being pickled."""
     assert pickle.loads(pickle.dumps(trial.effect)) == trial.effect
 
 
-def _compare(trial: Trial, values: FloatArray, columns: FloatArray) -> None:
+def _compare(trial: EffectCase, values: FloatArray, columns: FloatArray) -> None:
     """Compare columns with differences, to one side at a lower bound."""
     lower, _ = trial.effect.bounds()
     for parameter, step in enumerate(_STEP * np.eye(len(values))):
@@ -282,7 +282,7 @@ def _compare(trial: Trial, values: FloatArray, columns: FloatArray) -> None:
 
 
 #: All checks, in the order in which they are made.
-CHECKS: tuple[Callable[[Trial], None], ...] = (
+CHECKS: tuple[Callable[[EffectCase], None], ...] = (
     it_says_what_it_is,
     columns_have_one_place_per_parameter,
     size_zero_changes_nothing,

@@ -24,7 +24,7 @@ _MORE = 1.0001
 
 
 @dataclass(frozen=True)
-class Late(TorqueReading):
+class LateReading(TorqueReading):
     """A reading that comes late, which shows in how fast the torque changes."""
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -39,7 +39,7 @@ class Late(TorqueReading):
 
 
 @dataclass(frozen=True)
-class TimeDelay(Late):
+class TimeDelay(LateReading):
     """
     Torque readings older than the positions they are recorded with, reading(t) = tau(t - delay).
 
@@ -99,7 +99,7 @@ class TimeDelay(Late):
 
 
 @dataclass(frozen=True)
-class TorqueLag(Late):
+class TorqueLag(LateReading):
     """
     Torque readings through a low-pass of the first order, T dreading/dt + reading = tau.
 

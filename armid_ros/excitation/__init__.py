@@ -9,7 +9,7 @@ from rest to rest.
 
 """
 
-from armid_ros.excitation.design import Design, design, design_speeds, evaluate, Progress
+from armid_ros.excitation.design import Design, design, design_speeds, DesignProgress, evaluate
 from armid_ros.excitation.feasibility import excitation_faults, Faults, trajectory_faults
 from armid_ros.excitation.files import load_excitation, save_excitation
 from armid_ros.excitation.fitness import Fitness, fitness, not_checked
@@ -70,7 +70,7 @@ __all__ = [
     'MeasuredPose',
     'Obstacle',
     'Problem',
-    'Progress',
+    'DesignProgress',
     'Run',
     'SPEED_CLASSES',
     'TARGETS',

@@ -28,7 +28,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Progress:
+class DesignProgress:
     """
     How far a design has come.
 
@@ -92,7 +92,7 @@ def design(
     obstacles: Sequence[Obstacle] = (),
     prior_information: FloatArray | None = None,
     rival: ArmModel | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[DesignProgress], None] | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> Design:
     """
@@ -138,7 +138,7 @@ def design(
 
     def watch(done: float, found: Found) -> None:
         if progress is not None:
-            progress(Progress(done, found.cost))
+            progress(DesignProgress(done, found.cost))
 
     outcome = search_all(Task(problem, clearance, prior), rng.spawn(settings.starts), watch, clock)
     excitation = placed(problem, outcome.found.trajectory, clearance)
@@ -155,7 +155,7 @@ def design_speeds(
     obstacles: Sequence[Obstacle] = (),
     prior_information: FloatArray | None = None,
     rival: ArmModel | None = None,
-    progress: Callable[[str | float, Progress], None] | None = None,
+    progress: Callable[[str | float, DesignProgress], None] | None = None,
 ) -> dict[str | float, Design]:
     """
     Design one trajectory for every speed class, each as `design` finds it on its own.
@@ -174,7 +174,7 @@ def design_speeds(
     designs: dict[str | float, Design] = {}
     for speed in speeds:
 
-        def tell(step: Progress, speed: str | float = speed) -> None:
+        def tell(step: DesignProgress, speed: str | float = speed) -> None:
             if progress is not None:
                 progress(speed, step)
 

@@ -114,6 +114,10 @@ class DesignSettings:
                 f"focus goes with criterion 'D', not '{self.criterion}': it is the determinant of "
                 'what is learned about the parameters in focus'
             )
+        self._require_numbers()
+
+    def _require_numbers(self) -> None:
+        """Refuse counts below one, times that are not positive, and negative sizes."""
         for name in (
             'harmonics',
             'n_periods',

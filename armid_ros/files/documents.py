@@ -10,7 +10,7 @@ what it raises for content it did not expect becomes one error that names the fi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 import csv
 import json
@@ -132,9 +132,7 @@ def _check_size(text: str) -> None:
     total = 0
     for event in yaml.parse(text, Loader=_LOADER):
         if isinstance(event, yaml.AliasEvent):
-            if event.anchor not in sizes:
-                raise ValueError(f"line {_line(event)}: the alias '{event.anchor}' has no anchor")
-            total += sizes[event.anchor]
+            total += _written_out(event, sizes)
         elif isinstance(event, (yaml.SequenceStartEvent, yaml.MappingStartEvent)):
             total += 1
             open_nodes.append((event.anchor, total))
@@ -152,6 +150,13 @@ def _check_size(text: str) -> None:
             raise ValueError(
                 f'line {_line(event)}: more than {MAX_NODES} nodes, aliases written out'
             )
+
+
+def _written_out(event: yaml.AliasEvent, sizes: Mapping[str, int]) -> int:
+    """Return how many nodes an alias stands for."""
+    if event.anchor is None or event.anchor not in sizes:
+        raise ValueError(f"line {_line(event)}: the alias '{event.anchor}' has no anchor")
+    return sizes[event.anchor]
 
 
 def _line(event: yaml.Event) -> int:

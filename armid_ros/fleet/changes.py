@@ -24,7 +24,7 @@ from typing import Literal
 from armid_ros.fleet.scatter import (
     FEWEST,
     line_through,
-    Series,
+    ParameterHistory,
     splits,
     Spread,
     spreads,
@@ -41,13 +41,13 @@ _SMALLEST = 1e-300
 
 
 @dataclass(frozen=True)
-class Change:
+class HistoryChange:
     """
     The most that is to be said of a series.
 
     Attributes
     ----------
-    series : Series
+    series : ParameterHistory
         Which one.
     kind : {'step', 'trend'}
         A change from one bag to the next, or one that goes on.
@@ -62,7 +62,7 @@ class Change:
 
     """
 
-    series: Series
+    series: ParameterHistory
     kind: Kind
     index: int
     size: float
@@ -80,7 +80,7 @@ class Judged:
     ----------
     arm : str
         Which one.
-    changes : tuple of Change
+    changes : tuple of HistoryChange
         Of all series that were tested, the least probable first.
     p : float
         Of the first, with the factor for all series of the arm.
@@ -90,20 +90,20 @@ class Judged:
     """
 
     arm: str
-    changes: tuple[Change, ...]
+    changes: tuple[HistoryChange, ...]
     p: float
     adjusted: float
 
 
 def judge(
-    series: Sequence[Series], spread: Mapping[tuple[str, str], Spread] | None = None
+    series: Sequence[ParameterHistory], spread: Mapping[tuple[str, str], Spread] | None = None
 ) -> list[Judged]:
     """
     Test all series of arms of one kind.
 
     Parameters
     ----------
-    series : sequence of Series
+    series : sequence of ParameterHistory
         All parameters of all arms, without what siblings share on a day.
     spread : mapping, optional
         As of ``spreads``, which is the default.
@@ -115,7 +115,7 @@ def judge(
 
     """
     spread = spreads(series) if spread is None else spread
-    by_arm: dict[str, list[Change]] = {}
+    by_arm: dict[str, list[HistoryChange]] = {}
     for one in series:
         found = by_arm.setdefault(one.arm, [])
         if len(one.values) >= FEWEST:
@@ -130,7 +130,7 @@ def judge(
     return sorted(judged, key=lambda one: (one.adjusted, one.p, one.arm))
 
 
-def named(judged: Judged, alpha: float) -> tuple[Change, ...]:
+def named(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
     """Return the changes for which an arm is named: those that would name it by themselves."""
     if judged.adjusted > alpha or not judged.changes:
         return ()
@@ -138,7 +138,7 @@ def named(judged: Judged, alpha: float) -> tuple[Change, ...]:
     return tuple(change for change in judged.changes if change.p <= limit)
 
 
-def largest_change(series: Series, spread: Spread) -> Change:
+def largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
     """Return the largest step of a series, or its trend if that explains it as well."""
     cut, count = splits(series, spread), len(series.values)
     scores, trend = cut.scores / spread.steps, cut.trend / spread.trends
@@ -147,26 +147,26 @@ def largest_change(series: Series, spread: Spread) -> Change:
     if trend**2 + np.log(count) >= scores[at] ** 2:
         p = _p(trend, cut.freedom, count)
         std = cut.slope_std * spread.trends * MONTH
-        return Change(series, 'trend', 0, cut.slope * MONTH, std, cut.start, p)
+        return HistoryChange(series, 'trend', 0, cut.slope * MONTH, std, cut.start, p)
     p = _p(float(scores[at]), cut.freedom, count)
     size, std = float(cut.high[at] - cut.low[at]), float(cut.std[at]) * spread.steps
-    return Change(series, 'step', at + 1, size, std, float(cut.low[at]), p)
+    return HistoryChange(series, 'step', at + 1, size, std, float(cut.low[at]), p)
 
 
-def wear(series: Series, spread: Spread) -> tuple[float, float]:
+def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
     """Return the slope of a series and its standard deviation, in a month."""
     slope, std = line_through(series, spread)
     return slope * MONTH, std * MONTH
 
 
-def unlike_siblings(series: Sequence[Series]) -> dict[tuple[str, str, str], float]:
+def unlike_siblings(series: Sequence[ParameterHistory]) -> dict[tuple[str, str, str], float]:
     """
     Return how far each arm is from its siblings, by arm, name and joint.
 
     Distance of its median from that of all arms, over the spread of arms, both robust.
 
     """
-    groups: dict[tuple[str, str], list[Series]] = {}
+    groups: dict[tuple[str, str], list[ParameterHistory]] = {}
     for one in series:
         groups.setdefault(one.parameter, []).append(one)
     found = {}

@@ -53,7 +53,7 @@ DIAGNOSES = pa.schema(
 
 
 @dataclass(frozen=True)
-class Case:
+class ArmCase:
     """
     An arm to be diagnosed.
 
@@ -71,7 +71,7 @@ class Case:
     after: tuple[str, ...]
 
 
-def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> list[Case]:
+def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> list[ArmCase]:
     """
     Choose the bags by which arms are diagnosed.
 
@@ -104,7 +104,7 @@ def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> lis
 def diagnose_fleet(
     client: Client,
     store: Store,
-    chosen: Sequence[Case],
+    chosen: Sequence[ArmCase],
     found: Watch,
     tell: Callable[[int, int], None] = lambda ended, of: None,
 ) -> list[dict[str, Any]]:
@@ -144,7 +144,7 @@ def diagnose_fleet(
 
 
 def one_arm(
-    case: Case, model: ArmModel, filters: Filters, topic: str | None, out: str
+    case: ArmCase, model: ArmModel, filters: Filters, topic: str | None, out: str
 ) -> dict[str, Any]:
     """Task: identify what an arm was, diagnose what it is, and draw the bags beside the change."""
     store = Store(out)
@@ -183,7 +183,7 @@ def one_arm(
     )
 
 
-def _case(arm: WatchedArm) -> Case:
+def _case(arm: WatchedArm) -> ArmCase:
     urls = [str(row['bag']) for row in arm.bags]
     middle = max(1, len(urls) // 2)
     if not arm.named:
@@ -193,7 +193,7 @@ def _case(arm: WatchedArm) -> Case:
     else:
         cut = urls.index(arm.bag_at(arm.named[0])['bag'])
         before, after = urls[:cut], urls[cut:]
-    return Case(arm.arm, tuple(before[-BEFORE:]), tuple(after[:AFTER]))
+    return ArmCase(arm.arm, tuple(before[-BEFORE:]), tuple(after[:AFTER]))
 
 
 def _read(stack: ExitStack, url: str, model: ArmModel, topic: str | None) -> Recording:
@@ -202,7 +202,7 @@ def _read(stack: ExitStack, url: str, model: ArmModel, topic: str | None) -> Rec
 
 
 def _row(
-    case: Case,
+    case: ArmCase,
     verdict: str,
     summary: str,
     effects: Sequence[str] = (),

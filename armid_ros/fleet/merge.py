@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from armid_ros.estimate import ParameterName
 from armid_ros.fleet.job import Job
 from armid_ros.fleet.summary import (
+    BagSummary,
     MotionStatistics,
     noise_of,
-    Prepared,
+    PreparedBag,
     Refused,
     rows_of,
-    Summary,
 )
 from armid_ros.identification.fitting.excited import bounds, told_apart
 from armid_ros.identification.fitting.triangle import (
@@ -64,7 +64,7 @@ class Branch:
     found: int = 0
 
     @classmethod
-    def of(cls, summary: Summary | Refused) -> Branch:
+    def of(cls, summary: BagSummary | Refused) -> Branch:
         """Return the branch of one bag."""
         if isinstance(summary, Refused):
             return cls(None, None, (), (summary,))
@@ -174,7 +174,7 @@ def rooted(branches: Sequence[Branch], job: Job) -> Root:
     return Root(branch, ArmFit(base, tuple(kept), fit))
 
 
-def noise_products_of(prepared: Prepared, fit: ArmFit | None, job: Job) -> Packed | None:
+def noise_products_of(prepared: PreparedBag, fit: ArmFit | None, job: Job) -> Packed | None:
     """Return what the residuals of a bag at its arm's values say of the deviations."""
     if fit is None or isinstance(prepared.summary, Refused):
         return None

@@ -16,8 +16,8 @@ from typing import Any
 from urllib.parse import quote
 
 from armid_ros.fleet.bags import BagFile, folder_of
-from armid_ros.fleet.changes import Change
-from armid_ros.fleet.scatter import Series
+from armid_ros.fleet.changes import HistoryChange
+from armid_ros.fleet.scatter import ParameterHistory
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import change_rows, day_text, RESIDUAL, Watch, WatchedArm, wear_rows
 from armid_ros.report.notation import counted, digits, with_interval
@@ -29,14 +29,14 @@ from armid_ros.report.sections.fleet import (
     Cell,
     Curve,
     curve,
-    Curves,
     Headline,
+    ParameterCurves,
     RefusedBags,
-    Row,
     spark,
+    TableRow,
     Wear,
 )
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 from markupsafe import Markup
 
 #: Parameters that have a column of curves in the overview.
@@ -105,8 +105,8 @@ def arm_page(
             f'{"above" if arm.unlike[1] > 0 else "below"} that of its siblings'
         )
     sections: list[Section] = [
-        Verdict(arm.health, tone, [f'{said[0][0].upper()}{said[0][1:]}'], beware),
-        Curves([_curve(arm, one) for one in _ordered(arm)]),
+        VerdictSection(arm.health, tone, [f'{said[0][0].upper()}{said[0][1:]}'], beware),
+        ParameterCurves([_curve(arm, one) for one in _ordered(arm)]),
         _wear(found, arm),
         _bags(arm, reports),
     ]
@@ -114,7 +114,7 @@ def arm_page(
         link = f'../{quote(diagnosis["report"])}' if diagnosis['report'] else ''
         verdict = diagnosis['verdict'].replace('_', ' ')
         cells = [Cell(verdict, link), Cell(diagnosis['summary'])]
-        sections.insert(1, Headline(('Verdict', 'Summary'), [Row(cells)]))
+        sections.insert(1, Headline(('Verdict', 'Summary'), [TableRow(cells)]))
     if arm.refused:
         rows = [_refused_row(row) for row in arm.refused]
         sections.append(RefusedBags(('Arm', 'Bag', 'Why'), rows))
@@ -122,7 +122,7 @@ def arm_page(
     return Page(arm.arm, subtitle, sections, charts=False).html()
 
 
-def _verdict(found: Watch) -> Verdict:
+def _verdict(found: Watch) -> VerdictSection:
     counts = Counter(arm.health for arm in found.arms)
     ill = counts['changed'] + counts['wearing']
     first = (
@@ -139,7 +139,9 @@ def _verdict(found: Watch) -> Verdict:
     refused = sum(len(arm.refused) for arm in found.arms)
     if refused:
         beware.append(f'{counted(refused, "bag")} refused')
-    return Verdict('changes' if ill else 'quiet', 'fair' if ill else 'good', sentences, beware)
+    return VerdictSection(
+        'changes' if ill else 'quiet', 'fair' if ill else 'good', sentences, beware
+    )
 
 
 def _columns(found: Watch) -> list[tuple[str, str]]:
@@ -185,18 +187,18 @@ def _row(arm: WatchedArm, columns: Sequence[tuple[str, str]]) -> ArmRow:
     )
 
 
-def _spark(series: Series | None, named: Sequence[Change]) -> Markup:
+def _spark(series: ParameterHistory | None, named: Sequence[HistoryChange]) -> Markup:
     if series is None or len(series.values) < 2:
         return Markup('')
     title = f'{_title(*series.parameter)}: {digits(series.values[-1], 3)} {series.unit}'
     return spark(series.values, series.std, _cut(series, named), title)
 
 
-def _cut(series: Series, named: Sequence[Change]) -> int:
+def _cut(series: ParameterHistory, named: Sequence[HistoryChange]) -> int:
     return next((one.index for one in named if one.series.parameter == series.parameter), 0)
 
 
-def _ordered(arm: WatchedArm) -> list[Series]:
+def _ordered(arm: WatchedArm) -> list[ParameterHistory]:
     """Return the series of an arm, those that have changed first."""
     first = {change.series.parameter: k for k, change in enumerate(arm.named)}
     return sorted(
@@ -205,7 +207,7 @@ def _ordered(arm: WatchedArm) -> list[Series]:
     )
 
 
-def _curve(arm: WatchedArm, series: Series) -> Curve:
+def _curve(arm: WatchedArm, series: ParameterHistory) -> Curve:
     places = {row['start_ns']: row['bag'] for row in arm.bags}
     starts = sorted(places)
     links = []
@@ -220,7 +222,7 @@ def _curve(arm: WatchedArm, series: Series) -> Curve:
 
 def _wear(found: Watch, arm: WatchedArm) -> Wear:
     rows = [
-        Row(
+        TableRow(
             [
                 Cell(_title(row['name'], row['joint'])),
                 Cell(
@@ -259,7 +261,7 @@ def _bags(arm: WatchedArm, reports: set[str]) -> Bags:
             Cell(worst),
             Cell('; '.join(row['notes'])),
         ]
-        rows.append(Row(cells, name))
+        rows.append(TableRow(cells, name))
     heads = ('Start (UTC)', 'Bag', 'Length', 'Error', 'Largest residual [N m]', 'Notes')
     hint = (
         'A bag with a link has a report of its own. That of any other is made by '
@@ -269,8 +271,8 @@ def _bags(arm: WatchedArm, reports: set[str]) -> Bags:
     return Bags(heads, rows, (2, 3, 4), hint)
 
 
-def _refused_row(row: dict[str, str]) -> Row:
-    return Row([Cell(str(row['arm'])), Cell(row['bag']), Cell(row['reason'])])
+def _refused_row(row: dict[str, str]) -> TableRow:
+    return TableRow([Cell(str(row['arm'])), Cell(row['bag']), Cell(row['reason'])])
 
 
 def _title(name: str, joint: str) -> str:

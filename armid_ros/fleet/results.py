@@ -26,7 +26,7 @@ from armid_ros.fleet.bags import BagFile, folder_of, part_of
 from armid_ros.fleet.job import Job
 from armid_ros.fleet.merge import ArmEstimate
 from armid_ros.fleet.store import Store
-from armid_ros.fleet.summary import MotionStatistics, OwnEstimate, Refused, Summary
+from armid_ros.fleet.summary import BagSummary, MotionStatistics, OwnEstimate, Refused
 from armid_ros.identification.fitting.triangle import Triangle
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -92,7 +92,7 @@ REFUSED = pa.schema(
 )
 
 
-def write_summary(store: Store, summary: Summary, job: Job) -> None:
+def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
     """Write what is kept of a bag."""
     bag, own, motion = summary.bag, summary.own, summary.motion
     start = datetime.datetime.fromtimestamp(summary.start_ns * 1e-9, datetime.UTC)
@@ -130,7 +130,7 @@ def write_summary(store: Store, summary: Summary, job: Job) -> None:
     store.remove(_refused(bag))
 
 
-def find_summary(store: Store, bag: BagFile, job: Job) -> Summary | Refused | None:
+def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused | None:
     """
     Return what is among the results of a bag, if it is of the same bag and settings.
 
@@ -246,7 +246,7 @@ def _same(row: dict[str, object], bag: BagFile, job: Job) -> bool:
     return job.resume or row['run'] == job.run
 
 
-def _summary(row: dict[str, object], bag: BagFile, day: str, job: Job) -> Summary:
+def _summary(row: dict[str, object], bag: BagFile, day: str, job: Job) -> BagSummary:
     def array(name: str) -> FloatArray:
         return np.array(row[name], dtype=float)
 
@@ -261,7 +261,7 @@ def _summary(row: dict[str, object], bag: BagFile, day: str, job: Job) -> Summar
     triangle = Triangle.unpacked(array('triangle'))
     start = int(str(row['start_ns']))
     computed = row['run'] == job.run
-    return Summary(bag, day, start, triangle, motion, own, computed=computed)
+    return BagSummary(bag, day, start, triangle, motion, own, computed=computed)
 
 
 def _refused(bag: BagFile) -> str:

@@ -33,7 +33,7 @@ from armid_ros.fleet.results import (
     write_summary,
 )
 from armid_ros.fleet.store import Store
-from armid_ros.fleet.summary import prepare, Prepared, Refused
+from armid_ros.fleet.summary import prepare, PreparedBag, Refused
 from distributed import as_completed, Client, Future, KilledWorker
 
 #: Times that an arm is begun again whose tasks were on workers that others ended.
@@ -142,7 +142,7 @@ class _UnderWay:
     last: Future
 
 
-def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[Prepared, ...]:
+def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[PreparedBag, ...]:
     """Task: find bags among the results, or read them and write them there."""
     return tuple(_taken(bag, job, bags_of_arm) for bag in bags)
 
@@ -152,12 +152,12 @@ def same(job: Job) -> Job:
     return job
 
 
-def branch(prepared: Sequence[Prepared]) -> Branch:
+def branch(prepared: Sequence[PreparedBag]) -> Branch:
     """Task: merge the bags of a group, and leave their rows where they are."""
     return merged([Branch.of(one.summary) for one in prepared])
 
 
-def noise(prepared: Sequence[Prepared], root: Root, job: Job) -> Packed | None:
+def noise(prepared: Sequence[PreparedBag], root: Root, job: Job) -> Packed | None:
     """Task: what the residuals of a group at its arm's values say of the deviations."""
     return summed([noise_products_of(one, root.fit, job) for one in prepared])
 
@@ -361,11 +361,11 @@ def _read(client: Client, group: Group, job: Future) -> bool:
     return bool(ended.status != 'error')
 
 
-def _taken(bag: BagFile, job: Job, bags_of_arm: int) -> Prepared:
+def _taken(bag: BagFile, job: Job, bags_of_arm: int) -> PreparedBag:
     store = Store(job.out)
     known = find_summary(store, bag, job)
     if known is not None:
-        return Prepared(known)
+        return PreparedBag(known)
     prepared = prepare(bag, job, bags_of_arm)
     if isinstance(prepared.summary, Refused):
         write_refused(store, prepared.summary, job)

@@ -53,7 +53,7 @@ _ALIKE = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class ParameterHistory:
     """
     A parameter of an arm over time.
 
@@ -146,7 +146,7 @@ class Splits:
         return abs(self.slope) / self.slope_std if self.slope_std < np.inf else 0.0
 
 
-def splits(series: Series, spread: Spread) -> Splits:
+def splits(series: ParameterHistory, spread: Spread) -> Splits:
     """Return the steps and the trend of a series, in deviations of neighbours."""
     variance, freedom = _variance(series, spread)
     weights = 1.0 / variance
@@ -158,17 +158,17 @@ def splits(series: Series, spread: Spread) -> Splits:
     return Splits(low, high, np.sqrt(1.0 / before + 1.0 / after), *line, freedom)
 
 
-def line_through(series: Series, spread: Spread) -> tuple[float, float]:
+def line_through(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
     """Return the slope of a series in a day, and its standard deviation."""
     variance, _ = _variance(series, spread)
     slope, std, _ = _line(series.days, series.values, 1.0 / variance)
     return slope, std * spread.trends
 
 
-def spreads(series: Sequence[Series]) -> dict[tuple[str, str], Spread]:
+def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]:
     """Return by how much estimates of each parameter differ beyond what they state."""
     found = {parameter: _spread(group) for parameter, group in _by_parameter(series).items()}
-    names: dict[str, list[Series]] = {}
+    names: dict[str, list[ParameterHistory]] = {}
     for one in series:
         names.setdefault(one.name, []).append(one)
     alike = {name: _alike(group, found) for name, group in names.items()}
@@ -180,7 +180,7 @@ def spreads(series: Sequence[Series]) -> dict[tuple[str, str], Spread]:
     }
 
 
-def without_days(series: Sequence[Series]) -> list[Series]:
+def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
     """
     Return the series without what all siblings share on a day.
 
@@ -188,21 +188,23 @@ def without_days(series: Sequence[Series]) -> list[Series]:
     Days on which few siblings have bags are left as they are.
 
     """
-    changed: dict[int, Series] = {}
+    changed: dict[int, ParameterHistory] = {}
     for group in _by_parameter(series).values():
         for one, values in zip(group, _polished(group), strict=True):
             changed[id(one)] = replace(one, values=values)
     return [changed[id(one)] for one in series]
 
 
-def _by_parameter(series: Sequence[Series]) -> dict[tuple[str, str], list[Series]]:
-    groups: dict[tuple[str, str], list[Series]] = {}
+def _by_parameter(
+    series: Sequence[ParameterHistory],
+) -> dict[tuple[str, str], list[ParameterHistory]]:
+    groups: dict[tuple[str, str], list[ParameterHistory]] = {}
     for one in series:
         groups.setdefault(one.parameter, []).append(one)
     return groups
 
 
-def _polished(group: Sequence[Series]) -> list[FloatArray]:
+def _polished(group: Sequence[ParameterHistory]) -> list[FloatArray]:
     """Subtract the effects of days by a median polish with the arms' levels."""
     days = np.concatenate([np.floor(one.days) for one in group])
     arm = np.repeat(np.arange(len(group)), [len(one.days) for one in group])
@@ -232,7 +234,7 @@ def _medians(values: FloatArray, label: npt.NDArray[np.intp]) -> FloatArray:
     return np.asarray(0.5 * (ordered[low] + ordered[high]))
 
 
-def _spread(group: Sequence[Series]) -> Spread:
+def _spread(group: Sequence[ParameterHistory]) -> Spread:
     """Solve median(d^2 / (s_k^2 + s_k+1^2 + 2 t^2)) = median of chi^2 for t."""
     squares = np.concatenate([np.diff(one.values) ** 2 for one in group])
     stated = np.concatenate([one.std[1:] ** 2 + one.std[:-1] ** 2 for one in group])
@@ -250,7 +252,7 @@ def _spread(group: Sequence[Series]) -> Spread:
     return Spread(float(np.sqrt(extra)), freedom)
 
 
-def _alike(group: Sequence[Series], found: Mapping[tuple[str, str], Spread]) -> float:
+def _alike(group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Spread]) -> float:
     """
     Return the degrees of freedom of what the variances of arms have in common.
 
@@ -269,7 +271,7 @@ def _alike(group: Sequence[Series], found: Mapping[tuple[str, str], Spread]) -> 
     return _inverse_trigamma(beyond)
 
 
-def _ratio(series: Series, spread: Spread) -> float:
+def _ratio(series: ParameterHistory, spread: Spread) -> float:
     """Return the variance of a series over the usual one."""
     stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
     squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
@@ -301,7 +303,7 @@ def _inverse_trigamma(value: float) -> float:
     return 2.0 * float(optimize.brentq(lambda x: _trigamma(x) - value, 0.5, 0.5 * _ALIKE))
 
 
-def _variance(series: Series, spread: Spread) -> tuple[FloatArray, float]:
+def _variance(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, float]:
     """Return the variance of every value, shape (K,), and its degrees of freedom."""
     usual = np.maximum(series.std**2 + spread.std**2, 1e-300)
     if len(series.values) < FEWEST or spread.alike >= _ALIKE:
@@ -311,7 +313,9 @@ def _variance(series: Series, spread: Spread) -> tuple[FloatArray, float]:
     return usual * (spread.alike + freedom * ratio) / both, min(both, spread.freedom + freedom)
 
 
-def _lasting(group: Sequence[Series], found: dict[tuple[str, str], Spread]) -> tuple[float, float]:
+def _lasting(
+    group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
+) -> tuple[float, float]:
     """Return by how much steps and trends are larger than neighbours tell, in deviations."""
     steps, trends = [], []
     for one in group:

@@ -97,7 +97,7 @@ class OwnEstimate:
 
 
 @dataclass(frozen=True, eq=False)
-class Summary:
+class BagSummary:
     """
     What is kept of a bag.
 
@@ -154,24 +154,24 @@ class Refused:
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class PreparedBag:
     """
     A bag that was read.
 
     Attributes
     ----------
-    summary : Summary or Refused
+    summary : BagSummary or Refused
         What travels.
     rows : tuple of Regression or None
         What does not; None where the bag is read again if they are needed.
 
     """
 
-    summary: Summary | Refused
+    summary: BagSummary | Refused
     rows: tuple[Regression, ...] | None = None
 
 
-def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> Prepared:
+def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> PreparedBag:
     """
     Read a bag and compress it.
 
@@ -195,7 +195,7 @@ def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> Prepared:
         with fetched(bag.url) as path:
             return _prepared(bag, path, job, KEPT_BYTES // max(1, bags_of_arm))
     except ArmidError as error:
-        return Prepared(Refused(bag, _in_place(str(error), path, bag)))
+        return PreparedBag(Refused(bag, _in_place(str(error), path, bag)))
 
 
 def pieces(path: str, job: Job) -> Iterator[tuple[Recording, Sequence[Regression]]]:
@@ -211,7 +211,7 @@ def pieces(path: str, job: Job) -> Iterator[tuple[Recording, Sequence[Regression
     )
 
 
-def rows_of(prepared: Prepared, job: Job) -> Iterator[Regression]:
+def rows_of(prepared: PreparedBag, job: Job) -> Iterator[Regression]:
     """Yield the rows of a bag, as they were kept or read again."""
     if prepared.rows is not None:
         yield from prepared.rows
@@ -244,7 +244,7 @@ def noise_of(rows: Iterable[Regression], fit: TriangleFit, kept: Sequence[int]) 
     return products
 
 
-def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> Prepared:
+def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> PreparedBag:
     triangles: list[Triangle] = []
     motions: list[MotionStatistics] = []
     kept: list[Regression] | None = []
@@ -274,8 +274,8 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> Prepared:
     day = bag.day or _day(start_ns)
     rows = (part for _, parts in pieces(path, job) for part in parts) if kept is None else kept
     own = _own(rows, triangle, job)
-    summary = Summary(bag, day, start_ns, triangle, motion, own, notes)
-    return Prepared(summary, None if kept is None else tuple(kept))
+    summary = BagSummary(bag, day, start_ns, triangle, motion, own, notes)
+    return PreparedBag(summary, None if kept is None else tuple(kept))
 
 
 def _own(rows: Iterable[Regression], triangle: Triangle, job: Job) -> OwnEstimate | None:

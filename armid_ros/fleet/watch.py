@@ -20,11 +20,11 @@ import json
 from typing import Any
 
 from armid_ros.errors import FleetError
-from armid_ros.fleet.changes import Change, judge, Judged, named, unlike_siblings, wear
+from armid_ros.fleet.changes import HistoryChange, judge, Judged, named, unlike_siblings, wear
 from armid_ros.fleet.identify import kind_arm
 from armid_ros.fleet.kinds import document
 from armid_ros.fleet.results import table_of
-from armid_ros.fleet.scatter import Series, Spread, spreads, without_days
+from armid_ros.fleet.scatter import ParameterHistory, Spread, spreads, without_days
 from armid_ros.fleet.store import Store
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -93,15 +93,15 @@ class WatchedArm:
         Its name.
     kind : str
         That of its robot.
-    series : tuple of Series
+    series : tuple of ParameterHistory
         Its parameters, and the logarithm of its residuals.
-    compared : tuple of Series
+    compared : tuple of ParameterHistory
         The same without what its siblings share on a day, which is no change of its own.
     bags : tuple of dict
         A row of the table ``bags`` each, in order of time, without triangles.
     judged : Judged
         What the tests say.
-    named : tuple of Change
+    named : tuple of HistoryChange
         What it is named for.
     unlike : tuple of str and float
         Parameter furthest from that of its siblings, and by how much.
@@ -112,11 +112,11 @@ class WatchedArm:
 
     arm: str
     kind: str
-    series: tuple[Series, ...]
-    compared: tuple[Series, ...]
+    series: tuple[ParameterHistory, ...]
+    compared: tuple[ParameterHistory, ...]
     bags: tuple[dict[str, Any], ...]
     judged: Judged
-    named: tuple[Change, ...]
+    named: tuple[HistoryChange, ...]
     unlike: tuple[str, float]
     refused: tuple[dict[str, Any], ...]
 
@@ -127,7 +127,7 @@ class WatchedArm:
             return 'changed' if self.named[0].kind == 'step' else 'wearing'
         return 'healthy' if self.judged.changes else 'too few bags'
 
-    def bag_at(self, change: Change, offset: int = 0) -> dict[str, Any]:
+    def bag_at(self, change: HistoryChange, offset: int = 0) -> dict[str, Any]:
         """Return the row of the bag at a change: the first one after it, or so many from it."""
         at = change.index if change.kind == 'step' else len(change.series.days) - 1
         day = change.series.days[min(max(0, at + offset), len(change.series.days) - 1)]
@@ -177,7 +177,7 @@ def watch(store: Store, alpha: float = ALPHA) -> Watch:
     table = store.data_set('refused')
     for row in [] if table is None else table.to_pylist():
         refused.setdefault(str(row['arm']), []).append(row)
-    by_kind: dict[str, list[Series]] = {}
+    by_kind: dict[str, list[ParameterHistory]] = {}
     for one in series:
         by_kind.setdefault(kind_of.get(one.arm, ''), []).append(one)
     compared = {kind: without_days(group) for kind, group in by_kind.items()}
@@ -261,7 +261,7 @@ def wear_rows(found: Watch) -> Iterator[dict[str, Any]]:
                 }
 
 
-def sentence(change: Change) -> str:
+def sentence(change: HistoryChange) -> str:
     """Say what has changed, when, and by how much with a 95 % interval."""
     series = change.series
     what = _what(series)
@@ -285,7 +285,7 @@ def day_text(days: float) -> str:
     return moment.date().isoformat()
 
 
-def _what(series: Series) -> str:
+def _what(series: ParameterHistory) -> str:
     if series.name == RESIDUAL:
         return f'residual torque of {series.joint}'
     if series.name.isidentifier() and '_' in series.name:
@@ -304,7 +304,7 @@ def _beside_the_body(store: Store) -> frozenset[str]:
 
 
 def _judged(
-    by_kind: Mapping[str, Sequence[Series]],
+    by_kind: Mapping[str, Sequence[ParameterHistory]],
     spread: Mapping[str, Mapping[tuple[str, str], Spread]],
 ) -> list[Judged]:
     """Judge all arms together, each by the spread of its own kind."""
@@ -314,8 +314,8 @@ def _judged(
     return sorted(both, key=lambda one: (one.adjusted, one.p, one.arm))
 
 
-def _by_arm(series: Iterable[Series]) -> dict[str, list[Series]]:
-    own: dict[str, list[Series]] = {}
+def _by_arm(series: Iterable[ParameterHistory]) -> dict[str, list[ParameterHistory]]:
+    own: dict[str, list[ParameterHistory]] = {}
     for one in series:
         own.setdefault(one.arm, []).append(one)
     return own
@@ -332,7 +332,9 @@ def _bags(store: Store) -> dict[str, list[dict[str, Any]]]:
     return bags
 
 
-def _series(parameters: pa.Table, bags: Mapping[str, list[dict[str, Any]]]) -> list[Series]:
+def _series(
+    parameters: pa.Table, bags: Mapping[str, list[dict[str, Any]]]
+) -> list[ParameterHistory]:
     """Return every parameter of every arm over time, and the logarithm of its residuals."""
     found = []
     for arm, rows in sorted(bags.items()):
@@ -354,25 +356,29 @@ def _series(parameters: pa.Table, bags: Mapping[str, list[dict[str, Any]]]) -> l
         for key, members in groups.items():
             order = np.array(sorted(members, key=lambda row: int(at[row])))
             found.append(
-                Series(arm, *key, days[at[order]], numbers['value'][order], numbers['std'][order])
+                ParameterHistory(
+                    arm, *key, days[at[order]], numbers['value'][order], numbers['std'][order]
+                )
             )
     return found
 
 
-def _residuals(arm: str, days: FloatArray, rows: Sequence[dict[str, Any]]) -> list[Series]:
+def _residuals(
+    arm: str, days: FloatArray, rows: Sequence[dict[str, Any]]
+) -> list[ParameterHistory]:
     fitted = [k for k, row in enumerate(rows) if row['residual_std']]
     if not fitted:
         return []
     logs = np.log(np.maximum([rows[k]['residual_std'] for k in fitted], 1e-300))
     joints = rows[fitted[0]]['joints']
     return [
-        Series(arm, RESIDUAL, joint, '', days[fitted], logs[:, j], np.zeros(len(fitted)))
+        ParameterHistory(arm, RESIDUAL, joint, '', days[fitted], logs[:, j], np.zeros(len(fitted)))
         for j, joint in enumerate(joints)
     ]
 
 
 def _furthest(
-    unlike: Mapping[tuple[str, str, str], float], series: Sequence[Series]
+    unlike: Mapping[tuple[str, str, str], float], series: Sequence[ParameterHistory]
 ) -> tuple[str, float]:
     distances = {one: unlike[one.arm, *one.parameter] for one in series if one.name != RESIDUAL}
     if not distances:

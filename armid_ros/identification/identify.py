@@ -24,7 +24,7 @@ from armid_ros.identification.physical.physical_certificate import PhysicalCerti
 from armid_ros.identification.physical.physical_fit import fit_to_bodies
 from armid_ros.identification.rows.checks import check_length, check_motion, check_torque
 from armid_ros.identification.rows.damage import without_damage
-from armid_ros.identification.rows.regression import predictions, regressions
+from armid_ros.identification.rows.regression import predictions, Regression, regressions
 from armid_ros.identification.rows.signals import Conditioning, conditioning, SignalSettings
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
@@ -264,13 +264,7 @@ def identify(
         used = cutoff_of_torques(whole, theory.independent, recordings, used)
     columns = regressions(whole, theory.independent, recordings, used, progress)
     check_length(recordings, columns)
-    samples = sum(len(part.motion) for part in columns)
-    if samples * arm.robot.n_joints < 2 * theory.rank:
-        raise IdentificationError(
-            f'{recordings[0].source}: {samples} samples remain after filtering at '
-            f'{used.cutoff_hz:g} Hz and decimation by {used.decimation}; {theory.rank} parameters '
-            'need more: record longer'
-        )
+    _require_samples(theory, recordings[0].source, columns, used)
     base, problem = excited(theory, columns)
     notes += check_torque(arm, recordings, problem)
     if described:
@@ -281,30 +275,19 @@ def identify(
         notes += said
     else:
         fit = fit_values(arm, base, problem, recordings, used, settings.least_squares)
-    if not described and _hidden(arm, theory):
-        theory, fit = _with_what_shows_now(
-            theory, fit, recordings, used, settings.least_squares, rng
-        )
+        if _hidden(arm, theory):
+            theory, fit = _with_what_shows_now(
+                theory, fit, recordings, used, settings.least_squares, rng
+            )
     fit, said = refined(settings.method, arm, fit, recordings, used, rng)
     notes += said
-    if fit.base.rank < theory.rank:
-        notes += (
-            f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
-            'the others are grouped',
-        )
-    if fit.solution.outliers:
-        notes += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
+    notes += _remarks(fit, theory)
     certificate = None
     if settings.physical is not None:
         fit, certificate = fit_to_bodies(
             arm, fit, recordings, used, settings.least_squares, settings.physical, rng
         )
         notes += certificate.sentences()
-    if not fit.settled:
-        notes += (
-            f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
-            'change one another too much in these data; leave some out, or record more',
-        )
     return Identification(
         arm=fit.arm,
         theory=theory,
@@ -312,16 +295,56 @@ def identify(
         estimate=Estimate(fit.base.parameters, fit.values, fit.solution.covariance),
         condition_number=fit.solution.condition_number,
         joint_std=fit.solution.joint_std,
-        training=tuple(
-            Fit(part.source, part.motion, torque, part.informative)
-            for part, torque in zip(fit.problem, fit.predicted, strict=True)
-        ),
+        training=_training(fit),
         used=used,
         settings=settings,
-        notes=notes,
+        notes=notes + _unsettled(fit),
         halves_error=halves_error(fit.problem, fit.solution.weights, fit.base.values(whole.theta)),
         physical=certificate,
         passes=fit.passes,
+    )
+
+
+def _require_samples(
+    theory: BaseParameters, source: str, columns: Sequence[Regression], used: Conditioning
+) -> None:
+    """Refuse data with fewer than two torques for a parameter."""
+    samples = sum(len(part.motion) for part in columns)
+    if sum(part.tau.size for part in columns) < 2 * theory.rank:
+        raise IdentificationError(
+            f'{source}: {samples} samples remain after filtering at {used.cutoff_hz:g} Hz and '
+            f'decimation by {used.decimation}; {theory.rank} parameters need more: record longer'
+        )
+
+
+def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
+    """Say what the data group, and what they were weighted down for."""
+    said: tuple[str, ...] = ()
+    if fit.base.rank < theory.rank:
+        said += (
+            f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
+            'the others are grouped',
+        )
+    if fit.solution.outliers:
+        said += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
+    return said
+
+
+def _training(fit: FittedValues) -> tuple[Fit, ...]:
+    """Return how the model predicts the data that it was fitted to."""
+    return tuple(
+        Fit(part.source, part.motion, torque, part.informative)
+        for part, torque in zip(fit.problem, fit.predicted, strict=True)
+    )
+
+
+def _unsettled(fit: FittedValues) -> tuple[str, ...]:
+    """Say so where linearising once more would still change the fit."""
+    if fit.settled:
+        return ()
+    return (
+        f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
+        'change one another too much in these data; leave some out, or record more',
     )
 
 

@@ -26,7 +26,7 @@ _SCHEMAS = ('armid/identification/1', 'armid/model/1')
 
 
 @dataclass(frozen=True)
-class Parameters:
+class ParameterFile:
     """
     What a file says of an arm.
 
@@ -73,7 +73,7 @@ class Parameters:
             return np.asarray(np.diag(self.std[chosen] ** 2))
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
 
-    def told_as(self, other: Parameters) -> Parameters:
+    def told_as(self, other: ParameterFile) -> ParameterFile:
         """
         Return the values with those of another grouping that follow from them.
 
@@ -101,7 +101,7 @@ class Parameters:
         return replace(self, values={**self.values, **more}, covariance=covariance, terms=terms)
 
 
-def read_parameters(path: str | Path) -> Parameters:
+def read_parameters(path: str | Path) -> ParameterFile:
     """
     Read what was identified.
 
@@ -139,7 +139,7 @@ def read_parameters(path: str | Path) -> Parameters:
     return read if read.kinematics else _with_robot(read, path)
 
 
-def _with_robot(found: Parameters, path: Path) -> Parameters:
+def _with_robot(found: ParameterFile, path: Path) -> ParameterFile:
     """Look up the robot that a file without its kinematics names, where it is still there."""
     beside = path.parent / found.robot
     source = str(beside) if is_file(beside) else found.robot
@@ -150,7 +150,7 @@ def _with_robot(found: Parameters, path: Path) -> Parameters:
     return replace(found, joints=robot.joints, kinematics=kinematics_digest(robot))
 
 
-def parameters_of(source: str, document: dict[str, Any]) -> Parameters:
+def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
     """
     Return what a document of identification.json or model.yaml says.
 
@@ -179,7 +179,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> Parameters:
     if scores[0]:
         error = finite(scores[0]['relative_error_percent'], 'relative_error_percent')
     about = document.get('description', {})
-    return Parameters(
+    return ParameterFile(
         source,
         str(document['robot']),
         values,

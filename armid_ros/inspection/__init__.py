@@ -11,14 +11,14 @@ from armid_ros.inspection.inspect import inspect, Inspection, Remark
 from armid_ros.inspection.joints import JointFacts
 from armid_ros.inspection.output import inspection_document
 from armid_ros.inspection.sampling import Sampling
-from armid_ros.inspection.trial import Trial
+from armid_ros.inspection.trial import TrialFit
 
 __all__ = [
     'Inspection',
     'JointFacts',
     'Remark',
     'Sampling',
-    'Trial',
+    'TrialFit',
     'inspect',
     'inspection_document',
 ]

@@ -10,7 +10,7 @@ from typing import Literal
 
 from armid_ros.inspection.joints import joint_facts, JointFacts
 from armid_ros.inspection.sampling import Sampling
-from armid_ros.inspection.trial import Trial, try_identification
+from armid_ros.inspection.trial import TrialFit, try_identification
 from armid_ros.recording import Recording
 from armid_ros.recording.contents import TopicContent
 from armid_ros.robots import Robot
@@ -64,7 +64,7 @@ class Inspection:
         Rate, jitter, gaps, period.
     joints : tuple of JointFacts
         In the order of the recording.
-    trial : Trial or None
+    trial : TrialFit or None
         What an identification makes of it; None without a robot.
     remarks : tuple of Remark
         The worst first.
@@ -76,7 +76,7 @@ class Inspection:
     robot: Robot | None
     sampling: Sampling
     joints: tuple[JointFacts, ...]
-    trial: Trial | None
+    trial: TrialFit | None
     remarks: tuple[Remark, ...]
 
     @property
@@ -145,7 +145,7 @@ def inspect(
     return Inspection(recording, topics, robot, sampling, joints, trial, remarks)
 
 
-def _of_fit(trial: Trial) -> Iterator[Remark]:
+def _of_fit(trial: TrialFit) -> Iterator[Remark]:
     error = trial.relative_error_percent
     if error is not None and error > POOR:
         yield Remark(
@@ -238,7 +238,7 @@ def _of_motion(
 
 
 def _of_efforts(
-    joints: tuple[JointFacts, ...], robot: Robot | None, trial: Trial | None
+    joints: tuple[JointFacts, ...], robot: Robot | None, trial: TrialFit | None
 ) -> Iterator[Remark]:
     if joints[0].effort_rms is None:
         yield Remark('bad', 'no efforts: nothing can be identified; is JointState.effort filled?')

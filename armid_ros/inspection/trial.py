@@ -21,7 +21,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Trial:
+class TrialFit:
     """
     An identification, tried.
 
@@ -56,7 +56,7 @@ class Trial:
     notes: tuple[str, ...] = ()
 
 
-def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> Trial:
+def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> TrialFit:
     """
     Identify, and keep what says whether that can be believed.
 
@@ -76,10 +76,10 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
     try:
         result = identify(arm, [recording], rng=rng)
     except ArmidError as refusal:
-        return Trial(refused=str(refusal))
+        return TrialFit(refused=str(refusal))
     motions = [fit.motion for fit in result.training]
     error = Score.of(result.training).relative_error_percent
-    return Trial(
+    return TrialFit(
         relative_error_percent=error,
         rank=result.base.rank,
         theory=result.theory.rank,

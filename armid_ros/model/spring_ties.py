@@ -51,6 +51,25 @@ class Tie:
     other_point: tuple[float, float, float]
 
 
+@dataclass(frozen=True)
+class TiedMachines:
+    """
+    Two machines and where springs tie them.
+
+    Attributes
+    ----------
+    robot, other : Robot
+        The machine whose torques are measured, and the one it is tied to.
+    ties : sequence of Tie
+        Where the springs are.
+
+    """
+
+    robot: Robot
+    other: Robot
+    ties: Sequence[Tie]
+
+
 class TieGeometry(NamedTuple):
     """
     Ties along a motion.
@@ -84,11 +103,6 @@ class TieGeometry(NamedTuple):
         length = np.maximum(np.linalg.norm(self.way, axis=2), _SHORTEST)
         share = np.maximum(1.0 - slack / length, 0.0)
         return np.asarray(self.columns * share[:, np.newaxis])
-
-    @property
-    def other_columns(self) -> FloatArray:
-        """Torque of the other machine's per stiffness, -J^T D, shape (N, m, S) [m^2]."""
-        return -np.asarray(np.einsum('nsxj,nsx->njs', self.other_jacobian, self.way))
 
 
 def centroid_ties(robot: Robot, other: Robot, joints: Sequence[tuple[str, str]]) -> list[Tie]:

@@ -114,6 +114,11 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
         rclpy.try_shutdown()
     if hung_up:
         trouble.append('ended by SIGHUP, as by a terminal that is closed')
+    _exit(trouble, node)
+
+
+def _exit(trouble: list[str], node: ArmidNode | None) -> None:
+    """End the process with one line on stderr where something went wrong."""
     refused = node is None or bool(node.failure)
     if node is not None and node.failure:
         trouble.append(node.failure)

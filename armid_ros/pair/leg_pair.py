@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics, point_motion
-from armid_ros.model.spring_ties import centroid_ties, Tie, tie_geometry, TieGeometry
+from armid_ros.model.spring_ties import centroid_ties, Tie, tie_geometry, TiedMachines, TieGeometry
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.pair.gait import (
     Gait,
@@ -78,6 +78,11 @@ class TiedPair:
             if np.any(spread < 0.0) or not np.all(np.isfinite(spread)):
                 raise ModelError(f'{name}: {spread} has to be finite and not negative')
             object.__setattr__(self, name, read_only(np.array(spread, dtype=float)))
+
+    @property
+    def machines(self) -> TiedMachines:
+        """Both, and where they are tied, whatever the springs are."""
+        return TiedMachines(self.robot, self.other, self.ties)
 
     @property
     def segments(self) -> tuple[str, ...]:

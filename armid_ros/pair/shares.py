@@ -12,7 +12,6 @@ weigh and take to accelerate, less what the springs carry. While one foot stands
 from __future__ import annotations
 
 from armid_ros.model.kinematics import points_motion
-from armid_ros.model.leg_kinematics import trunk_shares
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.pair.gait_cycle import GaitCycle
 from armid_ros.pair.walkers import columns, floating, SIDES
@@ -67,6 +66,29 @@ def ground_by_shares(cycle: GaitCycle) -> FloatArray:
     whole = up.sum(axis=2, keepdims=True)
     part = np.where(whole > 0.0, up / np.where(whole > 0.0, whole, 1.0), 0.5)
     return np.asarray((part[..., np.newaxis] * feet[:, :, np.newaxis]).reshape(-1, 4, 2))
+
+
+def trunk_shares(
+    trunk: FloatArray, swing_thigh: FloatArray, stance_thigh: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Split the trunk's mass between the legs by the distances of their thighs, (20) to (22).
+
+    Parameters
+    ----------
+    trunk, swing_thigh, stance_thigh : ndarray, shape (..., 2)
+        Centroids [m].
+
+    Returns
+    -------
+    swing, stance : ndarray, shape (...)
+        Shares that add to 1; the leg whose thigh is nearer carries more.
+
+    """
+    to_swing = np.linalg.norm(swing_thigh - trunk, axis=-1)
+    to_stance = np.linalg.norm(stance_thigh - trunk, axis=-1)
+    swing = np.asarray(to_stance / (to_swing + to_stance))
+    return swing, 1.0 - swing
 
 
 def _bodies(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:

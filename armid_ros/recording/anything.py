@@ -20,11 +20,11 @@ from armid_ros.recording.tables import (
     measured,
     name_in_file,
     open_table,
-    Plan,
     plan,
+    TablePlan,
 )
 
-Show = Callable[[Plan], None]
+Show = Callable[[TablePlan], None]
 
 
 def read_anything(

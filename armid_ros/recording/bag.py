@@ -18,7 +18,6 @@ import os
 from pathlib import Path
 import re
 import tempfile
-from types import TracebackType
 from typing import Self
 
 from armid_ros.errors import RecordingError
@@ -28,7 +27,7 @@ from armid_ros.recording.damage import Damage
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.metadata import BagMetadata, FILE_NAME, read_metadata
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Block, RawMessage, Source, Topic
+from armid_ros.recording.source import MessageBlock, RawMessage, Source, Topic
 from armid_ros.recording.sqlite_source import SqliteSource
 import numpy as np
 
@@ -108,12 +107,7 @@ class Bag:
         """Return the bag."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Close the files."""
         self.close()
 
@@ -142,7 +136,7 @@ class Bag:
                 self._damage.add(f'{FILE_NAME} counts {count} messages of {name}, there are none')
         return tuple(merged.values())
 
-    def blocks(self, topic: str) -> Iterator[Block]:
+    def blocks(self, topic: str) -> Iterator[MessageBlock]:
         """Yield the messages of a topic, in the order they are stored."""
         count = 0
         with reading(self.path, RecordingError):
@@ -190,7 +184,7 @@ class Bag:
             raise RecordingError(f'{file}: cannot be decompressed: {error.strerror}') from error
         return plain
 
-    def _decompressed(self, block: Block) -> Block:
+    def _decompressed(self, block: MessageBlock) -> MessageBlock:
         """Return a block with its messages decompressed."""
         messages: list[bytes] = []
         size = 0
@@ -200,7 +194,7 @@ class Bag:
             self._settings.require(size, 'a block of messages')
         length = np.array([len(message) for message in messages], np.int64)
         start = np.cumsum(length) - length
-        return Block(b''.join(messages), start, length, block.log_time, block.publish_time)
+        return MessageBlock(b''.join(messages), start, length, block.log_time, block.publish_time)
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,15 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.decoder import JointStateDecoder, JointStates
 from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.recording import Clock, Gap, ReadReport, Recording
+from armid_ros.recording.recording import Clock, ReadReport, Recording, TimeGap
 from armid_ros.recording.series import (
     choose_clock,
     clock_problem,
     GAP_PERIODS,
     gather,
+    JointSamples,
     merged,
     ordered,
-    Series,
 )
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import IntArray, Topic
@@ -261,7 +261,7 @@ def _check_receive_clock(where: str, gathered: Sequence[JointStates], note: str)
 
 
 def _measured_quantities(
-    where: str, series: Series
+    where: str, series: JointSamples
 ) -> tuple[FloatArray, FloatArray | None, FloatArray | None, tuple[str, ...]]:
     """Tell quantities that were measured from those never filled in."""
     absent: list[str] = []
@@ -314,11 +314,11 @@ def _finite(
     return q, dq, tau, stamps[~bad]
 
 
-def _gaps(t: FloatArray) -> tuple[Gap, ...]:
+def _gaps(t: FloatArray) -> tuple[TimeGap, ...]:
     """Return the stretches without samples."""
     steps = np.diff(t)
     at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
-    return tuple(Gap(float(t[i]), float(steps[i])) for i in at)
+    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)
 
 
 def _counted(counts: Counter[str]) -> str:

@@ -17,7 +17,7 @@ Clock = Literal['header', 'receive']
 
 
 @dataclass(frozen=True)
-class Gap:
+class TimeGap:
     """
     A stretch without samples.
 
@@ -63,7 +63,7 @@ class ReadReport:
         Messages dropped since they cannot be decoded, or have arrays of the wrong length.
     unstamped : int
         Messages dropped since their header stamp is zero.
-    gaps : tuple of Gap
+    gaps : tuple of TimeGap
         Stretches of more than five sampling periods without a sample.
     absent : tuple of str
         Quantities some or all joints lack, in words: 'effort of wrist'.
@@ -85,7 +85,7 @@ class ReadReport:
     nan: int = 0
     malformed: int = 0
     unstamped: int = 0
-    gaps: tuple[Gap, ...] = ()
+    gaps: tuple[TimeGap, ...] = ()
     absent: tuple[str, ...] = ()
     clock_note: str = ''
     damage: str = ''

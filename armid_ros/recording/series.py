@@ -39,7 +39,7 @@ _MAX_SPAN_RATIO = 1000.0
 
 
 @dataclass(frozen=True)
-class Series:
+class JointSamples:
     """
     Samples of some joints; arrays of shape (N,) and (N, k), NaN where nothing was measured.
 
@@ -62,18 +62,20 @@ class Series:
         """Return the number of samples N."""
         return len(self.stamps)
 
-    def select(self, samples: npt.NDArray[np.intp] | npt.NDArray[np.bool_] | slice) -> Series:
+    def select(
+        self, samples: npt.NDArray[np.intp] | npt.NDArray[np.bool_] | slice
+    ) -> JointSamples:
         """Return some of the samples."""
         q, dq, tau = (None if v is None else v[samples] for v in self.values)
-        return Series(self.joints, self.stamps[samples], (q, dq, tau))
+        return JointSamples(self.joints, self.stamps[samples], (q, dq, tau))
 
-    def columns(self, joints: Sequence[str]) -> Series:
+    def columns(self, joints: Sequence[str]) -> JointSamples:
         """Return some of the joints."""
         if tuple(joints) == self.joints:
             return self
         chosen = [self.joints.index(joint) for joint in joints]
         q, dq, tau = (None if v is None else v[:, chosen] for v in self.values)
-        return Series(tuple(joints), self.stamps, (q, dq, tau))
+        return JointSamples(tuple(joints), self.stamps, (q, dq, tau))
 
 
 def gather(pieces: Sequence[JointStates]) -> list[JointStates]:
@@ -129,10 +131,10 @@ def clock_problem(
     return ''
 
 
-def ordered(states: JointStates, clock: Clock, counts: Counter[str]) -> Series:
+def ordered(states: JointStates, clock: Clock, counts: Counter[str]) -> JointSamples:
     """Return the messages as samples in order of time, counting what had to be done for it."""
     stamps = states.header if clock == 'header' else states.receive
-    series = Series(states.joints, stamps, (states.position, states.velocity, states.effort))
+    series = JointSamples(states.joints, stamps, (states.position, states.velocity, states.effort))
     stamped = stamps != 0
     if not stamped.all():
         counts['unstamped'] += int((~stamped).sum())
@@ -144,7 +146,9 @@ def ordered(states: JointStates, clock: Clock, counts: Counter[str]) -> Series:
     return _sorted(series, counts)
 
 
-def merged(series: Sequence[Series], joints: Sequence[str], counts: Counter[str]) -> Series:
+def merged(
+    series: Sequence[JointSamples], joints: Sequence[str], counts: Counter[str]
+) -> JointSamples:
     """Put the joints of several series on one time base."""
     holders: dict[tuple[int, ...], list[str]] = {}
     for joint in joints:
@@ -171,7 +175,9 @@ def merged(series: Sequence[Series], joints: Sequence[str], counts: Counter[str]
     q, dq, tau = (
         _side_by_side([part.values[field] for part in parts], parts) for field in range(3)
     )
-    together = Series(tuple(n for part in parts for n in part.joints), base.stamps, (q, dq, tau))
+    together = JointSamples(
+        tuple(n for part in parts for n in part.joints), base.stamps, (q, dq, tau)
+    )
     return together.columns(joints).select(known)
 
 
@@ -233,7 +239,7 @@ def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
 
 
 def _side_by_side(
-    arrays: Sequence[FloatArray | None], parts: Sequence[Series]
+    arrays: Sequence[FloatArray | None], parts: Sequence[JointSamples]
 ) -> FloatArray | None:
     """Concatenate along joints, NaN for what is missing."""
     if all(values is None for values in arrays):
@@ -281,7 +287,7 @@ def _runs_again(stamps: IntArray, back: int) -> bool:
     return after >= _FEWEST_AGAIN and before + after > 1.5 * expected
 
 
-def _sorted(series: Series, counts: Counter[str]) -> Series:
+def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
     """Sort by time and drop repeated stamps; of equal ones the first stays."""
     steps = np.diff(series.stamps)
     if (steps > 0).all():
@@ -296,7 +302,7 @@ def _sorted(series: Series, counts: Counter[str]) -> Series:
     return series if first.all() else series.select(first)
 
 
-def _union(parts: Sequence[Series], counts: Counter[str]) -> Series:
+def _union(parts: Sequence[JointSamples], counts: Counter[str]) -> JointSamples:
     """Put series of the same joints together."""
     if len(parts) == 1:
         return parts[0]
@@ -304,14 +310,14 @@ def _union(parts: Sequence[Series], counts: Counter[str]) -> Series:
     q, dq, tau = (
         _stacked([part.values[field] for part in parts], parts, len(joints)) for field in range(3)
     )
-    together = Series(joints, np.concatenate([part.stamps for part in parts]), (q, dq, tau))
+    together = JointSamples(joints, np.concatenate([part.stamps for part in parts]), (q, dq, tau))
     order = np.argsort(together.stamps, kind='stable')
     return _sorted(together.select(order), counts)
 
 
 def _resampled(
-    series: Series, stamps: IntArray
-) -> tuple[Series, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    series: JointSamples, stamps: IntArray
+) -> tuple[JointSamples, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Return a series at other stamps, where that is possible, and where it is exact."""
     if len(series) == len(stamps) and np.array_equal(series.stamps, stamps):
         everywhere = np.ones(len(stamps), np.bool_)
@@ -328,4 +334,4 @@ def _resampled(
     q, dq, tau = (
         None if v is None else v[before] + weight * (v[after] - v[before]) for v in series.values
     )
-    return Series(series.joints, stamps, (q, dq, tau)), valid, equal
+    return JointSamples(series.joints, stamps, (q, dq, tau)), valid, equal

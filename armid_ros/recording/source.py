@@ -56,7 +56,7 @@ class Topic:
 
 
 @dataclass(frozen=True)
-class Block:
+class MessageBlock:
     """
     Many messages of one topic, in one buffer.
 
@@ -111,7 +111,7 @@ class Source(Protocol):
     def topics(self) -> tuple[Topic, ...]:
         """Return the topics, in order of appearance."""
 
-    def blocks(self, topic: str) -> Iterator[Block]:
+    def blocks(self, topic: str) -> Iterator[MessageBlock]:
         """Yield the messages of a topic, in the order they are stored."""
 
     def messages(self) -> Iterator[RawMessage]:

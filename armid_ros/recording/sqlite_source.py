@@ -22,7 +22,7 @@ from armid_ros.recording.damage import Damage
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Block, RawMessage, Topic
+from armid_ros.recording.source import MessageBlock, RawMessage, Topic
 import numpy as np
 
 _BLOCK_MESSAGES = 4096
@@ -111,7 +111,7 @@ class SqliteSource:
             topics.append(Topic(name, described, parse_qos(qos), count, encoding))
         return tuple(topics)
 
-    def blocks(self, topic: str) -> Iterator[Block]:
+    def blocks(self, topic: str) -> Iterator[MessageBlock]:
         """Yield the messages of a topic, in the order they are stored."""
         query = (
             'SELECT timestamp, data FROM messages WHERE topic_id IN '
@@ -121,7 +121,7 @@ class SqliteSource:
             times = np.array([time for time, _ in rows], np.int64)
             length = np.array([len(data) for _, data in rows], np.int64)
             data = b''.join([data for _, data in rows])
-            yield Block(data, np.cumsum(length) - length, length, times, times)
+            yield MessageBlock(data, np.cumsum(length) - length, length, times, times)
 
     def messages(self) -> Iterator[RawMessage]:
         """Yield all messages in the order they were logged."""

@@ -16,7 +16,6 @@ from dataclasses import replace
 from pathlib import Path
 import shutil
 import time
-from types import TracebackType
 from typing import NamedTuple, Self
 
 from armid_ros.errors import ArmidError, RecordingError
@@ -150,12 +149,7 @@ class BagWriter:
         """Return the writer."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Complete the bag."""
         self.close()
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from armid_ros.motion import FloatArray
-from armid_ros.report.strip import View
+from armid_ros.report.strip import Camera
 from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
@@ -23,7 +23,7 @@ import pinocchio as pin
 _HEIGHT, _WIDTH, _EDGE = 250.0, 340.0, 30.0
 #: Names are so far above their joints, a line is so high, a name about so long [px].
 _ABOVE, _LINE, _LABEL = 14.0, 14.0, 90.0
-_VIEWS = tuple(View(float(azimuth), np.radians(14.0)) for azimuth in np.radians([-90, -55, -20]))
+_VIEWS = tuple(Camera(float(azimuth), np.radians(14.0)) for azimuth in np.radians([-90, -55, -20]))
 #: Poses that are tried, and how far the last body is drawn beyond its centre of mass.
 _POSES, _BEYOND = 12, 2.0
 #: Points nearer to each other than this are one [m].
@@ -176,7 +176,7 @@ def _bodies(model: pin.Model) -> list[tuple[int, FloatArray, FloatArray]]:
     return lines
 
 
-def _flat(robot: Robot, q: FloatArray, view: View) -> FloatArray:
+def _flat(robot: Robot, q: FloatArray, view: Camera) -> FloatArray:
     """Return all lines as they are seen, shape (L, 2, 2) [m]."""
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, np.asarray(q, dtype=float))

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.estimate import ParameterName
-from armid_ros.identification.assess.comparison import Change, Comparison, GroupChange
+from armid_ros.identification.assess.comparison import Comparison, GroupChange, ParameterChange
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH, told_from_zero
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, measured, pretty, robot_label
@@ -16,7 +16,7 @@ from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.changes import Changes
 from armid_ros.report.sections.facts import Asked
 from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 
 #: Changes that are told in a sentence each; the table has all.
 _TOLD = 8
@@ -44,7 +44,7 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
     sentences = tell(comparison)
     changed = comparison.anything
     sections = [
-        Verdict(
+        VerdictSection(
             'changed' if changed else 'unchanged',
             'fair' if changed else 'good',
             sentences,
@@ -122,7 +122,7 @@ def _together(group: GroupChange) -> str:
     )
 
 
-def _sentence(change: Change) -> str:
+def _sentence(change: ParameterChange) -> str:
     verb = 'rose' if change.difference > 0.0 else 'fell'
     unit = pretty(change.parameter.unit)
     label = full_label(change.parameter)
@@ -142,7 +142,7 @@ def _end(value: float, std: float) -> str:
     return f'{value:.4g}' if told_from_zero(value, std) else 'what is not told from 0'
 
 
-def _least_visible(changes: Sequence[Change]) -> str:
+def _least_visible(changes: Sequence[ParameterChange]) -> str:
     """Say how large a change would have had to be, of the kinds that wear changes."""
     worn = [c for c in changes if not c.parameter.rigid] or list(changes)
     known = [c for c in worn if told_from_zero(c.before, c.before_std)]

@@ -17,18 +17,18 @@ from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.candidates import CandidateTable
 from armid_ros.report.sections.could_be_seen import CouldBeSeen
 from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
-from armid_ros.report.sections.evidence import Evidence
+from armid_ros.report.sections.evidence import EvidenceSection
 from armid_ros.report.sections.forward import Forward
 from armid_ros.report.sections.gap import GapBars, GapOverlay
 from armid_ros.report.sections.named import NamedParameters
 from armid_ros.report.sections.next_steps import NextSteps
 from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.patch import Patch
+from armid_ros.report.sections.patch import PatchSection
 from armid_ros.report.sections.residual_map import ResidualMap
 from armid_ros.report.sections.shares import Shares
 from armid_ros.report.sections.small_print import SmallPrint
 from armid_ros.report.sections.story import Story
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 from armid_ros.report.sources import short_names, with_names
 from armid_ros.residual import Residual
 
@@ -101,7 +101,7 @@ def diagnosis_report(
         DataQuality([_quality(r, role, names) for role, every in read.items() for r in every])
     )
     if diagnosis.findings:
-        sections.append(Patch(diagnosis.findings, patch))
+        sections.append(PatchSection(diagnosis.findings, patch))
     sections.append(Origin(provenance or Provenance()))
     subtitle = (
         f'{robot_label(robot)} · {counted(len(recordings), "recording")} · '
@@ -112,11 +112,11 @@ def diagnosis_report(
     return Page(f'Diagnosis of {diagnosis.arm.robot.name}', subtitle, sections).html()
 
 
-def _verdict(diagnosis: Diagnosis, names: Mapping[str, str]) -> Verdict:
+def _verdict(diagnosis: Diagnosis, names: Mapping[str, str]) -> VerdictSection:
     tone = TONES.get(diagnosis.verdict, 'bad')
     notes = [with_names(note, names) for note in diagnosis.notes]
     summary = with_names(diagnosis.summary, names).replace('+-', '±')
-    return Verdict(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)
+    return VerdictSection(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)
 
 
 def _story(diagnosis: Diagnosis, names: Mapping[str, str]) -> list[Section]:
@@ -132,7 +132,7 @@ def _story(diagnosis: Diagnosis, names: Mapping[str, str]) -> list[Section]:
         GapOverlay(robot, diagnosis.gap, patched, names),
     ]
     if diagnosis.where:
-        sections.append(Evidence(diagnosis.where))
+        sections.append(EvidenceSection(diagnosis.where))
     return sections
 
 

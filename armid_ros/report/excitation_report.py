@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import (
@@ -39,12 +39,30 @@ from armid_ros.report.sections.plan import (
     PlannedClearance,
     PlannedMotion,
 )
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 from armid_ros.report.silhouettes import draw_silhouettes
 from armid_ros.robots import CollisionModel
 import numpy as np
 
 _SAMPLES, _POSES, _WAY = 600, 6, 150
+
+
+@dataclass(frozen=True)
+class CheckedRun:
+    """
+    A design with the way there and back, and what was checked of it.
+
+    Attributes
+    ----------
+    run : Run
+        The motion.
+    fitness : Fitness
+        What was checked.
+
+    """
+
+    run: Run
+    fitness: Fitness
 
 
 def excitation_report(
@@ -56,8 +74,7 @@ def excitation_report(
     obstacles: Sequence[Obstacle] = (),
     after: Sequence[str] = (),
     provenance: Provenance | None = None,
-    run: Run | None = None,
-    checked: Fitness | None = None,
+    planned: CheckedRun | None = None,
 ) -> str:
     """
     Return report.html of a design.
@@ -78,10 +95,9 @@ def excitation_report(
         Recordings that the design adds to.
     provenance : Provenance, optional
         Files, versions, settings, seed.
-    run : Run, optional
-        The design with the way there and back; by default the excitation alone.
-    checked : Fitness, optional
-        What was checked of it; by default it is looked at here, without a floor.
+    planned : CheckedRun, optional
+        The design with the way there and back; by default the excitation alone, which is looked
+        at here, without a floor.
 
     Returns
     -------
@@ -90,11 +106,14 @@ def excitation_report(
 
     """
     excitation, limits = design.excitation, design.limits
+    run = None if planned is None else planned.run
     whole_run = run or excitation
     motion = whole_run.at(np.linspace(0.0, whole_run.duration, _SAMPLES))
-    if checked is None:
+    if planned is None:
         floor = Floor(None, vertical(arm.robot.gravity), 'environment' if obstacles else 'given')
         checked = fitness(motion, limits, collision, floor, obstacles)
+    else:
+        checked = planned.fitness
     torque = arm.joint_torque(motion)
     motion = replace(motion, tau=torque)
     bodies = {'links from each other': collision}
@@ -132,7 +151,9 @@ def excitation_report(
     return Page(f'Excitation of {arm.robot.name}', subtitle, sections).html()
 
 
-def _verdict(design: Design, motion: Motion, checked: Fitness, notes: Sequence[str]) -> Verdict:
+def _verdict(
+    design: Design, motion: Motion, checked: Fitness, notes: Sequence[str]
+) -> VerdictSection:
     """Say how much is seen, what is known worst, and that nothing is hit."""
     information, settings = design.information, design.settings
     std, names = information.std, information.parameters
@@ -172,7 +193,7 @@ def _verdict(design: Design, motion: Motion, checked: Fitness, notes: Sequence[s
         beware.append('Not all bodies were looked at; see Clearance.')
     tone = 'good' if checked.word == FIT and not design.stopped else 'fair'
     tone = 'bad' if unseen or checked.word == UNFIT else tone
-    return Verdict('blind' if unseen else checked.word, tone, sentences, beware)
+    return VerdictSection('blind' if unseen else checked.word, tone, sentences, beware)
 
 
 def _kept(design: Design, motion: Motion, checked: Fitness) -> str:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification import Fit, Grade, Identification, Verification
@@ -19,22 +20,46 @@ from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.correlations import Correlations
 from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
 from armid_ros.report.sections.encoder_noise import EncoderNoise
-from armid_ros.report.sections.excitation import Excitation
+from armid_ros.report.sections.excitation import ExcitationSection
 from armid_ros.report.sections.facts import Asked
 from armid_ros.report.sections.fit import FitSection
 from armid_ros.report.sections.forward import Forward
 from armid_ros.report.sections.methods import Methods
 from armid_ros.report.sections.next_steps import NextSteps
 from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.parameters import Parameters
+from armid_ros.report.sections.parameters import ParameterSection
 from armid_ros.report.sections.physical import PhysicalSection
 from armid_ros.report.sections.residuals import Residuals
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 from armid_ros.report.sections.whiteness import WhitenessSection
 from armid_ros.report.statistics import directions, torque_reach, torque_scale
 
 #: Colour of each grade.
 TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """
+    What an identification was put to, beside predicting recordings.
+
+    Attributes
+    ----------
+    verification : Verification or None
+        Test for encoder noise, and simulations.
+    grade : Grade or None
+        What it is good for; found out where it is not given.
+    methods : sequence of MethodScore
+        Estimators that were compared on the same data.
+    exports : mapping of str to sequence of str
+        Files for other programs, and what each has no place for.
+
+    """
+
+    verification: Verification | None = None
+    grade: Grade | None = None
+    methods: Sequence[MethodScore] = ()
+    exports: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
 def identification_report(
@@ -45,10 +70,7 @@ def identification_report(
     recordings: Sequence[Recording],
     validation: Mapping[str, Sequence[Fit]],
     validation_recordings: Sequence[Recording] = (),
-    verification: Verification | None = None,
-    grade: Grade | None = None,
-    methods: Sequence[MethodScore] = (),
-    exports: Mapping[str, Sequence[str]] | None = None,
+    assessment: Assessment | None = None,
     provenance: Provenance | None = None,
 ) -> str:
     """
@@ -68,14 +90,8 @@ def identification_report(
         Predictions of recordings that were not used for fitting, by recording.
     validation_recordings : sequence of Recording
         Those recordings.
-    verification : Verification, optional
+    assessment : Assessment, optional
         What the identification was put to.
-    grade : Grade, optional
-        What it is good for; found out where it is not given.
-    methods : sequence of MethodScore
-        Estimators that were compared on the same data.
-    exports : mapping of str to sequence of str, optional
-        Files for other programs, and what each has no place for.
     provenance : Provenance, optional
         Files, versions, settings, seed.
 
@@ -85,7 +101,8 @@ def identification_report(
         One HTML file that loads nothing.
 
     """
-    arm = result.arm
+    arm, assessment = result.arm, assessment or Assessment()
+    verification, grade = assessment.verification, assessment.grade
     training: dict[str, list[Fit]] = {}
     for fit in result.training:
         training.setdefault(fit.source, []).append(fit)
@@ -103,7 +120,7 @@ def identification_report(
         ),
     ]
     sections: list[Section] = [
-        Verdict(
+        VerdictSection(
             grade.word, TONES[grade.word], _first(grade, judgement.sentences), judgement.beware
         ),
         Asked(_asked(result, robot, list(training), list(validation))),
@@ -111,17 +128,19 @@ def identification_report(
         FitSection(arm.robot, training, validation, torque_reach(result, shown)),
         *_forward(result, verification),
         Residuals(arm.robot, shown, role),
-        Parameters(result.estimate, result.base.values(description.theta), result.unidentified),
-        *_physical(result, exports or {}),
+        ParameterSection(
+            result.estimate, result.base.values(description.theta), result.unidentified
+        ),
+        *_physical(result, assessment.exports),
         Correlations(result.estimate),
-        Excitation(
+        ExcitationSection(
             result.condition_number,
             result.base.rank,
             directions(result.estimate, torque_scale(result)),
         ),
         WhitenessSection(arm.robot, shown, role),
         *_noise(result, verification),
-        *([Methods(methods)] if methods else []),
+        *([Methods(assessment.methods)] if assessment.methods else []),
         NextSteps(judgement.next_steps),
         Origin(provenance or Provenance()),
     ]

@@ -10,9 +10,9 @@ from armid_ros.inspection import Inspection
 from armid_ros.report.notation import counted
 from armid_ros.report.page import Page
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.inspection import Contents, Curves, JointTable
+from armid_ros.report.sections.inspection import ContentsSection, JointTable, RecordingCurves
 from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 
 
 def inspection_report(
@@ -41,10 +41,10 @@ def inspection_report(
     doubt = any(remark.weight == 'doubt' for remark in found.remarks)
     grade, tone = ('unfit', 'bad') if bad else ('look', 'fair') if doubt else ('clean', 'good')
     sections = [
-        Verdict(grade, tone, [found.verdict], [remark.text for remark in found.remarks]),
-        Contents(found),
+        VerdictSection(grade, tone, [found.verdict], [remark.text for remark in found.remarks]),
+        ContentsSection(found),
         JointTable(found),
-        Curves(found),
+        RecordingCurves(found),
         Origin(provenance or Provenance()),
     ]
     name = Path(recording.source).name or 'recording'

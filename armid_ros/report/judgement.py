@@ -30,7 +30,7 @@ TELLING_SHARE = 0.15
 COLOURED_SHARE = 0.25
 
 
-class Finding(NamedTuple):
+class Caution(NamedTuple):
     """Something to beware of, and what to do about it, if anything."""
 
     text: str
@@ -88,14 +88,14 @@ def judge(
         *_residual_findings(result, fits or result.training),
         *_excitation_findings(result),
         *_verification_findings(verification),
-        *(Finding(note[0].upper() + note[1:] + '.') for note in _notes(result)),
+        *(Caution(note[0].upper() + note[1:] + '.') for note in _notes(result)),
     ]
     steps = [finding.step for finding in findings if finding.step]
     if held_out is not None and not steps:
         steps = ['Nothing stands in the way of using this model in the range it was tested in.']
     return Judgement(
         sentences=(
-            *_sentences(result, training, held_out, len(validation), len(recordings)),
+            *_sentences(result, training, held_out, len(validation)),
             *_simulated(verification),
         ),
         beware=tuple(finding.text for finding in findings if finding.text),
@@ -113,7 +113,7 @@ def _notes(result: Identification) -> list[str]:
 
 
 def _sentences(
-    result: Identification, training: Score, held_out: Score | None, n_held_out: int, n_read: int
+    result: Identification, training: Score, held_out: Score | None, n_held_out: int
 ) -> tuple[str, ...]:
     robot = result.arm.robot
     effects = [
@@ -153,9 +153,9 @@ def _simulated(verification: Verification | None) -> list[str]:
     ]
 
 
-def _data_findings(recordings: Sequence[Recording]) -> list[Finding]:
+def _data_findings(recordings: Sequence[Recording]) -> list[Caution]:
     return [
-        Finding(f'{recording.source or "A recording"}: {recording.report.describe()}')
+        Caution(f'{recording.source or "A recording"}: {recording.report.describe()}')
         for recording in recordings
         if not unharmed(recording)
     ]
@@ -163,15 +163,15 @@ def _data_findings(recordings: Sequence[Recording]) -> list[Finding]:
 
 def _error_findings(
     result: Identification, training: Score, held_out: Score | None
-) -> list[Finding]:
+) -> list[Caution]:
     findings = []
     if held_out is None:
-        findings.append(Finding('', 'Record another motion and validate with it.'))
+        findings.append(Caution('', 'Record another motion and validate with it.'))
     else:
         ratio = held_out.relative_error_percent / max(training.relative_error_percent, 1e-9)
         if ratio > _OVERFIT:
             findings.append(
-                Finding(
+                Caution(
                     f'The error on held-out data is {digits(ratio)} times that on the training '
                     'data: the model is fitted to what does not repeat, or the held-out motion '
                     'goes where the training did not.',
@@ -183,7 +183,7 @@ def _error_findings(
     bad = [(joint, e) for joint, e in zip(joints, errors, strict=True) if e > LIMITS.poor]
     if bad:
         findings.append(
-            Finding(
+            Caution(
                 'Poorly predicted: ' + ', '.join(f'{j} ({digits(e)} %)' for j, e in bad) + '.',
                 f'Compare the residual of {", ".join(joint for joint, _ in bad)} with the noise '
                 'of the torque there, and diagnose what the model lacks.',
@@ -192,7 +192,7 @@ def _error_findings(
     return findings
 
 
-def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Finding]:
+def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caution]:
     findings = []
     coloured = []
     for joint, name in enumerate(result.arm.robot.joints):
@@ -203,7 +203,7 @@ def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Find
         if telling:
             parts = ', '.join(f'{key} ({100.0 * shares[key]:.0f} %)' for key in telling)
             findings.append(
-                Finding(
+                Caution(
                     f'The residual of {name} goes with {parts}.',
                     'Diagnose what the residual that follows a variable is due to, and add it to '
                     'the effects.',
@@ -213,7 +213,7 @@ def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Find
             coloured.append(name)
     if coloured:
         findings.append(
-            Finding(
+            Caution(
                 f'The residual of {", ".join(coloured)} is far from white: the model lacks '
                 'something there. The intervals allow for the correlation in time, not for the '
                 'bias.'
@@ -222,14 +222,14 @@ def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Find
     return findings
 
 
-def _excitation_findings(result: Identification) -> list[Finding]:
+def _excitation_findings(result: Identification) -> list[Caution]:
     findings = []
     estimate = result.estimate
     told = told_from_zero(estimate.values, estimate.std)
     lost = [full_label(estimate.parameters[k]) for k in np.flatnonzero(~told)]
     if lost:
         findings.append(
-            Finding(
+            Caution(
                 f'{len(lost)} of {len(estimate.parameters)} parameters are not told '
                 f'from zero: {", ".join(lost[:_NAMED])}'
                 + (f' and {len(lost) - _NAMED} more' if len(lost) > _NAMED else '')
@@ -238,7 +238,7 @@ def _excitation_findings(result: Identification) -> list[Finding]:
         )
     if result.condition_number > _WEAK_EXCITATION:
         findings.append(
-            Finding(
+            Caution(
                 f'The excitation is weak: condition number {result.condition_number:.3g}.',
                 'Design an excitation for this robot and record that.',
             )
@@ -246,14 +246,14 @@ def _excitation_findings(result: Identification) -> list[Finding]:
     return findings
 
 
-def _verification_findings(verification: Verification | None) -> list[Finding]:
+def _verification_findings(verification: Verification | None) -> list[Caution]:
     if verification is None:
         return []
-    findings = [Finding(text[0].upper() + text[1:] + '.') for text in verification.left_out]
+    findings = [Caution(text[0].upper() + text[1:] + '.') for text in verification.left_out]
     if verification.noise is not None and not verification.noise.harmless:
         size = float(np.max(np.abs(verification.noise.relative_bias)))
         findings.append(
-            Finding(
+            Caution(
                 'Noise of the encoders biases parameters, by up to '
                 f'{digits(size)} standard deviations: their intervals are off by that.',
                 'Lower the cut-off of the position filter (--cutoff), or move faster.',

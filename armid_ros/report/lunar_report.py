@@ -12,7 +12,7 @@ from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.lunar import GravityParameters, PaperTables, TorqueCurves
 from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 import numpy as np
 
 #: Wanted of Tables 3 and 4 [% of the peak], and of Table 6 [of the noise].
@@ -32,7 +32,7 @@ def lunar_report(found: Reproduction, *, provenance: Provenance | None = None) -
 
     """
     sections: list[Section] = [
-        Verdict(*_grade(found), sentences(found)),
+        VerdictSection(*_grade(found), sentences(found)),
         PaperTables(found.repeated),
         TorqueCurves(found.repeated),
         GravityParameters(found.composites, _load(found)),

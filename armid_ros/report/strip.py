@@ -15,7 +15,7 @@ _CAPTION = 30.0
 
 
 @dataclass(frozen=True)
-class View:
+class Camera:
     """
     Where space is looked at from, without perspective.
 
@@ -44,9 +44,9 @@ class View:
 
 
 #: From the left, x to the right and z up.
-SIDE = View(-np.pi / 2.0, 0.0)
+SIDE = Camera(-np.pi / 2.0, 0.0)
 #: From the front right and above.
-CORNER = View(np.radians(-55.0), np.radians(18.0))
+CORNER = Camera(np.radians(-55.0), np.radians(18.0))
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,10 @@ def parse_description(root: ElementTree.Element, source: str) -> Description:
     )
 
 
-def _check_tree(source: str, links: dict[str, Inertial | None], joints: Iterable[Joint]) -> None:
+def _carriers(
+    source: str, links: dict[str, Inertial | None], joints: Iterable[Joint]
+) -> dict[str, Joint]:
+    """Return the joint that carries each link; of a tree every link but the base has one."""
     carriers: dict[str, Joint] = {}
     for joint in joints:
         for role, link in (('parent', joint.parent), ('child', joint.child)):
@@ -177,6 +180,11 @@ def _check_tree(source: str, links: dict[str, Inertial | None], joints: Iterable
                 f"'{carriers[joint.child].name}' and '{joint.name}'; a URDF is a tree"
             )
         carriers[joint.child] = joint
+    return carriers
+
+
+def _check_tree(source: str, links: dict[str, Inertial | None], joints: Iterable[Joint]) -> None:
+    carriers = _carriers(source, links, joints)
     roots = [link for link in links if link not in carriers]
     if len(roots) > 1:
         raise RobotError(

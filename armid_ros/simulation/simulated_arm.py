@@ -165,17 +165,12 @@ class SimulatedArm:
 
     def set_trajectory(self, reference: Reference) -> None:
         """
-        Begin a trajectory now, in place of the one that may be under way.
-
-        A first point later than time zero gives the arm that time to get there from where it is
-        to be now.
+        Begin a trajectory now, in place of the one that may be under way; see `Course.begin`.
 
         Raises
         ------
         TrajectoryError
-            If a joint is unknown or missing, a position or velocity limit is passed, the first
-            point is somewhere else and there is no time to get there, or the last point is not at
-            rest. The arm goes on with what it was doing.
+            If the arm cannot follow it. It goes on with what it was doing.
 
         """
         self._course.begin(reference, self._state.steps)

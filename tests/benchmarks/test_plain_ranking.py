@@ -7,6 +7,8 @@ import pytest
 from benchmarks.lived import judge
 from benchmarks.plain_ranking import plain_ranking
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize(('kind', 'index'), [('development', 0), ('development/exact', 0)])
 def test_a_payload_is_first_and_takes_most(kind, index):

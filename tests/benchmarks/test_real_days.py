@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 from benchmarks.real_days import DAYS, pushes
 from tests.hidden.lived.chain import Chain
 
-pytestmark = pytest.mark.real_data
+pytestmark = [pytest.mark.real_data, pytest.mark.slow]
 
 
 def fit(chain: Chain, recordings: Sequence[Recording]) -> tuple[np.ndarray, np.ndarray]:

@@ -3,6 +3,9 @@
 """Every command that reads a bag says what is wrong with it, and takes --no-crc."""
 
 from armid_ros.cli import main
+from armid_ros.cli.exo import SimulationOptions
+from armid_ros.pair.gait import read_gait
+from armid_ros.pair.leg_pair import leg_pair
 from armid_ros.recording import Recording, write_recording
 from armid_ros.recording.mcap.records import map_file
 from armid_ros.robots import load_robot
@@ -55,12 +58,13 @@ def test_inspect_reads_with_and_without(damaged):
 
 
 def test_an_exoskeleton_s_bag_is_not_read_without_a_word(tmp_path):
-    recorded = tmp_path / 'walk'
-    armid('exo', '--duration', '4', '--out', recorded)
-    path = next((recorded / 'recording').glob('*.mcap'))
+    recorded, topics = tmp_path / 'recording', ('/exo/joint_states', '/human/joint_states')
+    walk = SimulationOptions(None, None, 'step', 4.0, torque_noise=0.5, angle_noise=0.05)
+    walk.record(recorded, topics, leg_pair(), read_gait(), np.random.default_rng(0))
+    path = next(recorded.glob('*.mcap'))
     content = bytearray(path.read_bytes())
     chunk = map_file(bytes(content), path).chunks[-1]
     content[(chunk.begin + chunk.end) // 2] ^= 4
     path.write_bytes(content)
-    said = armid('exo', recorded / 'recording', '--out', tmp_path / 'again').output
+    said = armid('exo', recorded, '--out', tmp_path / 'again').output
     assert 'the checksum of the chunk' in said or 'is damaged' in said

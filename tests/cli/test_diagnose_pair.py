@@ -15,6 +15,8 @@ import pytest
 
 from tests.hidden.leg_pair import description, SEGMENTS, Straps, walks, write_walk
 
+pytestmark = pytest.mark.slow
+
 #: Quick steps tell most in a short time; each fits twice into a recording [s].
 SECONDS, PERIODS = 4.5, (1.6, 1.3, 1.1)
 

@@ -10,6 +10,8 @@ from armid_ros.cli import main
 from click.testing import CliRunner
 import pytest
 
+from docsite.schemas import faults
+
 
 @pytest.fixture(scope='module')
 def result(tmp_path_factory):
@@ -29,6 +31,10 @@ def test_the_springs_that_were_simulated_are_found(result) -> None:
         'exo_swing_hip': True,
         'exo_swing_knee': True,
     }
+
+
+def test_the_document_is_as_its_schema_says(result) -> None:
+    assert faults('exo', result[1]) == []
 
 
 def test_hip_and_knee_walk_a_whole_cycle_by_their_torque(result) -> None:

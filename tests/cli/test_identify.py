@@ -40,6 +40,7 @@ def test_identify_prints_json_and_nothing_else(bags, tmp_path):
     assert json.loads(result.stdout)['robot'] == ROBOT
 
 
+@pytest.mark.slow
 def test_methods_are_compared_in_terminal_document_and_page(bags, tmp_path):
     out = tmp_path / 'out'
     arguments = ('--robot', ROBOT, '--validate', bags[1], '--methods', 'wls,iv', '--no-verify')

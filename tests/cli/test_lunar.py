@@ -10,6 +10,8 @@ from docsite.schemas import faults
 
 from .conftest import armid
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope='module')
 def repeated(tmp_path_factory):

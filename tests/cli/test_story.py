@@ -3,7 +3,7 @@
 """The story of the demo: what is hidden is drawn fairly, found, and revealed only in the end."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.cli.story import draw_hidden, show_story, Told
+from armid_ros.cli.story import draw_hidden, show_story, ToldStory
 from armid_ros.diagnosis import diagnose
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import ModelError
@@ -80,7 +80,7 @@ def test_it_is_revealed_in_the_end(motion, tmp_path, capsys):
         baseline=bench.recordings(seed=3),
         rng=np.random.default_rng(0),
     )
-    told = Told(hidden, found)
+    told = ToldStory(hidden, found)
     show_story(told, tmp_path)
     lines = capsys.readouterr().out.splitlines()
     assert told.found

@@ -86,10 +86,6 @@ def test_an_inspection(at_desk):
     check('inspection', json.loads(armid('inspect', 'monday', '--json')))
 
 
-def test_an_exoskeleton(tmp_path):
-    check('exo', json.loads(armid('exo', '--json', '--out', tmp_path / 'result')))
-
-
 def test_a_key_that_no_schema_has_and_a_value_of_another_kind_are_faults(at_desk):
     document = ar.compare('monday_result', 'friday_result').document()
     assert faults('comparison', {**document, 'new': 1}) == ['$.new: is in no schema']

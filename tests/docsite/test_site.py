@@ -16,6 +16,8 @@ import pytest
 from docsite.links import broken_links
 from docsite.nodes import NODES
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 
 

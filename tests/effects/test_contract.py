@@ -4,7 +4,7 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, make_effect, parse_effect
-from armid_ros.effects.testing import CHECKS, Trial
+from armid_ros.effects.testing import CHECKS, EffectCase
 from armid_ros.errors import ModelError
 from armid_ros.robots import load_robot
 import numpy as np
@@ -24,16 +24,16 @@ LOADED = {'joint_elasticity', 'backlash'}
 SIZES = {'link_inertia': 0.02, 'payload': 0.05, 'interface_slack': 300.0, 'soft_limit': 20.0}
 
 
-def test_the_catalogue_has_every_name():
-    assert sorted(CATALOGUE) == sorted(DESIGNED)
+def test_a_name_once_shipped_stays():
+    assert set(DESIGNED) <= set(CATALOGUE)
 
 
 @pytest.mark.parametrize('check', CHECKS, ids=lambda check: check.__name__)
 @pytest.mark.parametrize('name', CATALOGUE)
 def test_every_effect_keeps_the_contract(robot, name, check):
     """The one that is public, with sizes far from zero and with typical ones."""
-    check(Trial.of(CATALOGUE[name], robot))
-    check(Trial.of(CATALOGUE[name], robot, size=SIZES.get(name), seed=6))
+    check(EffectCase.of(CATALOGUE[name], robot))
+    check(EffectCase.of(CATALOGUE[name], robot, size=SIZES.get(name), seed=6))
 
 
 def derivative(function, values, parameter, lower):

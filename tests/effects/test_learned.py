@@ -5,7 +5,7 @@
 from armid_ros.arm import ArmModel, load_model, save_model
 from armid_ros.effects import CATALOGUE
 from armid_ros.effects.learned import LearnedTorque, TorqueMap, weight
-from armid_ros.effects.testing import CHECKS, sines, Trial
+from armid_ros.effects.testing import CHECKS, EffectCase, sines
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
@@ -62,7 +62,7 @@ def test_its_deviation_holds_the_truth():
 @pytest.mark.parametrize('check', CHECKS, ids=lambda check: check.__name__)
 def test_with_maps_it_keeps_the_contract(robot, learned, check):
     motion = sines(robot).with_torque(np.zeros_like(sines(robot).q))
-    check(Trial(learned, robot, motion, np.array([0.8, -1.1])))
+    check(EffectCase(learned, robot, motion, np.array([0.8, -1.1])))
 
 
 def test_the_load_is_what_holds_the_arm_where_it_is(robot):

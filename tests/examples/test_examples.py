@@ -12,6 +12,8 @@ import sys
 import armid_ros as ar
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))
 #: What an example has to print.

@@ -95,6 +95,7 @@ def test_predicted_deviations_are_the_scatter_of_repeats(humanoid_design):
     np.testing.assert_allclose(predicted, scatter, rtol=0.2)
 
 
+@pytest.mark.slow
 def test_same_seed_same_trajectory_in_one_process_or_in_two(two_link_arm, quick):
     here, again, spread = (
         design(two_link_arm, replace(quick, processes=p), np.random.default_rng(7))

@@ -3,7 +3,7 @@
 """Changes of arms over time: found where there are, and rarely where there are none."""
 
 from armid_ros.fleet.changes import judge, largest_change, MONTH, named, wear
-from armid_ros.fleet.scatter import Series, spreads, without_days
+from armid_ros.fleet.scatter import ParameterHistory, spreads, without_days
 import numpy as np
 import pytest
 
@@ -21,13 +21,15 @@ def fleet(rng, arms, bags=10, beyond=0.5):
             std = 0.01 * rng.uniform(0.5, 2.0, bags)
             noise = std * rng.normal(size=bags) + beyond * 0.01 * rng.normal(size=bags)
             values = rng.normal(1.0, 0.2) + noise
-            found.append(Series(f'arm_{arm}', name, joint, 'N m s/rad', days, values, std))
+            found.append(
+                ParameterHistory(f'arm_{arm}', name, joint, 'N m s/rad', days, values, std)
+            )
     return found
 
 
 def changed(series, shift):
     """Return the series with something added."""
-    return Series(**{**vars(series), 'values': series.values + shift})
+    return ParameterHistory(**{**vars(series), 'values': series.values + shift})
 
 
 def names(series, alpha=0.05):
@@ -35,6 +37,7 @@ def names(series, alpha=0.05):
     return {one.arm for one in judge(series) if named(one, alpha)}
 
 
+@pytest.mark.slow
 def test_a_thousand_healthy_arms_are_rarely_accused():
     accused = [len(names(fleet(np.random.default_rng(seed), 1000))) > 0 for seed in range(6)]
     assert np.mean(accused) <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / 6)
@@ -66,6 +69,7 @@ def test_the_interval_of_wear_holds_the_truth_as_often_as_it_says():
     assert inside == pytest.approx(0.95, abs=0.02)
 
 
+@pytest.mark.slow
 def test_of_the_arms_named_few_are_healthy():
     rng = np.random.default_rng(4)
     false, true = 0, 0
@@ -98,7 +102,7 @@ def test_a_step_of_one_arm_does_not_hide_itself_in_the_spread():
 
 def test_a_level_series_has_no_p_below_one_in_a_thousand():
     days = np.arange(10.0)
-    flat = Series('a', 'x', 'j', '', days, np.ones(10), np.full(10, 0.1))
+    flat = ParameterHistory('a', 'x', 'j', '', days, np.ones(10), np.full(10, 0.1))
     assert largest_change(flat, spreads([flat])[flat.parameter]).p == 1.0
 
 
@@ -135,6 +139,7 @@ def test_a_day_that_all_siblings_share_is_no_change_of_any():
         assert np.abs(kept).max() < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('bags', [10, 30])
 def test_healthy_arms_whose_days_differ_as_real_ones_do_are_rarely_named(bags):
     counts = [tally(120, bags, 20, np.random.default_rng([11, bags, k])) for k in range(2)]

@@ -25,6 +25,8 @@ import pytest
 from .conftest import identified, SETTINGS, URDF
 from .test_identify import digits, stamps
 
+pytestmark = pytest.mark.slow
+
 FIXED = replace(SETTINGS, signals=SignalSettings(20.0, 8))
 
 

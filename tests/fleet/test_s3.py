@@ -16,6 +16,7 @@ from .test_identify import digits
 
 # what the libraries below do, not this package
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.filterwarnings('ignore::DeprecationWarning'),
     pytest.mark.filterwarnings('ignore::ResourceWarning'),
 ]

@@ -15,6 +15,8 @@ from tests.hidden.catalogue import CATALOGUED, HIDDEN
 from tests.hidden.sizing import noise_floor
 from tests.hidden.specification import case_list, find_case, SETS
 
+pytestmark = pytest.mark.slow
+
 DESIGNED = (
     'viscous_friction coulomb_friction stribeck_friction asymmetric_friction quadratic_friction '
     'load_dependent_friction presliding_hysteresis thermal_friction coupled_joint_friction '

@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The first paper: gravity and inertia of the humanoid arm on the moon, from noisy torques."""
 
+import pytest
+
 from benchmarks import lunar_arm
 
 
+@pytest.mark.slow
 def test_the_papers_arm_is_identified_better_than_in_the_paper():
     """Wanted: 1 % of the peak torque on average, 1.5 % of each joint, the load within 10 g."""
     errors, load = lunar_arm.run()

@@ -78,6 +78,7 @@ def test_a_process_that_died_is_said():
         assert 'has ended' in done.text
 
 
+@pytest.mark.slow
 def test_the_process_ends_when_nobody_can_ask_it_any_more():
     with working() as assistant:
         assistant._process.stdin.close()

@@ -7,16 +7,12 @@ from __future__ import annotations
 from dataclasses import astuple
 
 from armid_ros.model import point_motion
-from armid_ros.model.leg_kinematics import (
-    leg_centroids,
-    leg_frames,
-    LegAngles,
-    LegLengths,
-    trunk_shares,
-)
+from armid_ros.pair.shares import trunk_shares
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
+
+from .leg_kinematics import leg_centroids, leg_frames, LegAngles, LegLengths
 
 
 def random_angles(rng: np.random.Generator) -> LegAngles:

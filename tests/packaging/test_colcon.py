@@ -11,6 +11,8 @@ import sys
 import pytest
 
 pytest.importorskip('colcon_core', reason='colcon is not installed: run make test')
+
+pytestmark = pytest.mark.slow
 LEFT_BEHIND = shutil.ignore_patterns(
     '.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'dist', 'demo', 'out', 'bags'
 )

@@ -11,6 +11,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 PACKAGE = Path(__file__).with_name('plug_in')
 #: Runs commands, a JSON list of arguments each, in one process.
 RUN = """

@@ -3,7 +3,7 @@
 """What real bags do to a reader: other orders, parts, repeats, gaps, and clocks that lie."""
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording import Gap, joint_state_cdr, read_recording, write_recording
+from armid_ros.recording import joint_state_cdr, read_recording, TimeGap, write_recording
 from armid_ros.recording.message_types import JOINT_STATE, STRING
 import numpy as np
 import pytest
@@ -166,7 +166,7 @@ def test_gaps_are_reported_with_place_and_length(
     recording = read_recording(write_bag(messages), joints=JOINTS)
     assert_same(recording, swinging, np.r_[0:50, 52:300, 400:500])
     # Two samples missing are a hiccup, a hundred are a gap.
-    assert recording.report.gaps == (Gap(pytest.approx(0.299), pytest.approx(0.101)),)
+    assert recording.report.gaps == (TimeGap(pytest.approx(0.299), pytest.approx(0.101)),)
     assert '1 gap, the longest 0.101 s at 0.299 s' in recording.report.describe()
 
 

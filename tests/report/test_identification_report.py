@@ -2,16 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report is one file that is safe to open, complete, and works in a real browser."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from html.parser import HTMLParser
 import re
 
 from armid_ros.identification import IdentificationSettings, identify, PhysicalSettings, verify
 from armid_ros.motion import Motion
 from armid_ros.report import hash_files, identification_report, Provenance, versions
+from armid_ros.report.identification_report import Assessment
 from armid_ros.report.repeatability import Repeatability
 from armid_ros.report.sections.fit import FitSection
-from armid_ros.report.sections.parameters import Parameters
+from armid_ros.report.sections.parameters import ParameterSection
 import numpy as np
 import pytest
 
@@ -73,7 +74,9 @@ def report_of(case, **changes):
         ),
         **changes,
     }
-    return identification_report(given.pop('result', case.result), **given)
+    named = [field.name for field in fields(Assessment)]
+    assessment = Assessment(**{name: given.pop(name) for name in named if name in given})
+    return identification_report(given.pop('result', case.result), assessment=assessment, **given)
 
 
 @pytest.fixture(scope='module')
@@ -188,7 +191,7 @@ def test_what_the_data_do_not_tell_is_no_number(case):
     estimate = case.result.estimate
     values = estimate.values.copy()
     values[0] = 0.5 * estimate.std[0]
-    section = Parameters(replace(estimate, values=values), 0.0 * values)
+    section = ParameterSection(replace(estimate, values=values), 0.0 * values)
     rows = [row for _, _, rows in section.families for row in rows]
     (row,) = (row for row in rows if row.value == values[0])
     assert row.text[0] == 'not told from 0'

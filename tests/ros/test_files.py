@@ -11,30 +11,14 @@ from pathlib import Path
 import re
 from xml.etree import ElementTree
 
-from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import EXECUTOR
-from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
-from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
-from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
-from armid_ros.nodes.online_identifier import OnlineIdentifierNode
-from armid_ros.nodes.recorder import RecorderNode
-from armid_ros.nodes.simulated_arm import SimulatedArmNode
-from armid_ros.nodes.simulated_pair import SimulatedPairNode
 from armid_ros.robots import load_robot
 import pytest
 import yaml
 
+from docsite.nodes import NODES
+
 ROOT = Path(__file__).parents[2]
-NODES = {
-    'bag_player': BagPlayerNode,
-    'excitation_publisher': ExcitationPublisherNode,
-    'interaction_identifier': InteractionIdentifierNode,
-    'live_diagnosis': LiveDiagnosisNode,
-    'online_identifier': OnlineIdentifierNode,
-    'recorder': RecorderNode,
-    'simulated_arm': SimulatedArmNode,
-    'simulated_pair': SimulatedPairNode,
-}
 TABLES = {
     name: {parameter.name: parameter for parameter in (*node.table, EXECUTOR)}
     for name, node in NODES.items()
@@ -98,3 +82,7 @@ def test_layouts_show_joints_of_the_shipped_arm():
         return leaves(node['first']) + leaves(node['second'])
 
     assert sorted(leaves(layout['layout'])) == sorted(layout['configById'])
+
+
+def test_every_node_with_an_executable_is_in_the_reference():
+    assert {path.name for path in (ROOT / 'scripts').iterdir()} == {*NODES, 'armid'}

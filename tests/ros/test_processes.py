@@ -19,6 +19,8 @@ import numpy as np
 import pytest
 from trajectory_msgs.msg import JointTrajectory
 
+pytestmark = pytest.mark.slow
+
 PATIENCE = 120.0
 
 

@@ -17,7 +17,7 @@ MIDDLE = np.array([0.3, -0.4, 0.2, 0.8, 0.1, 0.2])
 STRENGTH = np.array([1.0, 1.0, 0.5, 0.5, 0.02, 0.02])
 
 #: The effects that are simulated: values and shape. Friction and springs are scaled by how strong
-#: their joints are.
+#: their joints are; what is not listed is as small as it typically is, and scaled as well.
 CASES = {
     'viscous_friction': (0.2, None),
     'coulomb_friction': (0.2, None),
@@ -82,12 +82,13 @@ def reference(humanoid) -> Reference:
 
 
 def arm_with(robot, name) -> ArmModel:
-    values, shape = CASES[name]
     effect = make_effect(name, robot)
+    smallest = [quantity.typical[0] if quantity.typical else 0.1 for quantity in effect.quantities]
+    values, shape = CASES.get(name, (smallest, None))
     if shape is not None:
         effect = effect.with_shape(shape)
     values = np.resize(values, len(effect.parameters(robot)))
-    if name in SCALED:
+    if name in SCALED or name not in CASES:
         values = values * np.repeat(STRENGTH, len(effect.quantities))
     return ArmModel(robot).with_effect(effect, values)
 

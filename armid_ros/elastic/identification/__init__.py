@@ -19,7 +19,7 @@ from armid_ros.elastic.identification.interaction import (
     interaction_torques,
     joint_signals,
 )
-from armid_ros.elastic.identification.physical import fit_joint, JointFit
+from armid_ros.elastic.identification.physical import DecoupledFit, fit_joint
 from armid_ros.elastic.identification.rigid import fit_rigid, RigidFit
 from armid_ros.elastic.identification.spectra import measured_response
 from armid_ros.elastic.identification.subspace import identify_subspace, Signals, StateSpace
@@ -51,7 +51,7 @@ __all__ = [
     'Signals',
     'StateSpace',
     'fit_joint',
-    'JointFit',
+    'DecoupledFit',
     'tune',
     'Tuning',
 ]

@@ -40,7 +40,7 @@ _EXPLAINED = 0.9
 
 
 @dataclass(frozen=True, eq=False)
-class JointSpring:
+class SpringEstimate:
     """
     What two encoders and a torque show of one joint.
 
@@ -88,7 +88,7 @@ def fit_springs(
     rng: np.random.Generator,
     *,
     cutoff: float = CUTOFF,
-) -> list[JointSpring]:
+) -> list[SpringEstimate]:
     """
     Fit a spring, free play and a motor to every joint of an arm.
 
@@ -127,7 +127,7 @@ def fit_springs(
         except IdentificationError as error:
             raise IdentificationError(f"joint '{joint}': {error}") from None
         own = _motor([motor for motor, _ in stretches], loads, j, cutoff)
-        found.append(JointSpring(joint, fit, own, float(inertia[j])))
+        found.append(SpringEstimate(joint, fit, own, float(inertia[j])))
     return found
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from armid_ros.arm import parameter_table
 from armid_ros.elastic.identification.interaction import decibel_error, ideal_response
-from armid_ros.elastic.identification.joints import JointSpring
+from armid_ros.elastic.identification.joints import SpringEstimate
 from armid_ros.elastic.identification.names import parameter_names, unpack
 from armid_ros.elastic.identification.physical import BAND
 from armid_ros.elastic.identification.three_steps import TwoInertiaIdentification
@@ -77,7 +77,7 @@ def total_damping(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
     return rows
 
 
-def springs_document(found: Sequence[JointSpring], robot: str) -> dict[str, Any]:
+def springs_document(found: Sequence[SpringEstimate], robot: str) -> dict[str, Any]:
     """Return springs that were found joint by joint as the document that elastic.json holds."""
 
     def number(value: float) -> float | None:

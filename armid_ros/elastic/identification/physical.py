@@ -28,7 +28,7 @@ _POINTS = 120
 
 
 @dataclass(frozen=True, eq=False)
-class JointFit:
+class DecoupledFit:
     """
     Physical parameters of a decoupled joint, all at the joint.
 
@@ -44,8 +44,6 @@ class JointFit:
         Of the interaction torque; 1 when beta and gamma were right.
     antiresonance, resonance : float
         Of the motor's velocity, undamped [Hz].
-    error_db : float
-        Root mean square difference of identified and fitted responses [dB].
 
     """
 
@@ -58,10 +56,9 @@ class JointFit:
     interaction_gain: float
     antiresonance: float
     resonance: float
-    error_db: float
 
 
-def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> JointFit:
+def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> DecoupledFit:
     """
     Fit a motor and a link on a spring to an identified response.
 
@@ -88,8 +85,7 @@ def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> Joi
 
     fit = least_squares(residual, start, jac=jacobian, x_scale='jac')
     rotor, inertia, stiffness, between, motor, link, gain = np.exp(fit.x).tolist()
-    size = 20.0 * np.log10(np.abs(_response(s, np.exp(fit.x))[0] / found))
-    return JointFit(
+    return DecoupledFit(
         rotor,
         inertia,
         stiffness,
@@ -99,7 +95,6 @@ def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> Joi
         gain,
         float(np.sqrt(stiffness / inertia) / (2.0 * np.pi)),
         float(np.sqrt(stiffness * (1.0 / inertia + 1.0 / rotor)) / (2.0 * np.pi)),
-        float(np.sqrt(np.mean(size**2))),
     )
 
 

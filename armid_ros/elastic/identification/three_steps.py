@@ -12,7 +12,7 @@ from armid_ros.elastic.identification.interaction import (
     DecoupledJoint,
     joint_signals,
 )
-from armid_ros.elastic.identification.physical import fit_joint, JointFit
+from armid_ros.elastic.identification.physical import DecoupledFit, fit_joint
 from armid_ros.elastic.identification.rigid import fit_rigid, RigidFit
 from armid_ros.elastic.identification.spectra import measured_response
 from armid_ros.elastic.identification.tuning import tune, Tuning
@@ -62,7 +62,7 @@ class TwoInertiaIdentification:
         Responses of no model, for comparison.
     joints : tuple of DecoupledJoint
         Step 2, of both joints.
-    fits : tuple of JointFit
+    fits : tuple of DecoupledFit
         Step 3a, of both joints.
     untuned : TwoLinkParameters
         Parameters after step 3a.
@@ -78,7 +78,7 @@ class TwoInertiaIdentification:
     rigid: RigidFit
     measured: tuple[MeasuredJoint, MeasuredJoint]
     joints: tuple[DecoupledJoint, DecoupledJoint]
-    fits: tuple[JointFit, JointFit]
+    fits: tuple[DecoupledFit, DecoupledFit]
     untuned: TwoLinkParameters
     experiments: int
     angles: FloatArray
@@ -170,7 +170,9 @@ def _rigid_guess(rigid: RigidFit, drives: TwoLinkParameters) -> TwoLinkParameter
     )
 
 
-def _physical(fits: tuple[JointFit, JointFit], known: TwoLinkParameters) -> TwoLinkParameters:
+def _physical(
+    fits: tuple[DecoupledFit, DecoupledFit], known: TwoLinkParameters
+) -> TwoLinkParameters:
     def both(name: str) -> FloatArray:
         return np.array([getattr(fit, name) for fit in fits])
 

@@ -16,6 +16,13 @@ import numpy.typing as npt
 EXCITATION_RMS, WEAK = (60.0, 45.0), 0.15
 STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 4))
 STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
+#: Step of experiments through the resonances [s], and the band of their multisine [Hz].
+_DT, _BAND = 1e-3, (2.0, 100.0)
+#: Amplitude of the slow velocity [rad/s], and its lowest and highest frequency [Hz]; each
+#: experiment has its own.
+_SPEED, _SLOW = 0.8, (0.3, 1.0)
+#: How far the links begin from zero at most [rad].
+_REACH = np.pi / 3.0
 
 
 def multisine(
@@ -61,11 +68,6 @@ def resonance_experiments(
     rms: npt.ArrayLike,
     rng: np.random.Generator,
     duration: float = 4.0,
-    dt: float = 1e-3,
-    band: tuple[float, float] = (2.0, 100.0),
-    speed: npt.ArrayLike = 0.8,
-    slow: tuple[float, float] = (0.3, 1.0),
-    reach: npt.ArrayLike = np.pi / 3.0,
 ) -> list[Experiment]:
     """
     Return experiments that excite all joints through their resonances, in many poses.
@@ -82,29 +84,21 @@ def resonance_experiments(
         Of the torque of the multisine [N m].
     rng : numpy.random.Generator
         Source of phases and poses.
-    duration, dt : float
-        Of each experiment, and its step [s].
-    band : tuple of float
-        Of the multisine [Hz].
-    speed : array_like
-        Amplitude of the slow velocity [rad/s].
-    slow : tuple of float
-        Lowest and highest frequency of it [Hz]; each experiment has its own.
-    reach : array_like
-        How far the links begin from zero at most [rad].
+    duration : float
+        Of each experiment [s].
 
     """
-    size, far = np.asarray(rms, dtype=float), np.asarray(reach, dtype=float)
-    steps = round(duration / dt)
-    t = dt * np.arange(steps)[:, np.newaxis]
+    size = np.asarray(rms, dtype=float)
+    steps = round(duration / _DT)
+    t = _DT * np.arange(steps)[:, np.newaxis]
     experiments = []
     for _ in range(count):
-        rate = 2.0 * np.pi * rng.uniform(*slow, len(size))
+        rate = 2.0 * np.pi * rng.uniform(*_SLOW, len(size))
         phase = 2.0 * np.pi * rng.random(len(size))
         ramp = np.minimum(t / 0.2, 1.0)
-        velocity = ramp * np.asarray(speed) * np.cos(rate * t + phase)
-        torque = ramp * multisine(steps, dt, band, size, rng)
-        pose = far * rng.uniform(-1.0, 1.0, len(size))
+        velocity = ramp * _SPEED * np.cos(rate * t + phase)
+        torque = ramp * multisine(steps, _DT, _BAND, size, rng)
+        pose = _REACH * rng.uniform(-1.0, 1.0, len(size))
         experiments.append(Experiment(pose, velocity, torque))
     return experiments
 

@@ -16,7 +16,7 @@ from armid_ros.report.notation import counted, digits
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 from armid_ros.robots.two_link import TwoLinkParameters
 
 #: How far the measured, decoupled response may be from that of the parameters [dB rms].
@@ -62,7 +62,7 @@ def elastic_report(
     return Page(f'Elastic joints of {robot}', subtitle, sections).html()
 
 
-def _verdict(result: TwoInertiaIdentification) -> Verdict:
+def _verdict(result: TwoInertiaIdentification) -> VerdictSection:
     """Say how stiff the springs are, how surely, and what is not known."""
     springs = []
     for k, joint in enumerate(result.joints):
@@ -93,7 +93,9 @@ def _verdict(result: TwoInertiaIdentification) -> Verdict:
         beware.append(
             'Viscous friction of link and motor are known as a sum; their shares are not.'
         )
-    return Verdict('uncertain' if poor else 'found', 'fair' if poor else 'good', sentences, beware)
+    return VerdictSection(
+        'uncertain' if poor else 'found', 'fair' if poor else 'good', sentences, beware
+    )
 
 
 def _apart(result: TwoInertiaIdentification, joint: int) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.elastic.identification.joints import JointSpring
+from armid_ros.elastic.identification.joints import SpringEstimate
 from armid_ros.report.page import Section
 import numpy as np
 
@@ -20,7 +20,7 @@ class Springs(Section):
 
     Attributes
     ----------
-    found : sequence of JointSpring
+    found : sequence of SpringEstimate
         Every joint.
 
     """
@@ -28,7 +28,7 @@ class Springs(Section):
     title: ClassVar[str] = 'Springs'
     template: ClassVar[str] = 'springs.html'
 
-    found: Sequence[JointSpring]
+    found: Sequence[SpringEstimate]
 
     @property
     def springs(self) -> list[tuple[str, str, str, str, str, str]]:

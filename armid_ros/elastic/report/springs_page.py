@@ -6,24 +6,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armid_ros.elastic.identification.joints import JointSpring
+from armid_ros.elastic.identification.joints import SpringEstimate
 from armid_ros.elastic.report.springs import Springs
 from armid_ros.report.notation import counted
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 
 
 def springs_report(
-    found: Sequence[JointSpring], robot: str, *, provenance: Provenance | None = None
+    found: Sequence[SpringEstimate], robot: str, *, provenance: Provenance | None = None
 ) -> str:
     """
     Return report.html of springs that were found joint by joint.
 
     Parameters
     ----------
-    found : sequence of JointSpring
+    found : sequence of SpringEstimate
         Every joint.
     robot : str
         Its name.
@@ -36,7 +36,7 @@ def springs_report(
     return Page(f'Elastic joints of {robot}', subtitle, sections).html()
 
 
-def _verdict(found: Sequence[JointSpring]) -> Verdict:
+def _verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
     told = [one for one in found if one.told]
     lost = [one.joint for one in found if not one.told]
     beware = ['Inertias are those of the description or model: a stiffness is as right as they.']
@@ -46,7 +46,7 @@ def _verdict(found: Sequence[JointSpring]) -> Verdict:
             'load, or with finer encoders.'
         )
     if not told:
-        return Verdict('not told', 'bad', ['No joint shows a spring.'], beware)
+        return VerdictSection('not told', 'bad', ['No joint shows a spring.'], beware)
     softest = min(told, key=lambda one: one.transmission.stiffness[0])
     value, low, high = softest.transmission.stiffness
     sentences = [
@@ -56,6 +56,6 @@ def _verdict(found: Sequence[JointSpring]) -> Verdict:
     loose = [one.joint for one in told if one.transmission.backlash_seen]
     if loose:
         sentences.append(f'Free play is seen at {", ".join(loose)}.')
-    return Verdict(
+    return VerdictSection(
         'found' if not lost else 'partial', 'good' if not lost else 'fair', sentences, beware
     )

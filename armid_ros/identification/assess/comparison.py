@@ -22,7 +22,7 @@ from typing import Any
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.load_change import find_load, LoadChange
-from armid_ros.identification.parameters_file import Parameters
+from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy.special import erfc
@@ -36,7 +36,7 @@ _ROUNDING = 1e-10
 
 
 @dataclass(frozen=True)
-class Change:
+class ParameterChange:
     """
     One parameter in both.
 
@@ -109,9 +109,9 @@ class Comparison:
 
     Attributes
     ----------
-    before, after : Parameters
+    before, after : ParameterFile
         What was compared.
-    changes : tuple of Change
+    changes : tuple of ParameterChange
         Every parameter that both have, in the order of the first.
     only_before, only_after : tuple of ParameterName
         What the other does not have.
@@ -122,9 +122,9 @@ class Comparison:
 
     """
 
-    before: Parameters
-    after: Parameters
-    changes: tuple[Change, ...]
+    before: ParameterFile
+    after: ParameterFile
+    changes: tuple[ParameterChange, ...]
     only_before: tuple[ParameterName, ...]
     only_after: tuple[ParameterName, ...]
     groups: tuple[GroupChange, ...] = ()
@@ -142,7 +142,7 @@ class Comparison:
         return tuple(g for g in self.groups if g.changed and not sure.intersection(g.parameters))
 
     @property
-    def changed(self) -> tuple[Change, ...]:
+    def changed(self) -> tuple[ParameterChange, ...]:
         """What changed, the surest first."""
         found = [change for change in self.changes if change.changed]
         return tuple(sorted(found, key=lambda change: -abs(change.deviations)))
@@ -181,7 +181,7 @@ class Comparison:
         }
 
 
-def compare(before: Parameters, after: Parameters) -> Comparison:
+def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     """
     Compare two identifications of one robot.
 
@@ -211,7 +211,7 @@ def compare(before: Parameters, after: Parameters) -> Comparison:
     single = _beyond_chance(_single_chances(pairs), chance)
     together = [_group_chance(difference[g], covariance[np.ix_(g, g)]) for g in groups]
     changes = tuple(
-        Change(name, pair[0], pair[2], pair[1], pair[3], sure)
+        ParameterChange(name, pair[0], pair[2], pair[1], pair[3], sure)
         for name, pair, sure in zip(shared, pairs.tolist(), single, strict=True)
     )
     found = tuple(
@@ -245,7 +245,7 @@ def compare(before: Parameters, after: Parameters) -> Comparison:
     )
 
 
-def _require_one_robot(before: Parameters, after: Parameters) -> None:
+def _require_one_robot(before: ParameterFile, after: ParameterFile) -> None:
     """Refuse robots whose joints differ, wherever their files are."""
     known = before.kinematics and after.kinematics
     if not known or before.kinematics == after.kinematics:

@@ -196,7 +196,7 @@ class ZeroOff(Hypothesis):
 
 
 @dataclass(frozen=True)
-class Late(Hypothesis):
+class LateTorque(Hypothesis):
     """Torque comes later than the position that it belongs to, or earlier."""
 
     seconds: float
@@ -219,7 +219,7 @@ class Late(Hypothesis):
     def nearby(self) -> Iterator[Hypothesis]:
         """Yield times in steps of an eighth."""
         for share in (0.75, 0.875, 1.125, 1.25):
-            yield Late(share * self.seconds)
+            yield LateTorque(share * self.seconds)
 
     def sentence(self, robot: Robot) -> str:
         """Say by how much."""
@@ -339,8 +339,8 @@ class Faulty(Hypothesis):
 def hypotheses(robot: Robot) -> Iterator[Hypothesis]:
     """Yield what may be wrong with any recording of an arm."""
     for delay in DELAYS:
-        yield Late(delay)
-        yield Late(-delay)
+        yield LateTorque(delay)
+        yield LateTorque(-delay)
     yield OtherGravity()
     yield OtherUnit()
     if not np.all(robot.prismatic):

@@ -22,7 +22,7 @@ _NAMED = 3
 
 
 @dataclass(frozen=True)
-class Damage:
+class Repair:
     """
     Samples that were made up for.
 
@@ -52,7 +52,7 @@ class Damage:
 
 def without_damage(
     recordings: Sequence[Recording], settings: SignalSettings
-) -> tuple[list[Recording], tuple[Damage, ...]]:
+) -> tuple[list[Recording], tuple[Repair, ...]]:
     """
     Interpolate across damaged samples.
 
@@ -63,7 +63,7 @@ def without_damage(
     -------
     list of Recording
         Those without damage are the same objects.
-    tuple of Damage
+    tuple of Repair
         What was found.
 
     """
@@ -82,7 +82,7 @@ def without_damage(
 
 def _damage(
     recording: Recording, used: Conditioning
-) -> tuple[Damage | None, npt.NDArray[np.bool_]]:
+) -> tuple[Repair | None, npt.NDArray[np.bool_]]:
     """Return the damage of a recording, None without, and which samples it is, shape (N,)."""
     assert recording.tau is not None
     middle = np.median(recording.tau, axis=0)
@@ -103,7 +103,7 @@ def _damage(
     bad = np.isin(recording.t, damaged)
     if not excursions or bad.all():
         return None, bad
-    return Damage(recording.source, len(damaged), tuple(worst[:_NAMED])), bad
+    return Repair(recording.source, len(damaged), tuple(worst[:_NAMED])), bad
 
 
 def impossible_excursions(

@@ -13,7 +13,7 @@ from armid_ros.identification.ties.problem import Inertias, InteractionProblem
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.slack import find_slack, Slack
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
-from armid_ros.model.spring_ties import Tie
+from armid_ros.model.spring_ties import Tie, TiedMachines
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
@@ -198,11 +198,9 @@ class OnlineInteraction:
             )
         )
         return recorded_interaction_problem(
-            self.robot,
+            TiedMachines(self.robot, self.other, self.ties),
             own,
-            self.other,
             far,
-            self.ties,
             inertias=self.settings.inertias,
             separate=separate,
             slack=slack,

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from armid_ros.effects.load import described_spread
@@ -24,7 +24,12 @@ from armid_ros.model import (
     regressor,
     rigid_parameter_names,
 )
-from armid_ros.model.spring_ties import Tie, tie_columns_derivatives, tie_geometry
+from armid_ros.model.spring_ties import (
+    Tie,
+    tie_columns_derivatives,
+    tie_geometry,
+    TiedMachines,
+)
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
 import numpy as np
@@ -134,15 +139,30 @@ class InteractionProblem:
         return np.asarray(np.sqrt(np.mean(angles, axis=0) + self.torque_noise**2))
 
 
+@dataclass(frozen=True)
+class MachineNoise:
+    """
+    What sensors add to the truth.
+
+    Attributes
+    ----------
+    position : array_like, number or shape (n + m,)
+        Standard deviation of the angles of both machines [rad].
+    torque : array_like, number or shape (n,)
+        Standard deviation that the torques have at least [N m].
+
+    """
+
+    position: npt.ArrayLike = 0.0
+    torque: npt.ArrayLike = 0.0
+
+
 def interaction_problem(
-    robot: Robot,
+    machines: TiedMachines,
     motion: Motion,
-    other: Robot,
     other_motion: Motion,
-    ties: Sequence[Tie],
     *,
-    position_noise: npt.ArrayLike = 0.0,
-    torque_noise: npt.ArrayLike = 0.0,
+    noise: MachineNoise | None = None,
     used: Conditioning | None = None,
     inertias: Inertias = 'known',
     separate: bool = False,
@@ -153,16 +173,12 @@ def interaction_problem(
 
     Parameters
     ----------
-    robot, other : Robot
-        The machine whose torques were measured, and the one it is tied to.
+    machines : TiedMachines
+        Both, and where the springs are.
     motion, other_motion : Motion
         On one time base; ``motion`` with torques.
-    ties : sequence of Tie
-        Where the springs are.
-    position_noise : array_like, number or shape (n + m,)
-        Standard deviation of the angles in the motions [rad].
-    torque_noise : array_like, number or shape (n,)
-        Standard deviation that the torques have at least [N m].
+    noise : MachineNoise, optional
+        What sensors add; nothing by default.
     used : Conditioning, optional
         The filters that the positions went through, and by which torques and columns are to be
         decimated. By default every sample counts and noise is in the angles alone.
@@ -179,6 +195,7 @@ def interaction_problem(
         If there are no torques or the time bases differ.
 
     """
+    robot, other, ties = machines.robot, machines.other, machines.ties
     if motion.tau is None:
         raise IdentificationError(f'{robot.name}: no torques; the stiffness is in them alone')
     if len(motion) != len(other_motion) or np.max(np.abs(motion.t - other_motion.t)) > 1e-6:
@@ -192,47 +209,91 @@ def interaction_problem(
     springs_by = _springs_by_motion(robot, slow, other, far, ties, slack)
     if not separate:
         springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))
+    names = tuple(tie.name for tie in ties) if separate else ('all',)
     count = springs_by.shape[3] // 3
-    rigid: tuple[ParameterName, ...] = ()
-    described: FloatArray = np.zeros(0)
-    precision: FloatArray = np.zeros((0, 0))
     if inertias == 'known':
-        known = inverse_dynamics(robot, motion)
-        known_by = _placed(np.stack(inverse_dynamics_derivatives(robot, slow), axis=2), count)
-        columns, columns_by = springs, springs_by
+        body = _known_body(robot, motion, slow, count)
     else:
-        body = regressor(robot, motion)
-        base = _told_apart(robot, body, springs, ties, separate)
-        independent, rigid = base.independent, base.parameters
-        described = base.values(robot.rigid_parameters)
-        spread = base.grouping * described_spread(robot).ravel()
-        precision = np.asarray(np.linalg.inv(spread @ spread.T))
-        known = np.zeros_like(motion.tau)
-        known_by = np.zeros((*slow.q.shape, 3 * count))
-        columns = np.concatenate([springs, body[:, :, independent]], axis=2)
-        body_by = _placed(_regressor_by_motion(robot, slow, independent), count)
-        columns_by = np.concatenate([springs_by, body_by], axis=2)
-    tau = motion.tau
+        body = _free_body(
+            robot, motion, slow, springs, count, names if separate else ('the springs',)
+        )
+    columns, columns_by = body.beside(springs, springs_by)
+    tau, known = motion.tau, body.known
     passed, left = np.diag([1.0, 0.0, 0.0])[np.newaxis], np.ones(1)
     if used is not None:
         tau, known, columns = (decimate(values, used) for values in (tau, known, columns))
         passed, left = _passed(used), _torque_passed(used)
-    deviation = np.broadcast_to(np.asarray(position_noise, dtype=float), (count,))
+    noise = noise or MachineNoise()
+    deviation = np.broadcast_to(np.asarray(noise.position, dtype=float), (count,))
     return InteractionProblem(
         tau,
         known,
         columns,
-        known_by,
+        body.known_by,
         columns_by,
         np.asarray(np.kron(passed, np.diag(deviation**2))),
         left / left[0],
-        np.sqrt(left[0]) * np.broadcast_to(np.asarray(torque_noise, float), tau.shape[1:]),
-        tuple(tie.name for tie in ties) if separate else ('all',),
+        np.sqrt(left[0]) * np.broadcast_to(np.asarray(noise.torque, float), tau.shape[1:]),
+        names,
         tuple(tie.joint for tie in ties) if separate else ('',),
-        rigid,
-        np.concatenate([np.zeros(springs.shape[2]), described]),
-        scipy.linalg.block_diag(np.zeros((springs.shape[2],) * 2), precision),
+        body.parameters,
+        np.concatenate([np.zeros(springs.shape[2]), body.described]),
+        scipy.linalg.block_diag(np.zeros((springs.shape[2],) * 2), body.precision),
         float(np.sqrt(np.mean(np.sum(geometry.way**2, axis=2)))),
+    )
+
+
+@dataclass(frozen=True)
+class _Body:
+    """
+    What the rigid body is in a problem: torque that is known, or columns of free inertias.
+
+    Attributes are those of an InteractionProblem, without its springs.
+
+    """
+
+    known: FloatArray
+    known_by: FloatArray
+    columns: FloatArray | None = None
+    columns_by: FloatArray | None = None
+    parameters: tuple[ParameterName, ...] = ()
+    described: FloatArray = field(default_factory=lambda: np.zeros(0))
+    precision: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def beside(self, springs: FloatArray, springs_by: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the columns of springs and body, and their derivatives."""
+        if self.columns is None or self.columns_by is None:
+            return springs, springs_by
+        columns = np.concatenate([springs, self.columns], axis=2)
+        return columns, np.concatenate([springs_by, self.columns_by], axis=2)
+
+
+def _known_body(robot: Robot, motion: Motion, slow: Motion, count: int) -> _Body:
+    """Return the torque of a body as it is described."""
+    by = np.stack(inverse_dynamics_derivatives(robot, slow), axis=2)
+    return _Body(inverse_dynamics(robot, motion), _placed(by, count))
+
+
+def _free_body(
+    robot: Robot,
+    motion: Motion,
+    slow: Motion,
+    springs: FloatArray,
+    count: int,
+    names: Sequence[str],
+) -> _Body:
+    """Return the columns of inertias that are told apart beside the springs, and the prior."""
+    body = regressor(robot, motion)
+    base = _told_apart(robot, body, springs, names)
+    spread = base.grouping * described_spread(robot).ravel()
+    return _Body(
+        np.zeros_like(motion.q),
+        np.zeros((*slow.q.shape, 3 * count)),
+        body[:, :, base.independent],
+        _placed(_regressor_by_motion(robot, slow, base.independent), count),
+        base.parameters,
+        base.values(robot.rigid_parameters),
+        np.asarray(np.linalg.inv(spread @ spread.T)),
     )
 
 
@@ -263,21 +324,20 @@ def _torque_passed(used: Conditioning) -> FloatArray:
 
 
 def _told_apart(
-    robot: Robot, body: FloatArray, springs: FloatArray, ties: Sequence[Tie], separate: bool
+    robot: Robot, body: FloatArray, springs: FloatArray, names: Sequence[str]
 ) -> BaseParameters:
     """Return the rigid columns that the motion tells apart beside the springs."""
-    names = rigid_parameter_names(robot)
-    base = group_columns(body.reshape(-1, body.shape[2]), names, _RANK_TOLERANCE)
+    every = rigid_parameter_names(robot)
+    base = group_columns(body.reshape(-1, body.shape[2]), every, _RANK_TOLERANCE)
     w = np.concatenate([body[:, :, base.independent], springs], axis=2)
     w = w.reshape(-1, w.shape[2])
     scale = np.linalg.norm(w, axis=0)
     scaled = w / np.where(scale > 0.0, scale, 1.0)
     left = np.abs(np.diag(np.linalg.qr(scaled, mode='r')))[base.rank :]
     if len(left) and left.min() < _RANK_TOLERANCE:
-        name = ties[int(np.argmin(left))].name if separate else 'the springs'
         raise IdentificationError(
-            f'{name}: this motion does not tell its stiffness from weight and inertia; '
-            'keep the inertias known, or move more'
+            f'{names[int(np.argmin(left))]}: this motion does not tell its stiffness from weight '
+            'and inertia; keep the inertias known, or move more'
         )
     return base
 

@@ -19,9 +19,10 @@ from armid_ros.identification.ties.problem import (
     Inertias,
     interaction_problem,
     InteractionProblem,
+    MachineNoise,
     STACKED,
 )
-from armid_ros.model.spring_ties import Tie
+from armid_ros.model.spring_ties import TiedMachines
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import Robot
@@ -39,11 +40,9 @@ _ABOVE = 3.0
 
 
 def recorded_interaction_problem(
-    robot: Robot,
+    machines: TiedMachines,
     recording: Recording,
-    other: Robot,
     other_recording: Recording,
-    ties: Sequence[Tie],
     *,
     settings: SignalSettings | None = None,
     inertias: Inertias = 'known',
@@ -59,12 +58,10 @@ def recorded_interaction_problem(
 
     Parameters
     ----------
-    robot, other : Robot
-        The machine whose torques were measured, and the one it is tied to.
+    machines : TiedMachines
+        Both, and where the springs are.
     recording, other_recording : Recording
         Of both, with overlapping stamps.
-    ties : sequence of Tie
-        Where the springs are.
     settings : SignalSettings, optional
         Filters.
     inertias : {'known', 'free'}
@@ -82,12 +79,12 @@ def recorded_interaction_problem(
     """
     if recording.tau is None:
         raise IdentificationError(f'{recording.source}: {recording.topic} has no effort')
-    together = recorded_together(recording, other_recording, other, ties)
+    together = recorded_together(recording, other_recording, machines.other, machines.ties)
     settings = settings or SignalSettings()
     both = _one_machine(together)
     used = band_of_motion([both], conditioning([both], settings), settings)
     return together_interaction_problem(
-        robot, together, used, inertias=inertias, separate=separate, slack=slack
+        machines.robot, together, used, inertias=inertias, separate=separate, slack=slack
     )
 
 
@@ -128,20 +125,18 @@ def together_interaction_problem(
     assert beside is not None
     both = _one_machine(recording)
     assert both.tau is not None
-    noise, torque_noise = _white(both.q), _white(both.tau[:, :n])
+    machines = TiedMachines(robot, beside.robot, beside.ties)
+    noise = MachineNoise(_white(both.q), _white(both.tau[:, :n]))
     problems = []
     for stretch, own in zip(segments(both, used), segments(recording, used), strict=True):
         assert own.tau is not None
         tau = own.tau if rest is None else own.tau - rest(own)
         problems.append(
             interaction_problem(
-                robot,
+                machines,
                 own.with_torque(tau),
-                beside.robot,
                 _joints(stretch, slice(n, None), both.joints[n:]),
-                beside.ties,
-                position_noise=noise,
-                torque_noise=torque_noise,
+                noise=noise,
                 used=used,
                 inertias=inertias,
                 separate=separate,

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from armid_ros.identification.ties.problem import Inertias, InteractionProblem
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
-from armid_ros.model.spring_ties import Tie
+from armid_ros.model.spring_ties import Tie, TiedMachines
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
@@ -99,9 +99,8 @@ def find_interaction(
 
     def problem(recordings: tuple[Recording, Recording]) -> InteractionProblem:
         own, far = recordings
-        return recorded_interaction_problem(
-            robot, own, other, far, ties, inertias=inertias, separate=True
-        )
+        machines = TiedMachines(robot, other, ties)
+        return recorded_interaction_problem(machines, own, far, inertias=inertias, separate=True)
 
     seen, unseen = problem(training), problem(held_out)
     everywhere = identify_interaction(seen)

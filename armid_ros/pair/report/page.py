@@ -5,20 +5,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
 from armid_ros.pair.gait_cycle import GaitCycle
 from armid_ros.pair.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.pair.report.poses import draw_poses
-from armid_ros.pair.report.sections import Assumptions, Forces, Gait, Poses, Stiffness
+from armid_ros.pair.report.sections import Assumptions, Forces, GaitSection, Poses, Stiffness
 from armid_ros.pair.report.walk import CycleByTorque, Driven, FootForces, Walk
 from armid_ros.pair.torque_driven import GaitCheck
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import Verdict
+from armid_ros.report.sections.verdict import VerdictSection
 from armid_ros.robots.assumptions import Assumption
 import numpy as np
 
@@ -75,16 +75,54 @@ class WholeCycle:
     rate: float
 
 
+@dataclass(frozen=True)
+class ShownMotion:
+    """
+    The motion that is shown.
+
+    Attributes
+    ----------
+    motions : PairMotion
+        Of both.
+    abscissa : ndarray, shape (N,)
+        What it is drawn over.
+    name : str
+        Name and unit of the abscissa.
+
+    """
+
+    motions: PairMotion
+    abscissa: FloatArray
+    name: str
+
+
+@dataclass(frozen=True)
+class SimulatedWalk:
+    """
+    What is known of a pair that was simulated; nothing of one that was recorded.
+
+    Attributes
+    ----------
+    truth : mapping of str to float
+        True stiffnesses [N/m].
+    gait : GaitChecks or None
+        Joints driven by torque in single support.
+    whole : WholeCycle or None
+        The same over a whole cycle of walking.
+
+    """
+
+    truth: Mapping[str, float] = field(default_factory=dict)
+    gait: GaitChecks | None = None
+    whole: WholeCycle | None = None
+
+
 def exo_report(
     pair: TiedPair,
-    motions: PairMotion,
-    abscissa: FloatArray,
-    abscissa_name: str,
+    shown: ShownMotion,
     found: Sequence[Interaction],
+    walked: SimulatedWalk | None = None,
     *,
-    truth: Mapping[str, float] | None = None,
-    gait: GaitChecks | None = None,
-    whole: WholeCycle | None = None,
     assumptions: Mapping[str, Assumption] | None = None,
     provenance: Provenance | None = None,
 ) -> str:
@@ -95,31 +133,26 @@ def exo_report(
     ----------
     pair : TiedPair
         Both machines, with the stiffness that was found.
-    motions : PairMotion
+    shown : ShownMotion
         The motion that is shown.
-    abscissa : ndarray, shape (N,)
-        What it is drawn over.
-    abscissa_name : str
-        Its name and unit.
     found : sequence of Interaction
         One stiffness for all, then one for each.
-    truth : mapping of str to float, optional
-        True stiffnesses of simulated data [N/m].
-    gait : GaitChecks, optional
-        Joints driven by torque in single support.
-    whole : WholeCycle, optional
-        The same over a whole cycle of walking.
+    walked : SimulatedWalk, optional
+        What is known of simulated data.
     assumptions : mapping, optional
         What was assumed.
     provenance : Provenance, optional
         Files, versions, settings, seed.
 
     """
+    motions, abscissa = shown.motions, shown.abscissa
+    walked = walked or SimulatedWalk()
+    gait, whole = walked.gait, walked.whole
     torques = pair_torques(pair, *motions)
     alone = pair_torques(pair.with_stiffness(0.0), *motions)
     samples = np.linspace(0, len(abscissa) - 1, _POSES).astype(int).tolist()
     captions = [f'{abscissa[k]:.2f}' for k in samples]
-    sections: list[Section] = [_verdict(found, gait, whole), Stiffness(found, truth or {})]
+    sections: list[Section] = [_verdict(found, gait, whole), Stiffness(found, walked.truth)]
     if whole is not None:
         sections += [
             Walk(whole.cycle, whole.driven),
@@ -127,11 +160,11 @@ def exo_report(
             FootForces(whole.cycle),
         ]
     if gait is not None:
-        sections.append(Gait(gait.checks, gait.softer, gait.phase, gait.rate))
+        sections.append(GaitSection(gait.checks, gait.softer, gait.phase, gait.rate))
     sections += [
         Forces(
             abscissa,
-            abscissa_name,
+            shown.name,
             torques.forces,
             pair.segments,
             torques.tau,
@@ -149,7 +182,7 @@ def exo_report(
 
 def _verdict(
     found: Sequence[Interaction], gait: GaitChecks | None, whole: WholeCycle | None
-) -> Verdict:
+) -> VerdictSection:
     """Say what ties the two, how surely, and whether the torques walk."""
     overall = found[0]
     k, reach = overall.stiffness[0], 1.96 * overall.std[0]
@@ -175,6 +208,8 @@ def _verdict(
         )
     beware = [f'{", ".join(weak)}: too slightly drawn out to know within 10 %.'] if weak else []
     if k - reach <= 0.0:
-        return Verdict('no interaction', 'fair', ['No interaction is seen.'], beware)
+        return VerdictSection('no interaction', 'fair', ['No interaction is seen.'], beware)
     sure = reach < _NARROW * k
-    return Verdict('found' if sure else 'uncertain', 'good' if sure else 'fair', sentences, beware)
+    return VerdictSection(
+        'found' if sure else 'uncertain', 'good' if sure else 'fair', sentences, beware
+    )

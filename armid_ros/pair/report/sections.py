@@ -78,7 +78,7 @@ def _range(values: FloatArray) -> str:
 
 
 @dataclass(frozen=True)
-class Gait(Section):
+class GaitSection(Section):
     """
     Joints driven by their torques against the prescribed gait.
 

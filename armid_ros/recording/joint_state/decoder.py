@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.layout import JointStateLayout, MalformedMessage
-from armid_ros.recording.source import Block, IntArray, records_at
+from armid_ros.recording.source import IntArray, MessageBlock, records_at
 import numpy as np
 import numpy.typing as npt
 
@@ -100,7 +100,7 @@ class JointStateDecoder:
         """Return all joint names met, in order of appearance."""
         return tuple(self._names)
 
-    def decode(self, block: Block) -> Iterator[JointStates]:
+    def decode(self, block: MessageBlock) -> Iterator[JointStates]:
         """Yield the messages of a block that name a joint asked for, grouped by layout."""
         numbers = np.arange(self.messages, self.messages + len(block), dtype=np.int64)
         self.messages += len(block)

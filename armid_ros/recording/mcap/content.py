@@ -9,7 +9,7 @@ import mmap
 import struct
 
 from armid_ros.recording.mcap.records import MESSAGE, MESSAGE_HEADER, RECORD_HEADER
-from armid_ros.recording.source import Block, IntArray, records_at
+from armid_ros.recording.source import IntArray, MessageBlock, records_at
 from mcap.opcode import Opcode
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +29,7 @@ class Gathered:
         self._offsets: list[IntArray] = []
         self._size = self._count = 0
 
-    def add(self, content: bytes, offsets: IntArray) -> Iterator[Block]:
+    def add(self, content: bytes, offsets: IntArray) -> Iterator[MessageBlock]:
         """Add messages of a content of their own."""
         if not self._parts:
             yield from self.flush()
@@ -40,7 +40,7 @@ class Gathered:
         if self._size > _BLOCK_BYTES:
             yield from self.flush()
 
-    def add_in_place(self, offsets: IntArray) -> Iterator[Block]:
+    def add_in_place(self, offsets: IntArray) -> Iterator[MessageBlock]:
         """Add messages that lie in the file as they are."""
         if self._parts:
             yield from self.flush()
@@ -49,7 +49,7 @@ class Gathered:
         if self._count > BLOCK_MESSAGES:
             yield from self.flush()
 
-    def flush(self) -> Iterator[Block]:
+    def flush(self) -> Iterator[MessageBlock]:
         """Yield what was added, if it is something."""
         data = self._parts[0] if len(self._parts) == 1 else b''.join(self._parts)
         if self._count:
@@ -57,10 +57,10 @@ class Gathered:
         self._parts, self._offsets, self._size, self._count = [], [], 0, 0
 
 
-def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> Block:
+def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
     """Return the messages whose records begin there."""
     rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
-    return Block(
+    return MessageBlock(
         data,
         offsets + MESSAGE.itemsize,
         rows['length'].astype(np.int64) - MESSAGE_HEADER,

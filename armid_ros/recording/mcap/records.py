@@ -13,6 +13,7 @@ Specification: https://mcap.dev/spec
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from io import BytesIO
 import mmap
@@ -146,9 +147,48 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
     if data[: len(MAGIC)] != MAGIC:
         raise RecordingError(f'{path}: not an MCAP file, or its beginning is damaged')
     found = FileMap(data)
-    definitions: list[tuple[int, int, int]] = []
-    data_end = footer = None
-    size, position = len(data), len(MAGIC)
+    outside = _walk(found)
+    definitions = outside.definitions
+    if not found.finished:
+        found.damage.add(
+            'the file ends without its index, as after a crash: readable up to byte '
+            f'{outside.position} of {len(data)}'
+        )
+    if check and outside.footer is not None:
+        definitions = _believed(found, definitions, outside.footer)
+    for opcode, begin, end in definitions:
+        add_definition(found, opcode, data[begin:end])
+    if check and outside.data_end is not None and found.loose:
+        _check_data(found, outside.data_end)
+    return found
+
+
+@dataclass
+class _Outside:
+    """
+    What stands outside of chunks.
+
+    Attributes
+    ----------
+    definitions : list of (int, int, int)
+        Opcode, beginning and end of schemas, channels and statistics.
+    data_end, footer : int or None
+        Where those records are.
+    position : int
+        How far the records go.
+
+    """
+
+    definitions: list[tuple[int, int, int]] = field(default_factory=list)
+    data_end: int | None = None
+    footer: int | None = None
+    position: int = len(MAGIC)
+
+
+def _walk(found: FileMap) -> _Outside:
+    """Note chunks, indexes and loose messages; return what else there is."""
+    data, outside = found.data, _Outside()
+    size, position = len(data), outside.position
     while position + RECORD_HEADER <= size:
         opcode, length = struct.unpack_from('<BQ', data, position)
         begin, end = position + RECORD_HEADER, position + RECORD_HEADER + length
@@ -158,33 +198,19 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
             if opcode == Opcode.CHUNK:
                 _add_chunk(found, begin, size, whole=False)
             break
-        if opcode == Opcode.CHUNK:
-            _add_chunk(found, begin, end)
-        elif opcode == Opcode.MESSAGE_INDEX:
-            _add_index(found, begin, end)
-        elif opcode == Opcode.MESSAGE:
-            _add_loose(found, begin, end)
+        if opcode in _NOTED:
+            _NOTED[opcode](found, begin, end)
         elif opcode in _DEFINITIONS:
-            definitions.append((opcode, begin, end))
+            outside.definitions.append((opcode, begin, end))
         elif opcode == Opcode.DATA_END:
-            data_end = position
+            outside.data_end = position
         position = end
         if opcode == Opcode.FOOTER:
             found.finished = data[end : end + len(MAGIC)] == MAGIC
-            footer = begin if length == _FOOTER.size else None
+            outside.footer = begin if length == _FOOTER.size else None
             break
-    if not found.finished:
-        found.damage.add(
-            f'the file ends without its index, as after a crash: readable up to byte {position} '
-            f'of {size}'
-        )
-    if check and footer is not None:
-        definitions = _believed(found, definitions, footer)
-    for opcode, begin, end in definitions:
-        add_definition(found, opcode, data[begin:end])
-    if check and data_end is not None and found.loose:
-        _check_data(found, data_end)
-    return found
+    outside.position = position
+    return outside
 
 
 def add_definition(found: FileMap, opcode: int, content: bytes) -> None:
@@ -243,6 +269,14 @@ def _add_loose(found: FileMap, begin: int, end: int) -> None:
         found.damage.add(f'the message at byte {begin} is too short for one')
         return
     found.loose.append((begin, end))
+
+
+#: What is noted of records as they come.
+_NOTED: dict[int, Callable[[FileMap, int, int], None]] = {
+    Opcode.CHUNK: _add_chunk,
+    Opcode.MESSAGE_INDEX: _add_index,
+    Opcode.MESSAGE: _add_loose,
+}
 
 
 def _believed(

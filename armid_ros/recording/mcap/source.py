@@ -36,7 +36,7 @@ from armid_ros.recording.mcap.records import (
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Block, IntArray, RawMessage, records_at, Topic
+from armid_ros.recording.source import IntArray, MessageBlock, RawMessage, records_at, Topic
 from mcap.records import Channel
 import numpy as np
 import numpy.typing as npt
@@ -92,7 +92,7 @@ class McapSource:
             described[name] = self._describe(channel, counts[name])
         return tuple(described.values())
 
-    def blocks(self, topic: str) -> Iterator[Block]:
+    def blocks(self, topic: str) -> Iterator[MessageBlock]:
         """Yield the messages of a topic, in the order they are stored."""
         self._survey()
         wanted = sorted(c.id for c in self._found.channels.values() if c.topic == topic)
@@ -146,7 +146,7 @@ class McapSource:
 
     def _pieces(
         self, channels: Sequence[int]
-    ) -> Iterator[tuple[int, Block, npt.NDArray[np.uint16]]]:
+    ) -> Iterator[tuple[int, MessageBlock, npt.NDArray[np.uint16]]]:
         """Yield messages of all channels by chunk, chunks by their first log time."""
         in_order = sorted(self._found.chunks, key=lambda chunk: chunk.start_time)
         for chunk, unpacked in self._contents.of(in_order):
@@ -282,7 +282,9 @@ class McapSource:
         return records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)['channel']
 
 
-def _piece(data: bytes | mmap.mmap, offsets: IntArray) -> tuple[Block, npt.NDArray[np.uint16]]:
+def _piece(
+    data: bytes | mmap.mmap, offsets: IntArray
+) -> tuple[MessageBlock, npt.NDArray[np.uint16]]:
     rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
     return message_block(data, offsets), rows['channel']
 

@@ -10,14 +10,14 @@ Recordings that are not bags: CSV, NPZ, MAT, Parquet, LeRobot datasets.
 
 from armid_ros.recording.tables.files import is_table, open_table, side_by_side
 from armid_ros.recording.tables.measured import measured
-from armid_ros.recording.tables.plan import Plan, plan
+from armid_ros.recording.tables.plan import plan, TablePlan
 from armid_ros.recording.tables.settings import ColumnSettings, name_in_file, numbers, renamed
-from armid_ros.recording.tables.table import Column, Table
+from armid_ros.recording.tables.table import Table, TableColumn
 
 __all__ = [
-    'Column',
+    'TableColumn',
     'ColumnSettings',
-    'Plan',
+    'TablePlan',
     'Table',
     'is_table',
     'measured',

@@ -11,7 +11,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
 from armid_ros.recording.tables.arrays import read_hdf5, read_matlab, read_numpy
 from armid_ros.recording.tables.parquet import INFO, read_lerobot, read_parquet
-from armid_ros.recording.tables.table import Column, Table
+from armid_ros.recording.tables.table import Table, TableColumn
 from armid_ros.recording.tables.text import read_text
 
 _READERS: dict[str, Callable[[Path], Table]] = {
@@ -83,7 +83,7 @@ def side_by_side(tables: Sequence[Table]) -> Table:
         raise RecordingError(f'{counted}; files side by side hold the same samples')
     names = [name for table in tables for name in table.names]
     columns = [
-        Column(
+        TableColumn(
             name if names.count(name) == 1 else f'{_stem(table)}:{name}',
             column.values,
             column.array and f'{_stem(table)}:{column.array}',

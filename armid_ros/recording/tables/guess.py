@@ -14,9 +14,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import re
 
-from armid_ros.recording.tables.patterns import Chosen
+from armid_ros.recording.tables.patterns import ChosenColumns
 from armid_ros.recording.tables.settings import renamed
-from armid_ros.recording.tables.table import Column, Table
+from armid_ros.recording.tables.table import Table, TableColumn
 from armid_ros.recording.tables.words import MEASURED, OTHERWISE, QuantityName, TIMES, WORDS
 import numpy as np
 
@@ -31,14 +31,14 @@ class Guess:
 
     Attributes
     ----------
-    chosen : Chosen
+    chosen : ChosenColumns
         Its columns.
     score : float
         How much speaks for it.
 
     """
 
-    chosen: Chosen
+    chosen: ChosenColumns
     score: float
 
 
@@ -68,13 +68,13 @@ def guess(
         Guess(chosen, _score(chosen.pattern, quantity) - _still(chosen)) for chosen in families
     ]
     likely = [one for one in scored if one.score > 0.0]
-    best: dict[tuple[Column, ...], Guess] = {}
+    best: dict[tuple[TableColumn, ...], Guess] = {}
     for one in sorted(likely, key=lambda one: (-one.score, -len(one.chosen.columns))):
         best.setdefault(one.chosen.columns, one)
     return list(best.values())
 
 
-def guess_time(table: Table) -> Column | None:
+def guess_time(table: Table) -> TableColumn | None:
     """Return the column of time: named so, and increasing."""
     scores = {}
     for column in table.columns:
@@ -89,9 +89,9 @@ def guess_time(table: Table) -> Column | None:
 
 def _families(
     table: Table, joints: Sequence[str] | None, rename: Sequence[tuple[str, str]]
-) -> list[Chosen]:
+) -> list[ChosenColumns]:
     """Return the columns that are alike but for what stands for a joint."""
-    groups: dict[str, dict[str, Column]] = {}
+    groups: dict[str, dict[str, TableColumn]] = {}
     for column in table.columns:
         for pattern, label in _readings(column, joints, rename):
             groups.setdefault(pattern, {})[label] = column
@@ -104,7 +104,7 @@ def _families(
 
 
 def _readings(
-    column: Column, joints: Sequence[str] | None, rename: Sequence[tuple[str, str]]
+    column: TableColumn, joints: Sequence[str] | None, rename: Sequence[tuple[str, str]]
 ) -> Iterator[tuple[str, str]]:
     """Yield the ways to read a name as a pattern and what stands for the joint."""
     name = column.bare_name
@@ -139,10 +139,10 @@ def _named(name: str) -> Iterator[tuple[str, str]]:
 
 def _in_order(
     pattern: str,
-    members: dict[str, Column],
+    members: dict[str, TableColumn],
     joints: Sequence[str] | None,
     rename: Sequence[tuple[str, str]],
-) -> Chosen | None:
+) -> ChosenColumns | None:
     """Return a family in the order of the joints; None where it does not fit them."""
     labels = list(members)
     if all(label.isdigit() for label in labels):
@@ -153,7 +153,7 @@ def _in_order(
             labels = [labels[names.index(joint)] for joint in joints]
         elif len(labels) != len(joints) or not all(label.isdigit() for label in labels):
             return None
-    return Chosen(tuple(members[label] for label in labels), tuple(labels), pattern)
+    return ChosenColumns(tuple(members[label] for label in labels), tuple(labels), pattern)
 
 
 def _score(pattern: str, quantity: QuantityName) -> float:
@@ -170,7 +170,7 @@ def _score(pattern: str, quantity: QuantityName) -> float:
     )
 
 
-def _still(chosen: Chosen) -> float:
+def _still(chosen: ChosenColumns) -> float:
     """Return what speaks against a family with columns that never change: they are not filled."""
     still = [
         float(np.ptp(column.values[np.isfinite(column.values)])) == 0.0

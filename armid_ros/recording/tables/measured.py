@@ -8,9 +8,9 @@ from collections.abc import Mapping
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.recording import Gap, ReadReport, Recording
+from armid_ros.recording.recording import ReadReport, Recording, TimeGap
 from armid_ros.recording.series import GAP_PERIODS
-from armid_ros.recording.tables.plan import Plan
+from armid_ros.recording.tables.plan import TablePlan
 from armid_ros.recording.tables.settings import gear_matrix, per_joint, TIME_UNITS
 from armid_ros.recording.tables.words import QuantityName
 import numpy as np
@@ -22,7 +22,7 @@ _EPOCH = 1e8
 _MAX_NOT_FINITE = 0.2
 
 
-def measured(plan: Plan) -> Recording:
+def measured(plan: TablePlan) -> Recording:
     """
     Return what a table holds.
 
@@ -75,7 +75,7 @@ def measured(plan: Plan) -> Recording:
     )
 
 
-def _times(plan: Plan) -> tuple[FloatArray, int]:
+def _times(plan: TablePlan) -> tuple[FloatArray, int]:
     """Return times [s], and the stamp of the first row [ns]; zero where it is not known."""
     if plan.time is None:
         assert plan.rate_hz is not None
@@ -89,7 +89,7 @@ def _times(plan: Plan) -> tuple[FloatArray, int]:
 
 
 def _finite(
-    plan: Plan,
+    plan: TablePlan,
     t: FloatArray,
     values: Mapping[QuantityName, FloatArray],
 ) -> tuple[npt.NDArray[np.bool_], int]:
@@ -115,7 +115,7 @@ def _finite(
 
 
 def _joint_side(
-    plan: Plan, values: Mapping[QuantityName, FloatArray]
+    plan: TablePlan, values: Mapping[QuantityName, FloatArray]
 ) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
     """Return positions, velocities and efforts of the joints, where those of motors are given."""
     q, dq, tau = values['position'], values.get('velocity'), values.get('effort')
@@ -131,7 +131,7 @@ def _joint_side(
     return q, dq, tau
 
 
-def _gaps(t: FloatArray) -> tuple[Gap, ...]:
+def _gaps(t: FloatArray) -> tuple[TimeGap, ...]:
     steps = np.diff(t)
     at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
-    return tuple(Gap(float(t[i]), float(steps[i])) for i in at)
+    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)

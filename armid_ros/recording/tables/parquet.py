@@ -11,7 +11,7 @@ from typing import Any
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.tables.extra import imported
-from armid_ros.recording.tables.table import Column, Table
+from armid_ros.recording.tables.table import Table, TableColumn
 import numpy as np
 
 INFO = Path('meta', 'info.json')
@@ -50,7 +50,9 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
         rows = np.ones(len(columns[0].values), np.bool_) if index is None else index == chosen
         if rows.any():
             kept = tuple(
-                Column(c.name, c.values[rows], c.array) for c in columns if not _is_index(c.name)
+                TableColumn(c.name, c.values[rows], c.array)
+                for c in columns
+                if not _is_index(c.name)
             )
             notes = (f'episode {chosen} of 0 to {total - 1}',)
             return Table(str(path), kept, 'LeRobot dataset', rate_hz=info.get('fps'), notes=notes)
@@ -80,7 +82,7 @@ def _element_names(feature: Mapping[str, Any]) -> list[str]:
     return [str(name) for name in names] if isinstance(names, list) else []
 
 
-def _columns(path: Path, names: Mapping[str, Sequence[str]]) -> Iterator[Column]:
+def _columns(path: Path, names: Mapping[str, Sequence[str]]) -> Iterator[TableColumn]:
     parquet = imported('pyarrow.parquet', path, 'Parquet')
     types = imported('pyarrow', path, 'Parquet').types
     try:
@@ -92,16 +94,16 @@ def _columns(path: Path, names: Mapping[str, Sequence[str]]) -> Iterator[Column]
     for field in table.schema:
         column = table.column(field.name).combine_chunks()
         if types.is_timestamp(field.type):
-            yield Column(field.name, column.cast('int64').to_numpy(), unit=field.type.unit)
+            yield TableColumn(field.name, column.cast('int64').to_numpy(), unit=field.type.unit)
         elif types.is_integer(field.type) or types.is_floating(field.type):
-            yield Column(field.name, column.to_numpy(zero_copy_only=False).astype(float))
+            yield TableColumn(field.name, column.to_numpy(zero_copy_only=False).astype(float))
         elif types.is_list(field.type) or types.is_fixed_size_list(field.type):
             yield from _elements(path, field.name, column.to_pylist(), names.get(field.name, ()))
 
 
 def _elements(
     path: Path, name: str, rows: Sequence[Sequence[float] | None], labels: Sequence[str]
-) -> Iterator[Column]:
+) -> Iterator[TableColumn]:
     """Yield a column for each element of lists of equal length."""
     width = max((len(row) for row in rows if row is not None), default=0)
     if not width or any(isinstance(row[0], (str, list, dict)) for row in rows if row):
@@ -115,4 +117,4 @@ def _elements(
     values = np.array([[np.nan] * width if row is None else row for row in rows], dtype=float)
     for k in range(width):
         label = labels[k] if len(labels) == width else str(k)
-        yield Column(f'{name}[{label}]', values[:, k], name)
+        yield TableColumn(f'{name}[{label}]', values[:, k], name)

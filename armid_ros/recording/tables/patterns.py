@@ -10,19 +10,19 @@ import re
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.tables.settings import renamed
-from armid_ros.recording.tables.table import Column, Table
+from armid_ros.recording.tables.table import Table, TableColumn
 
 _RANGE = re.compile(r'([\[{])(\d+)\.\.(\d+)([\]}])')
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenColumns:
     """
     Columns of one quantity.
 
     Attributes
     ----------
-    columns : tuple of Column
+    columns : tuple of TableColumn
         One a joint.
     labels : tuple of str
         What of each name stands for the joint: its name, a number, or the whole name.
@@ -31,7 +31,7 @@ class Chosen:
 
     """
 
-    columns: tuple[Column, ...]
+    columns: tuple[TableColumn, ...]
     labels: tuple[str, ...]
     pattern: str
 
@@ -50,7 +50,7 @@ def choose(
     joints: Sequence[str] | None,
     what: str,
     rename: Sequence[tuple[str, str]] = (),
-) -> Chosen:
+) -> ChosenColumns:
     """
     Return the columns that a person asks for.
 
@@ -81,7 +81,7 @@ def choose(
         )
     columns, labels = list(found), list(found.values())
     if joints is None:
-        return Chosen(tuple(columns), tuple(labels), pattern)
+        return ChosenColumns(tuple(columns), tuple(labels), pattern)
     names = [renamed(label, rename) for label in labels]
     if set(joints) <= set(names):
         order = [names.index(joint) for joint in joints]
@@ -101,10 +101,12 @@ def choose(
             'matched by joint name or number: see --rename and --joints'
         )
         raise RecordingError(f"{table.source}: for {what}, '{pattern}': {problem}")
-    return Chosen(tuple(columns[k] for k in order), tuple(labels[k] for k in order), pattern)
+    return ChosenColumns(
+        tuple(columns[k] for k in order), tuple(labels[k] for k in order), pattern
+    )
 
 
-def _matching(table: Table, pattern: str) -> dict[Column, str]:
+def _matching(table: Table, pattern: str) -> dict[TableColumn, str]:
     """Return the columns that fit, in order, each with what stands for its joint."""
     exact = table.column(pattern)
     if exact is not None:
@@ -135,7 +137,7 @@ def _matching(table: Table, pattern: str) -> dict[Column, str]:
     return {}
 
 
-def _by_placeholder(table: Table, pattern: str) -> dict[Column, str]:
+def _by_placeholder(table: Table, pattern: str) -> dict[TableColumn, str]:
     before, _, after = pattern.partition('{}')
     expression = re.compile(f'{re.escape(before)}(.+){re.escape(after)}')
     found = {}

@@ -11,9 +11,9 @@ import textwrap
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.tables.guess import guess, guess_time
-from armid_ros.recording.tables.patterns import choose, Chosen
+from armid_ros.recording.tables.patterns import choose, ChosenColumns
 from armid_ros.recording.tables.settings import ColumnSettings, per_joint, TIME_UNITS
-from armid_ros.recording.tables.table import Column, Table
+from armid_ros.recording.tables.table import Table, TableColumn
 from armid_ros.recording.tables.words import QuantityName
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +28,7 @@ _STEP = (2e-5, 0.5)
 
 
 @dataclass(frozen=True)
-class Source:
+class QuantitySource:
     """
     Where one quantity comes from.
 
@@ -36,7 +36,7 @@ class Source:
     ----------
     quantity : str
         'position', 'velocity' or 'effort'.
-    chosen : Chosen
+    chosen : ChosenColumns
         Columns.
     unit : str
         Of the file.
@@ -50,7 +50,7 @@ class Source:
     """
 
     quantity: QuantityName
-    chosen: Chosen
+    chosen: ChosenColumns
     unit: str
     factor: FloatArray
     guessed: bool
@@ -62,7 +62,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Plan:
+class TablePlan:
     """
     What is read from where.
 
@@ -72,7 +72,7 @@ class Plan:
         The file.
     joints : tuple of str
         In the order of the columns.
-    time : Column or None
+    time : TableColumn or None
         None for even steps of a known rate.
     time_unit : str
         Of that column.
@@ -80,7 +80,7 @@ class Plan:
         Whether nobody named it.
     rate_hz : float or None
         Where there is no column of time.
-    sources : tuple of Source
+    sources : tuple of QuantitySource
         Position first.
     settings : ColumnSettings
         What was said.
@@ -91,11 +91,11 @@ class Plan:
 
     table: Table
     joints: tuple[str, ...]
-    time: Column | None
+    time: TableColumn | None
     time_unit: str
     time_guessed: bool
     rate_hz: float | None
-    sources: tuple[Source, ...]
+    sources: tuple[QuantitySource, ...]
     settings: ColumnSettings
     notes: tuple[str, ...] = ()
 
@@ -104,7 +104,7 @@ class Plan:
         """Whether anything was not said but guessed."""
         return self.time_guessed or any(source.guessed for source in self.sources)
 
-    def source(self, quantity: QuantityName) -> Source | None:
+    def source(self, quantity: QuantityName) -> QuantitySource | None:
         """Return where a quantity comes from; None where it does not."""
         return next((one for one in self.sources if one.quantity == quantity), None)
 
@@ -145,7 +145,7 @@ def plan(
     settings: ColumnSettings,
     joints: Sequence[str] | None = None,
     slides: Sequence[bool] | None = None,
-) -> Plan:
+) -> TablePlan:
     """
     Settle what is read from where.
 
@@ -183,7 +183,7 @@ def plan(
         if found is not None:
             sources.append(found)
     time, unit, rate = _time(table, settings)
-    return Plan(
+    return TablePlan(
         table,
         names,
         time,
@@ -201,7 +201,7 @@ def _source(
     quantity: QuantityName,
     settings: ColumnSettings,
     joints: Sequence[str] | None,
-) -> Source | None:
+) -> QuantitySource | None:
     asked = getattr(settings, quantity)
     if asked is not None and asked.lower() == 'none':
         return None
@@ -227,12 +227,12 @@ def _source(
         unit = 'A'
     plain = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}[quantity]
     factor = np.full(len(chosen.columns), _FACTORS.get(unit, 1.0))
-    return Source(quantity, chosen, unit or plain, factor, asked is None, rivals)
+    return QuantitySource(quantity, chosen, unit or plain, factor, asked is None, rivals)
 
 
 def _as_many(
-    table: Table, quantity: QuantityName, settings: ColumnSettings, position: Source
-) -> Source | None:
+    table: Table, quantity: QuantityName, settings: ColumnSettings, position: QuantitySource
+) -> QuantitySource | None:
     """Guess a quantity whose joints are called otherwise, or not at all, from their number."""
     if getattr(settings, quantity) is not None:
         return None
@@ -241,11 +241,11 @@ def _as_many(
 
 
 def _scaled(
-    source: Source,
+    source: QuantitySource,
     settings: ColumnSettings,
     joints: Sequence[str],
     slides: npt.NDArray[np.bool_],
-) -> Source:
+) -> QuantitySource:
     """Apply what a person says of units; degrees are those of joints that turn."""
     if source.quantity == 'effort':
         if settings.effort_scale:
@@ -272,7 +272,7 @@ def _short(values: FloatArray) -> str:
     return texts[0] if len(set(texts)) == 1 else ', '.join(texts)
 
 
-def _doubts(sources: Sequence[Source], settings: ColumnSettings) -> list[str]:
+def _doubts(sources: Sequence[QuantitySource], settings: ColumnSettings) -> list[str]:
     doubts = []
     for source in sources:
         text = source.chosen.pattern.lower()
@@ -291,10 +291,10 @@ def _doubts(sources: Sequence[Source], settings: ColumnSettings) -> list[str]:
     return doubts
 
 
-def _time(table: Table, settings: ColumnSettings) -> tuple[Column | None, str, float | None]:
+def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, str, float | None]:
     """Return the column of time and its unit, or None and the rate."""
     asked = settings.time
-    column: Column | None
+    column: TableColumn | None
     if asked is not None and asked.lower() != 'none':
         column = table.column(asked)
         if column is None:
@@ -317,7 +317,7 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[Column | None, str, f
     return None, 's', rate
 
 
-def _time_unit(table: Table, column: Column) -> str:
+def _time_unit(table: Table, column: TableColumn) -> str:
     if column.unit in TIME_UNITS:
         return column.unit
     steps = np.diff(column.values[np.isfinite(column.values)])

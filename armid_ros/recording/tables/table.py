@@ -34,7 +34,7 @@ _ENDINGS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
+class TableColumn:
     """
     One column.
 
@@ -78,7 +78,7 @@ class Table:
     ----------
     source : str
         The file.
-    columns : tuple of Column
+    columns : tuple of TableColumn
         Those with numbers in them.
     described : str
         What kind of file it is, for a person.
@@ -92,7 +92,7 @@ class Table:
     """
 
     source: str
-    columns: tuple[Column, ...]
+    columns: tuple[TableColumn, ...]
     described: str = ''
     first_line: int | None = None
     rate_hz: float | None = None
@@ -116,7 +116,7 @@ class Table:
         """Names of the columns."""
         return tuple(column.name for column in self.columns)
 
-    def column(self, name: str) -> Column | None:
+    def column(self, name: str) -> TableColumn | None:
         """Return the column of a name, with or without the unit in brackets; None if none has."""
         for column in self.columns:
             if name in (column.name, column.bare_name):
@@ -189,7 +189,7 @@ def table_of_arrays(
         if values.dtype.kind in 'fiub' and values.size > 1
     }
     length = _common_length(source, list(usable.values()))
-    columns: list[Column] = []
+    columns: list[TableColumn] = []
     for name, values in usable.items():
         columns += _columns_of(name, values.astype(np.float64), length)
     return Table(source, tuple(columns), described, **facts)  # type: ignore[arg-type]
@@ -206,11 +206,11 @@ def _common_length(source: str, arrays: Sequence[npt.NDArray[np.generic]]) -> in
     return max(counts, key=lambda length: (counts[length] if length > 50 else 0, length))
 
 
-def _columns_of(name: str, values: FloatArray, length: int) -> list[Column]:
+def _columns_of(name: str, values: FloatArray, length: int) -> list[TableColumn]:
     if values.ndim == 1 or 1 in values.shape:
         flat = values.ravel()
-        return [Column(name or '[0]', flat)] if len(flat) == length else []
+        return [TableColumn(name or '[0]', flat)] if len(flat) == length else []
     if values.ndim != 2 or length not in values.shape:
         return []
     rows = values if values.shape[0] == length else values.T
-    return [Column(f'{name}[{k}]', rows[:, k], name) for k in range(rows.shape[1])]
+    return [TableColumn(f'{name}[{k}]', rows[:, k], name) for k in range(rows.shape[1])]

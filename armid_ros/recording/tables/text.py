@@ -12,7 +12,7 @@ import re
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.tables.content import read_content
-from armid_ros.recording.tables.table import Column, Table
+from armid_ros.recording.tables.table import Table, TableColumn
 import numpy as np
 
 _SEPARATORS = {',': 'commas', ';': 'semicolons', '\t': 'tabs', ' ': 'blanks'}
@@ -43,7 +43,7 @@ def read_text(path: Path) -> Table:
     unit_cells += [''] * (len(names) - len(unit_cells))
     values, notes = _numbers(path, rows, separator, names, first + 1)
     columns = tuple(
-        Column(name, column, '' if header else '[]', unit)
+        TableColumn(name, column, '' if header else '[]', unit)
         for name, column, unit in zip(names, values.T, unit_cells, strict=True)
         if np.isfinite(column).any()
     )
@@ -147,6 +147,15 @@ def _numbers(
     return _cell_by_cell(path, rows, separator, names, first_line)
 
 
+def _number(cell: str, separator: str) -> float:
+    """Return a number, NaN for an empty cell; raise a ValueError for a word."""
+    if cell.lower() in _EMPTY:
+        return np.nan
+    if separator != ',' and _DECIMAL_COMMA.fullmatch(cell):
+        cell = cell.replace(',', '.')
+    return float(cell)
+
+
 def _cell_by_cell(
     path: Path, rows: list[str], separator: str, names: list[str], first_line: int
 ) -> tuple[FloatArray, tuple[str, ...]]:
@@ -166,12 +175,8 @@ def _cell_by_cell(
                 f'{path}: line {first_line + k} has {len(cells)} values, the others {len(names)}'
             )
         for j, cell in enumerate(cells):
-            if cell.lower() in _EMPTY:
-                continue
-            if separator != ',' and _DECIMAL_COMMA.fullmatch(cell):
-                cell = cell.replace(',', '.')
             try:
-                values[k, j] = float(cell)
+                values[k, j] = _number(cell, separator)
             except ValueError:
                 words.setdefault(j, (first_line + k, cell))
     for j, (line_number, cell) in words.items():

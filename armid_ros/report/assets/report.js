@@ -104,13 +104,17 @@
     };
   }
 
+  function withSoftPen(ctx) {
+    ctx.save();
+    ctx.strokeStyle = ctx.fillStyle = colour.soft;
+    ctx.lineWidth = uPlot.pxRatio;
+    ctx.font = `${10 * uPlot.pxRatio}px system-ui, sans-serif`;
+  }
+
   function drawMarks(spec) {
     return (u) => {
       const {ctx, bbox} = u;
-      ctx.save();
-      ctx.strokeStyle = ctx.fillStyle = colour.soft;
-      ctx.lineWidth = uPlot.pxRatio;
-      ctx.font = `${10 * uPlot.pxRatio}px system-ui, sans-serif`;
+      withSoftPen(ctx);
       ctx.setLineDash([4 * uPlot.pxRatio, 3 * uPlot.pxRatio]);
       for (const mark of spec.marks) {
         const x = u.valToPos(mark.x, 'x', true);
@@ -132,10 +136,7 @@
   function drawLevels(spec) {
     return (u) => {
       const {ctx, bbox} = u;
-      ctx.save();
-      ctx.strokeStyle = ctx.fillStyle = colour.soft;
-      ctx.lineWidth = uPlot.pxRatio;
-      ctx.font = `${10 * uPlot.pxRatio}px system-ui, sans-serif`;
+      withSoftPen(ctx);
       ctx.textAlign = 'right';
       for (const level of spec.levels) {
         const y = u.valToPos(level.y, 'y', true);

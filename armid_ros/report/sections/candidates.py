@@ -23,7 +23,7 @@ _TOLD = 3.0
 
 
 @dataclass(frozen=True)
-class Row:
+class CandidateRow:
     """One candidate, as text."""
 
     name: str
@@ -58,7 +58,7 @@ class CandidateTable(Section):
     settings: DiagnosisSettings
 
     @property
-    def rows(self) -> Sequence[Row]:
+    def rows(self) -> Sequence[CandidateRow]:
         """The best candidates."""
         explanation = self.diagnosis.explanation
         survey = None if explanation is None else explanation.survey
@@ -66,11 +66,11 @@ class CandidateTable(Section):
             return []
         return [self._row(trial, survey.total, survey.tried) for trial in survey.ranking[:_MOST]]
 
-    def _row(self, trial: Trial, total: float, tried: int) -> Row:
+    def _row(self, trial: Trial, total: float, tried: int) -> CandidateRow:
         effect = trial.group.effect
         names = {finding.name for finding in self.diagnosis.findings}
         price = self.settings.thresholds.price * cost(trial, self.settings)
-        return Row(
+        return CandidateRow(
             effect.name.replace('_', ' '),
             ', '.join(effect.joints) or 'whole arm',
             percent(trial.gain / total) if total > 0.0 else '',

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.identification.assess.comparison import Change, Comparison
+from armid_ros.identification.assess.comparison import Comparison, ParameterChange
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH, told_from_zero
 from armid_ros.report.families import parameter_families
 from armid_ros.report.notation import measured, pretty
@@ -22,12 +22,12 @@ class ChangeRow:
 
     Attributes
     ----------
-    change : Change
+    change : ParameterChange
         Both values.
 
     """
 
-    change: Change
+    change: ParameterChange
 
     @property
     def label(self) -> str:

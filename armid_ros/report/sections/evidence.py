@@ -17,7 +17,7 @@ _MOST = 3
 
 
 @dataclass(frozen=True)
-class Evidence(Section):
+class EvidenceSection(Section):
     """
     Residuals without what was named.
 

@@ -18,7 +18,7 @@ _WORST = 6
 
 
 @dataclass(frozen=True)
-class Excitation(Section):
+class ExcitationSection(Section):
     """
     Condition number and the combinations of parameters that are known worst.
 

@@ -19,7 +19,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class JointFit:
+class JointCurves:
     """One joint of one recording, drawn."""
 
     name: str
@@ -29,12 +29,12 @@ class JointFit:
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownRecording:
     """A recording whose curves are drawn."""
 
     source: str
     role: str
-    joints: Sequence[JointFit]
+    joints: Sequence[JointCurves]
 
 
 @dataclass(frozen=True)
@@ -146,16 +146,16 @@ class FitSection(Section):
         return not all(bool(fit.informative.all()) for fits in groups for fit in fits)
 
     @property
-    def shown(self) -> list[Shown]:
+    def shown(self) -> list[ShownRecording]:
         """The worst held-out recording, and the worst of the training data."""
         chosen = []
         for role, group in (('held-out', self.validation), ('training', self.training)):
             if group:
                 worst = max(group, key=lambda name: Score.of(group[name]).relative_error_percent)
-                chosen.append(Shown(worst, role, self._joints(worst, group[worst], role)))
+                chosen.append(ShownRecording(worst, role, self._joints(worst, group[worst], role)))
         return chosen
 
-    def _joints(self, source: str, fits: Sequence[Fit], role: str) -> list[JointFit]:
+    def _joints(self, source: str, fits: Sequence[Fit], role: str) -> list[JointCurves]:
         score = Score.of(fits)
         drawn = []
         for joint, name in enumerate(self.robot.joints):
@@ -163,7 +163,7 @@ class FitSection(Section):
             percent = digits(score.joint_relative_error_percent[joint])
             summary = f'residual {digits(score.rms[joint])} {unit} rms, {percent} %'
             torque, residual = fit_charts(fits, joint, unit, f'{role}-{joint}')
-            drawn.append(JointFit(name, summary, torque, residual))
+            drawn.append(JointCurves(name, summary, torque, residual))
         return drawn
 
 

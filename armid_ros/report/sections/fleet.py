@@ -101,7 +101,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Curves(Section):
+class ParameterCurves(Section):
     """All parameters of an arm over time, those that have changed first."""
 
     title: ClassVar[str] = 'Parameters over time'
@@ -119,7 +119,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """Cells, and the name of the row within the page; empty for none."""
 
     cells: Sequence[Cell]
@@ -131,7 +131,7 @@ class _Table(Section):
     template: ClassVar[str] = 'fleet_table.html'
 
     heads: Sequence[str]
-    rows: Sequence[Row]
+    rows: Sequence[TableRow]
     numbers: Sequence[int] = ()
     hint: str = ''
 

@@ -20,7 +20,7 @@ _LINK = 'time'
 
 
 @dataclass(frozen=True)
-class Contents(Section):
+class ContentsSection(Section):
     """Topics of the bag, and how it is sampled."""
 
     title: ClassVar[str] = 'What is in it'
@@ -68,7 +68,7 @@ class JointTable(Section):
 
 
 @dataclass(frozen=True)
-class Curves(Section):
+class RecordingCurves(Section):
     """All that was recorded, over time."""
 
     title: ClassVar[str] = 'Curves'

@@ -18,7 +18,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Row:
+class ParameterRow:
     """
     One parameter.
 
@@ -84,7 +84,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Parameters(Section):
+class ParameterSection(Section):
     """
     Every parameter against the description's.
 
@@ -116,14 +116,14 @@ class Parameters(Section):
         return found
 
     @property
-    def families(self) -> Sequence[tuple[str, str, Sequence[Row]]]:
+    def families(self) -> Sequence[tuple[str, str, Sequence[ParameterRow]]]:
         """Heading, unit and rows of each kind."""
         names, values = self.estimate.parameters, self.estimate.values
         reach = HALF_WIDTH * self.estimate.std
         families = []
         for title, members in parameter_families(names).items():
             rows = [
-                Row(
+                ParameterRow(
                     names[k].name,
                     names[k].joint,
                     pretty(names[k].unit),

@@ -14,7 +14,7 @@ from armid_ros.report.page import Section
 
 
 @dataclass(frozen=True)
-class Patch(Section):
+class PatchSection(Section):
     """
     What was added to the model, to be read and to be copied.
 

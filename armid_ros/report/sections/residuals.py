@@ -23,7 +23,7 @@ _CLOUD = 500
 
 
 @dataclass(frozen=True)
-class JointResidual:
+class JointResidualView:
     """The residual of one joint against its speed, its position and its load."""
 
     name: str
@@ -61,11 +61,11 @@ class Residuals(Section):
     role: str
 
     @property
-    def joints(self) -> list[JointResidual]:
+    def joints(self) -> list[JointResidualView]:
         """Every joint, in the order of the robot."""
         return [self._joint(joint) for joint in range(self.robot.n_joints)]
 
-    def _joint(self, joint: int) -> JointResidual:
+    def _joint(self, joint: int) -> JointResidualView:
         used = np.concatenate([fit.informative[:, joint] for fit in self.fits])
         residual = np.concatenate([fit.residual[:, joint] for fit in self.fits])[used]
         torque = torque_unit(self.robot, joint)
@@ -80,7 +80,7 @@ class Residuals(Section):
             for parts, xlabel in axes
         ]
         shares = explained_shares(self.fits, joint)
-        return JointResidual(self.robot.joints[joint], tuple(shares.items()), charts)
+        return JointResidualView(self.robot.joints[joint], tuple(shares.items()), charts)
 
 
 def cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Chart:

@@ -12,7 +12,7 @@ from armid_ros.report.page import Section
 
 
 @dataclass(frozen=True)
-class Verdict(Section):
+class VerdictSection(Section):
     """
     The sentence that a reader takes away.
 

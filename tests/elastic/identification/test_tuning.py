@@ -23,6 +23,8 @@ import pytest
 
 from benchmarks.elastic import errors, steps, tuning
 
+pytestmark = pytest.mark.slow
+
 LOOP = two_link_loop(two_link_set('after'))
 START = two_link_set('before').parameters
 

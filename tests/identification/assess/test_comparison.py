@@ -6,7 +6,7 @@ import json
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.comparison import compare
-from armid_ros.identification.parameters_file import Parameters, read_parameters
+from armid_ros.identification.parameters_file import ParameterFile, read_parameters
 import numpy as np
 import pytest
 
@@ -16,7 +16,7 @@ SYMBOLS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
 def parameters(values, std, source='a'):
     names = [ParameterName(f'Izz{k + 1}', f'joint_{k + 1}', 'kg m^2') for k in range(len(values))]
     table = {name: (float(v), float(s)) for name, v, s in zip(names, values, std, strict=True)}
-    return Parameters(source, 'arm', table, 5.0)
+    return ParameterFile(source, 'arm', table, 5.0)
 
 
 def test_a_list_of_changes_is_free_of_chance_finds_in_19_of_20_cases():
@@ -71,7 +71,7 @@ def drawn(rng, names, truth, covariance, terms=None):
     values = rng.multivariate_normal(truth, covariance)
     std = np.sqrt(np.diag(covariance))
     table = {n: (float(v), float(s)) for n, v, s in zip(names, values, std, strict=True)}
-    return Parameters('a', 'arm', table, 5.0, covariance, terms or {})
+    return ParameterFile('a', 'arm', table, 5.0, covariance, terms or {})
 
 
 FRICTION = [ParameterName(f'coefficient_{k}', 'elbow', 'N m') for k in range(4)]
@@ -93,7 +93,7 @@ def test_what_no_parameter_shows_alone_all_of_a_joint_do():
     """Two coefficients that only their sum is known of, which changes."""
     covariance = np.array([[1.0, -0.9999], [-0.9999, 1.0]])
     before, after = (
-        Parameters(source, 'arm', dict.fromkeys(FRICTION[:2], (value, 1.0)), 5.0, covariance)
+        ParameterFile(source, 'arm', dict.fromkeys(FRICTION[:2], (value, 1.0)), 5.0, covariance)
         for source, value in (('a', 0.0), ('b', 0.1))
     )
     comparison = compare(before, after)
@@ -124,7 +124,7 @@ def test_a_motion_that_shows_less_is_compared_with_one_that_shows_more():
     """One that shows a sum only, against one that shows both; and the other way round."""
     both = [ParameterName(name, 'elbow', 'kg m') for name in ('mx1', 'my1')]
     together = ParameterName('mx1 + 2 my1', 'elbow', 'kg m')
-    rich = Parameters(
+    rich = ParameterFile(
         'a',
         'arm',
         {both[0]: (1.0, 0.1), both[1]: (2.0, 0.1)},
@@ -132,7 +132,7 @@ def test_a_motion_that_shows_less_is_compared_with_one_that_shows_more():
         0.01 * np.eye(2),
         {name: {name.name: 1.0} for name in both},
     )
-    poor = Parameters(
+    poor = ParameterFile(
         'b',
         'arm',
         {together: (7.0, 0.3)},
@@ -167,7 +167,7 @@ class TestRefusals:
     """What cannot be compared is refused by name."""
 
     def test_nothing_in_common(self):
-        other = Parameters('b', 'arm', {ParameterName('x', '', 'm'): (0.0, 1.0)}, None)
+        other = ParameterFile('b', 'arm', {ParameterName('x', '', 'm'): (0.0, 1.0)}, None)
         with pytest.raises(ModelError, match='a and b have no identified parameter in common'):
             compare(parameters([1.0], [0.1]), other)
 

@@ -69,6 +69,7 @@ def test_the_bias_of_encoder_noise_goes_away(arm, motion, method):
     assert unbiased < 0.4 * plain
 
 
+@pytest.mark.slow
 def test_output_error_is_biased_less_by_encoder_noise_than_least_squares(arm, motion):
     plain, simulated = (
         torque_error(arm, motion, method, 0.05, 3e-4) for method in ('wls', 'cloe')

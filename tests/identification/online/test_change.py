@@ -132,7 +132,10 @@ RATE = 200.0
     [
         ('payload:' + changes.ball(0.3), 30.0, 'payload', 0.3),
         ('coulomb_friction@shoulder_pitch:coulomb_torque=0.1', 30.0, 'coulomb_friction', 0.1),
-        ('coulomb_friction@elbow_pitch:coulomb_torque=0.08', 60.0, 'coulomb_friction', 0.08),
+        pytest.param(
+            *('coulomb_friction@elbow_pitch:coulomb_torque=0.08', 60.0, 'coulomb_friction', 0.08),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_change_in_mid_motion_is_seen_and_nothing_else_forgotten(change, before, name, truth):
@@ -161,6 +164,7 @@ def test_a_change_in_mid_motion_is_seen_and_nothing_else_forgotten(change, befor
     assert np.all(moved < 4.0 * known.std[others])
 
 
+@pytest.mark.slow
 def test_work_without_a_change_raises_no_alarm():
     assert not changes.watch(changes.unchanging(2, 1, RATE)).changes
 

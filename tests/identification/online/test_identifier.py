@@ -113,6 +113,7 @@ def test_friction_is_found_without_noise(arm, clean, motion):
             assert found == pytest.approx(value, rel=0.02), (name, joint)
 
 
+@pytest.mark.slow
 def test_estimates_scatter_as_their_covariance_says(arm, motion, tau):
     """Chi-square of the errors of 8 noises, and every parameter within its own interval."""
     total, outside, count = 0.0, 0, 0
@@ -132,6 +133,7 @@ def test_estimates_scatter_as_their_covariance_says(arm, motion, tau):
     assert outside <= 0.01 * count + 2
 
 
+@pytest.mark.slow
 def test_unknown_noise_is_found_from_the_residuals(arm, motion, tau):
     rng = np.random.default_rng(1)
     noisy = tau + NOISE * rng.normal(size=tau.shape)
@@ -181,6 +183,7 @@ def test_an_arm_at_rest_teaches_nothing_it_could_unlearn(arm, motion, tau):
     np.testing.assert_array_equal(after.covariance, before.covariance)
 
 
+@pytest.mark.slow
 def test_an_arm_without_dry_friction_learns_at_rest_and_does_not_drift(arm, motion):
     rng = np.random.default_rng(4)
     rigid = ArmModel(arm.robot)
@@ -251,7 +254,7 @@ def test_jitter_does_not_spoil_the_estimate(arm):
     assert not online.rejected and not online.restarts
 
 
-@pytest.mark.parametrize('rate', [125.0, 2000.0])
+@pytest.mark.parametrize('rate', [125.0, pytest.param(2000.0, marks=pytest.mark.slow)])
 def test_other_sampling_rates(arm, rate):
     motion = multisine(arm.robot, 20.0, rate=rate)
     online = identifier(arm)
@@ -304,6 +307,7 @@ def test_before_any_motion_the_model_is_the_one_given(arm):
     assert online.delay is None
 
 
+@pytest.mark.slow
 def test_reset_forgets_everything(arm, motion, tau, clean):
     online = identifier(arm)
     feed(online, motion.t[:2000], motion.q[:2000], tau[:2000])

@@ -8,7 +8,11 @@ from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.ties.poses import choose_poses, stiffness_bound
-from armid_ros.identification.ties.problem import interaction_problem, InteractionProblem
+from armid_ros.identification.ties.problem import (
+    interaction_problem,
+    InteractionProblem,
+    MachineNoise,
+)
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.search import find_interaction
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
@@ -52,11 +56,9 @@ def percent(found: Interaction) -> np.ndarray:
 @pytest.mark.parametrize('separate', [False, True])
 def test_exact_data_give_exact_stiffness(pair, poses, inertias, separate) -> None:
     problem = interaction_problem(
-        pair.robot,
+        pair.machines,
         poses.own,
-        pair.other,
         poses.other,
-        pair.ties,
         inertias=inertias,
         separate=separate,
     )
@@ -99,9 +101,7 @@ def test_recordings_need_not_begin_together(pair, seconds) -> None:
     own, other = measured(seconds, 0.05, np.random.default_rng(0))
     late = other.select(slice(700, None))
     late = recorded(replace(late, t=late.t - late.t[0]), start_ns=700 * 10**6)
-    found = identify_interaction(
-        recorded_interaction_problem(pair.robot, recorded(own), pair.other, late, pair.ties)
-    )
+    found = identify_interaction(recorded_interaction_problem(pair.machines, recorded(own), late))
     assert abs(percent(found)[0]) < 0.5
 
 
@@ -121,16 +121,15 @@ def test_without_springs_none_are_found(pair) -> None:
 
 def test_data_that_cannot_tell_are_refused(pair, poses) -> None:
     same = replace(poses.own, q=poses.other.q)
-    problem = interaction_problem(pair.robot, same, pair.other, poses.other, pair.ties[:1])
+    one = replace(pair.machines, ties=pair.ties[:1])
+    problem = interaction_problem(one, same, poses.other)
     with pytest.raises(IdentificationError, match='nothing shows it'):
         identify_interaction(problem)
     with pytest.raises(IdentificationError, match='no torques'):
-        interaction_problem(
-            pair.robot, poses.own.with_torque(None), pair.other, poses.other, pair.ties
-        )
+        interaction_problem(pair.machines, poses.own.with_torque(None), poses.other)
     with pytest.raises(IdentificationError, match='one time base'):
         shifted = replace(poses.other, t=poses.other.t + 0.1)
-        interaction_problem(pair.robot, poses.own, pair.other, shifted, pair.ties)
+        interaction_problem(pair.machines, poses.own, shifted)
 
 
 def two_sides(pair: TiedPair, seed: int) -> tuple[Recording, Recording]:
@@ -159,6 +158,7 @@ def test_no_springs_no_name(pair) -> None:
     assert found.interaction is None
 
 
+@pytest.mark.slow
 def test_deviations_that_are_stated_are_those_of_repeats(pair) -> None:
     """The scatter of one stiffness over 150 draws, within what so many draws can tell."""
     poses = with_torques(pair, stepping(pair, read_gait(), np.linspace(0.0, 1.8, 101)[:-1]))
@@ -170,6 +170,7 @@ def test_deviations_that_are_stated_are_those_of_repeats(pair) -> None:
     assert low < ratio < high
 
 
+@pytest.mark.slow
 def test_deviations_of_a_recording_allow_for_samples_that_filters_make_alike(pair) -> None:
     """As if rows were independent they would be a third too small, half of the variance."""
     short = with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 3.0, 1e-3)))
@@ -185,7 +186,7 @@ def test_inertias_of_links_that_hardly_turn_stay_near_their_description(pair) ->
     real = leg_pair(3e3, ('stance_thigh',))
     own, other = two_sides(real, 9)
     problem = recorded_interaction_problem(
-        pair.robot, own, pair.other, other, pair.ties, inertias='free', separate=True
+        pair.machines, own, other, inertias='free', separate=True
     )
     found = identify_interaction(problem)
     away = found.estimate.values - problem.described
@@ -225,12 +226,10 @@ def exact(pair: TiedPair, motions: PairMotion) -> tuple[InteractionProblem, np.n
     """Return the regression of four springs and free inertias, and its exact solution."""
     own, other = with_torques(pair, motions)
     problem = interaction_problem(
-        pair.robot,
+        pair.machines,
         own,
-        pair.other,
         other,
-        pair.ties,
-        position_noise=np.radians(0.05),
+        noise=MachineNoise(np.radians(0.05)),
         inertias='free',
         separate=True,
     )

@@ -4,7 +4,6 @@
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.tables import (
-    Column,
     ColumnSettings,
     measured,
     name_in_file,
@@ -12,6 +11,7 @@ from armid_ros.recording.tables import (
     plan,
     renamed,
     Table,
+    TableColumn,
 )
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from .conftest import JOINTS
 def table(**columns):
     """Return a table of columns by name, with time where there is none."""
     columns = {'t': np.arange(50) * 0.01, **columns}
-    return Table('run.csv', tuple(Column(name, values) for name, values in columns.items()))
+    return Table('run.csv', tuple(TableColumn(name, values) for name, values in columns.items()))
 
 
 def ramps(*names):
@@ -46,7 +46,7 @@ def test_numbers_are_in_order_even_beyond_nine():
 
 
 def test_spans_name_columns_of_a_larger_array():
-    columns = tuple(Column(f'[{k}]', np.linspace(0, k + 1, 50), '[]') for k in range(9))
+    columns = tuple(TableColumn(f'[{k}]', np.linspace(0, k + 1, 50), '[]') for k in range(9))
     said = ColumnSettings(time='[0]', position='[1..2]', effort='[7..8]', velocity='none')
     recording = measured(plan(Table('run.npy', columns), said, JOINTS))
     np.testing.assert_allclose(recording.q[-1], [2, 3])
@@ -84,11 +84,11 @@ def test_elements_of_a_state_vector_are_told_apart_by_their_endings():
     """As LeRobot names them; what was commanded stands beside what was measured."""
     names = [f'{joint}.{kind}' for joint in JOINTS for kind in ('pos', 'vel', 'torque')]
     columns = [
-        Column(f'observation.state[{name}]', np.linspace(0, k + 1, 50), 'observation.state')
+        TableColumn(f'observation.state[{name}]', np.linspace(0, k + 1, 50), 'observation.state')
         for k, name in enumerate(names)
     ]
     columns += [
-        Column(f'action[{joint}.pos]', np.linspace(0, 9, 50), 'action') for joint in JOINTS
+        TableColumn(f'action[{joint}.pos]', np.linspace(0, 9, 50), 'action') for joint in JOINTS
     ]
     for joints in (JOINTS, None):
         settled = plan(Table('set', tuple(columns), rate_hz=50.0), ColumnSettings(), joints)

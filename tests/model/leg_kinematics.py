@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A seven-link body in the sagittal plane, as the human-exoskeleton leg pair is described.
+A seven-link body in the sagittal plane by the formulas of its source, to hold robots against.
 
 Links 1 to 7: stance foot, stance shank, stance thigh, trunk, swing thigh, swing shank, swing foot.
 The origin is the toe of the stance foot, x forward, y up. All angles are anatomical [rad]:
@@ -156,29 +156,6 @@ def leg_frames(angles: LegAngles, lengths: LegLengths) -> FloatArray:
         frame = frame @ _dh(float(theta), a, -1.0 if turned else 1.0)
         frames[number] = frame
     return frames
-
-
-def trunk_shares(
-    trunk: FloatArray, swing_thigh: FloatArray, stance_thigh: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """
-    Split the trunk's mass between the legs by the distances of their thighs, (20) to (22).
-
-    Parameters
-    ----------
-    trunk, swing_thigh, stance_thigh : ndarray, shape (..., 2)
-        Centroids [m].
-
-    Returns
-    -------
-    swing, stance : ndarray, shape (...)
-        Shares that add to 1; the leg whose thigh is nearer carries more.
-
-    """
-    to_swing = np.linalg.norm(swing_thigh - trunk, axis=-1)
-    to_stance = np.linalg.norm(stance_thigh - trunk, axis=-1)
-    swing = np.asarray(to_stance / (to_swing + to_stance))
-    return swing, 1.0 - swing
 
 
 def _vector(x: FloatArray, y: FloatArray) -> FloatArray:

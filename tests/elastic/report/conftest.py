@@ -1,0 +1,7 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The browser that looks at pages."""
+
+from tests.report.conftest import browser
+
+__all__ = ['browser']

@@ -1,0 +1,80 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Functions that can be read at a sight, and names that stand for one thing."""
+
+import ast
+from collections import defaultdict
+
+import pytest
+
+MOST_LINES, MOST_PARAMETERS = 60, 8
+#: What is longer or takes more, until it is mended; nothing may be added.
+LONG = {'diagnosis/diagnose.py:diagnose', 'diagnosis/diagnose.py:_said'}
+MANY = {
+    'api/diagnosis.py:diagnose',  # what a user types is spelled out
+    'api/identification.py:identify',
+    'excitation/design.py:design',
+    'excitation/design.py:design_speeds',
+    'identification/estimators/side_by_side.py:compare_methods',
+    'nodes/lockstep.py:run_lockstep',
+    'report/diagnosis_report.py:diagnosis_report',
+}
+TWICE = {'Beside', 'Evidence', 'Floor', 'Misfit', 'Problem', 'Question'}
+
+
+@pytest.fixture(scope='module')
+def trees(root):
+    """Return every module of the package, parsed, by its path within it."""
+    package = root / 'armid_ros'
+    return {
+        path.relative_to(package).as_posix(): ast.parse(path.read_text())
+        for path in package.rglob('*.py')
+    }
+
+
+def functions(trees):
+    """Yield the place of every function, and the function."""
+    for place, tree in trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                yield f'{place}:{node.name}', node
+
+
+def lines_of(function):
+    """Count the lines of a function without its docstring."""
+    count = function.end_lineno - function.lineno + 1
+    if ast.get_docstring(function):
+        first = function.body[0]
+        count -= first.end_lineno - first.lineno + 1
+    return count
+
+
+def parameters_of(function):
+    """List the parameters of a function but for the object that a method is of."""
+    given = function.args
+    names = [one.arg for one in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
+    return names[1:] if names[:1] in (['self'], ['cls']) else names
+
+
+def test_no_function_is_longer_than_a_screen(trees):
+    found = {place for place, one in functions(trees) if lines_of(one) > MOST_LINES}
+    assert found <= LONG
+
+
+def test_no_function_takes_more_parameters_than_can_be_remembered(trees):
+    found = {place for place, one in functions(trees) if len(parameters_of(one)) > MOST_PARAMETERS}
+    assert found <= MANY
+
+
+def test_a_public_class_has_its_name_alone(trees):
+    places = defaultdict(set)
+    for place, tree in trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith('_'):
+                places[node.name].add(place)
+    twice = {
+        name: sorted(where)
+        for name, where in places.items()
+        if len(where) > 1 and not all(one.startswith('diagnosis/') for one in where)
+    }
+    assert {name: where for name, where in twice.items() if name not in TWICE} == {}
