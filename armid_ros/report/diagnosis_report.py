@@ -89,7 +89,7 @@ def diagnosis_report(
     names = short_names([one.source for every in read.values() for one in every])
     sections: list[Section] = [
         _verdict(diagnosis, names),
-        *_story(diagnosis, names),
+        *_story(diagnosis, names, residual),
         *([] if residual is None else [ResidualMap(residual)]),
         NextSteps(_next_steps(diagnosis, next_run)),
         *_small_print(diagnosis, settings),
@@ -119,12 +119,14 @@ def _verdict(diagnosis: Diagnosis, names: Mapping[str, str]) -> Verdict:
     return Verdict(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)
 
 
-def _story(diagnosis: Diagnosis, names: Mapping[str, str]) -> list[Section]:
+def _story(
+    diagnosis: Diagnosis, names: Mapping[str, str], residual: Residual | None
+) -> list[Section]:
     """Return what a person wants to know: where, which, how much, and the curves that show it."""
     if diagnosis.gap is None:
         return []
     robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
-    sections: list[Section] = [Story(diagnosis)]
+    sections: list[Section] = [Story(diagnosis, residual)]
     if patched:
         sections += [Shares(diagnosis), NamedParameters(diagnosis.findings)]
     sections += [
