@@ -91,7 +91,7 @@ def diagnosis_report(
         _verdict(diagnosis, names),
         *_story(diagnosis, names, residual),
         *([] if residual is None else [ResidualMap(residual)]),
-        NextSteps(_next_steps(diagnosis, next_run)),
+        NextSteps([*_next_steps(diagnosis, next_run), *_of_maps(residual)]),
         *_small_print(diagnosis, settings),
     ]
     if forward:
@@ -161,6 +161,19 @@ def _quality(recording: Recording, role: str, names: Mapping[str, str]) -> Recor
 def _renamed(pair: ForwardValidation, names: Mapping[str, str]) -> ForwardValidation:
     after = replace(pair.after, source=names.get(pair.after.source, pair.after.source))
     return replace(pair, after=after)
+
+
+def _of_maps(residual: Residual | None) -> list[str]:
+    steps = []
+    for one in () if residual is None else residual.joints:
+        if one.law is None:
+            steps.append(f'Look at {one.joint} where its map is strong: gear, cables, stops.')
+        else:
+            steps.append(
+                f'If {one.law.text} makes sense for {one.joint}, write it as an effect of your '
+                'own and diagnose again.'
+            )
+    return steps
 
 
 def _next_steps(diagnosis: Diagnosis, next_run: NextRun | None) -> list[str]:

@@ -121,7 +121,11 @@ class Residual:
 
 
 def _sentence(one: JointResidual) -> str:
-    alone = '' if one.held_out is None else f' ({percent_of(one.held_out)} of held-out recordings)'
+    alone = ''
+    if one.held_out is not None:
+        alone = f' ({percent_of(one.held_out)} of held-out recordings)'
+        if one.held_out < 0.0:
+            alone = ' (held-out recordings get worse: they go beyond its data)'
     like = 'no law of few terms'
     if one.law is not None:
         like = f'{one.law.text} ({percent_of(one.law.share)})'

@@ -124,6 +124,17 @@ def test_the_page_says_what_is_in_the_model_that_is_written(unknown):
     assert f'what was learned of {joint}' in page
     assert f'{joint}: the map predicts' in page
     assert 'what was learned of' not in plain
+    begin, end = page.index('>What to do next</h2>'), page.index('>Data quality</h2>')
+    assert joint in page[begin:end]
+
+
+def test_a_map_that_harms_held_out_recordings_says_so(unknown):
+    learned = learn_residual(replace(unknown, verdict='unknown'), np.random.default_rng(0))
+    harmful = replace(learned, joints=(replace(learned.joints[0], held_out=-140.0),))
+    assert 'held-out recordings get worse' in harmful.sentences()[0]
+    page = diagnosis_report(unknown, robot='two_links', recordings=(), residual=harmful)
+    assert '>worse<' in page
+    assert '-14000' not in page
 
 
 def test_small_systems_are_solved_in_one_thread(unknown, monkeypatch):

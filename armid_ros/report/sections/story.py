@@ -42,12 +42,13 @@ class Story(Section):
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Joints to be pointed out: those of the causes, or else those with the gap."""
+        """Joints to be pointed out: those of the causes, or else the one with the gap."""
         robot = self.diagnosis.arm.robot
         if self.diagnosis.findings:
             named = [joint for one in self.diagnosis.findings for joint in one.joints or ()]
             return tuple(joint for joint in robot.joints if joint in named)
-        return tuple(place.joint for place in self.diagnosis.where[:1])
+        found = [place.joint for place in self.diagnosis.where] + [m.joint for m in self._maps]
+        return tuple(found[:1])
 
     @property
     def whole_arm(self) -> bool:
@@ -97,7 +98,9 @@ class Story(Section):
             rest = sum(place.share_of_gap for place in places[_JOINTS:])
             others = ', '.join(place.joint for place in places[_JOINTS:])
             lines.append(f'{others}: {percent(rest)}')
-        return lines or ['No joint has a gap.']
+        if lines or self.diagnosis.verdict == 'consistent':
+            return lines or ['No joint has a gap.']
+        return ['No joint is far above the floor.']
 
     def _which(self) -> list[str]:
         causes = [_cause(finding) for finding in self.diagnosis.findings] or ['Nothing is named.']
