@@ -95,7 +95,7 @@ class Walk(Section):
 
     @property
     def held(self) -> tuple[str, str]:
-        """The largest moment that keeps a trunk at its lean, of the machine and its wearer [N m]."""
+        """The largest moments that keep trunks at their lean, machine and wearer [N m]."""
         own, other = (
             f'{np.abs(self.cycle.trunk_moment(other=other)).max():.0f}' for other in (False, True)
         )
