@@ -31,9 +31,10 @@ import numpy as np
 from benchmarks import real_recordings
 from benchmarks.estimators import multisine
 from benchmarks.offline_speed import CUTOFF_HZ, DECIMATION, motion, panda
+from tests.hidden.lived.arms import load_arm
 
-#: Shipped arms that are simulated.
-SIMULATED = ('humanoid_arm',)
+#: Arms that are simulated: published descriptions, and drawn ones.
+SIMULATED = ('humanoid', 'ur5', 'panda', 'z1', 'drawn-6-0', 'drawn-4-0')
 FRICTION = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 
 
@@ -93,7 +94,7 @@ def held_out(name, data, effects):
 
 def simulated(name):
     """Print the same of a simulated arm whose links are not as described, in masses by 20 %."""
-    robot, rng = load_robot(name), np.random.default_rng(0)
+    robot, rng = load_arm(name), np.random.default_rng(0)
     factors = np.repeat(rng.uniform(0.8, 1.2, robot.n_joints), 10)
     arm = ArmModel(robot)
     for effect in FRICTION:
@@ -111,10 +112,10 @@ def simulated(name):
         tau=tau + noise * rng.normal(size=tau.shape),
         source=name,
     )
-    compared(name, arm, recording)
+    compared(name, arm, recording, true.robot)
 
 
-def compared(name, arm, recording):
+def compared(name, arm, recording, true=None):
     """Print the error on the last third of a recording, and the masses."""
     robot = arm.robot
     cut = 2 * len(recording.t) // 3
@@ -123,14 +124,20 @@ def compared(name, arm, recording):
     free, bodies = (Score.of(r.predict([rest])).relative_error_percent for r in results)
     least = min(link.eigenvalues[0] for link in results[1].physical.links)
     print(
-        f'{name:8s} held out {free:6.2f} %, among bodies {bodies:6.2f} % '
+        f'{name:9s} held out {free:6.2f} %, among bodies {bodies:6.2f} % '
         f'({100 * (bodies / free - 1):+.1f} %, wanted +3 % or less), least eigenvalue '
         f'{least:.2g}, {seconds[1] - seconds[0]:+.1f} s'
     )
     low, high = masses(robot, results[1])
     held = ', '.join(results[1].physical.active) or 'none'
+    if true is not None:
+        print(
+            '{:9s} masses over true ones from {:.2f} to {:.2f}'.format(
+                '', *masses(true, results[1])
+            )
+        )
     print(
-        f'{"":8s} masses over described ones from {low:.2f} to {high:.2f}; weight of the prior '
+        f'{"":9s} masses over described ones from {low:.2f} to {high:.2f}; weight of the prior '
         f'{results[1].physical.weight:.0e}; at the limit of a body: {held}',
         flush=True,
     )

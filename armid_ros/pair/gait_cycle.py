@@ -7,7 +7,7 @@ Joints move as a walkable gait prescribes and trunks keep their lean; where the 
 from what acts: weight, springs between the two, and the ground at both heels and toes, (27). So
 feet strike and leave the ground when they do, and nobody says which leg stands. The torques are
 those of Newton and Euler with all of these forces; what is left on the hips is nothing, and what
-is left on the trunk is what keeps it from falling over.
+is left on the trunk is a moment from outside that keeps it from falling over.
 
 """
 
@@ -72,6 +72,12 @@ class GaitCycle:
         """Return the force on the right and on the left foot, shape (N, 2, 2) [N]."""
         ground = self.other_ground if other else self.ground
         return np.asarray(ground.reshape(-1, 2, 2, 2).sum(axis=2))
+
+    def trunk_moment(self, *, other: bool = False) -> FloatArray:
+        """Return the moment from outside that keeps the trunk at its lean, shape (N,) [N m]."""
+        robot = self.pair.other if other else self.pair.robot
+        tau = self.torques.other_tau if other else self.torques.tau
+        return np.asarray(tau[:, floating(robot)[2]])
 
     def support(self, *, other: bool = False) -> npt.NDArray[np.int_]:
         """Return how many feet bear weight, shape (N,)."""

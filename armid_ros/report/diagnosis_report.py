@@ -89,9 +89,9 @@ def diagnosis_report(
     names = short_names([one.source for every in read.values() for one in every])
     sections: list[Section] = [
         _verdict(diagnosis, names),
-        *_story(diagnosis, names),
+        *_story(diagnosis, names, residual),
         *([] if residual is None else [ResidualMap(residual)]),
-        NextSteps(_next_steps(diagnosis, next_run)),
+        NextSteps([*_next_steps(diagnosis, next_run), *_of_maps(residual)]),
         *_small_print(diagnosis, settings),
     ]
     if forward:
@@ -119,12 +119,14 @@ def _verdict(diagnosis: Diagnosis, names: Mapping[str, str]) -> VerdictSection:
     return VerdictSection(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)
 
 
-def _story(diagnosis: Diagnosis, names: Mapping[str, str]) -> list[Section]:
+def _story(
+    diagnosis: Diagnosis, names: Mapping[str, str], residual: Residual | None
+) -> list[Section]:
     """Return what a person wants to know: where, which, how much, and the curves that show it."""
     if diagnosis.gap is None:
         return []
     robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
-    sections: list[Section] = [Story(diagnosis)]
+    sections: list[Section] = [Story(diagnosis, residual)]
     if patched:
         sections += [Shares(diagnosis), NamedParameters(diagnosis.findings)]
     sections += [
@@ -159,6 +161,19 @@ def _quality(recording: Recording, role: str, names: Mapping[str, str]) -> Recor
 def _renamed(pair: ForwardValidation, names: Mapping[str, str]) -> ForwardValidation:
     after = replace(pair.after, source=names.get(pair.after.source, pair.after.source))
     return replace(pair, after=after)
+
+
+def _of_maps(residual: Residual | None) -> list[str]:
+    steps = []
+    for one in () if residual is None else residual.joints:
+        if one.law is None:
+            steps.append(f'Look at {one.joint} where its map is strong: gear, cables, stops.')
+        else:
+            steps.append(
+                f'If {one.law.text} makes sense for {one.joint}, write it as an effect of your '
+                'own and diagnose again.'
+            )
+    return steps
 
 
 def _next_steps(diagnosis: Diagnosis, next_run: NextRun | None) -> list[str]:

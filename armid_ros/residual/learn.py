@@ -16,6 +16,7 @@ from armid_ros.effects.learned import as_effect, TorqueMap
 from armid_ros.motion import FloatArray
 from armid_ros.residual.gaussian_process import learn_map
 from armid_ros.residual.law import Law, share_of, suggest_law
+from armid_ros.residual.libraries import one_thread
 from armid_ros.residual.rows import BLOCKS, joint_rows, JointRows
 import numpy as np
 import numpy.typing as npt
@@ -120,7 +121,11 @@ class Residual:
 
 
 def _sentence(one: JointResidual) -> str:
-    alone = '' if one.held_out is None else f' ({percent_of(one.held_out)} of held-out recordings)'
+    alone = ''
+    if one.held_out is not None:
+        alone = f' ({percent_of(one.held_out)} of held-out recordings)'
+        if one.held_out < 0.0:
+            alone = ' (held-out recordings get worse: they go beyond its data)'
     like = 'no law of few terms'
     if one.law is not None:
         like = f'{one.law.text} ({percent_of(one.law.share)})'
@@ -180,11 +185,12 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
         validation = [overlay.trajectory for overlay in gap.overlays]
     every = joint_rows(base, diagnosis.data)
     unseen = joint_rows(base, validation) if validation else [None] * len(every)
-    found = []
-    for joint, rows, other in zip(base.robot.joints, every, unseen, strict=True):
-        one = _learned(joint, rows, other, base, rng)
-        if one is not None:
-            found.append(one)
+    with one_thread():
+        learned = [
+            _learned(joint, rows, other, base, rng)
+            for joint, rows, other in zip(base.robot.joints, every, unseen, strict=True)
+        ]
+    found = [one for one in learned if one is not None]
     if not found:
         return None
     found.sort(key=lambda one: -one.before)

@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
+from armid_ros.model.kinematics import points_motion
 from armid_ros.pair.driven_cycle import check_cycle, driving_torque
 from armid_ros.pair.gait_cycle import weight
 from armid_ros.pair.shares import feet_by_shares, ground_by_shares
-from armid_ros.pair.walkers import floating
+from armid_ros.pair.walkers import contacts, floating, leg_length
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from benchmarks.walking_in_mujoco import walk_in_mujoco
@@ -25,6 +27,30 @@ def test_nothing_holds_the_hips(cycle) -> None:
         (cycle.pair.other, cycle.torques.other_tau),
     ):
         assert np.abs(tau[:, floating(robot)[:2]]).max() < 1e-6 * weight(robot)
+
+
+@pytest.mark.parametrize('other', [False, True])
+def test_the_moment_on_a_trunk_is_what_the_ground_and_the_springs_do_not_give(
+    cycle, other
+) -> None:
+    """Euler, about the centre of mass, with the momentum of Pinocchio."""
+    robot = cycle.pair.other if other else cycle.pair.robot
+    motion = cycle.motions.other if other else cycle.motions.own
+    geometry = cycle.pair.geometry(*cycle.motions)
+    tied = geometry.other_position if other else geometry.other_position + geometry.way
+    pull = -cycle.torques.forces if other else cycle.torques.forces
+    feet = points_motion(robot, *contacts(robot, leg_length(robot)), motion.q)[0]
+    ground = cycle.other_ground if other else cycle.ground
+    data, moment = robot.model.createData(), cycle.trunk_moment(other=other)
+    assert np.abs(moment).max() > 0.1 * weight(robot)
+    for k in range(0, len(motion), 100):
+        change = pin.computeCentroidalMomentumTimeVariation(
+            robot.model, data, motion.q[k], motion.dq[k], motion.ddq[k]
+        )
+        arms = np.concatenate([feet[k], tied[k]]) - data.com[0]
+        upon = np.concatenate([np.insert(ground[k], 1, 0.0, axis=1), pull[k]])
+        given = np.cross(arms, upon).sum(axis=0)[1] + moment[k]
+        assert change.angular[1] == pytest.approx(given, abs=1e-6 * weight(robot))
 
 
 def test_on_average_the_ground_carries_the_weight_of_both(cycle) -> None:

@@ -84,8 +84,11 @@ def fit_rigid(runs: Sequence[ElasticRun], *, cutoff: float = CUTOFF) -> RigidFit
         assert run.motor.tau is not None
         t = run.motor.t
         dt = float(t[-1] - t[0]) / (len(t) - 1)
-        columns = _columns(run)
-        whole = np.concatenate([columns, run.motor.tau[:, :, np.newaxis]], axis=2)
+        # drives hold their torque from one sample to the next: that is half a sample later
+        columns, signs = _columns(run), direction(run.motor.dq)[:-1]
+        between = 0.5 * (columns[:-1] + columns[1:])
+        between[:, [0, 1], [6, 7]] = signs
+        whole = np.concatenate([between, run.motor.tau[:-1, :, np.newaxis]], axis=2)
         sections = butter(4, cutoff, fs=1.0 / dt, output='sos')
         ends = round(_ENDS / dt)
         if len(t) <= 2 * ends + 1:
@@ -103,7 +106,7 @@ def fit_rigid(runs: Sequence[ElasticRun], *, cutoff: float = CUTOFF) -> RigidFit
 
 
 def _columns(run: ElasticRun) -> FloatArray:
-    """Return the derivatives of both torques by the eight parameters, shape (N, 2, 8)."""
+    """Return the derivatives of both torques by the parameters, without Coulomb, (N, 2, 8)."""
     link, motor = run.link, run.motor
     cosine, sine = np.cos(link.q[:, 1]), np.sin(link.q[:, 1])
     (v1, v2), (a1, a2) = link.dq.T, link.ddq.T
@@ -113,10 +116,8 @@ def _columns(run: ElasticRun) -> FloatArray:
     table[:, 0, 2] = cosine * (2.0 * a1 + a2) - sine * (2.0 * v1 * v2 + v2**2)
     table[:, 1, 2] = cosine * a1 + sine * v1**2
     table[:, 1, 3] = a2
-    signs = direction(motor.dq)
     for joint in range(2):
         table[:, joint, 4 + joint] = motor.dq[:, joint]
-        table[:, joint, 6 + joint] = signs[:, joint]
     return table
 
 

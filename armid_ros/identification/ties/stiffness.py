@@ -23,8 +23,10 @@ from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.ties.problem import InteractionProblem
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
+from scipy.optimize import minimize
 
-_ITERATIONS = 100
+#: Steps of Gauss and Newton, and of the quasi-Newton method where they do not lead to the end.
+_ITERATIONS = 30, 300
 #: Solutions of linear equations that lead to where the iteration begins.
 _LINEAR = 4
 #: Iterations that take the torques' noise as the residuals have it.
@@ -120,7 +122,7 @@ def identify_interaction(
     for _ in range(_LINEAR):
         theta = _compensated(problem, theta, used)
         used = _torque_variance(problem, theta) if given is None else given
-    for iteration in range(_ITERATIONS):
+    for iteration in range(_ITERATIONS[0]):
         if given is None and iteration < _SETTLED:  # or the two chase each other
             share = 1.0 / max(1, iteration - _FREE)
             used = (1.0 - share) * used + share * _torque_variance(problem, theta)
@@ -130,10 +132,7 @@ def identify_interaction(
         if step @ information @ step < _CONVERGED**2 * len(step):
             break
     else:
-        raise IdentificationError(
-            'the stiffness does not settle: the angles are too noisy for ways of '
-            f'{1e3 * problem.typical_way:.2g} mm; filter them, or move more'
-        )
+        theta = _along_the_valley(problem, theta, used)
     freedom = max(1, problem.tau.size - len(theta))
     misfit = _misfit(problem, theta, used)
     excess = max(1.0, misfit / freedom)
@@ -207,6 +206,42 @@ def _scaled(
             break
         step, reached = 2.0 * step, further
     return step
+
+
+def _along_the_valley(
+    problem: InteractionProblem, theta: FloatArray, variance: FloatArray
+) -> FloatArray:
+    """
+    Return the solution, from a theta near it, by a quasi-Newton method (BFGS).
+
+    Where noise makes most of a column the loss is a valley much flatter than the information says,
+    in which steps of Gauss and Newton go to and fro. The curvature is learned from the gradients,
+    beginning with the information.
+
+    """
+    _, information, _, _ = _gauss_newton(problem, theta, variance)
+    size = np.sqrt(np.diag(information))
+    root = np.linalg.cholesky(information / np.outer(size, size))
+    unit = np.linalg.inv(root).T / size[:, np.newaxis]  # of one standard deviation each
+
+    def half_loss(z: FloatArray) -> tuple[float, FloatArray]:
+        here = theta + unit @ z
+        step, information, _, _ = _gauss_newton(problem, here, variance)
+        return 0.5 * _loss(problem, here, variance), -unit.T @ information @ step
+
+    found = minimize(
+        half_loss,
+        np.zeros(len(theta)),
+        jac=True,
+        method='BFGS',
+        options={'gtol': _CONVERGED, 'maxiter': _ITERATIONS[1]},
+    )
+    if not np.max(np.abs(found.jac)) < 10.0 * _CONVERGED:
+        raise IdentificationError(
+            'the stiffness does not settle: the angles are too noisy for ways of '
+            f'{1e3 * problem.typical_way:.2g} mm; filter them, or move more'
+        )
+    return np.asarray(theta + unit @ found.x)
 
 
 def _loss(problem: InteractionProblem, theta: FloatArray, variance: FloatArray) -> float:

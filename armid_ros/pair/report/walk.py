@@ -94,6 +94,14 @@ class Walk(Section):
         ]
 
     @property
+    def held(self) -> tuple[str, str]:
+        """The largest moments that keep trunks at their lean, machine and wearer [N m]."""
+        own, other = (
+            f'{np.abs(self.cycle.trunk_moment(other=other)).max():.0f}' for other in (False, True)
+        )
+        return own, other
+
+    @property
     def size(self) -> tuple[int, int, float]:
         """Width and height of the drawing, and where the ground is [px]."""
         return _WIDTH, _HEIGHT, _GROUND

@@ -81,7 +81,7 @@ class ResidualMap(Section):
                 f'{digits(one.before)} {self._unit(one)}',
                 f'{digits(one.after)} {self._unit(one)}',
                 percent(one.gain),
-                '' if one.held_out is None else percent(one.held_out),
+                _alone(one),
                 'none of few terms' if one.law is None else one.law.text,
                 '' if one.law is None else percent(one.law.share),
             )
@@ -120,6 +120,13 @@ class ResidualMap(Section):
             low=f'{digits(dq[0])} {length}/s',
             high=f'{digits(dq[-1])} {length}/s',
         )
+
+
+def _alone(one: JointResidual) -> str:
+    """Return the share of held-out recordings."""
+    if one.held_out is None:
+        return ''
+    return 'worse' if one.held_out < 0.0 else percent(one.held_out)
 
 
 def _image(colour: FloatArray, strength: FloatArray) -> str:

@@ -12,6 +12,7 @@ from armid_ros.diagnosis import Diagnosis, Finding
 from armid_ros.report.arm_picture import ArmPicture, draw_arm
 from armid_ros.report.notation import digits, percent, torque_unit, with_interval
 from armid_ros.report.page import render, Section
+from armid_ros.residual import JointResidual, Residual
 from markupsafe import Markup
 import numpy as np
 
@@ -28,6 +29,8 @@ class Story(Section):
     ----------
     diagnosis : Diagnosis
         What was found.
+    residual : Residual or None
+        What is left without a name, learned.
 
     """
 
@@ -35,15 +38,17 @@ class Story(Section):
     template: ClassVar[str] = 'story.html'
 
     diagnosis: Diagnosis
+    residual: Residual | None = None
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Joints to be pointed out: those of the causes, or else those with the gap."""
+        """Joints to be pointed out: those of the causes, or else the one with the gap."""
         robot = self.diagnosis.arm.robot
         if self.diagnosis.findings:
             named = [joint for one in self.diagnosis.findings for joint in one.joints or ()]
             return tuple(joint for joint in robot.joints if joint in named)
-        return tuple(place.joint for place in self.diagnosis.where[:1])
+        found = [place.joint for place in self.diagnosis.where] + [m.joint for m in self._maps]
+        return tuple(found[:1])
 
     @property
     def whole_arm(self) -> bool:
@@ -93,17 +98,31 @@ class Story(Section):
             rest = sum(place.share_of_gap for place in places[_JOINTS:])
             others = ', '.join(place.joint for place in places[_JOINTS:])
             lines.append(f'{others}: {percent(rest)}')
-        return lines or ['No joint has a gap.']
+        if lines or self.diagnosis.verdict == 'consistent':
+            return lines or ['No joint has a gap.']
+        return ['No joint is far above the floor.']
 
     def _which(self) -> list[str]:
-        return [_cause(finding) for finding in self.diagnosis.findings] or ['Nothing is named.']
+        causes = [_cause(finding) for finding in self.diagnosis.findings] or ['Nothing is named.']
+        return causes + [_likeness(one) for one in self._maps if one.law is not None]
 
     def _patch(self) -> list[str]:
-        names = [finding.name.replace('_', ' ') for finding in self.diagnosis.findings]
-        if not names:
+        diagnosis = self.diagnosis
+        patched = diagnosis.explanation is not None and (
+            diagnosis.arm is diagnosis.explanation.fitted.arm
+        )
+        added = [finding.name.replace('_', ' ') for finding in diagnosis.findings if patched]
+        if self._maps:
+            added.append(f'what was learned of {", ".join(one.joint for one in self._maps)}')
+        if not added:
             return ['The model stays as it was given.']
-        more = ', with its rigid body and friction fitted anew' if self.diagnosis.refitted else ''
-        return [f'model.yaml is the model with {" and ".join(names)}{more}.']
+        fitted = diagnosis.refitted and (patched or not diagnosis.findings)
+        more = ', with its rigid body and friction fitted anew' if fitted else ''
+        return [f'model.yaml is the model with {" and ".join(added)}{more}.']
+
+    @property
+    def _maps(self) -> tuple[JointResidual, ...]:
+        return () if self.residual is None else self.residual.joints
 
     def _gap(self) -> list[str]:
         gap = self.diagnosis.gap
@@ -121,7 +140,7 @@ class Story(Section):
         else:
             change = f'{before} before, {after} after'
         least = f'The floor, {floor}, is {self.diagnosis.baseline}.'
-        return [f'{robot.joints[j]}: {change}, {where}.', least]
+        return [f'{robot.joints[j]}: {change}, {where}.', least, *map(_taken, self._maps)]
 
 
 def _cause(finding: Finding) -> str:
@@ -140,6 +159,17 @@ def _cause(finding: Finding) -> str:
     rivals = ', '.join(name.replace('_', ' ') for name in finding.ambiguous_with)
     doubt = f'; not told from {rivals}' if rivals else ''
     return f'{finding.name.replace("_", " ")}{where}{numbers}; explains {share}{doubt}'
+
+
+def _likeness(one: JointResidual) -> str:
+    """Return the law that what is left of a joint looks like."""
+    assert one.law is not None
+    return f'{one.joint}, without a name: looks like {one.law.text}, {percent(one.law.share)}'
+
+
+def _taken(one: JointResidual) -> str:
+    """Return how much of what is left of a joint its map predicts."""
+    return f'{one.joint}: the map predicts {percent(one.gain)} of what is left without a name.'
 
 
 def _values(finding: Finding) -> Sequence[tuple]:  # type: ignore[type-arg]
