@@ -36,9 +36,11 @@ def excitation():
     return Excitation(random_feasible(ArmModel(ROBOT), limits, 2.0, 3, rng), 1, 0.5)
 
 
-@pytest.fixture
-def arm(bench):
-    return Controller(bench, ROBOT, HOME)
+@pytest.fixture(params=['topic', 'action'])
+def arm(bench, request):
+    arm = Controller(bench, ROBOT, HOME, action=request.param == 'action')
+    yield arm
+    arm.leave()
 
 
 def publisher(bench, arm, excitation, **parameters):
