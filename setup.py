@@ -13,6 +13,7 @@ NODES = (
     'bag_player',
     'excitation_publisher',
     'interaction_identifier',
+    'joint_state_merger',
     'live_diagnosis',
     'online_identifier',
     'recorder',

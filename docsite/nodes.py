@@ -8,6 +8,7 @@ from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode, EXECUTOR
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
+from armid_ros.nodes.joint_state_merger import JointStateMergerNode
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.parameters import NodeParameter
@@ -23,6 +24,7 @@ NODES: dict[str, type[ArmidNode]] = {
     'simulated_arm': SimulatedArmNode,
     'online_identifier': OnlineIdentifierNode,
     'live_diagnosis': LiveDiagnosisNode,
+    'joint_state_merger': JointStateMergerNode,
     'recorder': RecorderNode,
     'bag_player': BagPlayerNode,
     'simulated_pair': SimulatedPairNode,

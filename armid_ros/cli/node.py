@@ -10,6 +10,7 @@ import sys
 
 #: Modules of ROS 2 that the nodes import.
 _ROS = (
+    'action_msgs',
     'builtin_interfaces',
     'diagnostic_msgs',
     'rcl_interfaces',

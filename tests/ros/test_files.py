@@ -15,6 +15,7 @@ from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import EXECUTOR
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
+from armid_ros.nodes.joint_state_merger import JointStateMergerNode
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.recorder import RecorderNode
@@ -29,6 +30,7 @@ NODES = {
     'bag_player': BagPlayerNode,
     'excitation_publisher': ExcitationPublisherNode,
     'interaction_identifier': InteractionIdentifierNode,
+    'joint_state_merger': JointStateMergerNode,
     'live_diagnosis': LiveDiagnosisNode,
     'online_identifier': OnlineIdentifierNode,
     'recorder': RecorderNode,
