@@ -12,6 +12,7 @@ NAME = 'armid_ros'
 NODES = (
     'bag_player',
     'excitation_publisher',
+    'identification_run',
     'interaction_identifier',
     'joint_state_merger',
     'live_diagnosis',

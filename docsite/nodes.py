@@ -7,6 +7,7 @@ from __future__ import annotations
 from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode, EXECUTOR
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
+from armid_ros.nodes.identification_run import IdentificationRunNode
 from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
 from armid_ros.nodes.joint_state_merger import JointStateMergerNode
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
@@ -25,6 +26,7 @@ NODES: dict[str, type[ArmidNode]] = {
     'online_identifier': OnlineIdentifierNode,
     'live_diagnosis': LiveDiagnosisNode,
     'joint_state_merger': JointStateMergerNode,
+    'identification_run': IdentificationRunNode,
     'recorder': RecorderNode,
     'bag_player': BagPlayerNode,
     'simulated_pair': SimulatedPairNode,

@@ -162,7 +162,9 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
 )
 @click.option('--clearance', default=0.01, show_default=True, help='Between links [m].')
 @click.option(
-    '--environment', type=click.Path(path_type=Path), help='YAML with what stands around the arm.'
+    '--environment',
+    type=click.Path(path_type=Path),
+    help='YAML with what stands around the arm, or a planning scene of MoveIt.',
 )
 @click.option(
     '--floor',
@@ -222,7 +224,7 @@ def excite(
     refuse_other_options(click.get_current_context())
     robot = options.open_robot(robot_source, gravity, joints, after)
     collision = collision_model(robot)
-    around = load_environment(environment) if environment else ()
+    around = load_environment(environment, robot) if environment else ()
     ground = find_floor(collision, floor, around)
     around = (*around, *floor_obstacles(collision, ground, clearance))
     if kind in COURSES:

@@ -109,6 +109,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._run: Run | None = None
         self._begun_ns, self._sent_at, self._tracked = 0, -math.inf, -math.inf
         self._trouble = self._rehearsed = ''
+        self._runs, self._outcome = 0, 'none'
         self._rehearsal: Rehearsal | None = None
         self._halt: Halt | None = None
         self._waiting = bool(self.value('start'))
@@ -220,6 +221,7 @@ class ExcitationPublisherNode(ArmidNode):
         )
         receiver = self._controller.begin(message, tolerances)
         self._run = planned
+        self._runs, self._outcome = self._runs + 1, 'complete'  # unless it is stopped
         return self._tell(
             f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
             f'there, sent to {receiver}'
@@ -242,6 +244,8 @@ class ExcitationPublisherNode(ArmidNode):
             'running': int(elapsed is not None),
             'elapsed': elapsed or 0.0,
             'duration': self.duration,
+            'runs': self._runs,
+            'run': 'under way' if elapsed is not None else self._outcome,
         }
         if math.isfinite(self._controller.error):
             values['controller_error'] = self._controller.error
@@ -338,6 +342,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _end_run(self, motion: Motion) -> None:
         self._run = self._rehearsal = None
+        self._outcome = 'stopped'
         self._controller.bring_to_rest(self._stamped(motion, HANDOVER))
         self._expect_rest(float(motion.t[-1] - motion.t[0]) + HANDOVER, 1)
 
@@ -350,7 +355,7 @@ class ExcitationPublisherNode(ArmidNode):
         if not reason:
             self._tell('the controller has reached the end')
             return
-        self._rehearsal = None
+        self._rehearsal, self._outcome = None, 'stopped'
         self._expect_rest(HANDOVER, 1)
         self._say_trouble(f'stopped {elapsed or 0.0:.2f} s after the start: {reason}')
 

@@ -19,6 +19,7 @@ from docsite.blocks import blocks
 NODES = {
     'bag_player',
     'excitation_publisher',
+    'identification_run',
     'interaction_identifier',
     'joint_state_merger',
     'live_diagnosis',
