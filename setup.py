@@ -18,6 +18,7 @@ NODES = (
     'live_diagnosis',
     'online_identifier',
     'recorder',
+    'residual_markers',
     'simulated_arm',
     'simulated_pair',
 )

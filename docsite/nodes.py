@@ -14,6 +14,7 @@ from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.parameters import NodeParameter
 from armid_ros.nodes.recorder import RecorderNode
+from armid_ros.nodes.residual_markers import ResidualMarkersNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.nodes.simulated_pair import SimulatedPairNode
 
@@ -28,6 +29,7 @@ NODES: dict[str, type[ArmidNode]] = {
     'joint_state_merger': JointStateMergerNode,
     'identification_run': IdentificationRunNode,
     'recorder': RecorderNode,
+    'residual_markers': ResidualMarkersNode,
     'bag_player': BagPlayerNode,
     'simulated_pair': SimulatedPairNode,
     'interaction_identifier': InteractionIdentifierNode,

@@ -13,6 +13,7 @@ _ROS = (
     'action_msgs',
     'builtin_interfaces',
     'diagnostic_msgs',
+    'geometry_msgs',
     'rcl_interfaces',
     'rclpy',
     'rosgraph_msgs',
@@ -21,6 +22,7 @@ _ROS = (
     'std_msgs',
     'std_srvs',
     'trajectory_msgs',
+    'visualization_msgs',
 )
 
 

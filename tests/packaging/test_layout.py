@@ -25,6 +25,7 @@ NODES = {
     'live_diagnosis',
     'online_identifier',
     'recorder',
+    'residual_markers',
     'simulated_arm',
     'simulated_pair',
 }

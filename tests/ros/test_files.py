@@ -20,6 +20,7 @@ from armid_ros.nodes.joint_state_merger import JointStateMergerNode
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.recorder import RecorderNode
+from armid_ros.nodes.residual_markers import ResidualMarkersNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.nodes.simulated_pair import SimulatedPairNode
 from armid_ros.robots import load_robot
@@ -36,6 +37,7 @@ NODES = {
     'live_diagnosis': LiveDiagnosisNode,
     'online_identifier': OnlineIdentifierNode,
     'recorder': RecorderNode,
+    'residual_markers': ResidualMarkersNode,
     'simulated_arm': SimulatedArmNode,
     'simulated_pair': SimulatedPairNode,
 }
