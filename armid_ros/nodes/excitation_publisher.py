@@ -146,7 +146,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     @property
     def readers(self) -> int:
-        """Number of subscriptions to joint_trajectory."""
+        """Return the number of subscriptions to joint_trajectory."""
         return self._controller.readers
 
     @property

@@ -108,7 +108,7 @@ class IdentificationRunNode(ArmidNode):
 
     @property
     def failure(self) -> str:
-        """What has failed."""
+        """Say what has failed."""
         return self._failure
 
     def look(self) -> None:

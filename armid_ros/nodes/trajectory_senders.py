@@ -59,7 +59,7 @@ class TrajectorySenders:
 
     @property
     def readers(self) -> int:
-        """Number of subscriptions to the topic."""
+        """Return the number of subscriptions to the topic."""
         return int(self._publisher.get_subscription_count())
 
     @property

@@ -35,6 +35,8 @@ class Programs:
 
 
 class Ended:
+    """A program that has ended."""
+
     def __init__(self, returncode):
         self.returncode = returncode
 

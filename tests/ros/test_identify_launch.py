@@ -36,6 +36,8 @@ def stand_in():
         return SimpleNamespace(args=args, **named)
 
     class LaunchConfiguration:
+        """An argument by name, in a context that is a mapping."""
+
         def __init__(self, name):
             self._name = name
 
