@@ -25,7 +25,7 @@ from armid_ros.excitation import (
     TransferPlanner,
 )
 from armid_ros.excitation.files import load_excitation, read_excitation
-from armid_ros.excitation.supervision import HANDOVER
+from armid_ros.excitation.supervision import HANDOVER, Speedometer
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.excitation_parameters import (
@@ -105,6 +105,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._planner = planner
         self._excitation = excitation.for_joints(planner.arm.robot.joints)
         self._pose = MeasuredPose.unknown(self._excitation.joints)
+        self._speed = Speedometer.unknown(len(self._excitation.joints))
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._run: Run | None = None
         self._begun_ns, self._sent_at, self._tracked = 0, -math.inf, -math.inf
@@ -170,6 +171,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     def look(self) -> None:
         """Begin when somebody listens and the arm is heard of; stop it when it is not any more."""
+        self._controller.look()
         if self.elapsed is not None:
             # while the way was planned nothing was received, whatever the arm sent
             patience = self.value('state_timeout')
@@ -198,7 +200,8 @@ class ExcitationPublisherNode(ArmidNode):
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
-        lost = self._staleness()
+        robot = self._planner.arm.robot
+        lost = self._staleness() or self._speed.fault(robot.joints, robot.position_units)
         if lost:
             raise TrajectoryError(f'{self._states.topic_name}: {lost}; the arm is not started')
         self._trouble, self._rehearsed = '', ''
@@ -293,6 +296,7 @@ class ExcitationPublisherNode(ArmidNode):
         stamp = Time.from_msg(message.header.stamp).nanoseconds
         self._pose = self._pose.updated(message.name, message.position, stamp, self._now())
         now = self._now()
+        self._speed = self._speed.looked(now, self._pose.q)
         elapsed = self.elapsed
         if self._halt is not None:
             self._watch_halt(self._halt, now)

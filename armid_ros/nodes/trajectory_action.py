@@ -23,6 +23,10 @@ from trajectory_msgs.msg import JointTrajectory
 
 #: What a tolerance is that lets a joint be wherever it is; zero leaves it to the controller.
 ANYWHERE = -1.0
+#: How often it is looked whether a controller is known [s].
+_GLANCE = 0.005
+#: How long an answer to a goal may take [s]: a controller checks every waypoint before.
+_ANSWER = 5.0
 #: What control_msgs/action/FollowJointTrajectory calls its error codes.
 _ERRORS = {
     -1: 'the goal is not valid',
@@ -112,6 +116,12 @@ class TrajectoryAction:
         """Whether there is a controller that takes goals."""
         return bool(self._client.server_is_ready())
 
+    def wait(self, patience: float) -> None:
+        """Wait until a controller that offers it is known, at most a time [s]."""
+        deadline = time.monotonic() + patience
+        while not self.ready and time.monotonic() < deadline:
+            time.sleep(_GLANCE)
+
     @property
     def under_way(self) -> bool:
         """Whether a goal was sent that the controller has not ended."""
@@ -141,7 +151,7 @@ class TrajectoryAction:
             self._ask(self._canceller.call_async(CancelGoal.Request()), lambda _: None)
 
     def trouble(self, patience: float) -> str:
-        """Say what is wrong with the controller for longer than a time [s]; empty: nothing."""
+        """Say that the controller has been gone for a time [s], or is silent; empty: neither."""
         goal, now = self._goal, time.monotonic()
         if goal is None:
             return ''
@@ -149,8 +159,8 @@ class TrajectoryAction:
             self._seen = now
         if now - self._seen > patience:
             return f'{self.name} is gone: its controller was stopped or restarted'
-        if goal.handle is None and now - goal.sent > patience:
-            return f'{self.name} did not answer the goal within {patience:g} s'
+        if goal.handle is None and now - goal.sent > _ANSWER:
+            return f'{self.name} did not answer the goal within {_ANSWER:g} s'
         return ''
 
     def settle(self, patience: float) -> None:

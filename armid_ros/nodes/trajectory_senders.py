@@ -9,9 +9,18 @@ from typing import Any
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.nodes.qos import LATCHED, STREAM
-from armid_ros.nodes.trajectory_action import ANYWHERE, beside, find_action, Tolerances
+from armid_ros.nodes.trajectory_action import (
+    ANYWHERE,
+    beside,
+    find_action,
+    Tolerances,
+    TrajectoryAction,
+)
 from rclpy.duration import Duration
 from trajectory_msgs.msg import JointTrajectory
+
+#: How long it takes at most to know an action that somebody offers [s].
+_DISCOVERY = 1.0
 
 
 class TrajectorySenders:
@@ -23,7 +32,8 @@ class TrajectorySenders:
     topic : str
         Full name of the topic.
     action : TrajectoryAction or None
-        None where only the topic is to be used, or control_msgs is not installed.
+        None where only the topic is to be used, nobody has offered the action so far, or
+        control_msgs is not installed.
 
     """
 
@@ -47,15 +57,18 @@ class TrajectorySenders:
         quality = STREAM if node.value('zero_stamp') else LATCHED  # a late one must not begin then
         self._publisher = node.create_publisher(JointTrajectory, 'joint_trajectory', quality)
         self.topic = str(self._publisher.topic_name)
-        self.action, self._kind = None, node.value('interface')
-        if self._kind != 'topic':
-            self.action = find_action(node, node.value('action') or beside(self.topic), on_end)
-        if self._kind == 'action' and self.action is None:
-            raise TrajectoryError(
-                "parameter 'interface' is action, but the package control_msgs is not installed: "
-                'apt install ros-jazzy-control-msgs, or use interface:=topic'
-            )
-        self._by_action = False
+        self._node, self._on_end = node, on_end
+        self._kind = node.value('interface')
+        self._name = node.resolve_topic_name(node.value('action') or beside(self.topic))
+        self.action: TrajectoryAction | None = None
+        self._by_action, self._possible = False, self._kind != 'topic'
+        if self._kind == 'action':
+            self._make_action()
+            if self.action is None:
+                raise TrajectoryError(
+                    "parameter 'interface' is action, but the package control_msgs is not "
+                    'installed: apt install ros-jazzy-control-msgs, or use interface:=topic'
+                )
 
     @property
     def readers(self) -> int:
@@ -68,7 +81,7 @@ class TrajectorySenders:
         if self._has_action:
             return ''
         if self._kind == 'action':
-            return f'no controller offers the action {self.action.name}'
+            return f'no controller offers the action {self._name}'
         return '' if self.readers else f'nobody subscribes to {self.topic}'
 
     @property
@@ -81,6 +94,11 @@ class TrajectorySenders:
         """Largest error of a joint that the controller told of [rad or m]; NaN: none."""
         return float(self.action.error) if self.under_way else float('nan')
 
+    def look(self) -> None:
+        """Make a client of the action as soon as somebody offers it; before it costs nothing."""
+        if self._possible and self.action is None and self._offered:
+            self._make_action()
+
     def begin(self, trajectory: JointTrajectory, tolerances: Tolerances) -> str:
         """
         Send the trajectory of a run, and say where to.
@@ -91,6 +109,9 @@ class TrajectorySenders:
             If it is to go to an action that nobody offers.
 
         """
+        self.look()
+        if self.action is not None and self._offered:
+            self.action.wait(_DISCOVERY)
         if self._kind == 'action' and not self._has_action:
             raise TrajectoryError(f'{self.missing}; the arm is not started')
         self._by_action = self._has_action
@@ -128,6 +149,14 @@ class TrajectorySenders:
         """Let go of the action; nothing is heard of it any more."""
         if self.action is not None:
             self.action.close()
+
+    def _make_action(self) -> None:
+        self.action = find_action(self._node, self._name, self._on_end)
+        self._possible = self.action is not None
+
+    @property
+    def _offered(self) -> bool:
+        return bool(self._node.count_publishers(f'{self._name}/_action/feedback'))
 
     @property
     def _has_action(self) -> bool:

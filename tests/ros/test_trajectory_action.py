@@ -192,6 +192,15 @@ def test_a_controller_that_is_gone_is_said(bench, arm, excitation):
     assert f'/{NAME} is gone' in node.condition()[0]
 
 
+def test_a_controller_that_never_answers_is_said(bench, arm, excitation, monkeypatch):
+    monkeypatch.setattr('armid_ros.nodes.trajectory_action._ANSWER', 0.0)
+    node = publisher(bench, arm, excitation)
+    node.start()
+    node.look()
+    assert f'/{NAME} did not answer the goal within 0 s' in node.condition()[0]
+    assert node.elapsed is None
+
+
 def test_a_controller_that_goes_on_is_told_again(bench, arm, excitation):
     node = begun(bench, arm, excitation)
     arm.run(101.5)
@@ -231,6 +240,7 @@ def test_without_control_msgs_the_action_cannot_be_asked_for(bench, excitation, 
     arm = Controller(bench, ROBOT, HOME)
     monkeypatch.setitem(sys.modules, 'control_msgs.action', None)
     node = publisher(bench, arm, excitation)
+    node.start()
     assert node._controller.action is None
     with pytest.raises(TrajectoryError, match='control_msgs is not installed: apt install'):
         publisher(bench, arm, excitation, interface='action')
