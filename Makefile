@@ -29,6 +29,7 @@ LOCKED := $(PIP) --require-hashes --no-build-isolation
 TREE := $(shell find armid_ros scripts launch config resource -name __pycache__ -prune \
 	-o -print 2>/dev/null)
 MESSAGES := $(shell find msg_schemas -name __pycache__ -prune -o -type f -print)
+INTERFACES := $(shell find tests/interfaces -type f 2>/dev/null)
 
 .DEFAULT_GOAL := all
 .PHONY: all demo test test-all docs fuzz chaos coverage lint bench endurance benchmark lock clean help check
@@ -116,7 +117,7 @@ $(STAMPS)/run: requirements/run.txt requirements/build.txt $(STAMPS)/venv
 	$(LOCKED) -r requirements/run.txt
 	@touch $@
 
-$(STAMPS)/test: requirements/test.txt $(STAMPS)/run
+$(STAMPS)/test: requirements/test.txt $(STAMPS)/run $(STAMPS)/control_msgs
 	$(LOCKED) -r $<
 	@touch $@
 
@@ -127,6 +128,16 @@ $(STAMPS)/bench: requirements/bench.txt $(STAMPS)/run
 $(STAMPS)/armid_msgs: $(MESSAGES) $(STAMPS)/run
 	@echo 'compiling armid_msgs'
 	$(PIP) --no-deps --no-build-isolation --force-reinstall ./msg_schemas
+	@touch $@
+
+# On a robot's computer this comes with ros2_control; there is no wheel of it.
+$(STAMPS)/control_msgs: $(INTERFACES) msg_schemas/present_directories.cmake $(STAMPS)/run
+	@echo 'compiling control_msgs for the tests'
+	PATH='$(abspath $(BIN)):'"$$PATH" cmake --log-level=WARNING -S tests/interfaces \
+		-B build/control_msgs -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_TESTING=OFF -DCMAKE_INSTALL_MESSAGE=NEVER \
+		-DCMAKE_INSTALL_PREFIX='$(abspath $(VENV))' -DCMAKE_PREFIX_PATH='$(abspath $(VENV))' \
+		-DPython3_EXECUTABLE='$(abspath $(BIN))/python'
+	PATH='$(abspath $(BIN)):'"$$PATH" cmake --build build/control_msgs --target install -- --quiet
 	@touch $@
 
 # Not editable, for pip then leaves out the files that ROS 2 looks for. What a build left behind

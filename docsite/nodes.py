@@ -7,11 +7,14 @@ from __future__ import annotations
 from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode, EXECUTOR
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
+from armid_ros.nodes.identification_run import IdentificationRunNode
 from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
+from armid_ros.nodes.joint_state_merger import JointStateMergerNode
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.parameters import NodeParameter
 from armid_ros.nodes.recorder import RecorderNode
+from armid_ros.nodes.residual_markers import ResidualMarkersNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.nodes.simulated_pair import SimulatedPairNode
 
@@ -23,7 +26,10 @@ NODES: dict[str, type[ArmidNode]] = {
     'simulated_arm': SimulatedArmNode,
     'online_identifier': OnlineIdentifierNode,
     'live_diagnosis': LiveDiagnosisNode,
+    'joint_state_merger': JointStateMergerNode,
+    'identification_run': IdentificationRunNode,
     'recorder': RecorderNode,
+    'residual_markers': ResidualMarkersNode,
     'bag_player': BagPlayerNode,
     'simulated_pair': SimulatedPairNode,
     'interaction_identifier': InteractionIdentifierNode,

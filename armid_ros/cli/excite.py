@@ -145,7 +145,9 @@ FOURIER = 'fourier'
 )
 @click.option('--clearance', default=0.01, show_default=True, help='Between links [m].')
 @click.option(
-    '--environment', type=click.Path(path_type=Path), help='YAML with what stands around the arm.'
+    '--environment',
+    type=click.Path(path_type=Path),
+    help='YAML with what stands around the arm, or a planning scene of MoveIt.',
 )
 @click.option(
     '--floor',

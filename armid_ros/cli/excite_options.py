@@ -142,7 +142,7 @@ class LimitOptions:
     def workspace(self, robot: Robot) -> CollisionScene:
         """Return what the robot must not touch."""
         collision = collision_model(robot)
-        around = load_environment(self.environment) if self.environment else ()
+        around = load_environment(self.environment, robot) if self.environment else ()
         floor = find_floor(collision, self.floor, around)
         around = (*around, *floor_obstacles(collision, floor, self.clearance))
         return CollisionScene(collision, floor, around, self.clearance)

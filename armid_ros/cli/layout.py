@@ -10,6 +10,7 @@ from armid_ros.cli import options
 from armid_ros.cli.terminal import say
 from armid_ros.files import write_file
 from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout
+from armid_ros.report.rviz import rviz_config
 import click
 
 
@@ -19,12 +20,13 @@ import click
 @click.option('--namespace', default='', help='Of the nodes, such as left_arm.')
 @options.joints
 def layout(robot_source: str, out: Path, namespace: str, joints: str | None) -> None:
-    """Write layouts for PlotJuggler and Foxglove that show this robot's joints by name."""
+    """Write layouts for PlotJuggler, Foxglove and RViz that show this robot's joints by name."""
     robot = options.open_robot(robot_source, 'earth', joints)
     out.mkdir(parents=True, exist_ok=True)
     files = {
         'plotjuggler.xml': plotjuggler_layout(robot.name, robot.joints, namespace),
-        'foxglove.json': foxglove_layout(robot.joints, namespace),
+        'foxglove.json': foxglove_layout(robot.joints, namespace, robot.base),
+        'arm.rviz': rviz_config(robot.base, namespace),
     }
     for name, text in files.items():
         write_file(out / name, text)

@@ -10,8 +10,10 @@ import sys
 
 #: Modules of ROS 2 that the nodes import.
 _ROS = (
+    'action_msgs',
     'builtin_interfaces',
     'diagnostic_msgs',
+    'geometry_msgs',
     'rcl_interfaces',
     'rclpy',
     'rosgraph_msgs',
@@ -20,6 +22,7 @@ _ROS = (
     'std_msgs',
     'std_srvs',
     'trajectory_msgs',
+    'visualization_msgs',
 )
 
 

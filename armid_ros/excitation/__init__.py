@@ -15,12 +15,8 @@ from armid_ros.excitation.files import load_excitation, save_excitation
 from armid_ros.excitation.fitness import Fitness, fitness, not_checked
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
-from armid_ros.excitation.geometry.environment import (
-    load_environment,
-    Obstacle,
-    obstacles_alone,
-    with_obstacles,
-)
+from armid_ros.excitation.geometry.environment import Obstacle, obstacles_alone, with_obstacles
+from armid_ros.excitation.geometry.environment_file import load_environment
 from armid_ros.excitation.geometry.floor import find_floor, Floor, floor_obstacles
 from armid_ros.excitation.geometry.heights import LowestPoint
 from armid_ros.excitation.limits import (

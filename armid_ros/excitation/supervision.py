@@ -221,6 +221,45 @@ def held(joints: tuple[str, ...], q: FloatArray, duration: float) -> Motion:
 
 
 @dataclass(frozen=True)
+class Speedometer:
+    """
+    How fast the joints of an arm are, from where they were a moment ago.
+
+    Attributes
+    ----------
+    seen : float
+        When the arm was looked at last [s]; minus infinity before.
+    q : ndarray, shape (n,)
+        Where it was then [rad or m].
+    speed : ndarray, shape (n,)
+        Mean speed since the look before [rad/s or m/s]; 0 while none is known.
+
+    """
+
+    seen: float
+    q: FloatArray
+    speed: FloatArray
+
+    @classmethod
+    def unknown(cls, n_joints: int) -> Speedometer:
+        """Return that of an arm that was not looked at yet."""
+        return cls(-math.inf, np.full(n_joints, np.nan), np.zeros(n_joints))
+
+    def looked(self, now: float, q: FloatArray) -> Speedometer:
+        """Look at the arm, where it is long enough since it was looked at last."""
+        if now - self.seen < LOOK:
+            return self
+        return Speedometer(now, q, np.nan_to_num(np.abs(q - self.q) / (now - self.seen)))
+
+    def fault(self, joints: Sequence[str], units: Sequence[str]) -> str:
+        """Say which joint moves, and how fast; empty when all are at rest."""
+        fastest = int(np.argmax(self.speed))
+        if self.speed[fastest] < AT_REST:
+            return ''
+        return f"joint '{joints[fastest]}' moves at {self.speed[fastest]:.2g} {units[fastest]}/s"
+
+
+@dataclass(frozen=True)
 class Halt:
     """
     An arm that was told to stop, and by when it has to be at rest.

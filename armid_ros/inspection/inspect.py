@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from armid_ros.inspection.band import effort_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
 from armid_ros.inspection.sampling import Sampling
 from armid_ros.inspection.trial import TrialFit, try_identification
@@ -132,6 +133,7 @@ def inspect(
         *_of_units(recording, joints, robot),
         *_of_motion(recording, joints, sampling),
         *_of_efforts(joints, robot, trial),
+        *_of_filters(recording),
     ]
     if trial is not None and trial.refused:
         found.insert(0, Remark('bad', f'identify refuses it: {trial.refused}'))
@@ -271,4 +273,17 @@ def _of_efforts(
             'doubt',
             f'efforts follow the description with other factors ({named}): currents, torques '
             'before the gear, or wrong masses of the description; --current-gain scales them',
+        )
+
+
+def _of_filters(recording: Recording) -> Iterator[Remark]:
+    bands = effort_bands(recording)
+    known = np.flatnonzero(np.isfinite(bands))
+    if len(known):
+        named = ', '.join(f'{recording.joints[k]} {bands[k]:.2g} Hz' for k in known)
+        yield Remark(
+            'note',
+            f'efforts were low-passed before they were recorded ({named}): they are late by some '
+            f'{1e3 / (2.0 * np.pi * float(bands[known].min())):.0f} ms at most; '
+            '--effects torque_lag estimates it',
         )

@@ -43,6 +43,7 @@ _SAMPLES, _PER_HARMONIC = 100, 8
 EXCITATION_PARAMETERS = (
     NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
     NodeParameter('gravity', 'earth', 'earth, moon, or x,y,z in the base frame [m/s^2].'),
+    NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
     NodeParameter(
         'file',
         '',
@@ -73,7 +74,12 @@ EXCITATION_PARAMETERS = (
         'Height of the floor above the origin of the base [m], or none; empty: what is shipped '
         'with the robot, or the base plane of an arm that stands.',
     ),
-    NodeParameter('environment', '', 'YAML with what stands around the arm; empty: nothing.'),
+    NodeParameter(
+        'environment',
+        '',
+        'YAML with what stands around the arm, or a planning scene of MoveIt (.scene, or as ros2 '
+        'topic echo prints it); empty: nothing.',
+    ),
     NodeParameter(
         'design_time', 20.0, 'What the search may take at most.', 's', lower=1.0, upper=86400.0
     ),
@@ -129,9 +135,10 @@ def make_surroundings(value: Values) -> Surroundings:
         If there is no such file or robot, or nobody knows where its floor is.
 
     """
-    robot = load_robot(value('robot'), gravity=value('gravity'))
+    joints = tuple(filter(None, value('joints'))) or None
+    robot = load_robot(value('robot'), gravity=value('gravity'), joints=joints)
     collision, margin = collision_model(robot), value('clearance')
-    around = load_environment(value('environment')) if value('environment') else ()
+    around = load_environment(value('environment'), robot) if value('environment') else ()
     floor = find_floor(collision, value('floor'), around)
     around = (*around, *floor_obstacles(collision, floor, margin))
     clearance = ClearanceModel.of(with_obstacles(collision, around))

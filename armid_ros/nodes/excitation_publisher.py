@@ -25,7 +25,7 @@ from armid_ros.excitation import (
     TransferPlanner,
 )
 from armid_ros.excitation.files import load_excitation, read_excitation
-from armid_ros.excitation.supervision import HANDOVER
+from armid_ros.excitation.supervision import HANDOVER, Speedometer
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.excitation_parameters import (
@@ -36,12 +36,13 @@ from armid_ros.nodes.excitation_parameters import (
 )
 from armid_ros.nodes.parameters import declare, NodeParameter
 from armid_ros.nodes.process import run
-from armid_ros.nodes.qos import LATCHED, STREAM
+from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.run_parameters import RUN_PARAMETERS, SIMULATION
 from armid_ros.nodes.trajectories import write_trajectory
+from armid_ros.nodes.trajectory_action import Tolerances
+from armid_ros.nodes.trajectory_senders import TrajectorySenders
 import numpy as np
 from rclpy.clock import Clock, ClockType
-from rclpy.duration import Duration
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -57,12 +58,14 @@ _FAREWELL = 1.0
 
 class ExcitationPublisherNode(ArmidNode):
     """
-    Publishes an excitation for a trajectory controller, real or simulated.
+    Has a trajectory controller, real or simulated, run an excitation.
 
+    It is a goal of the action follow_joint_trajectory where a controller has that, else a message.
     It begins where joint_states say that the arm is, and goes from there to the excitation slowly,
-    past what stands around. It stops the arm when it is told to, when it ends itself, when the arm
-    does not follow, and when it hears no more of it. The message is latched and stamped with the
-    time it begins, so that a controller that comes up later does not set the arm in motion.
+    past what stands around. The arm is stopped when the node is told to, when it ends, when the
+    arm does not follow, and when nothing is heard of it or of its controller any more. A message
+    is latched and stamped with the time it begins, so that a controller that comes up later does
+    not set the arm in motion.
 
     """
 
@@ -102,16 +105,17 @@ class ExcitationPublisherNode(ArmidNode):
         self._planner = planner
         self._excitation = excitation.for_joints(planner.arm.robot.joints)
         self._pose = MeasuredPose.unknown(self._excitation.joints)
+        self._speed = Speedometer.unknown(len(self._excitation.joints))
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._run: Run | None = None
         self._begun_ns, self._sent_at, self._tracked = 0, -math.inf, -math.inf
         self._trouble = self._rehearsed = ''
+        self._runs, self._outcome = 0, 'none'
         self._rehearsal: Rehearsal | None = None
         self._halt: Halt | None = None
         self._waiting = bool(self.value('start'))
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
-        quality = STREAM if self.value('zero_stamp') else LATCHED  # a late one must not begin then
-        self._publisher = self.create_publisher(JointTrajectory, 'joint_trajectory', quality)
+        self._controller = TrajectorySenders(self, self._on_goal_ended)
         self._states = self.create_subscription(
             JointState, 'joint_states', self._on_joint_states, 10
         )
@@ -143,8 +147,8 @@ class ExcitationPublisherNode(ArmidNode):
 
     @property
     def readers(self) -> int:
-        """Number of subscriptions to joint_trajectory."""
-        return int(self._publisher.get_subscription_count())
+        """Return the number of subscriptions to joint_trajectory."""
+        return self._controller.readers
 
     @property
     def last_stamp_ns(self) -> int:
@@ -153,18 +157,26 @@ class ExcitationPublisherNode(ArmidNode):
 
     @property
     def elapsed(self) -> float | None:
-        """Time since the run began, approach included [s]; None when there is no run."""
+        """
+        Time since the run began, approach included [s]; None when there is no run.
+
+        A goal is under way until the controller says how it ended, whatever the time.
+
+        """
         if self._run is None:
             return None
         elapsed = (self.get_clock().now().nanoseconds - self._begun_ns) * 1e-9
-        return elapsed if elapsed < self._run.duration else None
+        on_the_way = elapsed < self._run.duration or self._controller.under_way
+        return elapsed if on_the_way else None
 
     def look(self) -> None:
         """Begin when somebody listens and the arm is heard of; stop it when it is not any more."""
+        self._controller.look()
         if self.elapsed is not None:
             # while the way was planned nothing was received, whatever the arm sent
-            listened = self._now() - self._sent_at > self.value('state_timeout')
-            lost = self._staleness() if listened else ''
+            patience = self.value('state_timeout')
+            lost = self._staleness() if self._now() - self._sent_at > patience else ''
+            lost = lost or self._controller.trouble(patience)
             if lost:
                 self._give_up(lost)
         elif self._rehearsal is not None:
@@ -188,7 +200,8 @@ class ExcitationPublisherNode(ArmidNode):
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
-        lost = self._staleness()
+        robot = self._planner.arm.robot
+        lost = self._staleness() or self._speed.fault(robot.joints, robot.position_units)
         if lost:
             raise TrajectoryError(f'{self._states.topic_name}: {lost}; the arm is not started')
         self._trouble, self._rehearsed = '', ''
@@ -203,11 +216,18 @@ class ExcitationPublisherNode(ArmidNode):
         )
         motion = planned.motion()
         first = max(math.ceil(HANDOVER * self._rate), 1)  # the set point is not where the arm is
-        self._send(motion.select(slice(first, None)), first / self._rate)
+        message = self._stamped(motion.select(slice(first, None)), first / self._rate)
+        tolerances = Tolerances(
+            self.value('tracking_tolerance'),
+            self.value('goal_tolerance'),
+            self.value('goal_time_tolerance'),
+        )
+        receiver = self._controller.begin(message, tolerances)
         self._run = planned
+        self._runs, self._outcome = self._runs + 1, 'complete'  # unless it is stopped
         return self._tell(
             f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
-            f'there, sent to {self.readers} subscribers'
+            f'there, sent to {receiver}'
         )
 
     def stop(self) -> str:
@@ -227,8 +247,14 @@ class ExcitationPublisherNode(ArmidNode):
             'running': int(elapsed is not None),
             'elapsed': elapsed or 0.0,
             'duration': self.duration,
+            'runs': self._runs,
+            'run': 'under way' if elapsed is not None else self._outcome,
         }
-        waiting = 'waiting for a subscriber and joint states' if self._waiting else ''
+        if math.isfinite(self._controller.error):
+            values['controller_error'] = self._controller.error
+        waiting = 'waiting for a controller and joint states' if self._waiting else ''
+        if elapsed is not None and elapsed > self.duration + self.value('state_timeout'):
+            waiting = 'the controller does not say that the end is reached; ~/stop gives it up'
         return self._trouble or waiting or self._rehearsed, values
 
     def objection(self, values: Mapping[str, Any]) -> str:
@@ -258,17 +284,19 @@ class ExcitationPublisherNode(ArmidNode):
         if self.elapsed is None or not self.context.ok():
             return
         self.stop()
-        self._publisher.wait_for_all_acked(Duration(seconds=_FAREWELL))
+        self._controller.settle(_FAREWELL)
 
     def destroy_node(self) -> None:
         """Stop the arm before the node is gone, whoever destroys it."""
         self.close()
+        self._controller.close()
         super().destroy_node()
 
     def _on_joint_states(self, message: JointState) -> None:
         stamp = Time.from_msg(message.header.stamp).nanoseconds
         self._pose = self._pose.updated(message.name, message.position, stamp, self._now())
         now = self._now()
+        self._speed = self._speed.looked(now, self._pose.q)
         elapsed = self.elapsed
         if self._halt is not None:
             self._watch_halt(self._halt, now)
@@ -293,18 +321,14 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _look_for_partners(self) -> None:
         lost = self._staleness()
-        if self.readers and not lost:
+        if not (lost or self._controller.missing):
             try:
                 self.start()
             except TrajectoryError as error:
                 self._say_trouble(f'not started: {error}')
         elif time.monotonic() > self._deadline:
             self._waiting = False
-            missing = (
-                f'{self._states.topic_name}: {lost}'
-                if lost
-                else f'nobody subscribes to {self._publisher.topic_name}'
-            )
+            missing = f'{self._states.topic_name}: {lost}' if lost else self._controller.missing
             self.get_logger().warning(f'{missing}; call ~/start when that has changed')
 
     def _give_up(self, reason: str, *, follows: bool = True) -> None:
@@ -321,9 +345,23 @@ class ExcitationPublisherNode(ArmidNode):
         self._say_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
 
     def _end_run(self, motion: Motion) -> None:
-        self._send(motion, HANDOVER)
         self._run = self._rehearsal = None
+        self._outcome = 'stopped'
+        self._controller.bring_to_rest(self._stamped(motion, HANDOVER))
         self._expect_rest(float(motion.t[-1] - motion.t[0]) + HANDOVER, 1)
+
+    def _on_goal_ended(self, reason: str) -> None:
+        """Take what a controller says of the run: that it is at its end, or why it is not."""
+        elapsed = self.elapsed
+        if self._run is None:
+            return  # it was stopped, and whether the arm is at rest is seen
+        self._run = None
+        if not reason:
+            self._tell('the controller has reached the end')
+            return
+        self._rehearsal, self._outcome = None, 'stopped'
+        self._expect_rest(HANDOVER, 1)
+        self._say_trouble(f'stopped {elapsed or 0.0:.2f} s after the start: {reason}')
 
     def _expect_rest(self, duration: float, asked: int) -> None:
         """Look from then on whether the arm is at rest that was told to stop."""
@@ -337,7 +375,8 @@ class ExcitationPublisherNode(ArmidNode):
             self._halt = None
         elif at_rest is False:
             stopping = self.value('stopping')
-            self._send(held(self._pose.joints, self._pose.q, stopping), HANDOVER)
+            still = held(self._pose.joints, self._pose.q, stopping)
+            self._controller.insist(self._stamped(still, HANDOVER))
             self._expect_rest(stopping, halt.asked + 1)
             times = 'once' if halt.asked == 1 else f'{halt.asked} times'
             self._say_trouble(
@@ -381,13 +420,14 @@ class ExcitationPublisherNode(ArmidNode):
         clock = self.get_clock() if self.value('use_sim_time') else self._steady
         return float(clock.now().nanoseconds * 1e-9)
 
-    def _send(self, motion: Motion, lead: float) -> None:
+    def _stamped(self, motion: Motion, lead: float) -> JointTrajectory:
+        """Return the message of a motion that begins now."""
         message = write_trajectory(motion, lead)
         now = self.get_clock().now()
         if not self.value('zero_stamp'):
             message.header.stamp = now.to_msg()
         self._begun_ns, self._sent_at = now.nanoseconds, self._now()
-        self._publisher.publish(message)
+        return message
 
     def _tell(self, text: str) -> str:
         self.get_logger().info(text)

@@ -18,7 +18,44 @@ START = NodeParameter(
     'default in a simulation only.',
 )
 
+INTERFACE_PARAMETERS = (
+    NodeParameter(
+        'interface',
+        'auto',
+        'How trajectories are sent: as goals of the action, which needs the package control_msgs; '
+        'by topic, which no controller answers; auto: by the action where there is one when the '
+        'run begins.',
+        choices=('auto', 'topic', 'action'),
+    ),
+    NodeParameter(
+        'action',
+        '',
+        'Name of the action; empty: follow_joint_trajectory beside the topic joint_trajectory, '
+        'where that is remapped to.',
+    ),
+    NodeParameter(
+        'goal_tolerance',
+        0.0,
+        'How far a joint may be from the end for the goal to be reached; 0: what the controller '
+        'has. On the way the controller gets tracking_tolerance.',
+        'rad or m',
+        lower=0.0,
+        upper=10.0,
+        read_only=False,
+    ),
+    NodeParameter(
+        'goal_time_tolerance',
+        0.0,
+        'How much later than planned the end may be reached; 0: what the controller has.',
+        's',
+        lower=0.0,
+        upper=60.0,
+        read_only=False,
+    ),
+)
+
 RUN_PARAMETERS = (
+    *INTERFACE_PARAMETERS,
     NodeParameter('rate', 100.0, 'Waypoints per second.', 'Hz', lower=1.0, upper=1000.0),
     NodeParameter(
         'approach',

@@ -16,6 +16,8 @@ _COLOURS = (
 _IDENTIFIER = 'online_identifier'
 _PREDICTED = f'{_IDENTIFIER}/predicted_joint_states'
 _RESIDUAL = f'{_IDENTIFIER}/residual'
+_MARKERS = 'residual_markers/markers'
+_DIAGNOSIS = 'live_diagnosis/diagnosis'
 
 
 def topic_prefix(namespace: str) -> str:
@@ -64,9 +66,9 @@ def plotjuggler_layout(robot: str, joints: Sequence[str], namespace: str = '') -
     )
 
 
-def foxglove_layout(joints: Sequence[str], namespace: str = '') -> str:
+def foxglove_layout(joints: Sequence[str], namespace: str = '', base: str = 'base_link') -> str:
     """
-    Return a layout of Foxglove: position, torque, residual, condition number, diagnostics.
+    Return a layout of Foxglove: the arm, torque, residual, condition number, diagnosis as text.
 
     Parameters
     ----------
@@ -74,6 +76,8 @@ def foxglove_layout(joints: Sequence[str], namespace: str = '') -> str:
         Driven joints, in the order in which joint_states has them.
     namespace : str
         Of the nodes; empty for none.
+    base : str
+        Base link, in whose frame the arm and what is drawn on it are shown.
 
     """
     at = topic_prefix(namespace)
@@ -86,6 +90,11 @@ def foxglove_layout(joints: Sequence[str], namespace: str = '') -> str:
             'Plot!torque': _plot('Torque, measured and predicted [N m]', measured + predicted),
             'Plot!residual': _plot('Residual [N m]', _paths(f'{at}{_RESIDUAL}.effort', joints)),
             'Plot!condition': _plot('Condition number', [condition]),
+            '3D!arm': _scene(at, base),
+            'RawMessages!diagnosis': {
+                'topicPath': f'{at}{_DIAGNOSIS}.summary',
+                'diffMode': 'off',
+            },
             'RawMessages!estimate': {
                 'topicPath': f'{at}{_IDENTIFIER}/estimate',
                 'diffMode': 'off',
@@ -104,13 +113,66 @@ def foxglove_layout(joints: Sequence[str], namespace: str = '') -> str:
         'layout': {
             'direction': 'row',
             'splitPercentage': 65,
-            'first': _column(33, 'Plot!motion', 'Plot!torque', 'Plot!residual'),
-            'second': _column(
-                30, 'DiagnosticSummary!nodes', 'Plot!condition', 'RawMessages!estimate'
-            ),
+            'first': {
+                'direction': 'column',
+                'splitPercentage': 40,
+                'first': '3D!arm',
+                'second': _column(33, 'Plot!motion', 'Plot!torque', 'Plot!residual'),
+            },
+            'second': {
+                'direction': 'column',
+                'splitPercentage': 20,
+                'first': 'RawMessages!diagnosis',
+                'second': _column(
+                    30, 'DiagnosticSummary!nodes', 'Plot!condition', 'RawMessages!estimate'
+                ),
+            },
         },
     }
     return json.dumps(layout, indent=2) + '\n'
+
+
+def _scene(at: str, base: str) -> dict[str, Any]:
+    """Return a view of the arm from the front and above, with what is drawn on its joints."""
+    return {
+        'followTf': base,
+        'followMode': 'follow-pose',
+        'cameraState': {
+            'perspective': True,
+            'distance': 3.0,
+            'phi': 60.0,
+            'thetaOffset': 45.0,
+            'targetOffset': [0.0, 0.0, 0.0],
+            'target': [0.0, 0.0, 0.0],
+            'targetOrientation': [0.0, 0.0, 0.0, 1.0],
+            'fovy': 45.0,
+            'near': 0.01,
+            'far': 500.0,
+        },
+        'scene': {},
+        'transforms': {},
+        'topics': {
+            f'{at}robot_description': {'visible': True},
+            f'{at}{_MARKERS}': {'visible': True},
+        },
+        'layers': {
+            'grid': {
+                'layerId': 'foxglove.Grid',
+                'instanceId': 'grid',
+                'label': 'Grid',
+                'visible': True,
+                'frameLocked': True,
+                'size': 4,
+                'divisions': 8,
+                'lineWidth': 1,
+                'color': '#a0a0a0ff',
+                'position': [0, 0, 0],
+                'rotation': [0, 0, 0],
+            }
+        },
+        'publish': {},
+        'imageMode': {},
+    }
 
 
 def _tab(window: ElementTree.Element, name: str, plots: Sequence[Sequence[str]]) -> None:

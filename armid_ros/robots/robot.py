@@ -127,6 +127,14 @@ class Robot:
         return read_only(np.array(self.model.gravity.linear))
 
     @property
+    def base(self) -> str:
+        """Name of the base link, in whose frame the arm is described."""
+        for frame in self.model.frames:
+            if frame.type == pin.FrameType.BODY:
+                return str(frame.name)
+        return str(self.model.frames[0].name)
+
+    @property
     def rigid_parameters(self) -> FloatArray:
         """
         Rigid-body parameters of the driven bodies, shape (10 n,).

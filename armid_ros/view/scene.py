@@ -140,6 +140,18 @@ def joint_frames(robot: Robot, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     return rotations, translations
 
 
+def joint_axes(robot: Robot) -> FloatArray:
+    """Return the axis of each joint in its own frame, shape (n, 3)."""
+    axes = np.empty((robot.n_joints, 3))
+    for j in range(robot.n_joints):
+        joint = robot.model.joints[j + 1]
+        data = joint.createData()
+        joint.calc(data, np.zeros(joint.nq))
+        motion = np.asarray(data.S).ravel()
+        axes[j] = motion[:3] + motion[3:]  # along it, or about it
+    return axes
+
+
 def _times(t: FloatArray) -> FloatArray:
     count = max(2, int((t[-1] - t[0]) * _POSE_RATE) + 1)
     return np.linspace(t[0], t[-1], min(count, len(t)))

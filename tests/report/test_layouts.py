@@ -7,10 +7,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout
+from armid_ros.report.rviz import rviz_config
 from armid_ros.robots import load_robot
+import yaml
 
 CONFIG = Path(__file__).parents[2] / 'config'
 JOINTS = load_robot('humanoid_arm').joints
+BASE = load_robot('humanoid_arm').base
 
 
 def test_layouts_of_the_shipped_arm_are_the_shipped_layouts():
@@ -20,7 +23,7 @@ def test_layouts_of_the_shipped_arm_are_the_shipped_layouts():
     same = {'strip_text': True}
     assert ElementTree.canonicalize(made, **same) == ElementTree.canonicalize(shipped, **same)
     shipped = json.loads((CONFIG / 'foxglove_layout.json').read_text())
-    assert json.loads(foxglove_layout(JOINTS)) == shipped
+    assert json.loads(foxglove_layout(JOINTS, base=BASE)) == shipped
 
 
 def test_a_namespace_is_before_every_topic_of_the_nodes():
@@ -40,3 +43,17 @@ def test_names_that_xml_does_not_like_are_escaped():
     text = plotjuggler_layout('arm', ('a<b&"c',))
     curves = [curve.get('name') for curve in ElementTree.fromstring(text).iter('curve')]
     assert '/joint_states/a<b&"c/effort' in curves
+
+
+def test_the_arm_and_what_is_drawn_on_it_are_shown_in_the_frame_of_its_base():
+    configured = json.loads(foxglove_layout(('a',), 'left', 'foot'))['configById']
+    scene = configured['3D!arm']
+    assert scene['followTf'] == 'foot'
+    assert set(scene['topics']) == {'/left/robot_description', '/left/residual_markers/markers'}
+    assert configured['RawMessages!diagnosis']['topicPath'].startswith('/left/live_diagnosis/')
+    manager = yaml.safe_load(rviz_config('foot', 'left'))['Visualization Manager']
+    assert manager['Global Options']['Fixed Frame'] == 'foot'
+    _, arm, markers = manager['Displays']
+    assert arm['Description Topic']['Value'] == '/left/robot_description'
+    assert arm['Description Topic']['Durability Policy'] == 'Transient Local'
+    assert markers['Topic']['Value'] == '/left/residual_markers/markers'

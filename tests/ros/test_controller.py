@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import re
+
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import (
     Excitation,
@@ -36,9 +38,11 @@ def excitation():
     return Excitation(random_feasible(ArmModel(ROBOT), limits, 2.0, 3, rng), 1, 0.5)
 
 
-@pytest.fixture
-def arm(bench):
-    return Controller(bench, ROBOT, HOME)
+@pytest.fixture(params=['topic', 'action'])
+def arm(bench, request):
+    arm = Controller(bench, ROBOT, HOME, action=request.param == 'action')
+    yield arm
+    arm.leave()
 
 
 def publisher(bench, arm, excitation, **parameters):
@@ -138,6 +142,18 @@ def test_at_half_the_speed_the_path_is_the_same_and_the_time_twice(bench, arm, e
     sent = read_trajectory(arm.accepted[0])
     expected = slow.motion(100.0).q
     np.testing.assert_allclose(sent.q[-len(expected) :], expected, atol=1e-6)
+
+
+def test_a_run_is_not_begun_while_the_arm_moves(bench, arm, excitation):
+    node = begun(bench, arm, excitation)
+    arm.run(102.0)
+    node.stop()
+    arm.run(102.2)
+    refused = bench.call('excitation_publisher/start')
+    assert not refused.success
+    assert re.search(r"joint '\w+' moves at [\d.]+ rad/s; the arm is not started", refused.message)
+    arm.run(103.5)
+    assert bench.call('excitation_publisher/start').success
 
 
 def test_a_rehearsal_is_slow_and_says_how_the_arm_followed(bench, arm, excitation):

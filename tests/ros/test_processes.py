@@ -17,7 +17,10 @@ from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
+from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
+
+from tests.ros.controller import Controller
 
 pytestmark = pytest.mark.slow
 
@@ -188,3 +191,36 @@ def test_a_wrong_start_ends_with_one_clear_line(processes, node, parameter, line
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 2
     assert line in errors and len(errors.strip().splitlines()) == 1, errors
+
+
+@pytest.mark.parametrize(
+    ('executor', 'signals'),
+    [('single', (signal.SIGINT, signal.SIGINT)), ('events', (signal.SIGTERM,))],
+)
+def test_a_signal_brings_a_goal_to_rest_before_the_process_is_gone(
+    bench, processes, tmp_path, executor, signals
+):
+    robot = load_robot('humanoid_arm')
+    arm = Controller(bench, robot, (robot.lower + robot.upper) / 2.0, action=True)
+    bench.listen(JointState, 'joint_states')  # goes on when the process does not
+    save_excitation(short_excitation(), tmp_path / 'run.yaml')
+    options = ('use_sim_time:=true', 'start:=false', 'interface:=action', f'executor:={executor}')
+    process = processes.start('excitation_publisher', f'file:={tmp_path / "run.yaml"}', *options)
+    arm.run(101.0)
+    bench.spin_until(
+        lambda: bench.call('excitation_publisher/start').success or arm.run(arm.now + 0.1),
+        'the start',
+    )
+    bench.spin_until(lambda: arm.goals, 'the goal')
+    arm.run(arm.now + 2.0)
+    assert not arm.ends
+    for number in signals:
+        process.send_signal(number)
+    bench.spin_until(lambda: process.poll() is not None, 'the end of the process')
+    assert process.returncode == 0
+    assert 'Traceback' not in process.communicate()[1]
+    assert len(arm.goals) == 2
+    arm.run(arm.now + 1.0)
+    assert arm.ends == ['abort', 'succeed']
+    np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
+    arm.leave()

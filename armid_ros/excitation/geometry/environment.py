@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.robots import CollisionModel, Robot
 import coal
 import numpy as np
@@ -168,23 +167,19 @@ def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) ->
     return with_obstacles(replace(collision, geometry=geometry), obstacles)
 
 
-def load_environment(path: str | Path) -> tuple[Obstacle, ...]:
+def parse_obstacles(path: Path, entries: Any) -> tuple[Obstacle, ...]:
     """
-    Read obstacles from a YAML file: a list of mappings with the attributes of `Obstacle`.
+    Return the obstacles of a list of mappings with the attributes of `Obstacle`.
 
     Raises
     ------
     TrajectoryError
-        If the file cannot be read or an entry is not an obstacle.
+        If an entry is not an obstacle; names the file that it was read from.
 
     """
-    path = Path(path)
-    text = read_text(path, TrajectoryError)
-    with reading(path, TrajectoryError):
-        entries: Any = load_yaml(text)
-        if not isinstance(entries, list):
-            raise TrajectoryError('has to be a list of obstacles')
-        return tuple(_obstacle(path, number, entry) for number, entry in enumerate(entries, 1))
+    if not isinstance(entries, list):
+        raise TrajectoryError('has to be a list of obstacles, or a planning scene')
+    return tuple(_obstacle(path, number, entry) for number, entry in enumerate(entries, 1))
 
 
 def _obstacle(path: Path, number: int, entry: Any) -> Obstacle:

@@ -1,0 +1,272 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The identification run node: excites, records, identifies, diagnoses, reports, and ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+import json
+from pathlib import Path
+import subprocess
+import sys
+import time
+from typing import Any
+
+from armid_ros.errors import ArmidError, RecordingError, TrajectoryError
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.parameters import names, NodeParameter
+from armid_ros.nodes.process import run
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.client import Client
+from rclpy.clock import Clock, ClockType
+from std_srvs.srv import Trigger
+
+#: How often it is looked what has happened [s].
+_LOOK_PERIOD = 0.05
+#: How long a program may take to end that is told to [s].
+_FAREWELL = 5.0
+#: What is said of a program that ended well, by command: the document it wrote, and its keys.
+_SAID = {
+    'identify': ('identification.json', ('grade',)),
+    'diagnose': ('diagnosis.json', ('verdict', 'summary')),
+}
+
+#: A program: its command and arguments.
+Program = tuple[str, ...]
+#: What a step waits for, in words, and whether it has come.
+Wait = tuple[str, Callable[[], Any]]
+
+
+def start_program(program: Program) -> subprocess.Popen[bytes]:
+    """Begin an armid command in a process of its own."""
+    return subprocess.Popen([sys.executable, '-m', 'armid_ros.cli', *program])
+
+
+class IdentificationRunNode(ArmidNode):
+    """
+    Has an arm identified, from the excitation to the report, and ends by itself.
+
+    It asks `recorder` and `excitation_publisher` for each run, and when all are recorded has
+    `armid identify` and `armid diagnose` make of them what they can. The last run is held out when
+    there are several. Whatever fails is said, and ends the node with code 2; what was recorded and
+    identified until then stays.
+
+    """
+
+    table = (
+        NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
+        NodeParameter('gravity', 'earth', 'earth, moon, or x,y,z in the base frame [m/s^2].'),
+        NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
+        NodeParameter(
+            'effects', [''], 'Effects beside the rigid body; without names, what armid takes.'
+        ),
+        NodeParameter(
+            'save_to',
+            'identification',
+            'Folder, in which identification and diagnosis get one each.',
+        ),
+        NodeParameter('runs', 2, 'How often the excitation is run.', lower=1, upper=20),
+        NodeParameter(
+            'rehearse', False, 'Run it slowly first, and go on only if that is as foreseen.'
+        ),
+        NodeParameter('diagnose', True, 'Look for what the model lacks, too.'),
+        NodeParameter('publisher', 'excitation_publisher', 'Name of the node that excites.'),
+        NodeParameter('recorder', 'recorder', 'Name of the node that records.'),
+        NodeParameter(
+            'patience',
+            300.0,
+            'How long to wait for the other nodes, of which one may have to design an excitation '
+            'first, and for a controller and joint states.',
+            's',
+            lower=1.0,
+            upper=3600.0,
+        ),
+    )
+
+    def __init__(self, start: Callable[[Program], Any] = start_program, **kwargs: Any) -> None:
+        """Take what starts a program; by default it is a process of its own."""
+        super().__init__('identification_run', **kwargs)
+        self._start = start
+        self._program: Any = None
+        self._done, self._failure, self._step = False, '', 'begins'
+        self._results: list[str] = []
+        self._state: dict[str, str] = {}
+        self._trigger_clients: dict[str, Client] = {}
+        self._full = {
+            name: self.resolve_topic_name(self.value(name)) for name in ('publisher', 'recorder')
+        }
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
+        self._script = self._steps()
+        self._wait: Wait = ('begins', lambda: True)
+        self.create_timer(_LOOK_PERIOD, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    @property
+    def finished(self) -> bool:
+        """Whether all is done, or something has failed."""
+        return self._done
+
+    @property
+    def failure(self) -> str:
+        """Say what has failed."""
+        return self._failure
+
+    def look(self) -> None:
+        """Take the next step when what it waits for has come."""
+        if self._done:
+            return
+        try:
+            while self._wait[1]():
+                self._wait = next(self._script)
+                if self._wait[0] != self._step:
+                    self._step = self._wait[0]
+                    self.get_logger().info(self._step)
+        except StopIteration:
+            self._done = True
+            self.get_logger().info('; '.join(self._results))
+        except ArmidError as error:
+            self._done, self._failure = True, str(error)
+            with suppress(ArmidError):
+                self._call('recorder', 'stop')
+
+    def condition(self) -> tuple[str, Mapping[str, object]]:
+        """Say what is under way, and what has come of it."""
+        return self._failure, {'step': self._step, 'results': '; '.join(self._results)}
+
+    def close(self) -> None:
+        """End the program that is under way."""
+        if self._program is not None and self._program.poll() is None:
+            self._program.terminate()
+            try:
+                self._program.wait(_FAREWELL)
+            except subprocess.TimeoutExpired:
+                self._program.kill()
+
+    def _steps(self) -> Iterator[Wait]:
+        """Go through all that is to be done."""
+        yield from self._until('waits for the other nodes', self._partners)
+        if self.value('rehearse'):
+            yield from self._excited('rehearse')
+        bags = []
+        for number in range(self.value('runs')):
+            said = yield from self._asked('recorder', 'start')
+            bags.append(said.removeprefix('recording into '))
+            yield from self._excited('start', f'run {number + 1} of {self.value("runs")}')
+            yield from self._asked('recorder', 'stop')
+        folder = Path(self.value('save_to')).expanduser()
+        yield from self._ended('identify', folder / 'identification', bags)
+        if self.value('diagnose'):
+            model = ('--model', str(folder / 'identification' / 'model.yaml'))
+            yield from self._ended('diagnose', folder / 'diagnosis', bags, *model)
+
+    def _excited(self, service: str, what: str = 'rehearsal') -> Iterator[Wait]:
+        """Have the arm run, and wait until it has come to the end."""
+        before = int(self._state.get('runs', 0))
+        yield from self._started(service, what)
+        yield f'{what} is under way', lambda: self._over(before, service == 'rehearse')
+        if self._state['run'] != 'complete':
+            raise TrajectoryError(f'{what}: {self._state["message"]}')
+        if service == 'rehearse':
+            said = self._state['message']
+            self.get_logger().info(said)
+            if 'look into it' in said:
+                raise TrajectoryError(said)
+
+    def _over(self, before: int, rehearsed: bool) -> bool:
+        """Return whether a run has ended that began after so many others."""
+        state = self._state
+        if int(state.get('runs', 0)) <= before or state['run'] == 'under way':
+            return False
+        return not rehearsed or state['run'] == 'stopped' or 'rehearsed' in state['message']
+
+    def _started(self, service: str, what: str) -> Iterator[Wait]:
+        """Ask again while a controller or joint states are still to come."""
+        deadline = time.monotonic() + self.value('patience')
+        while True:
+            future = self._call('publisher', service)
+            yield f'{what} is planned', future.done
+            answer = future.result()
+            if answer.success:
+                return
+            if time.monotonic() > deadline:
+                raise TrajectoryError(f'{what}: {answer.message}')
+            later = time.monotonic() + 1.0
+            yield f'{what} is planned', lambda later=later: time.monotonic() > later
+
+    def _asked(self, node: str, service: str) -> Any:
+        """Call a service, and return what it says."""
+        future = self._call(node, service)
+        yield self._step, future.done
+        answer = future.result()
+        if not answer.success:
+            raise RecordingError(f'{self._full[node]}: {answer.message}')
+        return str(answer.message)
+
+    def _ended(self, command: str, folder: Path, bags: list[str], *more: str) -> Iterator[Wait]:
+        """Run an armid command on the bags until it has ended."""
+        fitted, held_out = (bags[:-1], bags[-1:]) if len(bags) > 1 else (bags, [])
+        validate = [part for bag in held_out for part in ('--validate', bag)]
+        options = {name: self.value(name) for name in ('robot', 'gravity')}
+        if command == 'identify':
+            options['effects'] = ','.join(names(self, 'effects'))
+        options['joints'] = ','.join(names(self, 'joints'))
+        given = [part for key, text in options.items() if text for part in (f'--{key}', text)]
+        program = (command, *fitted, *validate, *given, *more, '--out', str(folder))
+        self._program = self._start(program)
+        yield f'armid {command} is under way', lambda: self._program.poll() is not None
+        if self._program.returncode:
+            known = f'; until then: {"; ".join(self._results)}' if self._results else ''
+            raise ArmidError(
+                f'armid {command} ended with code {self._program.returncode}; the recordings are '
+                f'{", ".join(bags)}{known}'
+            )
+        self._results.append(_result(command, folder))
+
+    def _until(self, what: str, come: Callable[[], str]) -> Iterator[Wait]:
+        """Wait until nothing is missing any more, for as long as patience lasts."""
+        deadline = time.monotonic() + self.value('patience')
+        yield what, lambda: not come() or time.monotonic() > deadline
+        if come():
+            raise ArmidError(come())
+
+    def _partners(self) -> str:
+        """Say which nodes are missing."""
+        missing = [
+            self._full[node]
+            for node, service in (('publisher', 'start'), ('recorder', 'start'))
+            if not self._client(node, service).service_is_ready()
+        ]
+        return f'{" and ".join(missing)} did not come up' if missing else ''
+
+    def _client(self, node: str, service: str) -> Client:
+        name = f'{self._full[node]}/{service}'
+        if name not in self._trigger_clients:
+            self._trigger_clients[name] = self.create_client(Trigger, name)
+        return self._trigger_clients[name]
+
+    def _call(self, node: str, service: str) -> Any:
+        return self._client(node, service).call_async(Trigger.Request())
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        wanted = f'{self._full["publisher"][1:]}: state'
+        for status in message.status:
+            if status.name == wanted:
+                values = {value.key: value.value for value in status.values}
+                self._state = {**values, 'message': status.message}
+
+
+def _result(command: str, folder: Path) -> str:
+    """Say what a command wrote, and where its report is."""
+    name, keys = _SAID[command]
+    document = json.loads((folder / name).read_text(encoding='utf-8'))
+    told = ': '.join(str(document[key]).replace('_', ' ') for key in keys if key in document)
+    return f'{command}: {told or "done"} ({folder / "report.html"})'
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    run(IdentificationRunNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,241 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The joint state merger node: positions and torques of several senders as one joint state."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from functools import partial
+import math
+from typing import Any
+
+from armid_ros.errors import RecordingError
+from armid_ros.identification.samples.joint_merge import JointMerger
+from armid_ros.inspection.band import LEAST, standing_bands
+from armid_ros.motion import FloatArray
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.effort_messages import effort_reader, Reader
+from armid_ros.nodes.message_classes import message_class
+from armid_ros.nodes.parameters import names, NodeParameter, ParameterError
+from armid_ros.nodes.process import run
+from armid_ros.nodes.qos import LATCHED, MatchedSubscription, STREAM
+from armid_ros.robots import robot_from_urdf
+import numpy as np
+from rclpy.clock import Clock, ClockType
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+#: How often publishers are looked for [s].
+_LOOK_PERIOD = 0.1
+#: Samples that the band of the torques is estimated from.
+_KEPT = 4096
+
+
+class JointStateMergerNode(ArmidNode):
+    """
+    Puts together one joint state of all joints out of what several senders say.
+
+    Positions may come on several topics, each with some of the joints; torques may be on a topic
+    of their own, as efforts, or as currents that gains make torques of. All are interpolated to
+    the stamps of the first joint's position. While the arm stands still, the noise of the torques
+    tells whether a driver low-passes them, and the status says how narrowly.
+
+    """
+
+    table = (
+        NodeParameter(
+            'joints',
+            [''],
+            'Joints to publish, in this order; empty: the driven ones of robot_description.',
+        ),
+        NodeParameter(
+            'position_topics',
+            ['joint_states'],
+            'JointState topics with positions, each of any of the joints.',
+        ),
+        NodeParameter(
+            'effort_topic',
+            '',
+            'Topic with torques or currents: JointState, control_msgs/DynamicJointState such as '
+            'dynamic_joint_states, or std_msgs/Float64MultiArray with one number a joint; empty: '
+            'the effort of the position topics.',
+        ),
+        NodeParameter(
+            'effort_interface',
+            'effort',
+            'Which value of a DynamicJointState it is, such as effort or current.',
+        ),
+        NodeParameter(
+            'effort_joints',
+            [''],
+            'Names of the joints on effort_topic, in the order of joints; empty: the same.',
+        ),
+        NodeParameter(
+            'gains',
+            [1.0],
+            'Torque per unit of what comes, N m/A for currents: one for all joints, or one a '
+            'joint; negative where the sign is the opposite.',
+        ),
+    )
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Take the keyword arguments of rclpy's Node."""
+        super().__init__('joint_state_merger', **kwargs)
+        self.joints: tuple[str, ...] = ()
+        self._published = 0
+        self._lag_ns, self._epoch_ns = 0, 0
+        self._reader: Reader | None = None
+        self._efforts: MatchedSubscription | None = None
+        self._kept: deque[tuple[float, FloatArray, FloatArray]] = deque(maxlen=_KEPT)
+        self._states = self.create_publisher(JointState, '~/joint_states', STREAM)
+        self._topics = names(self, 'position_topics')
+        if not self._topics:
+            raise ParameterError("parameter 'position_topics' names no topic")
+        own = not self.value('effort_topic')
+        self._positions = [
+            MatchedSubscription(self, JointState, topic, partial(self._on_positions, own))
+            for topic in self._topics
+        ]
+        if names(self, 'joints'):
+            self._adopt(names(self, 'joints'))
+        else:
+            self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
+        self.create_timer(_LOOK_PERIOD, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def look(self) -> None:
+        """Subscribe to what has appeared."""
+        for subscription in self._positions:
+            subscription.match()
+        topic = self.value('effort_topic')
+        if self._efforts is not None:
+            self._efforts.match()
+        elif topic and self.joints:
+            full = self.resolve_topic_name(topic)
+            types = dict(self.get_topic_names_and_types()).get(full, [])
+            if types:
+                self._reader = effort_reader(
+                    types[0], self._effort_names, self.value('effort_interface')
+                )
+                self._efforts = MatchedSubscription(
+                    self, message_class(types[0]), topic, self._on_efforts
+                )
+
+    @property
+    def bands(self) -> FloatArray:
+        """Band that a driver has filtered each torque to [Hz]; NaN where none is known."""
+        if len(self._kept) < LEAST:
+            return self._found
+        t, q, tau = (np.array(column) for column in zip(*self._kept, strict=True))
+        found = standing_bands(q, tau, float(np.median(np.diff(t))))
+        self._found = np.where(np.isfinite(found), found, self._found)
+        return self._found
+
+    def condition(self) -> tuple[str, Mapping[str, object]]:
+        """Say what comes, and how narrow the torques are."""
+        values: dict[str, object] = {'published': self._published}
+        if not self.joints:
+            return 'waiting for robot_description', values
+        for joint, band in zip(self.joints, self.bands, strict=True):
+            if math.isfinite(band):
+                values[f'low-passed to [Hz] {joint}'] = float(band)
+        if self._published:
+            return '', values
+        n = len(self.joints)
+        missing = self._merger.missing
+        positions = [self.joints[k] for k in missing if k < n]
+        torques = [self.joints[k - n] for k in missing if k >= n]
+        told = [
+            f'no {kind} of {", ".join(joints)} so far'
+            for kind, joints in (('position', positions), ('torque', torques))
+            if joints
+        ]
+        return '; '.join(told) or 'the senders do not share their time', values
+
+    def _on_description(self, message: String) -> None:
+        self._adopt(robot_from_urdf(message.data).joints)
+
+    def _adopt(self, joints: Sequence[str]) -> None:
+        if tuple(joints) == self.joints:
+            return
+        gains, others = self.value('gains'), names(self, 'effort_joints')
+        for name, values in (('gains', gains), ('effort_joints', others)):
+            if len(values) not in ((1, len(joints)) if name == 'gains' else (0, len(joints))):
+                raise ParameterError(
+                    f"parameter '{name}' has {len(values)} for {len(joints)} joints: "
+                    f'{", ".join(joints)}'
+                )
+        self.joints = tuple(joints)
+        self._effort_names = others or self.joints
+        self._gains = np.broadcast_to(np.array(gains, dtype=float), (len(joints),))
+        self._merger = JointMerger(2 * len(joints))  # positions, and after them torques
+        self._found = np.full(len(joints), np.nan)
+        self._kept.clear()
+
+    def _on_positions(self, with_effort: bool, message: JointState) -> None:
+        stamp = self._stamp(message.header.stamp)
+        if not self.joints:
+            return
+        self._lag_ns = self.get_clock().now().nanoseconds - stamp
+        rows = {
+            name: (position, velocity)
+            for name, position, velocity in zip(
+                message.name,
+                message.position,
+                message.velocity or [math.nan] * len(message.name),
+                strict=False,
+            )
+            if math.isfinite(position)
+        }
+        some = tuple(k for k, joint in enumerate(self.joints) if joint in rows)
+        if some:
+            self._take(some, stamp, np.array([rows[self.joints[k]] for k in some]).T)
+        if with_effort and message.effort:
+            known = dict(zip(message.name, message.effort, strict=False))
+            self._take_efforts(stamp, known, self.joints)
+
+    def _on_efforts(self, message: Any) -> None:
+        if self._reader is None:
+            return
+        header = getattr(message, 'header', None)
+        now = self.get_clock().now().nanoseconds - self._lag_ns
+        stamp = now if header is None else self._stamp(header.stamp)
+        self._take_efforts(stamp, self._reader(message), self._effort_names)
+
+    def _take_efforts(self, stamp: int, known: Mapping[str, float], called: Sequence[str]) -> None:
+        n = len(self.joints)
+        some = [k for k, name in enumerate(called) if math.isfinite(known.get(name, math.nan))]
+        if not some:
+            raise RecordingError(
+                f'torques of {", ".join(known)}, and of none of {", ".join(called)}'
+            )
+        torques = np.array([known[called[k]] for k in some]) * self._gains[some]
+        self._take(tuple(n + k for k in some), stamp, np.vstack([torques, torques]))
+
+    def _take(self, some: tuple[int, ...], stamp: int, values: FloatArray) -> None:
+        """Publish what is complete with the values of some joints, positions or torques."""
+        n = len(self.joints)
+        self._epoch_ns = self._epoch_ns or stamp  # a number of seconds has no room for all of it
+        for t, merged in self._merger.take(some, (stamp - self._epoch_ns) * 1e-9, values):
+            q, dq, tau = merged[0, :n], merged[1, :n], merged[0, n:]
+            message = JointState(name=list(self.joints), position=q.tolist(), effort=tau.tolist())
+            if np.isfinite(dq).all():
+                message.velocity = dq.tolist()
+            message.header.stamp = Time(nanoseconds=self._epoch_ns + round(t * 1e9)).to_msg()
+            self._states.publish(message)
+            self._kept.append((t, q, tau))
+            self._published += 1
+
+    def _stamp(self, stamp: Any) -> int:
+        """Return a stamp [ns]; the time of reception where there is none."""
+        return stamp.sec * 10**9 + stamp.nanosec or self.get_clock().now().nanoseconds
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    run(JointStateMergerNode, args)
+
+
+if __name__ == '__main__':
+    main()

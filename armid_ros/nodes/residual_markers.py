@@ -1,0 +1,214 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The residual markers node: what a model does not explain, drawn on the joints of the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import textwrap
+from typing import Any
+
+from armid_msgs.msg import Diagnosis
+from armid_ros.motion import FloatArray
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.joint_states import JointStateReader
+from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.process import run
+from armid_ros.nodes.qos import DEPTH, LATCHED, MatchedSubscription, STREAM
+from armid_ros.robots import load_robot, Robot, robot_from_urdf
+from armid_ros.view.scene import joint_axes, joint_frames
+from builtin_interfaces.msg import Duration
+from geometry_msgs.msg import Point
+import numpy as np
+from rclpy.clock import Clock, ClockType
+from sensor_msgs.msg import JointState
+from std_msgs.msg import ColorRGBA, String
+from visualization_msgs.msg import Marker, MarkerArray
+
+#: How often publishers of joint states are looked for [s].
+_LOOK_PERIOD = 0.1
+#: Markers that are not drawn anew vanish after this [s].
+_LIFETIME = 2
+#: Residuals and torques are averaged over so much time (mean square) [s].
+_WINDOW = 2.0
+#: Sizes as shares of the reach of the arm: arrow at the full scale, its shaft, letters.
+_ARROW, _SHAFT, _LETTER = 0.25, 0.015, 0.05
+#: Letters in a line of the diagnosis.
+_LINE = 60
+
+
+class ResidualMarkersNode(ArmidNode):
+    """
+    Draws the residual of the online identifier on the joints, for RViz and Foxglove.
+
+    At each joint an arrow along its axis is as long as the residual just now. A sphere is green
+    where the mean square of the residual over two seconds is small against that of the torque, and
+    red from `full` on; a text says both numbers. Above the base stands the diagnosis of
+    live_diagnosis as text. Positions are computed from joint_states; no transforms are needed.
+
+    """
+
+    table = (
+        NodeParameter('robot', '', 'Name or path; empty: robot_description.'),
+        NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
+        NodeParameter(
+            'frame', '', 'Frame of the markers; empty: the base link of the description.'
+        ),
+        NodeParameter('rate', 20.0, 'Of ~/markers.', 'Hz', lower=0.1, upper=100.0),
+        NodeParameter(
+            'full',
+            0.2,
+            'Residual against torque, of both the root mean square, from which a joint is red.',
+            lower=0.001,
+            upper=10.0,
+            read_only=False,
+        ),
+    )
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Take the keyword arguments of rclpy's Node."""
+        super().__init__('residual_markers', **kwargs)
+        self._robot: Robot | None = None
+        self._told = ''
+        self._markers = self.create_publisher(MarkerArray, '~/markers', STREAM)
+        if self.value('robot'):
+            self._adopt(load_robot(self.value('robot'), joints=self._joints()))
+        else:
+            self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
+        self.joint_states = MatchedSubscription(
+            self, JointState, 'joint_states', self._on_joint_states
+        )
+        self.create_subscription(
+            JointState, 'online_identifier/residual', self._on_residual, DEPTH
+        )
+        self.create_subscription(
+            Diagnosis, 'live_diagnosis/diagnosis', self._on_diagnosis, LATCHED
+        )
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_LOOK_PERIOD, self.joint_states.match, clock=steady)
+        self.create_timer(1.0 / self.value('rate'), self.draw, clock=steady)
+
+    def condition(self) -> tuple[str, Mapping[str, object]]:
+        """Say what is drawn, and what is missing."""
+        if self._robot is None:
+            return 'waiting for robot_description', {}
+        if not np.isfinite(self._q).all():
+            return 'no joint states so far', {}
+        shares = zip(self._robot.joints, self._shares(), strict=True)
+        return '', {f'residual share {joint}': float(share) for joint, share in shares}
+
+    def draw(self) -> None:
+        """Publish the markers of the arm as it is now."""
+        if self._robot is None or not np.isfinite(self._q).all():
+            return
+        stamp = self.get_clock().now().to_msg()
+        markers = [*self._of_joints(self._robot), *self._of_diagnosis(self._robot)]
+        for number, marker in enumerate(markers):
+            marker.header.frame_id, marker.header.stamp = self._frame, stamp
+            marker.id = number
+            marker.lifetime = Duration(sec=_LIFETIME)
+        self._markers.publish(MarkerArray(markers=markers))
+
+    def _of_joints(self, robot: Robot) -> Sequence[Marker]:
+        rotations, places = joint_frames(robot, self._q[np.newaxis])
+        ends = places[0] + np.einsum('jab,jb->ja', rotations[0], joint_axes(robot)) * (
+            _ARROW * self._reach * np.clip(self._now / self._scale(), -1.0, 1.0)[:, np.newaxis]
+        )
+        markers = []
+        for j, (joint, share) in enumerate(zip(robot.joints, self._shares(), strict=True)):
+            red = float(np.clip(share / self.value('full'), 0.0, 1.0))
+            colour = ColorRGBA(r=red, g=1.0 - red, b=0.1, a=0.9)
+            arrow = _marker('residual', Marker.ARROW, colour)
+            arrow.points = [_point(places[0, j]), _point(ends[j])]
+            arrow.scale.x, arrow.scale.y = self._reach * _SHAFT, 2.0 * self._reach * _SHAFT
+            ball = _marker('share', Marker.SPHERE, colour)
+            ball.pose.position = _point(places[0, j])
+            size = self._reach * _SHAFT * (3.0 + 3.0 * red)
+            ball.scale.x = ball.scale.y = ball.scale.z = size
+            unit = robot.torque_units[j]
+            rms = float(np.sqrt(self._residual[j]))
+            words = f'{joint} {rms:.3g} {unit}, {100.0 * share:.0f} %'
+            markers += [arrow, ball, self._text('joint', words, places[0, j], 1.0)]
+        return markers
+
+    def _of_diagnosis(self, robot: Robot) -> Sequence[Marker]:
+        if not self._told:
+            return ()
+        lines = '\n'.join(textwrap.wrap(self._told, _LINE))
+        return (self._text('diagnosis', lines, np.array([0.0, 0.0, 1.3 * self._reach]), 1.4),)
+
+    def _text(self, space: str, words: str, place: FloatArray, size: float) -> Marker:
+        text = _marker(space, Marker.TEXT_VIEW_FACING, ColorRGBA(r=0.5, g=0.5, b=0.5, a=1.0))
+        text.text = words
+        text.pose.position = _point(place + np.array([0.0, 0.0, 1.5 * _LETTER * self._reach]))
+        text.scale.z = size * _LETTER * self._reach
+        return text
+
+    def _shares(self) -> FloatArray:
+        """Return the residual against the torque of each joint, both as root mean square."""
+        return np.asarray(np.sqrt(self._residual / np.maximum(self._torque, 1e-12)))
+
+    def _scale(self) -> float:
+        """Return the residual that the longest arrow stands for [N m or N]."""
+        return max(2.0 * float(np.sqrt(self._residual.max())), 1e-9)
+
+    def _joints(self) -> tuple[str, ...] | None:
+        return tuple(filter(None, self.value('joints'))) or None
+
+    def _on_description(self, message: String) -> None:
+        self._adopt(robot_from_urdf(message.data, joints=self._joints()))
+
+    def _adopt(self, robot: Robot) -> None:
+        n = robot.n_joints
+        self._robot = robot
+        self._frame = self.value('frame') or robot.base
+        self._reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
+        self._q, self._now = np.full(n, np.nan), np.zeros(n)
+        self._residual, self._torque = np.zeros(n), np.zeros(n)
+        self._seen = {'residual': 0.0, 'torque': 0.0}
+        _, places = joint_frames(robot, np.zeros((1, n)))
+        steps = np.diff(np.vstack([np.zeros(3), places[0]]), axis=0)
+        self._reach = max(float(np.linalg.norm(steps, axis=1).sum()), 0.1)
+
+    def _on_joint_states(self, message: JointState) -> None:
+        if self._robot is None:
+            return
+        for sample in self._reader.read(message):
+            self._q = sample.q
+            self._torque = self._averaged('torque', sample.t, self._torque, sample.tau)
+
+    def _on_residual(self, message: JointState) -> None:
+        if self._robot is None or tuple(message.name) != self._robot.joints:
+            return
+        stamp = message.header.stamp
+        self._now = np.array(message.effort)
+        t = stamp.sec + 1e-9 * stamp.nanosec
+        self._residual = self._averaged('residual', t, self._residual, self._now)
+
+    def _on_diagnosis(self, message: Diagnosis) -> None:
+        self._told = f'{message.verdict.replace("_", " ")}: {message.summary}'
+
+    def _averaged(self, what: str, t: float, before: FloatArray, values: FloatArray) -> FloatArray:
+        """Return the mean square with one more sample; the first one is all there is."""
+        step, self._seen[what] = t - self._seen[what], t
+        share = 1.0 if not before.any() else float(np.clip(step / _WINDOW, 0.0, 1.0))
+        return np.asarray(before + share * (values**2 - before))
+
+
+def _marker(space: str, kind: int, colour: ColorRGBA) -> Marker:
+    marker = Marker(ns=space, type=kind, action=Marker.ADD, color=colour)
+    marker.pose.orientation.w = 1.0
+    return marker
+
+
+def _point(place: FloatArray) -> Point:
+    return Point(x=float(place[0]), y=float(place[1]), z=float(place[2]))
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    run(ResidualMarkersNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,257 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A trajectory controller as an action: goals that it accepts, reports on, and can be stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+import time
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from action_msgs.srv import CancelGoal
+from armid_ros.nodes.surviving import surviving
+from builtin_interfaces.msg import Duration
+from rclpy.action import ActionClient
+from rclpy.action.client import ClientGoalHandle
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.task import Future
+from trajectory_msgs.msg import JointTrajectory
+
+#: What a tolerance is that lets a joint be wherever it is; zero leaves it to the controller.
+ANYWHERE = -1.0
+#: How often it is looked whether a controller is known [s].
+_GLANCE = 0.005
+#: How long an answer to a goal may take [s]: a controller checks every waypoint before.
+_ANSWER = 5.0
+#: What control_msgs/action/FollowJointTrajectory calls its error codes.
+_ERRORS = {
+    -1: 'the goal is not valid',
+    -2: 'the joints are not those of the controller',
+    -3: 'the stamp is in the past: where clocks differ, use zero_stamp',
+    -4: 'a joint was outside its path tolerance',
+    -5: 'the goal was not reached within its tolerance',
+}
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """
+    How well a controller has to follow; 0 leaves it to the controller.
+
+    Attributes
+    ----------
+    path, goal : float
+        Of each joint on the way, and at its end [rad or m]; `ANYWHERE`: none.
+    goal_time : float
+        How long after its time the end may be reached [s].
+
+    """
+
+    path: float = 0.0
+    goal: float = 0.0
+    goal_time: float = 0.0
+
+
+@dataclass
+class _Goal:
+    """A goal that was sent: since when it is unanswered [s], and whether it is to be cancelled."""
+
+    sent: float
+    handle: ClientGoalHandle | None = None
+    unwanted: bool = False
+
+
+class TrajectoryAction:
+    """
+    The action follow_joint_trajectory of a controller.
+
+    Attributes
+    ----------
+    name : str
+        Full name of the action.
+    error : float
+        Largest distance of a joint from where the controller wants it, of the last feedback
+        [rad or m]; NaN before.
+
+    """
+
+    def __init__(
+        self, node: Any, action: Any, tolerance: Any, name: str, on_end: Callable[[str], None]
+    ) -> None:
+        """
+        Look for the action; nothing is sent.
+
+        Parameters
+        ----------
+        node : ArmidNode
+            Whose executor brings the answers.
+        action, tolerance : type
+            control_msgs/action/FollowJointTrajectory and control_msgs/msg/JointTolerance.
+        name : str
+            Of the action, relative to the namespace of the node or not.
+        on_end : callable
+            Told why the goal under way ended before it was reached; empty when it was reached.
+
+        """
+        self.name = node.resolve_topic_name(name)
+        self.error = math.nan
+        self._node, self._action, self._tolerance = node, action, tolerance
+        self._on_end = on_end
+        self._client = ActionClient(node, action, self.name)
+        self._canceller = node.create_client(CancelGoal, f'{self.name}/_action/cancel_goal')
+        self._goal: _Goal | None = None
+        self._requests: list[Future] = []
+        self._seen = -math.inf
+
+    def __str__(self) -> str:
+        """Say what is sent to."""
+        return f'the action {self.name}'
+
+    @property
+    def ready(self) -> bool:
+        """Whether there is a controller that takes goals."""
+        return bool(self._client.server_is_ready())
+
+    def wait(self, patience: float) -> None:
+        """Wait until a controller that offers it is known, at most a time [s]."""
+        deadline = time.monotonic() + patience
+        while not self.ready and time.monotonic() < deadline:
+            time.sleep(_GLANCE)
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a goal was sent that the controller has not ended."""
+        return self._goal is not None
+
+    def send(self, trajectory: JointTrajectory, tolerances: Tolerances) -> None:
+        """
+        Send a goal in the place of the one under way.
+
+        A controller of ros2_control goes from the old goal to the new one; the old one is
+        cancelled all the same, for others do not.
+
+        """
+        before, self._goal = self._goal, _Goal(time.monotonic())
+        goal, self.error, self._seen = self._goal, math.nan, time.monotonic()
+        future = self._client.send_goal_async(
+            self._message(trajectory, tolerances),
+            feedback_callback=self._guarded(lambda message: self._on_feedback(goal, message)),
+        )
+        self._ask(future, lambda handle: self._on_answer(goal, handle))
+        if before is not None:
+            self._cancel(before)
+
+    def cancel_all(self) -> None:
+        """Cancel every goal that the controller has, whoever sent it."""
+        if self._canceller.service_is_ready():
+            self._ask(self._canceller.call_async(CancelGoal.Request()), lambda _: None)
+
+    def trouble(self, patience: float) -> str:
+        """Say that the controller has been gone for a time [s], or is silent; empty: neither."""
+        goal, now = self._goal, time.monotonic()
+        if goal is None:
+            return ''
+        if self.ready:
+            self._seen = now
+        if now - self._seen > patience:
+            return f'{self.name} is gone: its controller was stopped or restarted'
+        if goal.handle is None and now - goal.sent > _ANSWER:
+            return f'{self.name} did not answer the goal within {_ANSWER:g} s'
+        return ''
+
+    def settle(self, patience: float) -> None:
+        """Wait until all is answered, at most a time [s], where nobody spins the node any more."""
+        executor = SingleThreadedExecutor(context=self._node.context)
+        before, deadline = self._node.executor, time.monotonic() + patience
+        executor.add_node(self._node)
+        try:
+            while self._requests and time.monotonic() < deadline:
+                executor.spin_once(timeout_sec=max(deadline - time.monotonic(), 0.0))
+        finally:
+            executor.remove_node(self._node)
+            executor.shutdown()
+            if before is not None:
+                before.add_node(self._node)
+
+    def close(self) -> None:
+        """End the client."""
+        self._client.destroy()
+
+    def _message(self, trajectory: JointTrajectory, tolerances: Tolerances) -> Any:
+        goal = self._action.Goal(trajectory=trajectory)
+        for joint in trajectory.joint_names:
+            goal.path_tolerance.append(self._tolerance(name=joint, position=tolerances.path))
+            goal.goal_tolerance.append(self._tolerance(name=joint, position=tolerances.goal))
+        seconds, nanoseconds = divmod(round(tolerances.goal_time * 1e9), 10**9)
+        goal.goal_time_tolerance = Duration(sec=seconds, nanosec=nanoseconds)
+        return goal
+
+    def _cancel(self, goal: _Goal) -> None:
+        """Cancel a goal, or as soon as it is accepted."""
+        goal.unwanted = True
+        if goal.handle is not None:
+            self._ask(goal.handle.cancel_goal_async(), lambda _: None)
+
+    def _on_answer(self, goal: _Goal, handle: ClientGoalHandle) -> None:
+        if not handle.accepted:
+            reason = 'where its log says no more, are its joints and its clock those of this node?'
+            self._end(goal, f'{self.name} refused the trajectory; {reason}')
+            return
+        goal.handle = handle
+        # not among what `settle` waits for: it comes when the arm is there
+        result = handle.get_result_async()
+        result.add_done_callback(self._guarded(lambda f: self._on_result(goal, f.result())))
+        if goal.unwanted:
+            self._cancel(goal)
+
+    def _on_result(self, goal: _Goal, response: Any) -> None:
+        status, result = response.status, response.result
+        if status == GoalStatus.STATUS_SUCCEEDED and not result.error_code:
+            self._end(goal, '')
+        elif status == GoalStatus.STATUS_CANCELED:
+            self._end(goal, f'the goal of {self.name} was cancelled by somebody else')
+        else:
+            why = _ERRORS.get(result.error_code, 'it says no reason')
+            detail = f' ({result.error_string})' if result.error_string else ''
+            self._end(goal, f'{self.name} gave up the trajectory: {why}{detail}')
+
+    def _end(self, goal: _Goal, reason: str) -> None:
+        if goal is self._goal:
+            self._goal = None
+            self._on_end(reason)
+
+    def _on_feedback(self, goal: _Goal, message: Any) -> None:
+        if goal is self._goal:
+            errors = [abs(error) for error in message.feedback.error.positions]
+            self.error = max(errors, default=math.nan)
+
+    def _ask(self, future: Future, then: Callable[[Any], None]) -> None:
+        def done(future: Future) -> None:
+            self._requests.remove(future)
+            then(future.result())
+
+        self._requests.append(future)
+        future.add_done_callback(self._guarded(done))
+
+    def _guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        node = self._node
+        return surviving(callback, self.name, lambda: node.complaints, node.context.ok)
+
+
+def beside(topic: str) -> str:
+    """Return the action that a controller has beside its topic joint_trajectory."""
+    return f'{topic.rpartition("/")[0]}/follow_joint_trajectory'
+
+
+def find_action(node: Node, name: str, on_end: Callable[[str], None]) -> TrajectoryAction | None:
+    """Return an action for a node; None where control_msgs is not installed."""
+    try:
+        from control_msgs.action import FollowJointTrajectory
+        from control_msgs.msg import JointTolerance
+    except ImportError:
+        return None
+    return TrajectoryAction(node, FollowJointTrajectory, JointTolerance, name, on_end)

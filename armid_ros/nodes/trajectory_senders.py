@@ -1,0 +1,163 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How trajectories get to a controller: as a goal of its action where it has one, or by topic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.nodes.qos import LATCHED, STREAM
+from armid_ros.nodes.trajectory_action import (
+    ANYWHERE,
+    beside,
+    find_action,
+    Tolerances,
+    TrajectoryAction,
+)
+from rclpy.duration import Duration
+from trajectory_msgs.msg import JointTrajectory
+
+#: How long it takes at most to know an action that somebody offers [s].
+_DISCOVERY = 1.0
+
+
+class TrajectorySenders:
+    """
+    The topic and the action of one controller; a run keeps to the one it was begun with.
+
+    Attributes
+    ----------
+    topic : str
+        Full name of the topic.
+    action : TrajectoryAction or None
+        None where only the topic is to be used, nobody has offered the action so far, or
+        control_msgs is not installed.
+
+    """
+
+    def __init__(self, node: Any, on_end: Callable[[str], None]) -> None:
+        """
+        Offer the topic, and look for the action.
+
+        Parameters
+        ----------
+        node : ArmidNode
+            With the parameters `interface`, `action` and `zero_stamp`.
+        on_end : callable
+            Told why the goal under way ended before it was reached; empty when it was reached.
+
+        Raises
+        ------
+        TrajectoryError
+            If the action is asked for and control_msgs is not installed.
+
+        """
+        quality = STREAM if node.value('zero_stamp') else LATCHED  # a late one must not begin then
+        self._publisher = node.create_publisher(JointTrajectory, 'joint_trajectory', quality)
+        self.topic = str(self._publisher.topic_name)
+        self._node, self._on_end = node, on_end
+        self._kind = node.value('interface')
+        self._name = node.resolve_topic_name(node.value('action') or beside(self.topic))
+        self.action: TrajectoryAction | None = None
+        self._by_action, self._possible = False, self._kind != 'topic'
+        if self._kind == 'action':
+            self._make_action()
+            if self.action is None:
+                raise TrajectoryError(
+                    "parameter 'interface' is action, but the package control_msgs is not "
+                    'installed: apt install ros-jazzy-control-msgs, or use interface:=topic'
+                )
+
+    @property
+    def readers(self) -> int:
+        """Return the number of subscriptions to the topic."""
+        return int(self._publisher.get_subscription_count())
+
+    @property
+    def missing(self) -> str:
+        """Say who is not there to take a trajectory; empty when somebody is."""
+        if self._has_action:
+            return ''
+        if self._kind == 'action':
+            return f'no controller offers the action {self._name}'
+        return '' if self.readers else f'nobody subscribes to {self.topic}'
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a goal was sent that the controller has not ended."""
+        return self._by_action and self.action.under_way
+
+    @property
+    def error(self) -> float:
+        """Largest error of a joint that the controller told of [rad or m]; NaN: none."""
+        return float(self.action.error) if self.under_way else float('nan')
+
+    def look(self) -> None:
+        """Make a client of the action as soon as somebody offers it; before it costs nothing."""
+        if self._possible and self.action is None and self._offered:
+            self._make_action()
+
+    def begin(self, trajectory: JointTrajectory, tolerances: Tolerances) -> str:
+        """
+        Send the trajectory of a run, and say where to.
+
+        Raises
+        ------
+        TrajectoryError
+            If it is to go to an action that nobody offers.
+
+        """
+        self.look()
+        if self.action is not None and self._offered:
+            self.action.wait(_DISCOVERY)
+        if self._kind == 'action' and not self._has_action:
+            raise TrajectoryError(f'{self.missing}; the arm is not started')
+        self._by_action = self._has_action
+        if self._by_action:
+            self.action.send(trajectory, tolerances)
+            return str(self.action)
+        self._publisher.publish(trajectory)
+        return f'{self.readers} subscribers'
+
+    def bring_to_rest(self, trajectory: JointTrajectory) -> None:
+        """Send what ends a run, wherever the joints are."""
+        if self._by_action:
+            self.action.send(trajectory, Tolerances(path=ANYWHERE, goal=ANYWHERE))
+        else:
+            self._publisher.publish(trajectory)
+
+    def insist(self, trajectory: JointTrajectory) -> None:
+        """Send it to a controller that goes on, on all ways that there are."""
+        if self._has_action:
+            self.action.cancel_all()
+        self.bring_to_rest(trajectory)
+
+    def trouble(self, patience: float) -> str:
+        """Say what is wrong with the controller for longer than a time [s]; empty: nothing."""
+        return self.action.trouble(patience) if self._by_action else ''
+
+    def settle(self, patience: float) -> None:
+        """Wait until what was sent has arrived, at most a time [s]."""
+        if self._by_action:
+            self.action.settle(patience)
+        else:
+            self._publisher.wait_for_all_acked(Duration(seconds=patience))
+
+    def close(self) -> None:
+        """Let go of the action; nothing is heard of it any more."""
+        if self.action is not None:
+            self.action.close()
+
+    def _make_action(self) -> None:
+        self.action = find_action(self._node, self._name, self._on_end)
+        self._possible = self.action is not None
+
+    @property
+    def _offered(self) -> bool:
+        return bool(self._node.count_publishers(f'{self._name}/_action/feedback'))
+
+    @property
+    def _has_action(self) -> bool:
+        return self.action is not None and self.action.ready

@@ -1,0 +1,16 @@
+# The wheels of ROS 2 export include directories of the machine that built them, and cmake does not
+# generate for a directory that is not there. They are not needed here: leave them out. An
+# installation by apt has none.
+get_property(imported_targets DIRECTORY PROPERTY IMPORTED_TARGETS)
+foreach(imported_target IN LISTS imported_targets)
+  get_target_property(directories ${imported_target} INTERFACE_INCLUDE_DIRECTORIES)
+  if(directories)
+    set(present)
+    foreach(directory IN LISTS directories)
+      if(directory MATCHES "^[$]<" OR EXISTS "${directory}")
+        list(APPEND present "${directory}")
+      endif()
+    endforeach()
+    set_target_properties(${imported_target} PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${present}")
+  endif()
+endforeach()

@@ -1,0 +1,153 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From the excitation to the report without anybody's help, and what fails is said."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from armid_ros.nodes.identification_run import IdentificationRunNode
+from armid_ros.nodes.recorder import RecorderNode
+from armid_ros.recording import read_recording
+import pytest
+
+from tests.ros.controller import Controller
+from tests.ros.test_controller import excitation, HOME, publisher, ROBOT
+
+__all__ = ['excitation']
+
+
+class Programs:
+    """Stand in for armid: write what it would, and end at once."""
+
+    def __init__(self, codes=(0, 0)):
+        self.called, self._codes = [], list(codes)
+
+    def __call__(self, program):
+        self.called.append(program)
+        folder = Path(program[-1])
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / 'identification.json').write_text(json.dumps({'grade': 'good'}))
+        document = {'verdict': 'not_repeatable', 'summary': 'nothing to name'}
+        (folder / 'diagnosis.json').write_text(json.dumps(document))
+        return Ended(self._codes.pop(0))
+
+
+class Ended:
+    """A program that has ended."""
+
+    def __init__(self, returncode):
+        self.returncode = returncode
+
+    def poll(self):
+        return self.returncode
+
+
+@pytest.fixture
+def arm(bench):
+    arm = Controller(bench, ROBOT, HOME, action=True)
+    yield arm
+    arm.leave()
+
+
+def everything(bench, arm, excitation, folder, programs, **parameters):
+    """Return the nodes that the launch file starts, with an arm in front of them."""
+    node = publisher(bench, arm, excitation, rehearsal_speed=1.0)
+    options = {'bag': str(folder / 'run'), 'record': False, 'topics': ['joint_states']}
+    bench.add(RecorderNode, use_sim_time=True, **options)
+    run = bench.add(
+        IdentificationRunNode,
+        programs,
+        robot='humanoid_arm',
+        save_to=str(folder),
+        **parameters,
+    )
+    return node, run
+
+
+def carry_on(bench, arm, node, run, fault=lambda: None):
+    """Let time go on until the node has ended."""
+    for step in range(1000):
+        if run.finished:
+            return
+        node.publish_diagnostics()
+        node.look()
+        run.look()
+        arm.run(arm.now + 0.2, step=0.2)
+        if step == 15:
+            fault()
+    pytest.fail(f'still {run.condition()}')
+
+
+def test_two_runs_are_recorded_identified_held_out_and_diagnosed(bench, arm, excitation, tmp_path):
+    programs = Programs()
+    options = {'effects': ['viscous_friction', 'coulomb_friction'], 'gravity': 'moon'}
+    node, run = everything(bench, arm, excitation, tmp_path, programs, **options)
+    carry_on(bench, arm, node, run)
+    assert not run.failure
+    assert arm.ends == ['succeed', 'succeed']
+    first, second = tmp_path / 'run', tmp_path / 'run_1'
+    for bag in (first, second):
+        recording = read_recording(bag, joints=ROBOT.joints)
+        assert recording.duration > excitation.duration
+    identify, diagnose = programs.called
+    assert identify[:4] == ('identify', str(first), '--validate', str(second))
+    assert '--effects viscous_friction,coulomb_friction' in ' '.join(identify)
+    assert '--gravity moon' in ' '.join(identify)
+    assert identify[-2:] == ('--out', str(tmp_path / 'identification'))
+    assert diagnose[0] == 'diagnose'
+    assert ('--model', str(tmp_path / 'identification' / 'model.yaml')) == diagnose[-4:-2]
+    results = run.condition()[1]['results']
+    assert results.startswith('identify: good (')
+    assert 'diagnose: not repeatable: nothing to name (' in results
+
+
+def test_after_a_rehearsal_that_is_as_foreseen_it_goes_on(bench, arm, excitation, tmp_path):
+    programs = Programs()
+    options = {'rehearse': True, 'runs': 1, 'diagnose': False}
+    node, run = everything(bench, arm, excitation, tmp_path, programs, **options)
+    carry_on(bench, arm, node, run)
+    assert not run.failure
+    assert len(arm.goals) == 2
+    assert [program[0] for program in programs.called] == ['identify']
+    assert '--validate' not in programs.called[0]
+
+
+def test_a_rehearsal_that_surprises_ends_it(bench, arm, excitation, tmp_path):
+    programs = Programs()
+    arm.faults.torque = 10.0
+    node, run = everything(bench, arm, excitation, tmp_path, programs, rehearse=True)
+    carry_on(bench, arm, node, run)
+    assert 'were foreseen; look into it' in run.failure
+    assert not programs.called
+    assert len(arm.goals) == 1
+
+
+def test_a_run_that_is_stopped_ends_it_with_the_reason(bench, arm, excitation, tmp_path):
+    def stick():
+        arm.faults.stuck = 3
+
+    programs = Programs()
+    node, run = everything(bench, arm, excitation, tmp_path, programs)
+    carry_on(bench, arm, node, run, fault=stick)
+    assert 'run 1 of 2: stopped' in run.failure
+    assert 'elbow_pitch' in run.failure
+    assert not programs.called
+    bench.settle()
+    assert len(read_recording(tmp_path / 'run', joints=ROBOT.joints)) > 10
+
+
+def test_a_program_that_fails_is_said_with_what_there_is(bench, arm, excitation, tmp_path):
+    programs = Programs(codes=(0, 2))
+    node, run = everything(bench, arm, excitation, tmp_path, programs, runs=1)
+    carry_on(bench, arm, node, run)
+    assert 'armid diagnose ended with code 2' in run.failure
+    assert f'the recordings are {tmp_path / "run"}' in run.failure
+    assert 'until then: identify: good' in run.failure
+
+
+def test_nodes_that_do_not_come_up_are_named(bench, tmp_path):
+    run = bench.add(IdentificationRunNode, Programs(), save_to=str(tmp_path), patience=1.0)
+    bench.spin_until(lambda: run.finished, 'the end')
+    assert run.failure == '/excitation_publisher and /recorder did not come up'

@@ -1,0 +1,151 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Positions and torques of several senders become one joint state, whatever brings them."""
+
+from __future__ import annotations
+
+from armid_ros.nodes.joint_state_merger import JointStateMergerNode
+from armid_ros.nodes.parameters import ParameterError
+from armid_ros.nodes.qos import LATCHED
+from armid_ros.robots import load_robot
+from control_msgs.msg import DynamicJointState, InterfaceValue
+import numpy as np
+import pytest
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, String
+
+from tests.ros.controller import stamp_of
+
+JOINTS = ('a', 'b')
+OUT = 'joint_state_merger/joint_states'
+
+
+def state(t, names, q, dq=(), tau=()):
+    message = JointState(name=list(names), position=list(q), velocity=list(dq), effort=list(tau))
+    message.header.stamp = stamp_of(t)
+    return message
+
+
+def merger(bench, **parameters):
+    node = bench.add(JointStateMergerNode, joints=list(JOINTS), **parameters)
+    return node, bench.listen(JointState, OUT)
+
+
+def sender(bench, node, kind, topic):
+    """Return a publisher that the node listens to."""
+    publisher = bench.probe.create_publisher(kind, topic, 10)
+    bench.spin_until(lambda: node.look() or publisher.get_subscription_count(), topic)
+    return publisher
+
+
+def test_joints_of_two_senders_are_one_message_in_the_order_asked_for(bench):
+    node, out = merger(bench)
+    first = sender(bench, node, JointState, 'joint_states')
+    for t in (1.0, 1.1, 1.2):
+        first.publish(state(t, ['b', 'gripper'], [20.0 * t, 0.0], [2.0, 0.0], [200.0 * t, 9.0]))
+        first.publish(state(t - 0.05, ['a'], [t - 0.05], [1.0], [-t]))
+    bench.spin_until(lambda: len(out) >= 2, OUT)
+    assert out[0].name == list(JOINTS)
+    np.testing.assert_allclose(out[0].position, [1.05, 21.0])
+    np.testing.assert_allclose(out[0].velocity, [1.0, 2.0])
+    np.testing.assert_allclose(out[0].effort, [-1.1, 210.0])
+    assert out[0].header.stamp == stamp_of(1.05)
+
+
+def test_joint_states_on_several_topics_are_merged(bench):
+    node, out = merger(bench, position_topics=['left', 'right'])
+    left, right = (sender(bench, node, JointState, topic) for topic in ('left', 'right'))
+    left.publish(state(1.0, ['a'], [1.0], [], [3.0]))
+    right.publish(state(1.0, ['b'], [2.0], [], [4.0]))
+    bench.spin_until(lambda: out, OUT)
+    assert (list(out[0].position), list(out[0].effort)) == ([1.0, 2.0], [3.0, 4.0])
+    assert not out[0].velocity
+
+
+def currents(t, values):
+    """Return currents as a broadcaster of ros2_control says them, under names of its own."""
+    message = DynamicJointState(joint_names=['drive_b', 'drive_a'])
+    message.header.stamp = stamp_of(t)
+    for value in values[::-1]:
+        message.interface_values.append(
+            InterfaceValue(interface_names=['temperature', 'current'], values=[40.0, value])
+        )
+    return message
+
+
+def test_currents_of_dynamic_joint_states_become_torques_by_gains(bench):
+    node, out = merger(
+        bench,
+        effort_topic='dynamic_joint_states',
+        effort_interface='current',
+        effort_joints=['drive_a', 'drive_b'],
+        gains=[2.0, -0.5],
+    )
+    efforts = sender(bench, node, DynamicJointState, 'dynamic_joint_states')
+    positions = sender(bench, node, JointState, 'joint_states')
+    for t in (1.0, 1.1):
+        efforts.publish(currents(t, [t, 10.0 * t]))
+    positions.publish(state(1.05, JOINTS, [0.1, 0.2], [0.0, 0.0], [77.0, 77.0]))
+    bench.spin_until(lambda: out, OUT)
+    np.testing.assert_allclose(out[0].effort, [2.0 * 1.05, -0.5 * 10.5])
+    np.testing.assert_allclose(out[0].position, [0.1, 0.2])
+
+
+def test_an_array_without_a_stamp_is_of_the_time_it_comes(bench):
+    node, out = merger(bench, effort_topic='currents', gains=[3.0])
+    efforts = sender(bench, node, Float64MultiArray, 'currents')
+    positions = sender(bench, node, JointState, 'joint_states')
+    for k in range(4):
+        positions.publish(state(1.0 + k, JOINTS, [k, k]))
+        bench.settle()
+        efforts.publish(Float64MultiArray(data=[1.0, 2.0]))
+        bench.settle()
+    assert out
+    np.testing.assert_allclose(out[-1].effort, [3.0, 6.0])
+
+
+def test_the_joints_are_those_of_the_description(bench):
+    robot = load_robot('humanoid_arm')
+    node = bench.add(JointStateMergerNode)
+    assert node.condition()[0] == 'waiting for robot_description'
+    publisher = bench.matched_publisher(String, 'robot_description', LATCHED)
+    publisher.publish(String(data=robot.urdf))
+    bench.spin_until(lambda: node.joints, 'the joints')
+    assert node.joints == robot.joints
+    assert f'no position of {", ".join(robot.joints)}' in node.condition()[0]
+
+
+def test_what_is_missing_is_named(bench):
+    node, _ = merger(bench, effort_topic='dynamic_joint_states', effort_interface='torque')
+    efforts = sender(bench, node, DynamicJointState, 'dynamic_joint_states')
+    positions = sender(bench, node, JointState, 'joint_states')
+    positions.publish(state(1.0, JOINTS, [0.1, 0.2]))
+    efforts.publish(currents(1.0, [1.0, 1.0]))
+    bench.settle()
+    assert node.condition()[0] == 'no torque of a, b so far'
+    assert "no joint has the interface 'torque'; there are current" in node.complaints.latest
+
+
+def test_a_topic_without_torques_and_wrong_counts_are_refused(bench):
+    with pytest.raises(ParameterError, match=r"'gains' has 3 for 2 joints: a, b"):
+        merger(bench, gains=[1.0, 2.0, 3.0])
+    node, _ = merger(bench, effort_topic='words')
+    bench.probe.create_publisher(String, 'words', 10)
+    bench.spin_until(lambda: node.complaints.counts, 'a complaint')
+    assert 'std_msgs/msg/String holds no efforts' in node.complaints.latest
+
+
+def test_torques_that_a_driver_low_passes_are_said(bench):
+    node, out = merger(bench)
+    rng, tau = np.random.default_rng(1), np.zeros(2)
+    positions = sender(bench, node, JointState, 'joint_states')
+    for k in range(1500):
+        noise = rng.normal(size=2)
+        tau += [0.1, 1.0] * (noise - tau)  # a is smoothed, b as it is
+        positions.publish(state(1.0 + 0.002 * k, JOINTS, [0.5, 0.5], [], tau))
+        if k % 5 == 0:
+            bench.settle()
+    bench.spin_until(lambda: len(out) > 1400, OUT)
+    _, values = node.condition()
+    assert values['low-passed to [Hz] a'] == pytest.approx(8.4, rel=0.35)  # 500/2 pi ln(1/0.9)
+    assert 'low-passed to [Hz] b' not in values

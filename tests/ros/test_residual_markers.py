@@ -1,0 +1,116 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The residual is drawn where the joints are, as large and as red as it is."""
+
+from __future__ import annotations
+
+from armid_msgs.msg import Diagnosis
+from armid_ros.nodes.qos import LATCHED
+from armid_ros.nodes.residual_markers import ResidualMarkersNode
+from armid_ros.robots import load_robot
+import numpy as np
+import pinocchio as pin
+import pytest
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from visualization_msgs.msg import Marker, MarkerArray
+
+from tests.ros.controller import stamp_of
+
+ROBOT = load_robot('humanoid_arm')
+Q = 0.4 * np.ones(ROBOT.n_joints)
+
+
+def state(t, **parts):
+    message = JointState(name=list(ROBOT.joints), **parts)
+    message.header.stamp = stamp_of(t)
+    return message
+
+
+@pytest.fixture
+def drawn(bench):
+    """Return what draws an arm at Q with torques of 10 N m and residuals."""
+    node = bench.add(ResidualMarkersNode)
+    out = bench.listen(MarkerArray, 'residual_markers/markers')
+    latched = bench.matched_publisher(String, 'robot_description', LATCHED)
+    states = bench.probe.create_publisher(JointState, 'joint_states', 10)
+    bench.spin_until(states.get_subscription_count, 'joint_states')
+    residuals = bench.matched_publisher(JointState, 'online_identifier/residual')
+    latched.publish(String(data=ROBOT.urdf))
+    bench.settle()
+
+    def draw(residual):
+        for k in range(50):
+            states.publish(state(1.0 + 0.1 * k, position=Q.tolist(), effort=[10.0] * 6))
+            residuals.publish(state(1.0 + 0.1 * k, effort=list(residual)))
+            bench.settle()
+        out.clear()
+        node.draw()
+        bench.spin_until(lambda: out, 'the markers')
+        return node, out[-1].markers
+
+    return draw
+
+
+def of(markers, space):
+    return [marker for marker in markers if marker.ns == space]
+
+
+def array(point):
+    return np.array([point.x, point.y, point.z])
+
+
+def test_spheres_are_at_the_joints_in_the_frame_of_the_base(drawn):
+    _, markers = drawn([0.0] * 6)
+    data = ROBOT.model.createData()
+    pin.forwardKinematics(ROBOT.model, data, Q)
+    balls = of(markers, 'share')
+    assert len(balls) == ROBOT.n_joints
+    for j, ball in enumerate(balls):
+        np.testing.assert_allclose(
+            array(ball.pose.position), data.oMi[j + 1].translation, atol=1e-9
+        )
+    assert {marker.header.frame_id for marker in markers} == {ROBOT.base}
+    assert len({(marker.ns, marker.id) for marker in markers}) == len(markers)
+
+
+def test_arrows_lie_along_the_axes_and_are_as_long_as_the_residual(drawn):
+    _, markers = drawn([2.0, -1.0, 0.5, 0.0, 0.0, 0.0])
+    data = ROBOT.model.createData()
+    jacobian = pin.computeJointJacobians(ROBOT.model, data, Q)
+    lengths = []
+    for j, arrow in enumerate(of(markers, 'residual')):
+        assert arrow.type == Marker.ARROW
+        begin, end = map(array, arrow.points)
+        lengths.append((end - begin) @ jacobian[3:, j])
+        np.testing.assert_allclose(np.cross(end - begin, jacobian[3:, j]), 0.0, atol=1e-9)
+    np.testing.assert_allclose(np.array(lengths[:3]) / lengths[0], [1.0, -0.5, 0.25], atol=0.02)
+    np.testing.assert_allclose(lengths[3:], 0.0, atol=1e-9)
+
+
+def test_colour_and_words_say_the_share_of_the_torque(drawn):
+    node, markers = drawn([2.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    reds = [ball.color.r for ball in of(markers, 'share')]
+    np.testing.assert_allclose(reds[:3], [1.0, 0.5, 0.0], atol=0.02)  # red from 20 % on
+    words = [text.text for text in of(markers, 'joint')]
+    assert words[0] == f'{ROBOT.joints[0]} 2 N m, 20 %'
+    values = node.condition()[1]
+    assert values[f'residual share {ROBOT.joints[1]}'] == pytest.approx(0.1, rel=0.02)
+
+
+def test_the_diagnosis_is_text_above_the_base(bench, drawn):
+    sender = bench.matched_publisher(Diagnosis, 'live_diagnosis/diagnosis', LATCHED)
+    sender.publish(Diagnosis(verdict='not_repeatable', summary='the torque differs ' * 8))
+    _, markers = drawn([0.0] * 6)
+    (text,) = of(markers, 'diagnosis')
+    assert text.text.startswith('not repeatable: the torque differs')
+    assert '\n' in text.text
+    assert text.pose.position.z > 0.0
+
+
+def test_nothing_is_drawn_before_the_arm_is_known(bench):
+    node = bench.add(ResidualMarkersNode)
+    out = bench.listen(MarkerArray, 'residual_markers/markers')
+    assert node.condition()[0] == 'waiting for robot_description'
+    bench.settle()
+    assert not out

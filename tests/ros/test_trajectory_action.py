@@ -1,0 +1,251 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The excitation as a goal of follow_joint_trajectory: accepted, watched, cancelled, ended."""
+
+from __future__ import annotations
+
+import gc
+import sys
+
+from action_msgs.msg import GoalStatus
+from armid_ros.errors import TrajectoryError
+from armid_ros.nodes.trajectories import read_trajectory
+from armid_ros.nodes.trajectory_action import beside
+from control_msgs.action import FollowJointTrajectory
+import numpy as np
+import pytest
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+
+from tests.ros.controller import Controller, NAME
+from tests.ros.test_controller import begun, excitation, HOME, publisher, ROBOT, set_parameter
+
+__all__ = ['excitation']
+
+
+@pytest.fixture
+def arm(bench):
+    arm = Controller(bench, ROBOT, HOME, action=True)
+    yield arm
+    arm.leave()
+
+
+def test_the_excitation_is_a_goal_and_no_message(bench, arm, excitation):
+    node = publisher(bench, arm, excitation, tracking_tolerance=0.3, goal_tolerance=0.05)
+    assert set_parameter(node, 'goal_time_tolerance', 1.5).successful
+    answer = bench.call('excitation_publisher/start')
+    assert answer.success
+    assert answer.message.endswith(f'sent to the action /{NAME}')
+    bench.spin_until(lambda: arm.goals, 'the goal')
+    bench.settle()
+    goal = arm.goals[0]
+    assert len(arm.accepted) == 1
+    assert [t.name for t in goal.path_tolerance] == list(ROBOT.joints)
+    assert {t.position for t in goal.path_tolerance} == {0.3}
+    assert {t.position for t in goal.goal_tolerance} == {0.05}
+    assert (goal.goal_time_tolerance.sec, goal.goal_time_tolerance.nanosec) == (1, 500_000_000)
+    assert read_trajectory(goal.trajectory).duration == pytest.approx(node.duration, abs=1e-6)
+
+
+def test_a_run_ends_when_the_controller_says_so(bench, arm, excitation):
+    arm.faults.lag = 1.5  # the arm arrives later than planned
+    node = begun(bench, arm, excitation, goal_tolerance=1e-4, tracking_tolerance=5.0)
+    arm.run(102.0)
+    node.publish_diagnostics()
+    _, values = node.condition()
+    assert 0.0 < values['controller_error'] < 5.0
+    end = 100.2 + node.duration
+    arm.run(end + 0.4)
+    assert node.elapsed is not None
+    refused = bench.call('excitation_publisher/start')
+    assert not refused.success and 'under way' in refused.message
+    arm.run(end + 0.7)
+    assert 'does not say that the end is reached' in node.condition()[0]
+    arm.run(end + 1.7)
+    assert arm.ends == ['succeed']
+    assert node.elapsed is None
+    assert not node.condition()[0]
+
+
+def test_a_goal_that_is_refused_is_said(bench, arm, excitation):
+    node = publisher(bench, arm, excitation)
+    arm.faults.deaf = True
+    node.start()
+    bench.spin_until(lambda: node.condition()[0], 'the refusal')
+    assert f'/{NAME} refused the trajectory' in node.condition()[0]
+    assert node.elapsed is None
+
+
+def test_a_controller_that_gives_up_is_quoted(bench, arm, excitation):
+    node = begun(bench, arm, excitation, tracking_tolerance=1.0)
+    arm.run(101.5)
+    arm.faults.stuck = 3
+    arm._goal.path[:] = 0.02  # the controller's own are narrower than those of the node
+    arm.run(103.5)
+    assert arm.ends == ['abort']
+    said = node.condition()[0]
+    assert 'a joint was outside its path tolerance (elbow_pitch is too far away)' in said
+    assert node.elapsed is None
+    assert len(arm.accepted) == 1
+
+
+def test_an_end_that_is_not_reached_in_time_is_said(bench, arm, excitation):
+    options = {'goal_tolerance': 0.001, 'goal_time_tolerance': 0.3, 'tracking_tolerance': 1.0}
+    node = begun(bench, arm, excitation, **options)
+    arm.faults.lag = 2.0
+    arm.run(100.2 + node.duration + 1.0)
+    assert arm.ends == ['abort']
+    assert 'was not reached within its tolerance' in node.condition()[0]
+
+
+def trouble(fault):
+    """Return what makes a run end, given the node and the arm."""
+
+    def stop(node, arm):
+        node.stop()
+
+    def silence(node, arm):
+        arm.faults.silent = True
+
+    def stick(node, arm):
+        set_parameter(node, 'tracking_tolerance', 0.02)
+        arm.faults.stuck = int(np.argmax(np.abs(arm.state(arm.now).dq)))
+
+    return {'stop': stop, 'joint states lost': silence, 'not followed': stick}[fault]
+
+
+@pytest.mark.parametrize('fault', ['stop', 'joint states lost', 'not followed'])
+def test_a_stop_replaces_the_goal_by_one_that_comes_to_rest(bench, arm, excitation, fault):
+    node = begun(bench, arm, excitation, tracking_tolerance=1.0)
+    arm.run(101.5)
+    trouble(fault)(node, arm)
+    arm.run(104.5)
+    node.look()
+    arm.run(106.0)
+    assert len(arm.goals) >= 2
+    assert {t.position for t in arm.goals[1].path_tolerance} == {-1.0}
+    assert arm.ends[:2] == ['abort', 'succeed']
+    np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
+    assert node.elapsed is None
+
+
+class Stubborn:
+    """A controller that takes no goal while it has one, and stops when that is cancelled."""
+
+    def __init__(self, bench):
+        self.handles, self.cancelled = [], []
+        self.server = ActionServer(
+            bench.probe,
+            FollowJointTrajectory,
+            NAME,
+            execute_callback=lambda handle: None,
+            goal_callback=lambda _: GoalResponse(1 if self.handles else 2),
+            handle_accepted_callback=self.handles.append,
+            cancel_callback=self._cancel,
+        )
+
+    def _cancel(self, handle):
+        self.cancelled.append(handle)
+        return CancelResponse.ACCEPT
+
+
+@pytest.fixture
+def stubborn(bench):
+    controller = Stubborn(bench)
+    yield controller
+    controller.server.destroy()
+    del controller.server, controller.handles, controller.cancelled
+    gc.collect()
+
+
+@pytest.mark.parametrize('fault', ['stop', 'joint states lost', 'not followed'])
+def test_a_controller_that_replaces_nothing_is_told_to_cancel(bench, excitation, stubborn, fault):
+    arm = Controller(bench, ROBOT, HOME)
+    node = publisher(bench, arm, excitation, interface='action', tracking_tolerance=5.0)
+    node.start()
+    bench.spin_until(lambda: stubborn.handles, 'the goal')
+    arm.run(101.0)
+    if fault == 'not followed':  # this arm never moves
+        set_parameter(node, 'tracking_tolerance', 0.001)
+    else:
+        trouble(fault)(node, arm)
+    arm.run(102.0)
+    node.look()
+    bench.spin_until(lambda: stubborn.cancelled, 'the cancellation')
+    assert stubborn.cancelled[0].status == GoalStatus.STATUS_CANCELING
+    assert node.elapsed is None
+
+
+def test_a_goal_that_somebody_else_cancels_is_said(bench, arm, excitation):
+    node = begun(bench, arm, excitation)
+    arm.run(101.0)
+    node._controller.action.cancel_all()
+    bench.spin_until(lambda: arm.ends, 'the end')
+    bench.spin_until(lambda: node.condition()[0], 'what is said')
+    assert 'was cancelled by somebody else' in node.condition()[0]
+
+
+def test_a_controller_that_is_gone_is_said(bench, arm, excitation):
+    node = begun(bench, arm, excitation, state_timeout=0.2)
+    bench.settle()
+    arm.leave()
+    bench.spin_until(lambda: node.look() or node.condition()[0], 'what is said')
+    assert f'/{NAME} is gone' in node.condition()[0]
+
+
+def test_a_controller_that_never_answers_is_said(bench, arm, excitation, monkeypatch):
+    monkeypatch.setattr('armid_ros.nodes.trajectory_action._ANSWER', 0.0)
+    node = publisher(bench, arm, excitation)
+    node.start()
+    node.look()
+    assert f'/{NAME} did not answer the goal within 0 s' in node.condition()[0]
+    assert node.elapsed is None
+
+
+def test_a_controller_that_goes_on_is_told_again(bench, arm, excitation):
+    node = begun(bench, arm, excitation)
+    arm.run(101.5)
+    arm.faults.deaf = True
+    node.stop()
+    arm.run(102.4)
+    arm.faults.deaf = False
+    arm.run(103.4)
+    assert 'goes on moving though it was stopped once' in node.condition()[0]
+    np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
+
+
+def test_a_rehearsal_goes_as_a_goal_and_is_reported_at_its_end(bench, arm, excitation):
+    node = publisher(bench, arm, excitation, rehearsal_speed=0.5)
+    node.rehearse()
+    bench.spin_until(lambda: arm.goals, 'the goal')
+    arm.run(100.6 + node.duration, step=0.2)
+    node.look()
+    assert node.condition()[0].startswith('rehearsed: followed within')
+    assert arm.ends == ['succeed']
+
+
+def test_where_there_is_no_action_the_topic_is_used_or_it_is_said(bench, excitation):
+    arm = Controller(bench, ROBOT, HOME)
+    node = publisher(bench, arm, excitation)
+    assert 'subscribers' in node.start()
+    bench.spin_until(lambda: arm.accepted, 'the trajectory')
+    node.stop()
+    arm.run(102.0)
+    strict = publisher(bench, arm, excitation, interface='action', action='/x/y')
+    arm.run(102.5)
+    with pytest.raises(TrajectoryError, match='no controller offers the action /x/y'):
+        strict.start()
+
+
+def test_without_control_msgs_the_action_cannot_be_asked_for(bench, excitation, monkeypatch):
+    arm = Controller(bench, ROBOT, HOME)
+    monkeypatch.setitem(sys.modules, 'control_msgs.action', None)
+    node = publisher(bench, arm, excitation)
+    node.start()
+    assert node._controller.action is None
+    with pytest.raises(TrajectoryError, match='control_msgs is not installed: apt install'):
+        publisher(bench, arm, excitation, interface='action')
+
+
+def test_the_action_is_beside_the_topic():
+    assert beside('/arm_controller/joint_trajectory') == '/arm_controller/follow_joint_trajectory'
+    assert beside('/joint_trajectory') == '/follow_joint_trajectory'
