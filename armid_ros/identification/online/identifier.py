@@ -7,11 +7,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.friction_beside import by_joint, FrictionBeside
+from armid_ros.identification.online.background import Background
 from armid_ros.identification.online.change import Change, change_candidates
 from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.online.checks import StreamChecks
@@ -35,6 +37,8 @@ __all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
 _FORGOTTEN = 10.0
 #: Windows of which the colour of the noise is learned [s]: longer than what it lasts.
 _WINDOW = 4.0
+#: Pieces of work in the background per second, at the least; one for a sample at 1 kHz.
+_PIECES = 400.0
 
 
 @dataclass(frozen=True)
@@ -146,7 +150,9 @@ class OnlineIdentifier:
             scale_covariance=settings.torque_noise is None,
         )
         window = max(1, round(_WINDOW / self._row_period))
-        self._scores = ScoreVariance(window, settings.forgetting)
+        self._work = Background()
+        self._crowded = False
+        self._scores = ScoreVariance(window, settings.forgetting, self._work)
         self._watch = None
         if settings.changes is not None:
             self._beside = FrictionBeside(arm)
@@ -155,6 +161,7 @@ class OnlineIdentifier:
                 self._beside.parameters,
                 change_candidates(arm, self.base),
                 settings.changes,
+                self._work,
             )
         self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
@@ -168,6 +175,7 @@ class OnlineIdentifier:
 
     def reset(self) -> None:
         """Forget everything that was learned, and set the counters to zero."""
+        self._work.clear()
         self._filter.reset()
         self._misfit.reset()
         self._checks.reset()
@@ -208,7 +216,19 @@ class OnlineIdentifier:
         else:
             good = self._gate.take(t, signal, self._without_consequence)
             self.latest = tuple(one for sample in good for one in self._take_good(sample))
+        self._go_on()
         return self.latest[-1] if self.latest else None
+
+    def _go_on(self) -> None:
+        """Do some of what takes long, with a sample that brings no row if there are such."""
+        if not self.latest or self._crowded:
+            self._work.advance(max(1, round(_PIECES * (self._filter.period or 0.0))))
+        self._crowded = bool(self.latest)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Finish what is under way, for a job can be in one place only."""
+        self._work.finish()
+        return self.__dict__
 
     def _take_good(self, sample: StreamSample) -> tuple[OnlineSample, ...]:
         """Learn from a sample of the gate, which says where a stretch begins."""
