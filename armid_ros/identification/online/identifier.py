@@ -343,8 +343,8 @@ class OnlineIdentifier:
         one = _one_sample(self.arm, motion)
         stacked = np.column_stack([motion.tau, self._rows(one), self._rows_beside(one)])
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
-        measured, rows, beside = np.split(filtered, [1, 1 + self.base.rank], axis=1)
-        measured = measured[:, 0]
+        last = 1 + self.base.rank
+        measured, rows, beside = filtered[:, 0], filtered[:, 1:last], filtered[:, last:]
         noise = self._row_noise()
         gain, independent = noise.gain, noise.independent(min(step, self._row_period))
         stamp = motion.t - (self.delay or 0.0)

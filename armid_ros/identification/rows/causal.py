@@ -359,10 +359,12 @@ class CausalFilter:
 
     def _unwrapped(self, signal: FloatArray) -> FloatArray:
         """Undo the jump by a full turn with which some drivers keep a joint within +-pi."""
+        position = signal[: self._n_joints]
         if self._position is not None:
-            turns = np.rint((signal[: self._n_joints] - self._position) / (2.0 * np.pi))
-            signal[: self._n_joints] -= 2.0 * np.pi * turns * self._revolute
-        self._position = signal[: self._n_joints]
+            step = position - self._position
+            if float(np.abs(step).max()) > np.pi:
+                position -= 2.0 * np.pi * np.rint(step / (2.0 * np.pi)) * self._revolute
+        self._position = position
         return signal
 
     def _restart(self) -> None:
