@@ -133,8 +133,12 @@ class ChangeSearch:
         self._sizes, ends = np.array(sizes), np.cumsum(sizes)
         self._slices = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
         self._of_size = {size: np.flatnonzero(self._sizes == size) for size in set(sizes)}
-        self._chance = chance / (len(sizes) * len(_LENGTHS))
+        self.believe(chance)
         self.reset()
+
+    def believe(self, chance: float) -> None:
+        """Test with another chance of a positive test without a change; 0: none is positive."""
+        self._chance = chance / (len(self._sizes) * len(_LENGTHS))
 
     def reset(self) -> None:
         """Forget what noise usually does, and all blocks."""
@@ -167,8 +171,9 @@ class ChangeSearch:
             window = yield from self._window(len(self._blocks) - m, loudness)
             yield
             weighed[m] = Weighed(self._ratios(window), window.strength)
-            excess = self._usual[m].excess(weighed[m], self._chance)
-            positive = positive or bool(np.any(excess > 1.0))
+            if self._chance > 0.0:
+                excess = self._usual[m].excess(weighed[m], self._chance)
+                positive = positive or bool(np.any(excess > 1.0))
             yield
         if positive:
             found = yield from self._judge(loudness)

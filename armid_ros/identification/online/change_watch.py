@@ -114,6 +114,22 @@ class ChangeWatch:
         self._late: list[Sample] | None = None
         self._searching = False
 
+    def use(self, settings: ChangeSettings | None, forgetting: float) -> None:
+        """
+        Go on with other settings.
+
+        Parameters
+        ----------
+        settings : ChangeSettings or None
+            How readily a change is believed; None believes in none.
+        forgetting : float
+            Of what is learned.
+
+        """
+        chance = 0.0 if settings is None else BLOCK / settings.false_alarm_time
+        self._search.believe(chance)
+        self._wider.forgetting = forgetting
+
     def interrupt(self) -> None:
         """Begin a new stretch of rows, which does not continue the one before."""
         self._open = self._open or _Stretch(0.0, self._estimator.learned())

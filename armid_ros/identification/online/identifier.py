@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
@@ -17,10 +17,10 @@ from armid_ros.identification.online.background import Background
 from armid_ros.identification.online.change import Change, change_candidates
 from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.online.checks import StreamChecks
-from armid_ros.identification.online.recursive import RecursiveLeastSquares
+from armid_ros.identification.online.recursive import check_forgetting, RecursiveLeastSquares
 from armid_ros.identification.online.score_variance import ScoreVariance
 from armid_ros.identification.online.settings import OnlineSettings
-from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, TripleLag
+from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
 from armid_ros.identification.rows.row_noise import Misfit, RowNoise, sensor_noise
 from armid_ros.identification.samples.joint_gate import joint_gate
 from armid_ros.identification.samples.spikes import SpikeGate
@@ -109,6 +109,9 @@ class OnlineIdentifier:
     0.3
 
     """
+
+    #: Settings that can change while samples are learned from.
+    CHANGEABLE: ClassVar = ('forgetting', 'max_gap', 'changes')
 
     def __init__(
         self,
@@ -263,6 +266,52 @@ class OnlineIdentifier:
     def model(self) -> ArmModel:
         """Return the arm with the estimate, otherwise as near as possible to what it was."""
         return self.arm.with_theta(self.base.lift(self._estimator.values, self.arm.theta))
+
+    def check(self, settings: OnlineSettings) -> None:
+        """
+        Refuse settings that this identifier cannot go on with; see `use`.
+
+        Raises
+        ------
+        IdentificationError
+            If they need a new beginning, or are out of range.
+
+        """
+        for part in fields(settings):
+            same = getattr(settings, part.name) == getattr(self.settings, part.name)
+            if part.name not in self.CHANGEABLE and not same:
+                raise IdentificationError(
+                    f'{part.name} cannot change while samples are learned from: begin anew'
+                )
+        if self._watch is None and settings.changes is not None:
+            raise IdentificationError(
+                'changes of the arm were not looked for from the beginning: begin anew'
+            )
+        check_forgetting(settings.forgetting)
+        check_gap(settings.max_gap)
+
+    def use(self, settings: OnlineSettings) -> None:
+        """
+        Go on with other settings; nothing that was learned is lost.
+
+        Parameters
+        ----------
+        settings : OnlineSettings
+            As before but for what is `CHANGEABLE`.
+
+        Raises
+        ------
+        IdentificationError
+            If they need a new beginning, or are out of range.
+
+        """
+        self.check(settings)
+        self.settings = settings
+        self._filter.max_gap = settings.max_gap
+        for part in (self._estimator, self._scores, self._misfit):
+            part.forgetting = settings.forgetting
+        if self._watch is not None:
+            self._watch.use(settings.changes, settings.forgetting)
 
     @property
     def changes(self) -> tuple[Change, ...]:

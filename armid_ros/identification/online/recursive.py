@@ -123,10 +123,7 @@ class RecursiveLeastSquares:
         start: npt.ArrayLike | None = None,
         scale_covariance: bool | None = None,
     ) -> None:
-        if not SMALLEST_FORGETTING <= forgetting <= 1.0:
-            raise IdentificationError(
-                f'forgetting factor {forgetting}: has to be from {SMALLEST_FORGETTING} to 1'
-            )
+        check_forgetting(forgetting)
         self.parameters = parameters
         self.samples = 0
         self._forgetting = float(forgetting)
@@ -270,6 +267,17 @@ class RecursiveLeastSquares:
         self._freedom -= directions.shape[1]
 
     @property
+    def forgetting(self) -> float:
+        """Forgetting factor; it may be set at any time."""
+        return self._forgetting
+
+    @forgetting.setter
+    def forgetting(self, factor: float) -> None:
+        check_forgetting(factor)
+        self._forgetting = factor
+        self._take(self._root, self._values)  # R theta is not kept up while samples are forgotten
+
+    @property
     def forgets(self) -> bool:
         """Whether samples lose weight with time."""
         return self._forgetting < 1.0
@@ -338,6 +346,14 @@ class RecursiveLeastSquares:
         if not np.isfinite(rows.sum() + tau.sum() + counts.sum()):
             raise IdentificationError('update: rows, torques and weights have to be finite')
         return rows, tau, counts
+
+
+def check_forgetting(factor: float) -> None:
+    """Refuse a forgetting factor that is none."""
+    if not SMALLEST_FORGETTING <= factor <= 1.0:
+        raise IdentificationError(
+            f'forgetting factor {factor}: has to be from {SMALLEST_FORGETTING} to 1'
+        )
 
 
 def _checked_noise(noise: npt.ArrayLike) -> FloatArray:

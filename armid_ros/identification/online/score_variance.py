@@ -84,7 +84,7 @@ class ScoreVariance:
         self, window: int, forgetting: float = 1.0, work: Background | None = None
     ) -> None:
         self._window = window
-        self._kept = forgetting**window
+        self.forgetting = forgetting
         self._work = work or Foreground()
         self.reset()
 
@@ -148,7 +148,7 @@ class ScoreVariance:
         if self._latest is not None:
             settled = self._settled or _nothing(window)
             yield from _add(settled, self._latest)
-            kept = max(self._kept, 1.0 - _brought(window, settled))
+            kept = max(self.forgetting**self._window, 1.0 - _brought(window, settled))
             yield
             if kept < 1.0:
                 for products in settled.products:
