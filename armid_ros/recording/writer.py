@@ -349,7 +349,7 @@ class BagWriter:
         if not self._mcap.finished:
             self.flush()
             self._write_information(self.file.name)
-            self._mcap.finish()
+        self._mcap.finish()
         write_metadata(self.path, self._information(self.file.name))
         self._closed = True
 
@@ -368,8 +368,7 @@ class BagWriter:
             return ''
         self._closed = True
         try:
-            if not self._mcap.finished:
-                self._mcap.finish()
+            self._mcap.finish()
             write_metadata(self.path, self._information(self.file.name))
         except ArmidError as error:
             self._mcap.give_up()
