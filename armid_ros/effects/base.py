@@ -19,6 +19,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, ClassVar, Protocol, Self
 
 from armid_ros.effects.action import Action, Displacement
@@ -27,7 +28,7 @@ from armid_ros.effects.smooth import SmoothColumns
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.model import LinkFrames
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
@@ -189,9 +190,7 @@ class Effect(ABC):
 
     def shape_over_joints(self, robot: Robot) -> FloatArray:
         """Return every shape over the joints of a robot, defaults elsewhere, shape (S, n)."""
-        spread = np.tile([[s.default] for s in self.shapes], robot.n_joints)
-        spread[:, self.indices(robot.joints)] = self.shape_values.T
-        return spread
+        return _spread_shape(self.shapes, self.shape, self.joints, robot.joints)
 
     def with_shape(self, values: npt.ArrayLike) -> Effect:
         """
@@ -352,7 +351,26 @@ class Effect(ABC):
 
     def indices(self, motion_joints: tuple[str, ...]) -> list[int]:
         """Return the columns of the effect's joints among the joints of a motion or robot."""
-        return [motion_joints.index(joint) for joint in self.joints]
+        return list(_places(self.joints, motion_joints))
+
+
+@lru_cache(maxsize=1024)
+def _places(joints: tuple[str, ...], among: tuple[str, ...]) -> tuple[int, ...]:
+    """Return where joints are among others; a stream asks the same for every sample."""
+    return tuple(among.index(joint) for joint in joints)
+
+
+@lru_cache(maxsize=1024)
+def _spread_shape(
+    shapes: tuple[Shape, ...],
+    values: tuple[float, ...],
+    joints: tuple[str, ...],
+    among: tuple[str, ...],
+) -> FloatArray:
+    """Return shape parameters over joints of which some have their own, shape (S, n)."""
+    spread = np.tile([[s.default] for s in shapes], len(among))
+    spread[:, _places(joints, among)] = np.array(values).reshape(-1, len(shapes)).T
+    return read_only(spread)
 
 
 class Kind(Protocol):

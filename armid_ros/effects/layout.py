@@ -30,11 +30,10 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
         Zero where a parameter belongs to another joint.
 
     """
-    count = len(quantities)
-    columns = np.zeros((len(motion), motion.n_joints, count * len(effect.joints)))
-    for position, joint in enumerate(effect.indices(motion.joints)):
-        for offset, values in enumerate(quantities):
-            columns[:, joint, count * position + offset] = values[:, joint]
+    joints, count = effect.indices(motion.joints), len(quantities)
+    columns = np.zeros((len(motion), motion.n_joints, count * len(joints)))
+    for offset, values in enumerate(quantities):
+        columns[:, joints, range(offset, count * len(joints), count)] = values[:, joints]
     return columns
 
 

@@ -49,7 +49,7 @@ class TorqueOffset(Effect):
         (offset,) = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.broadcast_to(offset, np.shape(dq))
+            return offset if np.shape(dq) == offset.shape else np.broadcast_to(offset, dq.shape)
 
         return Action(torque=torque)
 

@@ -10,6 +10,9 @@ Everything here is linear in the gravity vector and in the inertial parameters o
 
 from __future__ import annotations
 
+import threading
+from weakref import WeakKeyDictionary
+
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -39,6 +42,22 @@ def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
     )
 
 
+class _Scratch(threading.local):
+    """Space that Pinocchio works in, once for a robot and thread: to make it takes longer."""
+
+    def __init__(self) -> None:
+        self._of: WeakKeyDictionary[Robot, pin.Data] = WeakKeyDictionary()
+
+    def of(self, robot: Robot) -> pin.Data:
+        data = self._of.get(robot)
+        if data is None:
+            data = self._of[robot] = robot.model.createData()
+        return data
+
+
+_SCRATCH = _Scratch()
+
+
 def inverse_dynamics(robot: Robot, motion: Motion) -> FloatArray:
     """
     Compute the joint torques that a motion takes, by recursive Newton-Euler.
@@ -49,8 +68,7 @@ def inverse_dynamics(robot: Robot, motion: Motion) -> FloatArray:
         Torque [N m] or force [N].
 
     """
-    model = robot.model
-    data = model.createData()
+    model, data = robot.model, _SCRATCH.of(robot)
     tau = np.empty((len(motion), robot.n_joints))
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
         tau[k] = pin.rnea(model, data, q, dq, ddq)
@@ -73,8 +91,7 @@ def inverse_dynamics_derivatives(
     Source: Carpentier and Mansard 2018; Pinocchio's computeRNEADerivatives.
 
     """
-    model = robot.model
-    data = model.createData()
+    model, data = robot.model, _SCRATCH.of(robot)
     n = robot.n_joints
     by_q, by_dq, by_ddq = np.empty((3, len(motion), n, n))
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
@@ -113,8 +130,7 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
     >>> tau = y @ robot.rigid_parameters  # [N m]
 
     """
-    model = robot.model
-    data = model.createData()
+    model, data = robot.model, _SCRATCH.of(robot)
     n = robot.n_joints
     y = np.empty((len(motion), n, len(LINK_PARAMETERS) * n))
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):

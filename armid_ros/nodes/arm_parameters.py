@@ -51,11 +51,21 @@ ARM_PARAMETERS = (
         'What makes an arm with rigid joints follow its trajectory.',
         choices=('computed_torque', 'gravity_pd'),
     ),
-    NodeParameter('torque_noise', [0.0], 'Standard deviation, one or one a joint.', 'N m or N'),
-    NodeParameter('position_noise', [0.0], 'Standard deviation, one or one a joint.', 'rad or m'),
-    NodeParameter('velocity_noise', [0.0], 'Standard deviation, one or one a joint.', 'rad/s'),
-    NodeParameter('resolution', [0.0], 'Encoder step, one or one a joint; 0: none.', 'rad or m'),
-    NodeParameter('velocity_from_encoder', False, 'Differentiate positions for the velocity.'),
+    *(
+        NodeParameter(name, [0.0], f'{what}, one or one a joint; 0: none.', unit, read_only=False)
+        for name, what, unit in (
+            ('torque_noise', 'Standard deviation', 'N m or N'),
+            ('position_noise', 'Standard deviation', 'rad or m'),
+            ('velocity_noise', 'Standard deviation', 'rad/s'),
+            ('resolution', 'Encoder step', 'rad or m'),
+        )
+    ),
+    NodeParameter(
+        'velocity_from_encoder',
+        False,
+        'Differentiate positions for the velocity.',
+        read_only=False,
+    ),
     NodeParameter('torque_delay', 0, 'Steps by which torque is read late.', lower=0, upper=100000),
     NodeParameter(
         'acceleration_noise',
@@ -64,6 +74,7 @@ ARM_PARAMETERS = (
         'm/s^2',
         lower=0.0,
         upper=1000.0,
+        read_only=False,
     ),
     NodeParameter(
         'loop_gain',
@@ -75,6 +86,17 @@ ARM_PARAMETERS = (
     NodeParameter('seed', 0, 'Of the noise.', lower=0, upper=2**62),
     NodeParameter('time_step', 0.001, 'Of the integration.', 's', lower=1e-5, upper=0.01),
 )
+
+
+#: Parameters of the sensors that can be set while the arm moves.
+SENSOR_PARAMETERS = {
+    'torque_noise',
+    'position_noise',
+    'velocity_noise',
+    'resolution',
+    'velocity_from_encoder',
+    'acceleration_noise',
+}
 
 
 def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm | ElasticArm:
@@ -98,15 +120,7 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm | Ela
     n, dt = arm.robot.n_joints, value('time_step')
     rng = np.random.default_rng(value('seed'))
     start = _numbers(value('start'), n, 'start') if value('start') else None
-    sensors = Sensors(
-        torque_noise=_per_joint(value('torque_noise'), n, 'torque_noise'),
-        position_noise=_per_joint(value('position_noise'), n, 'position_noise'),
-        velocity_noise=_per_joint(value('velocity_noise'), n, 'velocity_noise'),
-        resolution=_per_joint(value('resolution'), n, 'resolution'),
-        velocity_from_encoder=value('velocity_from_encoder'),
-        torque_delay=value('torque_delay'),
-        acceleration_noise=value('acceleration_noise'),
-    )
+    sensors = sensors_of(value, n)
     springs, rotorless = elastic_joints(arm)
     if rotorless:
         warn(no_rotor(rotorless))
@@ -124,6 +138,27 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm | Ela
     controllers = {'computed_torque': ComputedTorque, 'gravity_pd': GravityPD}
     controller = controllers[value('controller')](plant.arm)
     return SimulatedArm(plant, rng=rng, controller=controller, sensors=sensors, start=start)
+
+
+def sensors_of(value: Values, n_joints: int) -> Sensors:
+    """
+    Return the sensors that parameters describe.
+
+    Raises
+    ------
+    ArmidError
+        If there are not as many numbers as joints, or one is negative.
+
+    """
+    return Sensors(
+        torque_noise=_per_joint(value('torque_noise'), n_joints, 'torque_noise'),
+        position_noise=_per_joint(value('position_noise'), n_joints, 'position_noise'),
+        velocity_noise=_per_joint(value('velocity_noise'), n_joints, 'velocity_noise'),
+        resolution=_per_joint(value('resolution'), n_joints, 'resolution'),
+        velocity_from_encoder=value('velocity_from_encoder'),
+        torque_delay=value('torque_delay'),
+        acceleration_noise=value('acceleration_noise'),
+    )
 
 
 def bare_arm(value: Values) -> ArmModel:

@@ -71,6 +71,7 @@ class BagPlayerNode(ArmidNode):
             'Hz',
             lower=0.0,
             upper=10000.0,
+            read_only=False,
         ),
         NodeParameter(
             'subscriber_timeout',
@@ -80,6 +81,7 @@ class BagPlayerNode(ArmidNode):
             's',
             lower=0.0,
             upper=3600.0,
+            read_only=False,
         ),
         NodeParameter(
             'start_tolerance',
@@ -88,6 +90,7 @@ class BagPlayerNode(ArmidNode):
             'rad or m',
             lower=0.0001,
             upper=1.0,
+            read_only=False,
         ),
         NodeParameter(
             'state_timeout',
@@ -96,6 +99,7 @@ class BagPlayerNode(ArmidNode):
             's',
             lower=0.01,
             upper=60.0,
+            read_only=False,
         ),
     )
 
@@ -106,10 +110,9 @@ class BagPlayerNode(ArmidNode):
             raise RecordingError("parameter 'bag' is empty: give a bag, -p bag:=PATH")
         self._bag = bag or Bag(self.value('bag'))
         self._lock_step = bool(self.value('use_sim_time'))
-        if self._lock_step and self.value('clock_rate'):
-            raise RecordingError(
-                'use_sim_time follows /clock; it cannot publish it too: clock_rate'
-            )
+        trouble = self.objection({'clock_rate': self.value('clock_rate')})
+        if trouble:
+            raise RecordingError(trouble)
         self._wanted = {self.resolve_topic_name(name) for name in names(self, 'topics')}
         self._refused = ''
         self._topics = self._make_publishers()
@@ -121,14 +124,11 @@ class BagPlayerNode(ArmidNode):
         self._begin = self._first + int(self.value('start_offset') * 1e9)
         self._position = self._begin
         self._anchor: int | None = None
-        self._deadline = time.monotonic() + self.value('subscriber_timeout')
+        self._made = time.monotonic()
         self.published: Counter[str] = Counter()
-        clock_rate = self.value('clock_rate')
-        self._clock_period = int(1e9 / clock_rate) if clock_rate else 0
         self._clock_due = self._begin
-        self._clock_publisher = (
-            self.create_publisher(ClockMessage, '/clock', 10) if clock_rate else None
-        )
+        self._clock_publisher: Publisher | None = None
+        self._keep_clock()
         pace = self.get_clock() if self._lock_step else Clock(clock_type=ClockType.STEADY_TIME)
         self._pace = pace
         self._timer = self.create_timer(TICK, self.play, clock=pace)
@@ -173,6 +173,26 @@ class BagPlayerNode(ArmidNode):
         self._publish_clock()
         if self.finished:
             self._timer.cancel()
+
+    def objection(self, values: Mapping[str, Any]) -> str:
+        """Refuse to publish the clock that it follows."""
+        if self.value('use_sim_time') and values.get('clock_rate'):
+            return 'use_sim_time follows /clock; it cannot publish it too: clock_rate'
+        return ''
+
+    def changed(self, names: frozenset[str]) -> None:
+        """Publish /clock as often as the parameter says by now, and judge jumps by it."""
+        if 'clock_rate' in names:
+            self._keep_clock()
+        if self._guard is not None:
+            self._guard.tolerance = self.value('start_tolerance')
+            self._guard.timeout = self.value('state_timeout')
+
+    def _keep_clock(self) -> None:
+        rate = self.value('clock_rate')
+        self._clock_period = int(1e9 / rate) if rate else 0
+        if rate and self._clock_publisher is None:
+            self._clock_publisher = self.create_publisher(ClockMessage, '/clock', 10)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say how far it has played."""
@@ -242,7 +262,7 @@ class BagPlayerNode(ArmidNode):
         everyone = all(p.get_subscription_count() for p in self._topics.values())
         if self._guard is not None and not self._has_states:
             everyone = everyone and self._guard.hears
-        return everyone or time.monotonic() > self._deadline
+        return everyone or time.monotonic() > self._made + self.value('subscriber_timeout')
 
     def _publish(self, message: RawMessage) -> None:
         topic = self._topics[message.topic]
@@ -270,7 +290,8 @@ class BagPlayerNode(ArmidNode):
             self._position = self._clock_due = self._begin
 
     def _publish_clock(self) -> None:
-        if self._clock_publisher is None or self._position < self._clock_due:
+        due = self._clock_period and self._position >= self._clock_due
+        if self._clock_publisher is None or not due:
             return
         stamp = Time(nanoseconds=self._position).to_msg()
         self._clock_publisher.publish(ClockMessage(clock=stamp))

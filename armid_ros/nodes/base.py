@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.complaints import Complaints
-from armid_ros.nodes.parameters import declare, NodeParameter
+from armid_ros.nodes.parameters import as_declared, declare, is_as, NodeParameter
 from armid_ros.nodes.surviving import FATAL, surviving
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
@@ -51,6 +51,7 @@ class ArmidNode(Node):
         """Take the keyword arguments of rclpy's Node: context, namespace, overrides and others."""
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
+        self._paced: dict[str, tuple[Callable[[], None], Timer]] = {}
         declare(self, self.parameters())
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._apply)
@@ -75,6 +76,17 @@ class ArmidNode(Node):
         """Make a timer as rclpy does, with a callback that may fail."""
         guarded = self._surviving(callback, getattr(callback, '__name__', 'timer'))
         return super().create_timer(timer_period_sec, guarded, *args, **more)
+
+    def pace(self, parameter: str, callback: Callable[[], None]) -> None:
+        """Call something as often as a parameter says [Hz], also once it is set anew."""
+        if parameter in self._paced:  # a timer that is given another period waits for the old one
+            self.destroy_timer(self._paced[parameter][1])
+        timer = self.create_timer(1.0 / self.value(parameter), callback)
+        self._paced[parameter] = callback, timer
+
+    def until_call(self, parameter: str) -> float:
+        """Return the time until what is paced by a parameter is called next [s]."""
+        return float(self._paced[parameter][1].time_until_next_call()) * 1e-9
 
     @property
     def finished(self) -> bool:
@@ -172,16 +184,23 @@ class ArmidNode(Node):
         self.create_service(Trigger, service, answer)
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
-        """Set parameters as rclpy does, and complain of those that are refused."""
-        results = super().set_parameters(parameter_list)
-        for parameter, result in zip(parameter_list, results, strict=True):
-            self._note_refusal(parameter.name, result)
-        return results
+        """Set parameters one by one; see `set_parameters_atomically`."""
+        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Set parameters as rclpy does, and complain when they are refused."""
-        result = super().set_parameters_atomically(parameter_list)
-        self._note_refusal(', '.join(p.name for p in parameter_list), result)
+        """
+        Set parameters as rclpy does, and complain when they are refused.
+
+        What has that value already is no change, so that all a node was dumped with can be loaded
+        again; a whole number is taken for a float.
+
+        """
+        given = [as_declared(self, parameter) for parameter in parameter_list]
+        changed = [p for p in given if not is_as(self, p)]
+        if not changed:
+            return SetParametersResult(successful=True)
+        result = super().set_parameters_atomically(changed)
+        self._note_refusal(', '.join(p.name for p in changed), result)
         return result
 
     def publish_diagnostics(self) -> None:
@@ -206,8 +225,11 @@ class ArmidNode(Node):
         return SetParametersResult(successful=not reason, reason=reason)
 
     def _apply(self, parameters: list[Parameter]) -> None:
+        names = frozenset(p.name for p in parameters)
+        for name in names & self._paced.keys():
+            self.pace(name, self._paced[name][0])
         try:
-            self.changed(frozenset(p.name for p in parameters))
+            self.changed(names)
         except ArmidError as error:
             self.complaints.say('parameter', str(error))
 

@@ -44,7 +44,14 @@ IDENTIFIER_PARAMETERS = (
         lower=0.0,
         upper=10000.0,
     ),
-    NodeParameter('forgetting', 1.0, 'Per sample used; 1 keeps all.', lower=0.9, upper=1.0),
+    NodeParameter(
+        'forgetting',
+        1.0,
+        'Per sample used; 1 keeps all.',
+        lower=0.9,
+        upper=1.0,
+        read_only=False,
+    ),
     NodeParameter(
         'torque_noise',
         [0.0],
@@ -52,7 +59,12 @@ IDENTIFIER_PARAMETERS = (
         'N m or N',
     ),
     NodeParameter(
-        'max_gap', 10, 'Missing samples that are interpolated across.', lower=1, upper=1000
+        'max_gap',
+        10,
+        'Missing samples that are interpolated across.',
+        lower=1,
+        upper=1000,
+        read_only=False,
     ),
     NodeParameter(
         'measured_velocity', False, 'Differentiate the measured velocity, not the position.'
@@ -64,6 +76,7 @@ IDENTIFIER_PARAMETERS = (
         's',
         lower=0.0,
         upper=1e9,
+        read_only=False,
     ),
 )
 
@@ -94,10 +107,15 @@ def make_identifier(value: Values, description: str | None = None) -> OnlineIden
     arm = ArmModel(robot)
     for text in filter(None, value('effects')):
         arm = arm.with_effect(make_effect(text, robot))
+    return OnlineIdentifier(arm, settings_of(value, arm), rng=np.random.default_rng(0))
+
+
+def settings_of(value: Values, arm: ArmModel) -> OnlineSettings:
+    """Return the settings that parameters describe."""
     noise = tuple(value('torque_noise'))
     if len(noise) == 1:
-        noise = noise * robot.n_joints
-    settings = OnlineSettings(
+        noise = noise * arm.robot.n_joints
+    return OnlineSettings(
         cutoff=value('cutoff'),
         row_rate=value('row_rate') or None,
         forgetting=value('forgetting'),
@@ -106,4 +124,3 @@ def make_identifier(value: Values, description: str | None = None) -> OnlineIden
         measured_velocity=value('measured_velocity'),
         changes=ChangeSettings(value('false_alarm_time')) if value('false_alarm_time') else None,
     )
-    return OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))

@@ -36,7 +36,7 @@ class JumpGuard:
     """
 
     def __init__(self, node: Node, tolerance: float, timeout: float) -> None:
-        self._tolerance, self._timeout = tolerance, timeout
+        self.tolerance, self.timeout = tolerance, timeout
         self._clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._latest: dict[tuple[str, ...], tuple[JointState, float]] = {}
         self._limits: dict[str, float] = {}
@@ -66,12 +66,12 @@ class JumpGuard:
         pose = MeasuredPose.unknown(reference.joints)
         for message, seen in self._latest.values():
             pose = pose.updated(message.name, message.position, 0, seen)
-        lost = pose.staleness(self._now(), self._timeout)
+        lost = pose.staleness(self._now(), self.timeout)
         if lost:
             return f'trajectory: {self._states.topic_name}: {lost}; it is not known where it is'
         first = (float(reference.t[0]), reference.q[0])
         fault = jump_fault(
-            reference.joints, first, pose.q, self._fastest(reference), self._tolerance
+            reference.joints, first, pose.q, self._fastest(reference), self.tolerance
         )
         return f'trajectory: {fault}; bring the arm to its first point' if fault else ''
 

@@ -33,6 +33,7 @@ from armid_ros.nodes.process import make_executor
 from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
+from armid_ros.nodes.steady import steady
 from armid_ros.simulation import SimulatedArm
 from rclpy.context import Context
 from rclpy.executors import Executor
@@ -350,7 +351,7 @@ def _matched(learner: OnlineIdentifierNode) -> bool:
 
 @contextmanager
 def _scope(domain: int | None) -> Iterator[tuple[Context, Executor]]:
-    with private_context(domain) as context:
+    with private_context(domain) as context, steady():
         executor = make_executor('events', context)
         try:
             yield context, executor

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 import sys
 import time
@@ -15,13 +16,21 @@ from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm.model_file import read_model
 from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.identification.online.change import Change
-from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSample
+from armid_ros.identification.online.identifier import (
+    OnlineIdentifier,
+    OnlineSample,
+    OnlineSettings,
+)
 from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.estimates import estimate_message, save_identification
 from armid_ros.nodes.freshness import Freshness
-from armid_ros.nodes.identifier_parameters import IDENTIFIER_PARAMETERS, make_identifier
+from armid_ros.nodes.identifier_parameters import (
+    IDENTIFIER_PARAMETERS,
+    make_identifier,
+    settings_of,
+)
 from armid_ros.nodes.joint_states import JointSample, JointStateReader
 from armid_ros.nodes.learning_status import change_status, parameter_status
 from armid_ros.nodes.parameters import NodeParameter
@@ -77,7 +86,15 @@ class OnlineIdentifierNode(ArmidNode):
 
     table = (
         *IDENTIFIER_PARAMETERS,
-        NodeParameter('estimate_rate', 10.0, 'Of ~/estimate.', 'Hz', lower=0.1, upper=1000.0),
+        NodeParameter(
+            'estimate_rate',
+            10.0,
+            'Of ~/estimate.',
+            'Hz',
+            lower=0.1,
+            upper=1000.0,
+            read_only=False,
+        ),
         NodeParameter(
             'save_to',
             '',
@@ -115,7 +132,7 @@ class OnlineIdentifierNode(ArmidNode):
         )
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
-        self.create_timer(1.0 / self.value('estimate_rate'), self.publish_estimate)
+        self.pace('estimate_rate', self.publish_estimate)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_LOOK_PERIOD, self.look, clock=steady)
 
@@ -207,6 +224,29 @@ class OnlineIdentifierNode(ArmidNode):
         for status in statuses:
             status.hardware_id = self.hardware
         return statuses
+
+    def objection(self, values: Mapping[str, Any]) -> str:
+        """Refuse settings that would need a new beginning."""
+        if self.identifier is None:
+            return ''
+        try:
+            self.identifier.check(self._settings(values))
+        except ArmidError as error:
+            return str(error)
+        return ''
+
+    def changed(self, names: frozenset[str]) -> None:
+        """Go on with settings that were changed."""
+        if self.identifier is not None:
+            self.identifier.use(self._settings({}))
+
+    def _settings(self, values: Mapping[str, Any]) -> OnlineSettings:
+        """Return the settings of the identifier with the parameters that can change."""
+        described = settings_of(
+            lambda name: values.get(name, self.value(name)), self._require().arm
+        )
+        can_change = {name: getattr(described, name) for name in OnlineIdentifier.CHANGEABLE}
+        return replace(self._require().settings, **can_change)
 
     def level(self, troubled: bool) -> bytes:
         """Return STALE when joint states have stopped, ERROR when nothing can be learned."""

@@ -136,6 +136,28 @@ def declare(node: Node, table: Iterable[NodeParameter]) -> None:
             raise ParameterError(_explain_value(entry, str(error))) from error
 
 
+def as_declared(node: Node, parameter: Parameter) -> Parameter:
+    """Return a parameter whose numbers are of the type that the node declared."""
+    floats = {
+        Parameter.Type.DOUBLE: (Parameter.Type.INTEGER, float),
+        Parameter.Type.DOUBLE_ARRAY: (Parameter.Type.INTEGER_ARRAY, lambda v: list(map(float, v))),
+    }
+    if node.has_parameter(parameter.name):
+        declared = node.get_parameter(parameter.name).type_
+        whole, convert = floats.get(declared, (None, None))
+        if parameter.type_ == whole and convert is not None:
+            return Parameter(parameter.name, declared, convert(parameter.value))
+    return parameter
+
+
+def is_as(node: Node, parameter: Parameter) -> bool:
+    """Return whether a parameter of a node has a value already."""
+    if not node.has_parameter(parameter.name):
+        return False
+    now = node.get_parameter(parameter.name).get_parameter_value()
+    return bool(now == parameter.get_parameter_value())
+
+
 def names(node: Node, parameter: str) -> tuple[str, ...]:
     """Return a list of names, without the empty one that stands for none."""
     values: list[str] = node.get_parameter(parameter).value

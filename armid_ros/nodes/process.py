@@ -11,6 +11,7 @@ import sys
 
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.steady import steady
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
@@ -96,8 +97,9 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
             node = make_node()
         executor = make_executor(node.value('executor'))
         executor.add_node(node)
-        while rclpy.ok() and not (node.finished or ending.asked or hung_up):
-            executor.spin_once(timeout_sec=_LOOK_PERIOD)  # events: without a time-out it hangs
+        with steady():
+            while rclpy.ok() and not (node.finished or ending.asked or hung_up):
+                executor.spin_once(timeout_sec=_LOOK_PERIOD)  # events: else it hangs
     except (_EndedAtOnce, ExternalShutdownException):
         pass
     except RCLError:  # the context is shut down between looking at it and waiting on it

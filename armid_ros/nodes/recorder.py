@@ -60,12 +60,25 @@ class RecorderNode(ArmidNode):
 
     table = (
         NodeParameter(
-            'bag', '', 'Directory to write; empty: armid_<date>_<time> in the current directory.'
+            'bag',
+            '',
+            'Directory to write; empty: armid_<date>_<time> in the current directory. Set while '
+            'a bag is open, it is of the next one.',
+            read_only=False,
         ),
-        NodeParameter('topics', [''], 'Topics to record; without names, all that are published.'),
+        NodeParameter(
+            'topics',
+            [''],
+            'Topics to record; without names, all that are published.',
+            read_only=False,
+        ),
         NodeParameter('record', True, 'Record from the start, without waiting for ~/start.'),
         NodeParameter(
-            'compression', 'zstd', 'Compression of the chunks.', choices=('zstd', 'lz4', 'none')
+            'compression',
+            'zstd',
+            'Compression of the chunks, of the next bag where one is open.',
+            choices=('zstd', 'lz4', 'none'),
+            read_only=False,
         ),
         NodeParameter(
             'min_free',
@@ -74,9 +87,16 @@ class RecorderNode(ArmidNode):
             'MB',
             lower=0.0,
             upper=1e6,
+            read_only=False,
         ),
         NodeParameter(
-            'chunk_age', 0.1, 'Age at which a chunk is written out.', 's', lower=0.01, upper=60.0
+            'chunk_age',
+            0.1,
+            'Age at which a chunk is written out.',
+            's',
+            lower=0.01,
+            upper=60.0,
+            read_only=False,
         ),
     )
 
@@ -84,7 +104,7 @@ class RecorderNode(ArmidNode):
         """Take what opens a bag; by default a BagWriter with the parameters of the node."""
         super().__init__('recorder', **kwargs)
         self._open_bag = open_bag or self._default_bag
-        self._wanted = {self.resolve_topic_name(name) for name in names(self, 'topics')}
+        self._wanted = self._topics_wanted()
         self._writer: BagWriter | None = None
         self._subscriptions_by_topic: dict[str, MatchedSubscription] = {}
         self._held: list[tuple[Channel, bytes]] = []
@@ -149,11 +169,13 @@ class RecorderNode(ArmidNode):
         """Subscribe to topics that have appeared, with the QoS of their publishers."""
         if self._writer is None:
             return
-        for subscription in self._subscriptions_by_topic.values():
-            subscription.match()
+        for topic in list(self._subscriptions_by_topic):
+            if self._is_wanted(topic):
+                self._subscriptions_by_topic[topic].match()
+            else:
+                self._subscriptions_by_topic.pop(topic).close()
         for topic, types in self.get_topic_names_and_types():
-            wanted = topic in self._wanted if self._wanted else '/_' not in topic
-            if wanted and topic not in self._subscriptions_by_topic:
+            if self._is_wanted(topic) and topic not in self._subscriptions_by_topic:
                 self._record(self._writer, topic, types)
 
     def watch(self) -> None:
@@ -184,6 +206,16 @@ class RecorderNode(ArmidNode):
                 'disk', f'the disk of {writer.path} will be full in less than {_WARNED:.0f} s'
             )
 
+    def changed(self, names: frozenset[str]) -> None:
+        """Record other topics, or write more often, from now on."""
+        if 'topics' in names:
+            self._wanted = self._topics_wanted()
+            self.look()
+        if 'bag' in names:
+            self._bags = 0
+        if 'chunk_age' in names and self._writer is not None:
+            self._writer.chunk_age = self.value('chunk_age')
+
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say where the messages go and how many there are."""
         trouble = f'nobody publishes {", ".join(self.missing)}' if self.missing else ''
@@ -200,6 +232,12 @@ class RecorderNode(ArmidNode):
         """Complete the bag."""
         if self._writer is not None:
             self.stop()
+
+    def _topics_wanted(self) -> set[str]:
+        return {self.resolve_topic_name(name) for name in names(self, 'topics')}
+
+    def _is_wanted(self, topic: str) -> bool:
+        return topic in self._wanted if self._wanted else '/_' not in topic
 
     def _record(self, writer: BagWriter, topic: str, types: Sequence[str]) -> None:
         publishers = self.get_publishers_info_by_topic(topic)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import time
 from typing import Any
 
@@ -12,7 +13,14 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import read_model
 from armid_ros.elastic.plant.arm import ElasticArm, ElasticSample
 from armid_ros.errors import ArmidError, ModelError, TrajectoryError
-from armid_ros.nodes.arm_parameters import ARM_PARAMETERS, bare_arm, make_arm, with_effects
+from armid_ros.nodes.arm_parameters import (
+    ARM_PARAMETERS,
+    bare_arm,
+    make_arm,
+    SENSOR_PARAMETERS,
+    sensors_of,
+    with_effects,
+)
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.elastic_topics import ElasticTopics
 from armid_ros.nodes.parameters import NodeParameter
@@ -22,8 +30,10 @@ from armid_ros.nodes.trajectories import read_trajectory
 from armid_ros.simulation import Reference, SimulatedArm
 from armid_ros.simulation.run import whole_steps
 from rclpy.clock import Clock, ClockType
+from rclpy.publisher import Publisher
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.time import Time
+from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -58,7 +68,9 @@ class SimulatedArmNode(ArmidNode):
 
     table = (
         *ARM_PARAMETERS,
-        NodeParameter('rate', 1000.0, 'Of joint_states.', 'Hz', lower=0.1, upper=100000.0),
+        NodeParameter(
+            'rate', 1000.0, 'Of joint_states.', 'Hz', lower=0.1, upper=100000.0, read_only=False
+        ),
         NodeParameter(
             'real_time_factor',
             1.0,
@@ -66,6 +78,7 @@ class SimulatedArmNode(ArmidNode):
             'messages. 0: moves only when told.',
             lower=0.0,
             upper=1000.0,
+            read_only=False,
         ),
         NodeParameter(
             'clock_rate',
@@ -74,6 +87,7 @@ class SimulatedArmNode(ArmidNode):
             'Hz',
             lower=0.1,
             upper=100000.0,
+            read_only=False,
         ),
     )
 
@@ -99,16 +113,14 @@ class SimulatedArmNode(ArmidNode):
         super().__init__('simulated_arm', **kwargs)
         self._arm = arm or make_arm(self.value, self.get_logger().warn)
         self._bare = bare_arm(self.value) if arm is None else None
-        rate = self.value('rate')
         self._dt_ns = round(self._arm.plant.dt * 1e9)
-        self._stride = whole_steps(1.0 / rate, self._arm.plant.dt, f'a rate of {rate:g} Hz')
+        self._stride = self._steps_at(self.value('rate'))
         self._follows = bool(self.value('use_sim_time'))
-        self._factor = 0.0 if self._follows else self.value('real_time_factor')
         self._origin_ns = start_ns
         if start_ns is None and not self._follows:
             self._origin_ns = self.get_clock().now().nanoseconds
         self._pending: tuple[int, Reference] | None = None
-        self._anchor = (time.monotonic(), 0)
+        self._anchor = (time.monotonic(), 0.0)
         self._states = self.create_publisher(
             JointState,
             'joint_states',
@@ -119,20 +131,36 @@ class SimulatedArmNode(ArmidNode):
         self._sides = None
         if isinstance(self._arm, ElasticArm):
             self._sides = ElasticTopics(self, self._arm)
-        self._clock_due, self._clock_period = 0, round(1e9 / self.value('clock_rate'))
-        self._clock_publisher = None
-        if not self._follows and self._factor != 1.0:
-            self._clock_publisher = self.create_publisher(ClockMessage, '/clock', STREAM)
+        self._clock_publisher: Publisher | None = None
+        self._timer: Timer | None = None
+        self._keep_pace()
         description = self.create_publisher(String, 'robot_description', LATCHED)
         description.publish(String(data=self._arm.plant.robot.urdf))
         self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, LATCHED)
         self.create_subscription(String, 'model', self._on_model, LATCHED)
         self.offer('~/reset', self.reset)
+
+    def _steps_at(self, rate: float) -> int:
+        """Return the steps of the plant between two samples."""
+        return whole_steps(1.0 / rate, self._arm.plant.dt, f'a rate of {rate:g} Hz')
+
+    def _keep_pace(self) -> None:
+        """Move as often, and publish /clock as often, as the parameters say."""
+        rate = self.value('rate')
+        self._stride = self._steps_at(rate)
+        self._factor = 0.0 if self._follows else self.value('real_time_factor')
+        self._clock_due, self._clock_period = 0, round(1e9 / self.value('clock_rate'))
+        if self._clock_publisher is None and not self._follows and self._factor != 1.0:
+            self._clock_publisher = self.create_publisher(ClockMessage, '/clock', STREAM)
+        if self._timer is not None:
+            self.destroy_timer(self._timer)
+        self._timer, self._anchor = None, (time.monotonic(), self._elapsed())
         if self._follows:
-            self.create_timer(1.0 / rate, self.follow)
+            self._timer = self.create_timer(1.0 / rate, self.follow)
         elif self._factor:
             period = max(1.0 / (rate * self._factor), _SHORTEST_PERIOD)
-            self.create_timer(period, self.catch_up, clock=Clock(clock_type=ClockType.STEADY_TIME))
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self._timer = self.create_timer(period, self.catch_up, clock=steady)
 
     @property
     def stamp_ns(self) -> int:
@@ -226,19 +254,26 @@ class SimulatedArmNode(ArmidNode):
         return '', {'simulated_time': self._arm.state.t, 'moving': int(self.moving)}
 
     def objection(self, values: Mapping[str, Any]) -> str:
-        """Refuse effects that the arm cannot have."""
-        if 'effects' not in values:
-            return ''
+        """Refuse effects that the arm cannot have, and noise and rates that do not fit it."""
+        n_joints = self._arm.plant.robot.n_joints
         try:
-            self._check(self._with_effects(values['effects']))
+            sensors_of(lambda name: values.get(name, self.value(name)), n_joints)
+            self._steps_at(values.get('rate', self.value('rate')))
+            if 'effects' in values:
+                self._check(self._with_effects(values['effects']))
         except ArmidError as error:
-            return f"parameter 'effects': {error}"
+            return f'parameter {", ".join(map(repr, values))}: {error}'
         return ''
 
     def changed(self, names: frozenset[str]) -> None:
         """Go on from where the arm is with the effects that were set."""
         if 'effects' in names:
             self._become(self._with_effects(self.value('effects')))
+        if names & {'rate', 'real_time_factor', 'clock_rate'}:
+            self._keep_pace()
+        described = sensors_of(self.value, self._arm.plant.robot.n_joints)
+        known = {name: getattr(described, name) for name in names & SENSOR_PARAMETERS}
+        self._arm.sensors = replace(self._arm.sensors, **known)
 
     def _with_effects(self, texts: Sequence[str]) -> ArmModel:
         """Return the arm as it was before any effects of the parameter, with others."""

@@ -132,7 +132,7 @@ class BagWriter:
             raise RecordingError(f'{self.path}: cannot be made: {error.strerror}') from error
         self.file = self.path / f'{self.path.resolve().name}_0.mcap'
         self._chunk_size = chunk_size
-        self._chunk_age = chunk_age
+        self.chunk_age = chunk_age
         self._clock = clock
         library = f'armid_ros {__version__}'
         self._mcap = McapWriter(self.file, compression=compression, library=library)
@@ -284,7 +284,7 @@ class BagWriter:
             self._opened, self._size = now, 0
         records.append(record)
         self._size += len(record)
-        if self._size >= self._chunk_size or now - self._opened >= self._chunk_age:
+        if self._size >= self._chunk_size or now - self._opened >= self.chunk_age:
             self.flush()
 
     def write_many(
@@ -343,7 +343,7 @@ class BagWriter:
         if not self._mcap.finished:
             self.flush()
             self._write_information(self.file.name)
-            self._mcap.finish()
+        self._mcap.finish()
         write_metadata(self.path, self._information(self.file.name))
         self._closed = True
 
@@ -362,8 +362,7 @@ class BagWriter:
             return ''
         self._closed = True
         try:
-            if not self._mcap.finished:
-                self._mcap.finish()
+            self._mcap.finish()
             write_metadata(self.path, self._information(self.file.name))
         except ArmidError as error:
             self._mcap.give_up()

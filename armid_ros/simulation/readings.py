@@ -110,13 +110,17 @@ class RecentPast:
 
     def extend(self, trace: Trace) -> None:
         """Take in what happened."""
-        drive = self._action.drive
-        asked = np.concatenate([trace.tau, trace.torque[np.newaxis]])
+        drive, state = self._action.drive, trace.state
+        rows = np.empty((len(trace.q), 5, len(self._joints)))
+        rows[:-1, 0], rows[-1, 0] = trace.q[1:], state.q
+        rows[:-1, 1], rows[-1, 1] = trace.dq[1:], state.dq
+        rows[:, 2] = trace.ddq
+        asked = np.empty((len(trace.tau) + 1, len(self._joints)))
+        asked[:-1], asked[-1] = trace.tau, trace.torque
+        rows[:, 4] = (asked[1:] + asked[:-1]) / 2
         given = asked if drive is None else drive(asked)
-        q = np.concatenate([trace.q[1:], trace.state.q[np.newaxis]])
-        dq = np.concatenate([trace.dq[1:], trace.state.dq[np.newaxis]])
-        means = [(x[1:] + x[:-1]) / 2 for x in (given, asked)]
-        self.append(np.stack([q, dq, trace.ddq, *means], axis=1), trace.state.steps)
+        rows[:, 3] = rows[:, 4] if drive is None else (given[1:] + given[:-1]) / 2
+        self.append(rows, state.steps)
 
     def latest(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return position, velocity and torque as read now, each of shape (n,)."""

@@ -22,10 +22,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
-from armid_ros.identification.online.recursive import Learned
+from armid_ros.identification.online.background import at_once, Pieces
+from armid_ros.identification.online.recursive import Learned, Sample
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 from scipy import linalg
 
 #: Eigenvalues of an information below this share of the largest are nothing [-].
@@ -49,7 +52,7 @@ class Block:
         What was known when it began.
     asked : Learned
         What the estimator that is asked for its parameters knew then.
-    samples : tuple of (rows, tau, weights)
+    samples : tuple of Sample
         What it was made of, to learn from it once more.
 
     """
@@ -60,7 +63,12 @@ class Block:
     right: FloatArray
     before: Learned
     asked: Learned
-    samples: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]
+    samples: tuple[Sample, ...]
+
+    @cached_property
+    def known(self) -> FloatArray:
+        """Information before it, A = R^T R, shape (P, P)."""
+        return np.asarray(self.before.root.T @ self.before.root)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +93,17 @@ class Evidence:
 
     def ratio(self, some: slice) -> float:
         """Return twice the logarithm of the likelihood ratio of some changes at once."""
-        if some.stop - some.start == 1:
-            information, score = self.information[some.start, some.start], self.score[some.start]
-            return float(score**2 / information) if information > 0.0 else 0.0
-        size, vectors = np.linalg.eigh(self.information[some, some])
-        kept = size > _NOTHING * max(size[-1], 0.0)
-        return float(np.sum((vectors.T @ self.score[some])[kept] ** 2 / size[kept]))
+        return float(self.ratios(np.arange(some.start, some.stop)[np.newaxis])[0])
+
+    def ratios(self, sets: npt.NDArray[np.intp]) -> FloatArray:
+        """Return the same for G sets of p changes, of indices of shape (G, p), shape (G,)."""
+        information = self.information[sets[:, :, np.newaxis], sets[:, np.newaxis, :]]
+        size, vectors = np.linalg.eigh(information)
+        squares = np.einsum('gpk,gp->gk', vectors, self.score[sets]) ** 2
+        kept = size > _NOTHING * np.maximum(size[:, -1:], 0.0)
+        return np.asarray(
+            np.sum(np.divide(squares, size, where=kept, out=np.zeros_like(size)), axis=1)
+        )
 
     def size(self, some: slice) -> tuple[FloatArray, FloatArray]:
         """Return the estimate of some changes and its covariance in white noise."""
@@ -99,30 +112,43 @@ class Evidence:
 
 
 def evidence(
-    blocks: Sequence[Block], before: Learned, directions: FloatArray, loudness: float = 1.0
+    blocks: Sequence[Block], before: Block, directions: FloatArray, loudness: float = 1.0
 ) -> Evidence:
+    """Weigh possible changes by a window of rows; see `weighing`."""
+    return at_once(weighing(blocks, before, directions, loudness))
+
+
+def weighing(
+    blocks: Sequence[Block], before: Block, directions: FloatArray, loudness: float = 1.0
+) -> Pieces[Evidence]:
     """
-    Weigh possible changes by a window of rows.
+    Weigh possible changes by a window of rows, piece by piece.
 
     Parameters
     ----------
     blocks : sequence of Block
         The window.
-    before : Learned
-        What was known before it.
+    before : Block
+        What was known when this one began is compared with the window.
     directions : ndarray, shape (P, Q)
         What the changes do to the parameters.
     loudness : float
         Noise of what was learned before, in the unit of the window's.
 
     """
-    information = np.sum([block.information for block in blocks], axis=0)
-    right = np.sum([block.right for block in blocks], axis=0)
-    known = before.root.T @ before.root / loudness**2
-    scale = 1.0 / np.sqrt(np.diag(known) + np.diag(information))
-    both = scale[:, np.newaxis] * (known + information) * scale + _NOTHING * np.eye(len(scale))
+    information, right = blocks[0].information, blocks[0].right
+    for block in blocks[1:]:
+        information, right = information + block.information, right + block.right
+    yield
+    known = before.known / loudness**2
+    both = known + information
+    scale = 1.0 / np.sqrt(np.diag(both))
+    both *= scale * scale[:, np.newaxis]
+    np.fill_diagonal(both, 1.0 + _NOTHING)
+    yield
     factor = linalg.cho_factor(both, check_finite=False)
-    moved = np.column_stack([information @ directions, right - information @ before.values])
+    moved = np.column_stack([information @ directions, right - information @ before.before.values])
+    yield
     solved = linalg.cho_solve(factor, scale[:, np.newaxis] * moved, check_finite=False)
     shared = (known @ directions).T @ (scale[:, np.newaxis] * solved)
     strength = np.sum(directions * moved[:, :-1], axis=0)

@@ -3,75 +3,58 @@
 """
 Watch for changes while learning: a load picked up, friction risen.
 
-Rows are summed up in blocks of a quarter of a second. After each block windows of half a second to
-two seconds that end with it are tested (``change_evidence``). When a test is positive, all begins
-of the change are compared, and it is named as soon as nothing else explains the torques as well,
-or when time is up. The estimator then returns to what it knew before, forgets what may have
+Rows are summed up in blocks of a quarter of a second, which are searched (``change_search``).
+When a change is named, the estimator returns to what it knew before, forgets what may have
 changed, and only that, and learns from the rows since then again.
+
+All but the update of the estimator itself goes on in the background, so a change is named some
+samples after the block that made it clear. Until the rows since then are learned again the
+estimator goes on as if nothing had happened.
 
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
 
-from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.online.background import at_once, Background, Foreground, Job, Pieces
 from armid_ros.identification.online.change import Candidate, Change
-from armid_ros.identification.online.change_evidence import Block, Evidence, evidence
+from armid_ros.identification.online.change_evidence import Block
+from armid_ros.identification.online.change_search import (
+    BLOCK,
+    ChangeSearch,
+    ChangeSettings,
+    Found,
+)
 from armid_ros.identification.online.loudness import Loudness
-from armid_ros.identification.online.recursive import Learned, RecursiveLeastSquares
-from armid_ros.identification.online.usual_size import UsualSize, Weighed
+from armid_ros.identification.online.recursive import Learned, RecursiveLeastSquares, Sample
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Length of a block [s].
-BLOCK = 0.25
-#: Lengths of the windows that are tested, in blocks.
-_LENGTHS = (2, 4, 8)
-#: Blocks that are kept: the longest window, and one before it.
-_KEPT = 9
-#: Blocks since the change before which it is not named, and after which it is in any case.
-_EARLIEST = 4
-_LATEST = 6
+__all__ = ['BLOCK', 'ChangeSettings', 'ChangeWatch']
+
 #: Share of an assumed noise, of which only the ratios between joints are known, below which no
 #: torque is measured: a hundredth of a hundredth of its range.
 _LEAST_NOISE = 0.01
-#: Logarithm of the likelihood ratio by which the best explanation is clear.
-_CLEAR = 5.0
-#: Of two begins of a change that differ by less the later one is taken: soon after a change any
-#: begin before it will do, and all that can be told apart by then is not much.
-_ALIKE = 4.0
 #: Blocks whose residuals are remembered: a minute of four a second.
 _REMEMBERED = 240
-#: For so long after a change its size is still being learned [s]; what is less likely than this
-#: share of it corrects the size.
-_LEARNING = 10.0
-_CORRECTION = 0.3
+#: Samples that are learned in one piece of work, together or one by one, as with forgetting. More
+#: than come in the meantime, so that what came late is caught up with.
+_TOGETHER, _ONE_BY_ONE = 10, 4
 
 
-@dataclass(frozen=True)
-class ChangeSettings:
-    """
-    How readily a change is believed.
+@dataclass(eq=False)
+class _Stretch:
+    """Samples that were not searched so far; those of a block, or what an interruption left."""
 
-    Attributes
-    ----------
-    false_alarm_time : float
-        Mean time between two alarms of an arm that does not change [s].
-
-    """
-
-    false_alarm_time: float = 100.0 * 3600.0
-
-    def __post_init__(self) -> None:
-        """Refuse times that are none."""
-        if not self.false_alarm_time > 0.0:
-            raise IdentificationError(
-                f'time between false alarms {self.false_alarm_time} s: has to be above 0'
-            )
+    begin: float
+    asked: Learned
+    end: float | None = None
+    samples: list[Sample] = field(default_factory=list)
 
 
 class ChangeWatch:
@@ -88,6 +71,8 @@ class ChangeWatch:
         What may change.
     settings : ChangeSettings, optional
         How readily a change is believed.
+    work : Background, optional
+        Does what takes long; without it all is done at once.
 
     Attributes
     ----------
@@ -102,39 +87,53 @@ class ChangeWatch:
         beside: tuple[ParameterName, ...],
         candidates: Sequence[Candidate],
         settings: ChangeSettings | None = None,
+        work: Background | None = None,
     ) -> None:
         settings = settings or ChangeSettings()
         self._estimator = estimator
         self._wider = estimator.with_more(beside)
         self._asked = len(estimator.parameters)
-        self._candidates = tuple(candidates)
-        sizes = [len(c.parameters) for c in self._candidates]
-        ends = np.cumsum(sizes)
-        self._slices = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
-        self._sizes = np.array(sizes, dtype=float)
-        self._directions = self._among_all(np.hstack([c.directions for c in self._candidates]))
-        tests = len(sizes) * len(_LENGTHS)
-        self._chance = BLOCK / settings.false_alarm_time / tests
+        self._work = work or Foreground()
+        self._search = ChangeSearch(
+            candidates,
+            self._among_all(np.hstack([c.directions for c in candidates])),
+            BLOCK / settings.false_alarm_time,
+            self._work,
+        )
         self.reset()
 
     def reset(self) -> None:
-        """Forget what noise usually does, and all changes."""
+        """Forget what noise usually does, and all changes; nothing may be left to be done."""
         self.changes: list[Change] = []
         self._wider.reset()
+        self._search.reset()
         self._loudness = Loudness(_LEAST_NOISE if self._estimator.noise_is_relative else 1.0)
-        sizes, places = self._sizes.astype(int).tolist(), {c.joint for c in self._candidates}
         self._left: deque[float] = deque(maxlen=_REMEMBERED)
-        self._usual = {m: UsualSize(sizes, m, len(places)) for m in _LENGTHS}
-        self._fresh = -np.inf, 0.0
-        self.interrupt()
+        self._open: _Stretch | None = None
+        self._unseen: deque[_Stretch] = deque()
+        self._late: list[Sample] | None = None
+        self._searching = False
+
+    def use(self, settings: ChangeSettings | None, forgetting: float) -> None:
+        """
+        Go on with other settings.
+
+        Parameters
+        ----------
+        settings : ChangeSettings or None
+            How readily a change is believed; None believes in none.
+        forgetting : float
+            Of what is learned.
+
+        """
+        chance = 0.0 if settings is None else BLOCK / settings.false_alarm_time
+        self._search.believe(chance)
+        self._wider.forgetting = forgetting
 
     def interrupt(self) -> None:
         """Begin a new stretch of rows, which does not continue the one before."""
-        self._blocks: deque[Block] = deque(maxlen=_KEPT)
-        self._waiting: deque[dict[int, Weighed]] = deque()
-        self._samples: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-        self._before: tuple[Learned, Learned] | None = None
-        self._begin = 0.0
+        self._open = self._open or _Stretch(0.0, self._estimator.learned())
+        self._hand_over(None)
 
     def update(
         self, t: float, rows: FloatArray, tau: FloatArray, weights: FloatArray
@@ -152,125 +151,129 @@ class ChangeWatch:
             As for the estimator.
 
         """
-        if self._before is not None and t - self._begin >= BLOCK:
-            self._end_block(t)
-        if self._before is None:
-            self._before, self._begin = (self._wider.learned(), self._estimator.learned()), t
-        self._samples.append((rows, tau, weights))
-        return self._learn(rows, tau, weights)
+        if self._open is not None and t - self._open.begin >= BLOCK:
+            self._hand_over(t)
+        sample = Sample(rows, tau, weights)
+        if self._late is not None:  # a change was named, and what came since is learned again
+            self._late.append(sample)
+        else:
+            if self._open is None:
+                self._open = _Stretch(t, self._estimator.learned())
+            self._open.samples.append(sample)
+        return self._estimator.update(*self._for_estimator(sample))
 
-    def _learn(self, rows: FloatArray, tau: FloatArray, weights: FloatArray) -> FloatArray:
-        self._wider.update(rows, tau, weights)
-        return self._estimator.update(rows[:, : self._asked], tau, weights)
+    def _for_estimator(self, sample: Sample) -> Sample:
+        return sample._replace(rows=sample.rows[:, : self._asked])
 
     def _among_all(self, directions: FloatArray) -> FloatArray:
         """Return directions in the parameters of the estimator in those of the wider one."""
         more = len(self._wider.parameters) - self._asked
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
-    def _end_block(self, t: float) -> None:
-        assert self._before is not None
-        rows, tau, weights = (np.stack(part) for part in zip(*self._samples, strict=True))
-        w, y = self._scaled(rows, weights), self._scaled(tau, weights)
-        loudness = self._loudness.value
-        residual = y - w @ self._before[0].values
-        self._loudness.learn(residual, weights)
+    def _hand_over(self, end: float | None) -> None:
+        """Let the open stretch be searched."""
+        assert self._open is not None
+        self._open.end = end
+        self._unseen.append(self._open)
+        self._open = None
+        if not self._searching:
+            self._searching = True
+            self._work.begin(self._see(), urgent=True)
+
+    def _see(self) -> Job:
+        """Search what was not searched so far."""
+        try:
+            while self._unseen:
+                stretch = self._unseen.popleft()
+                before = self._wider.learned()
+                yield from self._learn(self._wider, stretch.samples)
+                if stretch.end is None:
+                    self._search.interrupt()
+                    continue
+                block = yield from self._summed(stretch, stretch.end, before)
+                found = yield from self._search.take(block, self._usual_loudness)
+                if found is not None:
+                    yield from self._name(found)
+        finally:
+            self._searching = False
+
+    def _learn(self, estimator: RecursiveLeastSquares, samples: Sequence[Sample]) -> Job:
+        for part in _parts(samples, self._at_a_time):
+            estimator.update_together(part)
+            yield
+
+    @property
+    def _at_a_time(self) -> int:
+        return _ONE_BY_ONE if self._estimator.forgets else _TOGETHER
+
+    def _summed(self, stretch: _Stretch, end: float, before: Learned) -> Pieces[Block]:
+        """Sum up the rows of a block."""
+        loudness, residuals, squares = self._loudness.value, [], 0.0
+        size = len(self._wider.parameters)
+        information, right = np.zeros((size, size)), np.zeros(size)
+        for part in _parts(stretch.samples, _TOGETHER):
+            rows, tau, weights = (np.stack(some) for some in zip(*part, strict=True))
+            scale = self._estimator.scale(weights)
+            residuals.append(scale * (tau - rows @ before.values))
+            squares += float(np.sum((residuals[-1] / loudness) ** 2))
+            w = (rows * (scale / loudness)[:, :, np.newaxis]).reshape(-1, size)
+            information += w.T @ w
+            right += w.T @ (tau * scale / loudness).reshape(-1)
+            yield
+        weights = np.stack([sample.weights for sample in stretch.samples])
+        self._loudness.learn(np.concatenate(residuals), weights)
         if weights.any():
-            self._left.append(float(np.sum((residual / loudness) ** 2) / np.sum(weights)))
-        sums = _normal(w / loudness[:, np.newaxis], y / loudness)
-        block = Block(self._begin, t, *sums, *self._before, tuple(self._samples))
-        self._blocks.append(block)
-        self._samples, self._before = [], None
-        weighed = {m: self._weigh(m) for m in _LENGTHS if m <= len(self._blocks)}
-        if any(np.any(self._usual[m].excess(r, self._chance) > 1.0) for m, r in weighed.items()):
-            self._judge()
-        if self._blocks:
-            self._waiting.append(weighed)
-            if len(self._waiting) > _LENGTHS[-1]:  # by now a change in it would have been named
-                for m, values in self._waiting.popleft().items():
-                    self._usual[m].learn(values)
+            self._left.append(squares / float(np.sum(weights)))
+        yield
+        samples = tuple(stretch.samples)
+        return Block(stretch.begin, end, information, right, before, stretch.asked, samples)
 
-    def _window(self, first: int, before: int | None = None) -> Evidence:
-        """Weigh the blocks from one on against what was known before it, or another one."""
-        blocks = list(self._blocks)
-        known = blocks[first if before is None else before].before
-        usual = float(np.exp(np.mean(np.log(self._loudness.value))))
-        return evidence(blocks[first:], known, self._directions, usual)
+    @property
+    def _usual_loudness(self) -> float:
+        return float(np.exp(np.mean(np.log(self._loudness.value))))
 
-    def _weigh(self, length: int) -> Weighed:
-        """Return how large the statistics of a window of blocks are, and what it can show."""
-        window = self._window(len(self._blocks) - length)
-        return Weighed(self._ratios(window), window.strength)
-
-    def _ratios(self, window: Evidence) -> FloatArray:
-        return np.array([window.ratio(some) for some in self._slices])
-
-    def _judge(self) -> None:
-        """Find when the change was and what it is; name it if that is clear or time is up."""
-        count = len(self._blocks)
-        starts = range(count - 1)
-        likelihood = np.array([self._likelihood(self._ratios(self._window(k))) for k in starts])
-        at = likelihood.max(axis=0)
-        best = int(np.argmax(at))
-        first = int(np.flatnonzero(likelihood[:, best] > at[best] - _ALIKE)[-1])
-        seen = count - first
-        near = np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))
-        if at[best] > self._least_likelihood() and seen >= _EARLIEST:
-            alike = [self._candidates[k] for k in near]
-            named = self._most_common(self._candidates[best], alike)
-            rivals = [c for c in alike if not (c.includes(named) or named.includes(c))]
-            if not rivals or seen >= _LATEST:
-                self._name(first, named, rivals, float(at[best]))
-
-    def _least_likelihood(self) -> float:
-        """Return what counts as a change: soon after one, no mere correction of its size."""
-        t, likelihood = self._fresh
-        soon = self._blocks[-1].end - t < _LEARNING
-        return max(_CLEAR, _CORRECTION * likelihood) if soon else _CLEAR
-
-    @staticmethod
-    def _most_common(best: Candidate, alike: Sequence[Candidate]) -> Candidate:
-        """Return the load where it explains the torques as well: arms pick things up all day."""
-        return next((c for c in alike if c.common), best)
-
-    def _likelihood(self, ratios: FloatArray) -> FloatArray:
-        """Return logarithms of likelihoods, each free parameter being charged for."""
-        factors = np.concatenate([u.factors for u in self._usual.values()])
-        usual = float(np.nanmedian(factors))
-        observations = sum(len(block.samples) for block in self._blocks)
-        return np.asarray(ratios / (2.0 * usual) - 0.5 * self._sizes * np.log(observations))
-
-    def _name(
-        self, first: int, best: Candidate, rivals: list[Candidate], likelihood: float
-    ) -> None:
+    def _name(self, found: Found) -> Job:
         """Report a change in a block, and learn anew what it concerns."""
-        blocks = list(self._blocks)
-        before = max(first - 1, 0)
-        after = min(first + 1, len(blocks) - 1)
-        some = self._slices[self._candidates.index(best)]
-        values, covariance = self._window(after, before).size(some)
-        usual = np.nanmax([u.factors[self._candidates.index(best)] for u in self._usual.values()])
-        size = Estimate(best.parameters, values, covariance * usual)
-        change = Change(best, tuple(rivals), blocks[first].begin, blocks[-1].end, size)
-        self._learn_again(blocks[before], blocks[after:], change.reopened)
-        louder = self._louder(blocks[after:], change.reopened.shape[1])
+        values, covariance = yield from self._search.size(found, self._usual_loudness)
+        yield
+        size = Estimate(found.best.parameters, values, covariance)
+        begin, detected = found.blocks[found.first].begin, found.blocks[-1].end
+        change = Change(found.best, found.rivals, begin, detected, size)
+        yield from self._learn_again(found, change.reopened)
+        louder = yield from self._louder(found.blocks[found.after :], change.reopened.shape[1])
         self.changes.append(
             replace(change, size=replace(size, covariance=louder * size.covariance))
         )
-        self._fresh = change.detected, likelihood
-        self.interrupt()
 
-    def _learn_again(self, last: Block, since: Sequence[Block], reopened: FloatArray) -> None:
+    def _learn_again(self, found: Found, reopened: FloatArray) -> Job:
         """Return to what was known when a block began, and learn what may have changed anew."""
-        self._wider.restore(last.before)
-        self._wider.reopen(self._among_all(reopened))
-        self._estimator.restore(last.asked)
-        self._estimator.reopen(reopened)
-        for block in since:
-            for sample in block.samples:
-                self._learn(*sample)
+        last = found.blocks[found.before]
+        since = [sample for block in found.blocks[found.after :] for sample in block.samples]
+        for stretch in (*self._unseen, *([self._open] if self._open else ())):
+            since += stretch.samples
+        self._unseen.clear()
+        self._open, self._late = None, []
+        again = copy(self._estimator)
+        for estimator, known, directions in (
+            (self._wider, last.before, self._among_all(reopened)),
+            (again, last.asked, reopened),
+        ):
+            estimator.restore(known)
+            estimator.reopen(directions)
+            yield
+        yield from self._learn_both(again, since)
+        while len(self._late) > self._at_a_time:
+            late, self._late = self._late, []
+            yield from self._learn_both(again, late)
+        at_once(self._learn_both(again, self._late))
+        self._late = None
+        self._estimator.restore(again.learned())
 
-    def _louder(self, blocks: Sequence[Block], free: int) -> float:
+    def _learn_both(self, again: RecursiveLeastSquares, samples: Sequence[Sample]) -> Job:
+        yield from self._learn(self._wider, samples)
+        yield from self._learn(again, [self._for_estimator(sample) for sample in samples])
+
+    def _louder(self, blocks: Sequence[Block], free: int) -> Pieces[float]:
         """
         Return how much larger squares of residuals are than usual, 1 at least.
 
@@ -280,20 +283,16 @@ class ChangeWatch:
         squares = count = 0.0
         for block in blocks:
             rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
-            residual = self._scaled(tau - rows @ self._wider.values, weights)
+            residual = self._estimator.scale(weights) * (tau - rows @ self._wider.values)
             squares += float(np.sum((residual / self._loudness.value) ** 2))
             count += float(np.sum(weights))
+            yield
         if not self._left or count <= free:
             return 1.0
         return max(1.0, squares / (count - free) / float(np.median(self._left)))
 
-    def _scaled(self, values: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return torques (k, m) or rows (k, m, P) in units of the assumed noise."""
-        scale = np.array([self._estimator.scale(w) for w in weights])
-        return np.asarray(values * scale.reshape(*scale.shape, *[1] * (values.ndim - scale.ndim)))
 
-
-def _normal(rows: FloatArray, tau: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the normal equations of rows of shape (k, m, P)."""
-    w = rows.reshape(-1, rows.shape[2])
-    return w.T @ w, w.T @ tau.reshape(-1)
+def _parts(samples: Sequence[Sample], size: int) -> Iterator[Sequence[Sample]]:
+    """Yield so many samples after the other."""
+    for first in range(0, len(samples), size):
+        yield samples[first : first + size]

@@ -6,19 +6,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.friction_beside import by_joint, FrictionBeside
+from armid_ros.identification.online.background import Background
 from armid_ros.identification.online.change import Change, change_candidates
 from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.online.checks import StreamChecks
-from armid_ros.identification.online.recursive import RecursiveLeastSquares
+from armid_ros.identification.online.recursive import check_forgetting, RecursiveLeastSquares
 from armid_ros.identification.online.score_variance import ScoreVariance
 from armid_ros.identification.online.settings import OnlineSettings
-from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, TripleLag
+from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
 from armid_ros.identification.rows.row_noise import Misfit, RowNoise, sensor_noise
 from armid_ros.identification.samples.joint_gate import joint_gate
 from armid_ros.identification.samples.spikes import SpikeGate
@@ -35,6 +37,8 @@ __all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
 _FORGOTTEN = 10.0
 #: Windows of which the colour of the noise is learned [s]: longer than what it lasts.
 _WINDOW = 4.0
+#: Pieces of work in the background per second, at the least; one for a sample at 1 kHz.
+_PIECES = 400.0
 
 
 @dataclass(frozen=True)
@@ -106,6 +110,9 @@ class OnlineIdentifier:
 
     """
 
+    #: Settings that can change while samples are learned from.
+    CHANGEABLE: ClassVar = ('forgetting', 'max_gap', 'changes')
+
     def __init__(
         self,
         arm: ArmModel,
@@ -146,7 +153,9 @@ class OnlineIdentifier:
             scale_covariance=settings.torque_noise is None,
         )
         window = max(1, round(_WINDOW / self._row_period))
-        self._scores = ScoreVariance(window, settings.forgetting)
+        self._work = Background()
+        self._crowded = False
+        self._scores = ScoreVariance(window, settings.forgetting, self._work)
         self._watch = None
         if settings.changes is not None:
             self._beside = FrictionBeside(arm)
@@ -155,6 +164,7 @@ class OnlineIdentifier:
                 self._beside.parameters,
                 change_candidates(arm, self.base),
                 settings.changes,
+                self._work,
             )
         self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
@@ -168,6 +178,7 @@ class OnlineIdentifier:
 
     def reset(self) -> None:
         """Forget everything that was learned, and set the counters to zero."""
+        self._work.clear()
         self._filter.reset()
         self._misfit.reset()
         self._checks.reset()
@@ -208,7 +219,19 @@ class OnlineIdentifier:
         else:
             good = self._gate.take(t, signal, self._without_consequence)
             self.latest = tuple(one for sample in good for one in self._take_good(sample))
+        self._go_on()
         return self.latest[-1] if self.latest else None
+
+    def _go_on(self) -> None:
+        """Do some of what takes long, with a sample that brings no row if there are such."""
+        if not self.latest or self._crowded:
+            self._work.advance(max(1, round(_PIECES * (self._filter.period or 0.0))))
+        self._crowded = bool(self.latest)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Finish what is under way, for a job can be in one place only."""
+        self._work.finish()
+        return self.__dict__
 
     def _take_good(self, sample: StreamSample) -> tuple[OnlineSample, ...]:
         """Learn from a sample of the gate, which says where a stretch begins."""
@@ -243,6 +266,52 @@ class OnlineIdentifier:
     def model(self) -> ArmModel:
         """Return the arm with the estimate, otherwise as near as possible to what it was."""
         return self.arm.with_theta(self.base.lift(self._estimator.values, self.arm.theta))
+
+    def check(self, settings: OnlineSettings) -> None:
+        """
+        Refuse settings that this identifier cannot go on with; see `use`.
+
+        Raises
+        ------
+        IdentificationError
+            If they need a new beginning, or are out of range.
+
+        """
+        for part in fields(settings):
+            same = getattr(settings, part.name) == getattr(self.settings, part.name)
+            if part.name not in self.CHANGEABLE and not same:
+                raise IdentificationError(
+                    f'{part.name} cannot change while samples are learned from: begin anew'
+                )
+        if self._watch is None and settings.changes is not None:
+            raise IdentificationError(
+                'changes of the arm were not looked for from the beginning: begin anew'
+            )
+        check_forgetting(settings.forgetting)
+        check_gap(settings.max_gap)
+
+    def use(self, settings: OnlineSettings) -> None:
+        """
+        Go on with other settings; nothing that was learned is lost.
+
+        Parameters
+        ----------
+        settings : OnlineSettings
+            As before but for what is `CHANGEABLE`.
+
+        Raises
+        ------
+        IdentificationError
+            If they need a new beginning, or are out of range.
+
+        """
+        self.check(settings)
+        self.settings = settings
+        self._filter.max_gap = settings.max_gap
+        for part in (self._estimator, self._scores, self._misfit):
+            part.forgetting = settings.forgetting
+        if self._watch is not None:
+            self._watch.use(settings.changes, settings.forgetting)
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -323,8 +392,8 @@ class OnlineIdentifier:
         one = _one_sample(self.arm, motion)
         stacked = np.column_stack([motion.tau, self._rows(one), self._rows_beside(one)])
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
-        measured, rows, beside = np.split(filtered, [1, 1 + self.base.rank], axis=1)
-        measured = measured[:, 0]
+        last = 1 + self.base.rank
+        measured, rows, beside = filtered[:, 0], filtered[:, 1:last], filtered[:, last:]
         noise = self._row_noise()
         gain, independent = noise.gain, noise.independent(min(step, self._row_period))
         stamp = motion.t - (self.delay or 0.0)

@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from collections import deque
-
+from armid_ros.identification.online.history import History
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import stats
@@ -34,7 +33,7 @@ class Loudness:
 
     def __init__(self, least: float) -> None:
         self._least = least
-        self._seen: deque[FloatArray] = deque(maxlen=_MEMORY)
+        self._seen: History | None = None
         self._value: FloatArray | None = None
 
     @property
@@ -48,11 +47,20 @@ class Loudness:
         if not used.any():
             return  # an arm at rest must not forget what it is like in motion
         squares = np.sum(residual, axis=0) ** 2
+        if self._seen is None:
+            self._seen = History(len(squares), _MEMORY)
         self._seen.append(np.where(used > 0, squares / np.maximum(used, 1), np.nan))
         if len(self._seen) < _FEWEST:
             return
-        later = np.array(self._seen)[len(self._seen) // 2 :]
+        later = self._seen.values[len(self._seen) // 2 :]
         known = np.any(later > 0.0, axis=0)
         value = np.ones(later.shape[1]) if self._value is None else self._value.copy()
-        value[known] = np.sqrt(np.nanmedian(later[:, known], axis=0) / _MEDIAN)
+        value[known] = np.sqrt(_medians(later[:, known]) / _MEDIAN)
         self._value = np.maximum(value, self._least)
+
+
+def _medians(values: FloatArray) -> FloatArray:
+    """Return the medians of the numbers in every column; numpy's nanmedian takes ten times it."""
+    ordered, counts = np.sort(values, axis=0), np.sum(~np.isnan(values), axis=0)
+    columns = np.arange(values.shape[1])
+    return np.asarray((ordered[(counts - 1) // 2, columns] + ordered[counts // 2, columns]) / 2.0)

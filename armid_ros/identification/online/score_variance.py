@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from armid_ros.identification.fitting.least_squares import LEAST_LEFT
+from armid_ros.identification.online.background import Background, Foreground, Job, Pieces
 from armid_ros.identification.online.square_root import PRIOR_STD
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -27,6 +28,8 @@ from scipy import linalg, stats
 
 #: Rows over frequencies that are looked at: beyond, the low-pass has left nothing.
 _ROWS_OF_BIN = 8
+#: Columns that are transformed in one piece of work.
+_COLUMNS = 24
 #: Ridge that keeps the information of what was never excited invertible [-].
 _RIDGE = 1e-9
 #: What is divided by is at least this.
@@ -56,9 +59,6 @@ class _Bands:
     products: FloatArray
     counts: FloatArray
 
-    def __add__(self, other: _Bands) -> _Bands:
-        return _Bands(self.products + other.products, self.counts + other.counts)
-
     @property
     def information(self) -> FloatArray:
         """M of all joints and bands, shape (P, P)."""
@@ -75,16 +75,21 @@ class ScoreVariance:
         Rows in a window, which should last longer than errors do.
     forgetting : float
         Share of what was that is not forgotten with a row; no window takes more than it brings.
+    work : Background, optional
+        Sums windows up; without it a window is summed up at once.
 
     """
 
-    def __init__(self, window: int, forgetting: float = 1.0) -> None:
+    def __init__(
+        self, window: int, forgetting: float = 1.0, work: Background | None = None
+    ) -> None:
         self._window = window
-        self._kept = forgetting**window
+        self.forgetting = forgetting
+        self._work = work or Foreground()
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Forget everything; nothing may be left to be done."""
         self._settled: _Bands | None = None
         self._latest: _Bands | None = None
         self._shape: tuple[FloatArray, FloatArray] | None = None
@@ -92,7 +97,8 @@ class ScoreVariance:
 
     def interrupt(self) -> None:
         """Begin a new stretch of rows, which does not continue the one before."""
-        self._rows: list[FloatArray] = []
+        self._rows: FloatArray | None = None
+        self._count = 0
 
     def add(self, rows: FloatArray, tau: FloatArray, values: FloatArray) -> None:
         """
@@ -106,19 +112,14 @@ class ScoreVariance:
             The estimate that residuals are taken of, at the end of a window.
 
         """
-        self._rows.append(np.concatenate([rows, tau[:, np.newaxis]], axis=1))
-        if len(self._rows) < self._window:
-            return
-        window = _transformed(np.stack(self._rows))
-        self.interrupt()
-        if not window.counts.any():
-            return
-        if self._latest is not None:
-            self._settled = _sum(self._settled, self._latest)
-            kept = max(self._kept, 1.0 - _brought(window, self._settled))
-            self._settled = _Bands(self._settled.products * kept, self._settled.counts * kept)
-            self._shape = _shape(self._settled + window, values)
-        self._latest = window
+        if self._rows is None:
+            self._rows = np.empty((len(tau), self._window, rows.shape[1] + 1))
+        self._rows[:, self._count, :-1] = rows
+        self._rows[:, self._count, -1] = tau
+        self._count += 1
+        if self._count == self._window:
+            self._work.begin(self._sum_up(self._rows, values))
+            self.interrupt()
 
     def reopen(self, directions: FloatArray, values: FloatArray) -> None:
         """
@@ -136,7 +137,34 @@ class ScoreVariance:
 
         """
         self.interrupt()
-        self._latest = self._shape = None
+        self._shape = None
+        self._work.begin(self._reopened(directions, values))
+
+    def _sum_up(self, columns: FloatArray, values: FloatArray) -> Job:
+        """Take in a window of rows and torques, shape (m, k, P + 1)."""
+        window = yield from _transformed(columns)
+        if not window.counts.any():
+            return
+        if self._latest is not None:
+            settled = self._settled or _nothing(window)
+            yield from _add(settled, self._latest)
+            kept = max(self.forgetting**self._window, 1.0 - _brought(window, settled))
+            yield
+            if kept < 1.0:
+                for products in settled.products:
+                    products *= kept
+                    yield
+                settled.counts[:] *= kept
+            self._settled = settled
+            both = _nothing(window)
+            yield from _add(both, settled)
+            yield from _add(both, window)
+            self._shape = yield from _shape(both, values)
+        self._latest = window
+
+    def _reopened(self, directions: FloatArray, values: FloatArray) -> Job:
+        """Give the parameters before any values along some directions."""
+        self._latest = None
         if self._settled is None:
             return
         products, size = self._settled.products, len(values)
@@ -147,9 +175,12 @@ class ScoreVariance:
         along = linalg.pinvh(directions.T @ both[:, :size] @ directions) @ directions.T @ both
         change = np.eye(size + 1)
         change[:size] -= (1.0 - np.sqrt(_RIDGE)) * directions @ along
-        moved = change.T @ products @ change
-        self._settled = _Bands(moved, self._settled.counts)
-        self._shape = _shape(self._settled, values)
+        yield
+        for of_joint in products:
+            for of_band in of_joint:
+                of_band[:] = change.T @ of_band @ change
+                yield
+        self._shape = yield from _shape(self._settled, values)
 
     def covariance(self, root: FloatArray) -> FloatArray | None:
         """
@@ -173,8 +204,16 @@ class ScoreVariance:
         return np.asarray(half @ half.T)
 
 
-def _sum(some: _Bands | None, more: _Bands) -> _Bands:
-    return more if some is None else some + more
+def _nothing(like: _Bands) -> _Bands:
+    return _Bands(np.zeros_like(like.products), np.zeros_like(like.counts))
+
+
+def _add(some: _Bands, more: _Bands) -> Job:
+    """Add to products, joint by joint."""
+    for products, others in zip(some.products, more.products, strict=True):
+        products += others
+        yield
+    some.counts[:] += more.counts
 
 
 def _brought(window: _Bands, before: _Bands) -> float:
@@ -186,25 +225,31 @@ def _brought(window: _Bands, before: _Bands) -> float:
     return float(np.trace(share)) / len(size)
 
 
-def _transformed(columns: FloatArray) -> _Bands:
-    """Return the products of a window of rows [W, y] of shape (k, m, P + 1), in octaves."""
-    count, joints, size = columns.shape
-    transformed = np.fft.rfft(columns, axis=0)[: max(2, count // _ROWS_OF_BIN)]
-    transformed *= np.sqrt(2.0 / count)
-    transformed[0] *= np.sqrt(0.5)
-    edges = [0, *(2 ** np.arange(1, (len(transformed) - 1).bit_length())), len(transformed)]
-    used = np.mean(columns.any(axis=2), axis=0)
+def _transformed(columns: FloatArray) -> Pieces[_Bands]:
+    """Return the products of a window of rows [W, y] of shape (m, k, P + 1), in octaves."""
+    joints, count, size = columns.shape
+    bins = max(2, count // _ROWS_OF_BIN)
+    edges = [0, *(2 ** np.arange(1, (bins - 1).bit_length())), bins]
     products = np.zeros((joints, len(edges) - 1, size, size))
     counts = np.zeros((joints, len(edges) - 1))
-    for band, (first, last) in enumerate(pairwise(edges)):
-        part = transformed[first:last].transpose(1, 0, 2)
-        parts = np.concatenate([part.real, part.imag], axis=1)
-        products[:, band] = parts.transpose(0, 2, 1) @ parts
-        counts[:, band] = used * (2 * (last - first) - (first == 0))
+    for joint, rows in enumerate(columns):
+        parts = []
+        for first in range(0, size, _COLUMNS):
+            parts.append(np.fft.rfft(rows[:, first : first + _COLUMNS], axis=0)[:bins])
+            yield
+        transformed = np.concatenate(parts, axis=1) * np.sqrt(2.0 / count)
+        transformed[0] *= np.sqrt(0.5)
+        used = np.mean(rows.any(axis=1))
+        for band, (first, last) in enumerate(pairwise(edges)):
+            part = transformed[first:last]
+            both = np.concatenate([part.real, part.imag])
+            products[joint, band] = both.T @ both
+            counts[joint, band] = used * (2 * (last - first) - (first == 0))
+        yield
     return _Bands(products, counts)
 
 
-def _shape(bands: _Bands, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatArray]]:
     """
     Return a root of R_M^-T J R_M^-1, R_M that of M, and what widens deviations by it.
 
@@ -215,36 +260,45 @@ def _shape(bands: _Bands, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     information, scores = bands.information, bands.products[..., :-1, :-1]
     size = np.sqrt(np.diag(information).clip(PRIOR_STD**-2))
     ridge = _RIDGE * np.eye(len(size))
-    inverse = linalg.solve_triangular(
-        _triangle(information / np.outer(size, size) + ridge), np.eye(len(size))
-    )
+    yield
+    triangle = linalg.cholesky(information / np.outer(size, size) + ridge)
+    inverse = linalg.solve_triangular(triangle, np.eye(len(size)))
     root = inverse / size[:, np.newaxis]
     covariance = root @ root.T
-
+    yield
+    taken, power = yield from _each_joint(bands, covariance, np.append(values, -1.0))
     counts = bands.counts.clip(_SMALLEST)
-    taken = np.einsum('pq,jbpq->jb', covariance, scores)
     freedom = counts * (1.0 - taken / counts).clip(LEAST_LEFT)
-    ends = np.append(values, -1.0)
-    power = np.einsum('p,jbpq,q->jb', ends, bands.products, ends, optimize=True)
     noise = np.maximum(power, _LEAST_NOISE * bands.products[..., -1, -1]) / freedom
 
     usual = float(np.sum(noise * taken) / np.sum(taken))
-    meat = (
-        root.T @ np.tensordot(noise, scores, axes=2) @ root + usual * inverse.T @ ridge @ inverse
-    )
+    meat = usual * inverse.T @ ridge @ inverse
+    for of_joint, products in zip(noise, scores, strict=True):
+        meat += root.T @ np.tensordot(of_joint, products, axes=1) @ root
+        yield
     sizes, vectors = np.linalg.eigh(meat)
     half = vectors * np.sqrt(np.maximum(sizes, _RIDGE * sizes[-1]))
-
-    shares = np.einsum('pq,jbqp->jbp', covariance, scores @ covariance, optimize=True)
-    shares *= noise[..., np.newaxis]
-    uncertain = np.sum(shares**2 / freedom[..., np.newaxis], axis=(0, 1))
-    known = np.sum(shares, axis=(0, 1)) ** 2 / uncertain.clip(_SMALLEST)
+    yield
+    all_shares, uncertain = np.zeros(len(size)), np.zeros(len(size))
+    for joint, band in np.ndindex(*noise.shape):
+        shares = noise[joint, band] * np.sum(
+            covariance * (scores[joint, band] @ covariance).T, axis=1
+        )
+        all_shares += shares
+        uncertain += shares**2 / freedom[joint, band]
+        yield
+    known = all_shares**2 / uncertain.clip(_SMALLEST)
     student = stats.t.ppf(_LEVEL, np.maximum(known, _FEWEST))
     return half, student / stats.norm.ppf(_LEVEL)
 
 
-def _triangle(information: FloatArray) -> FloatArray:
-    """Return the upper triangle R with R^T R as given, its diagonal positive."""
-    sizes, vectors = np.linalg.eigh(information)
-    root = np.linalg.qr(np.sqrt(sizes.clip(_RIDGE))[:, np.newaxis] * vectors.T, mode='r')
-    return np.asarray(np.where(np.diag(root) < 0.0, -1.0, 1.0)[:, np.newaxis] * root)
+def _each_joint(
+    bands: _Bands, covariance: FloatArray, ends: FloatArray
+) -> Pieces[tuple[FloatArray, FloatArray]]:
+    """Return what a fit takes of the scores, and the squares of its residuals, each (m, B)."""
+    taken, power = [], []
+    for products in bands.products:
+        taken.append(np.tensordot(products[:, :-1, :-1], covariance, axes=2))
+        power.append(products @ ends @ ends)
+        yield
+    return np.array(taken), np.array(power)

@@ -12,14 +12,15 @@ distribution, its degrees of freedom counting how much was measured.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from armid_ros.identification.online.background import at_once, Job, Pieces
+from armid_ros.identification.online.history import History
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special, stats
 
 #: Windows that are remembered: ten minutes of four a second.
 _MEMORY = 2400
@@ -42,6 +43,8 @@ _STRONG = 0.1
 _ROUNDS = 8
 #: Independent windows before anything is judged.
 _FEWEST = 12.0
+#: Numbers that are looked at in one piece of work.
+_AT_A_TIME = 4_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +93,8 @@ class UsualSize:
         shared = np.arange(1, overlap) / overlap
         self._overlap = 1.0 + 2.0 * float(np.sum(shared**2))  # of squares of sums that overlap
         self._sources = sources
-        self._seen: deque[Weighed] = deque(maxlen=_MEMORY)
+        self._ratios = History(len(sizes), _MEMORY)
+        self._strengths = History(int(np.sum(sizes)), _MEMORY)
         self._first = np.cumsum([0, *sizes[:-1]])
         self._strength = np.zeros(int(np.sum(sizes)))
         self._most = stats.chi2.isf(_TAIL, self._sizes)
@@ -107,39 +111,75 @@ class UsualSize:
 
     def learn(self, window: Weighed) -> None:
         """Take in a window in which nothing changed."""
+        at_once(self.learning(window))
+
+    def learning(self, window: Weighed) -> Job:
+        """Take in a window in which nothing changed, piece by piece."""
         if not np.any(window.ratios > 0.0):
             return
-        self._seen.append(window)
+        self._ratios.append(window.ratios)
+        self._strengths.append(window.strength)
         self._fresh += 1
-        if self._fresh < max(_EVERY, _SHARE * len(self._seen)):
+        if self._fresh < max(_EVERY, _SHARE * len(self._ratios)):
             return
         self._fresh = 0
-        later = np.array([window.ratios for window in self._seen])[len(self._seen) // 4 :]
-        later = np.where(later > 0.0, later, np.nan)
-        strengths = np.array([window.strength for window in self._seen])
-        self._strength = np.quantile(strengths, 1.0 - _STRONG, axis=0)
-        independent = np.sum(np.isfinite(later), axis=0) / self._overlap
-        self.factors = np.full(len(self._sizes), np.nan)
-        self._freedom = np.zeros(len(self._sizes))
+        yield
+        strengths = self._strengths.values
+        for columns in _in_pieces(strengths):
+            some = strengths[:, columns]
+            self._strength[columns] = np.quantile(some, 1.0 - _STRONG, axis=0)
+            yield
+        yield from self._look(self._ratios.values[len(self._ratios) // 4 :])
+
+    def _look(self, later: FloatArray) -> Job:
+        """Find the factors of the later windows; 0: no data."""
+        counts = np.sum(later > 0.0, axis=0)
+        independent = counts / self._overlap
         judged = independent >= _FEWEST
         if not judged.any():
+            self.factors = np.full(len(self._sizes), np.nan)
+            self._freedom = np.zeros(len(self._sizes))
             return
-        single = np.log(self._fitted(later, judged))
+        single = np.full(len(self._sizes), np.nan)
+        for columns in _in_pieces(later):
+            some = np.arange(len(single))[columns][judged[columns]]
+            single[some] = np.log(self._fitted(later[:, some], counts[some], some))
+            yield
         value, left = _drawn_together(
-            single, self._variance[judged] / independent[judged], self._sources
+            single[judged], self._variance[judged] / independent[judged], self._sources
         )
-        self.factors[judged] = np.exp(value).clip(1.0)
-        relative = later[:, judged] / (self.factors * self._rare)[judged]
-        self._tail = max(1.0, float(np.nanquantile(relative, 1.0 - _RARE)))
+        factors = np.full(len(self._sizes), np.nan)
+        factors[judged] = np.exp(value).clip(1.0)
+        yield
+        tail = yield from self._tail_of(later[:, judged], (factors * self._rare)[judged])
+        self.factors, self._tail = factors, max(1.0, tail)
+        self._freedom = np.zeros(len(self._sizes))
         self._freedom[judged] = 2.0 / left  # what a mean square of so many degrees varies by
 
-    def _fitted(self, seen: FloatArray, judged: npt.NDArray[np.bool_]) -> FloatArray:
+    def _fitted(
+        self, seen: FloatArray, counts: npt.NDArray[np.intp], some: npt.NDArray[np.intp]
+    ) -> FloatArray:
         """Return the factors with which the means of limited statistics are as expected."""
-        seen, most, mean = seen[:, judged], self._most[judged], self._mean[judged]
-        factors = np.nanmean(seen, axis=0) / self._sizes[judged]
+        most, mean = self._most[some], self._mean[some] * counts
+        factors = np.sum(seen, axis=0) / (self._sizes[some] * counts)
         for _ in range(_ROUNDS):
-            factors = factors * np.nanmean(np.minimum(seen / factors, most), axis=0) / mean
+            factors = factors * np.sum(np.minimum(seen / factors, most), axis=0) / mean
         return np.asarray(factors)
+
+    @staticmethod
+    def _tail_of(seen: FloatArray, rare: FloatArray) -> Pieces[float]:
+        """Return what one in a hundred of all statistics exceeds, over what it does in noise."""
+        count = int(np.sum(seen > 0.0))
+        most = count - int((1.0 - _RARE) * (count - 1))  # so many of the largest hold the quantile
+        largest = np.empty(0)
+        for columns in _in_pieces(seen):
+            relative = (seen[:, columns] / rare[columns]).reshape(-1)
+            largest = np.concatenate([largest, relative])
+            if len(largest) > most:
+                largest = np.partition(largest, len(largest) - most)[-most:]
+            yield
+        place = (1.0 - _RARE) * (count - 1) - (count - len(largest))
+        return float(np.interp(place, np.arange(len(largest)), np.sort(largest)))
 
     def excess(self, window: Weighed, chance: float) -> FloatArray:
         """
@@ -162,10 +202,18 @@ class UsualSize:
             window.strength / self._strength.clip(_SMALLEST), self._first
         ).clip(1.0)
         usual = 1.0 + (_MARGIN * self._tail * self.factors[judged] - 1.0) * stronger[judged]
-        sizes = self._sizes[judged]
-        limit = sizes * stats.f.isf(chance, sizes, self._freedom[judged])
-        result[judged] = window.ratios[judged] / (usual * limit)
+        sizes, freedom = self._sizes[judged], self._freedom[judged]
+        # Fisher's distribution as that of a share, for scipy.stats takes ten times as long
+        share = special.betaincinv(0.5 * freedom, 0.5 * sizes, chance)
+        result[judged] = window.ratios[judged] / (usual * freedom * (1.0 - share) / share)
         return result
+
+
+def _in_pieces(values: FloatArray) -> Iterator[slice]:
+    """Yield columns whose numbers are looked at in one piece of work."""
+    width = max(1, _AT_A_TIME // max(1, len(values)))
+    for first in range(0, values.shape[1], width):
+        yield slice(first, first + width)
 
 
 def _drawn_together(

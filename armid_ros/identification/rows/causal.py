@@ -47,6 +47,12 @@ _PERIOD_INTERVALS = 20
 _STAGES = np.arange(1.0, 4.0)
 
 
+def check_gap(samples: int) -> None:
+    """Refuse a largest gap that is none."""
+    if samples < 1:
+        raise IdentificationError(f'largest gap of {samples} samples: has to be at least 1')
+
+
 class TripleLag:
     """
     Three equal first-order lags in series, 1 / (1 + s / pole)^3, for a stack of signals.
@@ -211,12 +217,11 @@ class CausalFilter:
             raise IdentificationError(f'cut-off frequency {cutoff} Hz: has to be above 0')
         if period is not None and not (np.isfinite(period) and period > 0.0):
             raise IdentificationError(f'sampling period {period} s: has to be above 0')
-        if max_gap < 1:
-            raise IdentificationError(f'largest gap of {max_gap} samples: has to be at least 1')
+        check_gap(max_gap)
         self._n_joints = n_joints
         self._cutoff = cutoff
         self._given_period = period
-        self._max_gap = max_gap
+        self.max_gap = max_gap
         self._measured_velocity = measured_velocity
         self._rejected: Counter[str] = Counter()
         self._restarts: Counter[str] = Counter()
@@ -326,7 +331,7 @@ class CausalFilter:
         if self._last is None:
             return True
         dt = t - self._last
-        longest = self._max_gap * self._period if self._period else np.inf
+        longest = self.max_gap * self._period if self._period else np.inf
         if 0.0 < dt <= longest:
             return True
         if dt == 0.0 or (self._period and -longest <= dt < 0.0):
@@ -359,10 +364,12 @@ class CausalFilter:
 
     def _unwrapped(self, signal: FloatArray) -> FloatArray:
         """Undo the jump by a full turn with which some drivers keep a joint within +-pi."""
+        position = signal[: self._n_joints]
         if self._position is not None:
-            turns = np.rint((signal[: self._n_joints] - self._position) / (2.0 * np.pi))
-            signal[: self._n_joints] -= 2.0 * np.pi * turns * self._revolute
-        self._position = signal[: self._n_joints]
+            step = position - self._position
+            if float(np.abs(step).max()) > np.pi:
+                position -= 2.0 * np.pi * np.rint(step / (2.0 * np.pi)) * self._revolute
+        self._position = position
         return signal
 
     def _restart(self) -> None:
@@ -373,7 +380,7 @@ class CausalFilter:
         self._start = None
         self._last = None
         self._position = None
-        self._recent: deque[tuple[float, FloatArray]] = deque(maxlen=3 * self._max_gap)
+        self._recent: deque[tuple[float, FloatArray]] = deque(maxlen=3 * self.max_gap)
         if self._period is not None:
             self._make_filter(self._period)
 

@@ -84,7 +84,7 @@ class Misfit:
 
     def __init__(self, joints: int, forgetting: float = 1.0) -> None:
         self._joints = joints
-        self._forgetting = forgetting
+        self.forgetting = forgetting
         self.reset()
 
     def reset(self) -> None:
@@ -94,8 +94,8 @@ class Misfit:
 
     def learn(self, before: FloatArray, after: FloatArray, weights: FloatArray) -> None:
         """Take in the residual of a sample before and after it was learned, shape (n,)."""
-        self._squares = self._forgetting * self._squares + weights * before * after
-        self._counts = self._forgetting * self._counts + weights
+        self._squares = self.forgetting * self._squares + weights * before * after
+        self._counts = self.forgetting * self._counts + weights
         known = np.maximum(self._counts, np.finfo(float).tiny)
         self.size = np.sqrt(np.maximum(self._squares, 0.0) / known)
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.identification.samples.straight_line import share_of_noise, Usual, usual_size
 from armid_ros.motion import FloatArray
@@ -109,7 +109,7 @@ def line_errors(
     error[gap[1:] | gap[:-1]] = 0.0
     usual = _usual(period, error / np.maximum(noise, bend)[:, np.newaxis], window, share)
     smallest = np.minimum(_smallest_steps(np.abs(moves), seen), np.abs(error).max(axis=0))
-    usual = usual._replace(size=np.maximum(usual.size, smallest))
+    usual = replace(usual, size=np.maximum(usual.size, smallest))
     bent = error / bend[:, np.newaxis]
     error[1:] -= usual.smoothness * bent[:-1] * bend[1:, np.newaxis]
     none = np.zeros((2, x.shape[1]))

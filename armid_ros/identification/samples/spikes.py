@@ -172,7 +172,8 @@ class SpikeGate:
     def _take(self, sample: StreamSample, floor: FloatArray | float) -> list[StreamSample]:
         """Take in a sample whose stamp is not contradicted by the next one."""
         if self._known:
-            sample = replace(sample, x=unwrapped(sample.x, self._known[1].x, self._turn))
+            x = unwrapped(sample.x, self._known[1].x, self._turn)
+            sample = sample if x is sample.x else replace(sample, x=x)
         if not self._in_time(sample):
             return []
         if self._first is None:
@@ -255,7 +256,8 @@ class SpikeGate:
     @property
     def _tail(self) -> StreamSample | None:
         """The newest sample that is not damaged for sure."""
-        return next((part[-1] for part in (self._held, self._first, self._known) if part), None)
+        latest = self._held or self._first or self._known
+        return latest[-1] if latest else None
 
     def _in_time(self, sample: StreamSample) -> bool:
         """Return whether a stamp continues the stream; two that do not begin a new one."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 import math
 from typing import NamedTuple
 
@@ -21,6 +21,8 @@ _NOISE_CORRELATION = -2.0 / 3.0
 _HARDER = 2.0 * 1.96
 #: Usual errors beyond which one says nothing of the correlation.
 _CLIPPED = 3.0
+#: Less is no jump by a full turn [rad].
+_HALF_A_TURN = np.pi
 
 
 #: How much more something is over other times, of one sample or of each, shape (N, 1).
@@ -75,7 +77,8 @@ class Excursion:
         return np.where(self.off > 1.0, np.maximum(outside, 0.0), 0.0)
 
 
-class Usual(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Usual:
     """
     What predictions usually miss by.
 
@@ -99,10 +102,15 @@ class Usual(NamedTuple):
         squares = bend**2
         return np.asarray(np.sqrt(squares + self.noisy * (noise**2 - squares)))
 
-    @property
+    @cached_property
     def smoothness(self) -> FloatArray:
         """Correlation of successive errors, 0 for noise, shape (m,)."""
         return np.clip(1.0 - (1.0 - _NOISE_CORRELATION) * self.noisy, 0.0, 1.0)
+
+    @cached_property
+    def _shares(self) -> tuple[FloatArray, FloatArray]:
+        """Standard deviations of what is noise, and most of what is not, over `size`, (m,)."""
+        return np.sqrt(self.noisy), np.sqrt(1.0 - self.noisy) * _HARDER
 
     def limits(self, quantile: float, noise: Factor, bend: Factor) -> FloatArray:
         """
@@ -113,11 +121,9 @@ class Usual(NamedTuple):
         distribution.
 
         """
+        noisy, smooth = self._shares
         tails = quantile * self.growth(noise, bend)
-        bounded = np.sqrt(1.0 - self.noisy) * _HARDER * bend
-        return np.asarray(
-            self.size * np.minimum(tails, quantile * np.sqrt(self.noisy) * noise + bounded)
-        )
+        return np.asarray(self.size * np.minimum(tails, quantile * noisy * noise + smooth * bend))
 
 
 class Missed(NamedTuple):
@@ -151,6 +157,8 @@ def missed_by(known: Sequence[StreamSample], sample: StreamSample, period: float
 
 def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
     """Undo the jump by a full turn, where there is one, with which drivers keep within +-pi."""
+    if float(np.abs(x - last).max()) <= _HALF_A_TURN:
+        return x
     turns = np.rint(np.divide(x - last, turn, where=turn > 0.0, out=np.zeros_like(x)))
     return np.asarray(x - turns * turn)
 

@@ -18,6 +18,7 @@ from contextlib import suppress
 import os
 from pathlib import Path
 import struct
+from tempfile import TemporaryFile
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 import zlib
@@ -89,12 +90,12 @@ class McapWriter:
         self._compress = _COMPRESSORS[compression]
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        # As bytes, for a recorder that runs for days has millions of chunks.
-        self._index = bytearray()
         self._metadata: list[MetadataIndex] = []
         self._done = _Committed()
         try:
             self._stream = path.open('xb', buffering=0)
+            # In a file without a name, for a recorder that runs for days has millions of chunks.
+            self._index = TemporaryFile(dir=path.parent, buffering=0)
         except OSError as error:
             raise RecordingError(f'{path}: cannot be written: {error.strerror}') from error
         head = MAGIC + _record(Header('ros2', library))
@@ -211,14 +212,13 @@ class McapWriter:
             uncompressed_size=len(content),
         )
         done = self._done
-        del self._index[done.index_size :]
-        self._index += _record(index)
+        index_size = self._note(_record(index))
         end_position = self._append(b''.join(parts))
         first, last = done.time_range if done.counts else (start, end)
         self._done = done._replace(
             position=end_position,
             chunks=done.chunks + 1,
-            index_size=len(self._index),
+            index_size=index_size,
             counts=MappingProxyType(counts + Counter(done.counts)),
             time_range=(min(first, start), max(last, end)) if counts else done.time_range,
         )
@@ -233,13 +233,20 @@ class McapWriter:
 
     def finish(self) -> None:
         """Write the summary and close the file; may be called again if it was interrupted."""
+        if not self._stream.closed:
+            self._append(self._tail())
+            self._stream.close()
+        self._index.close()
+
+    def _tail(self) -> bytes:
+        """Return what is behind the last chunk."""
         data_end = _record(DataEnd(0))
         begin = self._done.position + len(data_end)
         groups: list[tuple[Opcode, bytes]] = [
             (Opcode.SCHEMA, _records(self._schemas)),
             (Opcode.CHANNEL, _records(self._channels)),
             (Opcode.STATISTICS, _record(self._statistics())),
-            (Opcode.CHUNK_INDEX, bytes(self._index[: self._done.index_size])),
+            (Opcode.CHUNK_INDEX, self._noted()),
             (Opcode.METADATA_INDEX, _records(self._metadata[: self._done.metadata])),
         ]
         summary, offsets = b'', b''
@@ -250,13 +257,12 @@ class McapWriter:
         offsets_begin = begin + len(summary)
         footer = struct.pack('<BQQQ', Opcode.FOOTER, 20, begin, offsets_begin)
         crc = zlib.crc32(summary + offsets + footer)
-        tail = data_end + summary + offsets + _record(Footer(begin, offsets_begin, crc)) + MAGIC
-        self._append(tail)
-        self._stream.close()
+        return data_end + summary + offsets + _record(Footer(begin, offsets_begin, crc)) + MAGIC
 
     def give_up(self) -> None:
         """Close the file as it is; every chunk that was written can be read."""
         self._stream.close()
+        self._index.close()
 
     def _statistics(self) -> Statistics:
         counts = self.counts
@@ -272,6 +278,25 @@ class McapWriter:
             metadata_count=self._done.metadata,
             schema_count=len(self._schemas),
         )
+
+    def _note(self, record: bytes) -> int:
+        """Put the index of a chunk behind those of the others, and return where it ends."""
+        position, rest = self._done.index_size, memoryview(record)
+        try:
+            while len(rest):
+                count = os.pwrite(self._index.fileno(), rest, position)
+                position, rest = position + count, rest[count:]
+        except OSError as error:
+            raise RecordingError(f'{self._path}: cannot be written: {error.strerror}') from error
+        return position
+
+    def _noted(self) -> bytes:
+        """Return the indexes of all chunks that are in the file for good."""
+        content = b''
+        while len(content) < self._done.index_size:
+            missing = self._done.index_size - len(content)
+            content += os.pread(self._index.fileno(), missing, len(content))
+        return content
 
     def _append(self, data: bytes) -> int:
         """Write behind what is in the file for good, and return where that ends."""

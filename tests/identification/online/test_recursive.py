@@ -3,7 +3,7 @@
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.least_squares import solve
-from armid_ros.identification.online.recursive import RecursiveLeastSquares
+from armid_ros.identification.online.recursive import RecursiveLeastSquares, Sample
 from armid_ros.identification.online.square_root import PRIOR_STD
 from armid_ros.identification.rows.regression import regressions
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
@@ -46,6 +46,25 @@ def test_equals_weighted_batch_least_squares():
     w, y = weighted(rows, tau)
     np.testing.assert_allclose(estimate.values, np.linalg.lstsq(w, y)[0], rtol=1e-6)
     np.testing.assert_allclose(estimate.covariance, np.linalg.inv(w.T @ w), rtol=2e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize('forgetting', [1.0, 0.99])
+def test_samples_taken_together_teach_what_they_teach_one_by_one(forgetting):
+    rng = np.random.default_rng(11)
+    rows, tau, _ = linear_data(rng, samples=60)
+    weights = np.where(rng.random((60, 1)) < 0.2, 0.0, rng.random(tau.shape))
+    samples = [Sample(*some) for some in zip(rows, tau, weights, strict=True)]
+    single, several = (
+        RecursiveLeastSquares(names(8), NOISE, forgetting=forgetting) for _ in range(2)
+    )
+    for sample in samples:
+        single.update(*sample)
+    for first in range(0, 60, 7):
+        several.update_together(samples[first : first + 7])
+    np.testing.assert_allclose(several.values, single.values, rtol=1e-8)
+    np.testing.assert_allclose(several.covariance, single.covariance, rtol=1e-6)
+    assert several.variance_factor == pytest.approx(single.variance_factor)
+    assert several.samples == single.samples < 60
 
 
 @pytest.mark.parametrize('method', ['ols', 'wls'])

@@ -1,0 +1,83 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Work that goes on between the samples of a stream, piece by piece.
+
+A stream must not wait, so what takes longer than a sample may is a generator that yields after
+every piece of bounded size. Each sample does a few pieces, in an order that depends on the samples
+alone: what comes out does not depend on how fast the computer is.
+
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Generator
+from typing import TypeVar
+
+Result = TypeVar('Result')
+
+#: A job: it yields after every piece.
+Job = Generator[None, None, None]
+#: The same with a result.
+Pieces = Generator[None, None, Result]
+
+
+def at_once(work: Pieces[Result]) -> Result:
+    """Do all pieces, and return the result."""
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            result: Result = end.value
+            return result
+
+
+class Background:
+    """Jobs that wait for their next piece: urgent ones first, otherwise in order."""
+
+    def __init__(self) -> None:
+        self._urgent: deque[Job] = deque()
+        self._patient: deque[Job] = deque()
+
+    def begin(self, job: Job, *, urgent: bool = False) -> None:
+        """Take on a job."""
+        (self._urgent if urgent else self._patient).append(job)
+
+    @property
+    def busy(self) -> bool:
+        """Whether anything is left to do."""
+        return bool(self._urgent or self._patient)
+
+    def advance(self, pieces: int = 1) -> None:
+        """Do some pieces, if there are so many."""
+        for _ in range(pieces):
+            waiting = self._urgent or self._patient
+            if not waiting:
+                return
+            job = waiting.popleft()  # one that fails is not tried again
+            try:
+                next(job)
+            except StopIteration:
+                continue
+            waiting.appendleft(job)
+
+    def finish(self) -> None:
+        """Do all that is left."""
+        while self.busy:
+            self.advance()
+
+    def clear(self) -> None:
+        """Give up all that is left."""
+        for job in (*self._urgent, *self._patient):
+            job.close()
+        self._urgent.clear()
+        self._patient.clear()
+
+
+class Foreground(Background):
+    """What does every job at once, where nothing waits for it."""
+
+    def begin(self, job: Job, *, urgent: bool = False) -> None:
+        """Do a job."""
+        at_once(job)

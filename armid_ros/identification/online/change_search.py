@@ -1,0 +1,252 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Search the last blocks of rows for a change: when it was, and what it is.
+
+After each block windows of half a second to two seconds that end with it are tested
+(``change_evidence``). When a test is positive, all begins of the change are compared, and it is
+named as soon as nothing else explains the torques as well, or when time is up.
+
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.online.background import Background, Pieces
+from armid_ros.identification.online.change import Candidate
+from armid_ros.identification.online.change_evidence import Block, Evidence, weighing
+from armid_ros.identification.online.usual_size import UsualSize, Weighed
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Length of a block [s].
+BLOCK = 0.25
+#: Lengths of the windows that are tested, in blocks.
+_LENGTHS = (2, 4, 8)
+#: Blocks that are kept: the longest window, and one before it.
+_KEPT = 9
+#: Blocks since the change before which it is not named, and after which it is in any case.
+_EARLIEST = 4
+_LATEST = 6
+#: Logarithm of the likelihood ratio by which the best explanation is clear.
+_CLEAR = 5.0
+#: Of two begins of a change that differ by less the later one is taken: soon after a change any
+#: begin before it will do, and all that can be told apart by then is not much.
+_ALIKE = 4.0
+#: For so long after a change its size is still being learned [s]; what is less likely than this
+#: share of it corrects the size.
+_LEARNING = 10.0
+_CORRECTION = 0.3
+
+
+@dataclass(frozen=True)
+class ChangeSettings:
+    """
+    How readily a change is believed.
+
+    Attributes
+    ----------
+    false_alarm_time : float
+        Mean time between two alarms of an arm that does not change [s].
+
+    """
+
+    false_alarm_time: float = 100.0 * 3600.0
+
+    def __post_init__(self) -> None:
+        """Refuse times that are none."""
+        if not self.false_alarm_time > 0.0:
+            raise IdentificationError(
+                f'time between false alarms {self.false_alarm_time} s: has to be above 0'
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """
+    A change that is clear.
+
+    Attributes
+    ----------
+    blocks : tuple of Block
+        The last ones.
+    first : int
+        Which of them it was in.
+    best : Candidate
+        What explains the torques best.
+    rivals : tuple of Candidate
+        What explains them nearly as well.
+    likelihood : float
+        Logarithm of the likelihood ratio.
+
+    """
+
+    blocks: tuple[Block, ...]
+    first: int
+    best: Candidate
+    rivals: tuple[Candidate, ...]
+    likelihood: float
+
+    @property
+    def before(self) -> int:
+        """The last block that is not of the change."""
+        return max(self.first - 1, 0)
+
+    @property
+    def after(self) -> int:
+        """The first block that is wholly of the arm as it is now."""
+        return min(self.first + 1, len(self.blocks) - 1)
+
+
+class ChangeSearch:
+    """
+    Remembers blocks of rows, and what their statistics usually are.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        What may change.
+    directions : ndarray, shape (P, Q)
+        What a unit of each quantity of theirs adds to the parameters.
+    chance : float
+        Of a block without a change to be tested positive.
+    work : Background
+        Learns what statistics usually are.
+
+    """
+
+    def __init__(
+        self,
+        candidates: Sequence[Candidate],
+        directions: FloatArray,
+        chance: float,
+        work: Background,
+    ) -> None:
+        self._candidates = tuple(candidates)
+        self._directions = directions
+        self._work = work
+        sizes = [len(c.parameters) for c in self._candidates]
+        self._sizes, ends = np.array(sizes), np.cumsum(sizes)
+        self._slices = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
+        self._of_size = {size: np.flatnonzero(self._sizes == size) for size in set(sizes)}
+        self.believe(chance)
+        self.reset()
+
+    def believe(self, chance: float) -> None:
+        """Test with another chance of a positive test without a change; 0: none is positive."""
+        self._chance = chance / (len(self._sizes) * len(_LENGTHS))
+
+    def reset(self) -> None:
+        """Forget what noise usually does, and all blocks."""
+        places = {c.joint for c in self._candidates}
+        self._usual = {m: UsualSize(self._sizes.tolist(), m, len(places)) for m in _LENGTHS}
+        self._fresh = -np.inf, 0.0
+        self.interrupt()
+
+    def interrupt(self) -> None:
+        """Begin a new stretch of blocks, which does not continue the one before."""
+        self._blocks: deque[Block] = deque(maxlen=_KEPT)
+        self._waiting: deque[dict[int, Weighed]] = deque()
+
+    def take(self, block: Block, loudness: float) -> Pieces[Found | None]:
+        """
+        Take in a block of rows, and say whether a change is clear by now.
+
+        Parameters
+        ----------
+        block : Block
+            Its rows in units of their noise.
+        loudness : float
+            That noise over the one of what was learned before.
+
+        """
+        self._blocks.append(block)
+        lengths = [m for m in _LENGTHS if m <= len(self._blocks)]
+        weighed, positive = {}, False
+        for m in lengths:
+            window = yield from self._window(len(self._blocks) - m, loudness)
+            yield
+            weighed[m] = Weighed(self._ratios(window), window.strength)
+            if self._chance > 0.0:
+                excess = self._usual[m].excess(weighed[m], self._chance)
+                positive = positive or bool(np.any(excess > 1.0))
+            yield
+        if positive:
+            found = yield from self._judge(loudness)
+            if found is not None:
+                self._fresh = block.end, found.likelihood
+                self.interrupt()
+                return found
+        self._waiting.append(weighed)
+        if len(self._waiting) > _LENGTHS[-1]:  # by now a change in it would have been named
+            for m, values in self._waiting.popleft().items():
+                self._work.begin(self._usual[m].learning(values))
+        return None
+
+    def size(self, found: Found, loudness: float) -> Pieces[tuple[FloatArray, FloatArray]]:
+        """Return by how much a candidate has changed, and the covariance of that."""
+        blocks = found.blocks
+        window = yield from weighing(
+            blocks[found.after :], blocks[found.before], self._directions, loudness
+        )
+        yield
+        number = self._candidates.index(found.best)
+        values, covariance = window.size(self._slices[number])
+        usual = np.nanmax([u.factors[number] for u in self._usual.values()])
+        return values, covariance * usual
+
+    def _window(self, first: int, loudness: float) -> Pieces[Evidence]:
+        """Weigh the blocks from one on against what was known before it."""
+        blocks = list(self._blocks)[first:]
+        return weighing(blocks, blocks[0], self._directions, loudness)
+
+    def _ratios(self, window: Evidence) -> FloatArray:
+        ratios = np.empty(len(self._candidates))
+        for size, some in self._of_size.items():
+            first = np.array([self._slices[k].start for k in some])
+            ratios[some] = window.ratios(first[:, np.newaxis] + np.arange(size))
+        return ratios
+
+    def _judge(self, loudness: float) -> Pieces[Found | None]:
+        """Find when the change was and what it is, if that is clear or time is up."""
+        count, rows = len(self._blocks), []
+        for k in range(count - 1):
+            window = yield from self._window(k, loudness)
+            yield
+            rows.append(self._likelihood(self._ratios(window)))
+            yield
+        likelihood = np.array(rows)
+        at = likelihood.max(axis=0)
+        best = int(np.argmax(at))
+        first = int(np.flatnonzero(likelihood[:, best] > at[best] - _ALIKE)[-1])
+        seen = count - first
+        if not (at[best] > self._least_likelihood() and seen >= _EARLIEST):
+            return None
+        alike = [self._candidates[k] for k in np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))]
+        named = self._most_common(self._candidates[best], alike)
+        rivals = tuple(c for c in alike if not (c.includes(named) or named.includes(c)))
+        if rivals and seen < _LATEST:
+            return None
+        return Found(tuple(self._blocks), first, named, rivals, float(at[best]))
+
+    def _least_likelihood(self) -> float:
+        """Return what counts as a change: soon after one, no mere correction of its size."""
+        t, likelihood = self._fresh
+        soon = self._blocks[-1].end - t < _LEARNING
+        return max(_CLEAR, _CORRECTION * likelihood) if soon else _CLEAR
+
+    @staticmethod
+    def _most_common(best: Candidate, alike: Sequence[Candidate]) -> Candidate:
+        """Return the load where it explains the torques as well: arms pick things up all day."""
+        return next((c for c in alike if c.common), best)
+
+    def _likelihood(self, ratios: FloatArray) -> FloatArray:
+        """Return logarithms of likelihoods, each free parameter being charged for."""
+        factors = np.concatenate([u.factors for u in self._usual.values()])
+        usual = float(np.nanmedian(factors))
+        observations = sum(len(block.samples) for block in self._blocks)
+        return np.asarray(ratios / (2.0 * usual) - 0.5 * self._sizes * np.log(observations))
