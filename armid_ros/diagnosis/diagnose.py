@@ -341,7 +341,12 @@ def _as_stated(
     """Return names in the model as given, or beside a body common to both days, and a note."""
     as_told = in_model_as_given(rest)
     told = shares_of(as_told, unseen)[0]
-    if told.share(range(len(as_told.steps))) >= least:
+    names = range(len(as_told.steps))
+    if told.share(names) >= least:
+        small = [k for k in names if told.share([k]) < least]
+        if small and len(small) < len(names):
+            fewer = rest.without(min(small, key=lambda k: told.share([k])))
+            return _as_stated(fewer, shares_of(fewer, unseen)[0], unseen, arm, least)
         return as_told, told, []
     bodily, remarks = as_bodies(rest, arm)
     return bodily, shares, [_COMMON, *remarks]
