@@ -48,22 +48,24 @@ class FrictionBeside:
 
     def torques(self, motion: Motion) -> FloatArray:
         """
-        Return the friction of a unit of each quantity, joint by joint, at one sample.
+        Return the friction of a unit of each quantity, joint by joint.
 
         Parameters
         ----------
         motion : Motion
-            Of one sample.
+            N samples.
 
         Returns
         -------
-        ndarray, shape (n, K)
+        ndarray, shape (N, n, K)
             Torques; each acts on its own joint.
 
         """
-        n = motion.n_joints
-        columns = [effect.columns(motion, self._arm)[0] for effect in self._effects]
-        return np.array([np.diagonal(torque) for torque in columns]).reshape(-1, n).T
+        columns = [effect.columns(motion, self._arm) for effect in self._effects]
+        torques = np.empty((len(motion), motion.n_joints, len(columns)))
+        for k, column in enumerate(columns):
+            torques[:, :, k] = np.diagonal(column, axis1=1, axis2=2)
+        return torques
 
 
 def _lacking(arm: ArmModel) -> list[Effect]:

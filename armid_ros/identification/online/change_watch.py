@@ -20,8 +20,9 @@ from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 
-from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import at_once, Background, Foreground, Job, Pieces
+from armid_ros.identification.online.beside import RowsBeside, Seed
 from armid_ros.identification.online.change import Candidate, Change
 from armid_ros.identification.online.change_evidence import Block
 from armid_ros.identification.online.change_search import (
@@ -45,6 +46,12 @@ _REMEMBERED = 240
 #: Samples that are learned in one piece of work, together or one by one, as with forgetting. More
 #: than come in the meantime, so that what came late is caught up with.
 _TOGETHER, _ONE_BY_ONE = 10, 4
+#: Samples whose rows beside are made in one piece of work.
+_WIDENED = 5
+
+
+#: A sample, and what its rows beside are made from; None begins a new stretch.
+Narrow = tuple[Sample, Seed | None]
 
 
 @dataclass(eq=False)
@@ -54,7 +61,7 @@ class _Stretch:
     begin: float
     asked: Learned
     end: float | None = None
-    samples: list[Sample] = field(default_factory=list)
+    samples: list[Narrow | None] = field(default_factory=list)
 
 
 class ChangeWatch:
@@ -65,8 +72,8 @@ class ChangeWatch:
     ----------
     estimator : RecursiveLeastSquares
         Learns.
-    beside : sequence of ParameterName
-        What the rows hold behind its parameters, which is learned for the tests alone.
+    beside : RowsBeside or None
+        Makes rows of what is learned for the tests alone.
     candidates : sequence of Candidate
         What may change.
     settings : ChangeSettings, optional
@@ -84,14 +91,15 @@ class ChangeWatch:
     def __init__(
         self,
         estimator: RecursiveLeastSquares,
-        beside: tuple[ParameterName, ...],
+        beside: RowsBeside | None,
         candidates: Sequence[Candidate],
         settings: ChangeSettings | None = None,
         work: Background | None = None,
     ) -> None:
         settings = settings or ChangeSettings()
         self._estimator = estimator
-        self._wider = estimator.with_more(beside)
+        self._beside = beside
+        self._wider = estimator.with_more(() if beside is None else beside.parameters)
         self._asked = len(estimator.parameters)
         self._work = work or Foreground()
         self._search = ChangeSearch(
@@ -111,8 +119,10 @@ class ChangeWatch:
         self._left: deque[float] = deque(maxlen=_REMEMBERED)
         self._open: _Stretch | None = None
         self._unseen: deque[_Stretch] = deque()
-        self._late: list[Sample] | None = None
+        self._late: list[Narrow | None] | None = None
         self._searching = False
+        if self._beside is not None:
+            self._beside.reset()
 
     def use(self, settings: ChangeSettings | None, forgetting: float) -> None:
         """
@@ -132,12 +142,14 @@ class ChangeWatch:
 
     def interrupt(self) -> None:
         """Begin a new stretch of rows, which does not continue the one before."""
+        if self._late is not None:
+            self._late.append(None)
+            return
         self._open = self._open or _Stretch(0.0, self._estimator.learned())
+        self._open.samples.append(None)
         self._hand_over(None)
 
-    def update(
-        self, t: float, rows: FloatArray, tau: FloatArray, weights: FloatArray
-    ) -> FloatArray:
+    def update(self, t: float, sample: Sample, seed: Seed | None = None) -> FloatArray:
         """
         Let the estimator take in one sample; see ``RecursiveLeastSquares.update``.
 
@@ -145,22 +157,21 @@ class ChangeWatch:
         ----------
         t : float
             Time of the sample [s].
-        rows : ndarray, shape (m, P + K)
-            Sensitivities to its parameters and to those beside them.
-        tau, weights : ndarray, shapes (m,), (m,)
-            As for the estimator.
+        sample : Sample
+            Of the estimator.
+        seed : Seed, optional
+            What the rows beside are made from, where there are any.
 
         """
         if self._open is not None and t - self._open.begin >= BLOCK:
             self._hand_over(t)
-        sample = Sample(rows, tau, weights)
         if self._late is not None:  # a change was named, and what came since is learned again
-            self._late.append(sample)
+            self._late.append((sample, seed))
         else:
             if self._open is None:
                 self._open = _Stretch(t, self._estimator.learned())
-            self._open.samples.append(sample)
-        return self._estimator.update(*self._for_estimator(sample))
+            self._open.samples.append((sample, seed))
+        return self._estimator.update(*sample)
 
     def _for_estimator(self, sample: Sample) -> Sample:
         return sample._replace(rows=sample.rows[:, : self._asked])
@@ -185,12 +196,13 @@ class ChangeWatch:
         try:
             while self._unseen:
                 stretch = self._unseen.popleft()
+                samples = yield from self._widened(stretch.samples)
                 before = self._wider.learned()
-                yield from self._learn(self._wider, stretch.samples)
+                yield from self._learn(self._wider, samples)
                 if stretch.end is None:
                     self._search.interrupt()
                     continue
-                block = yield from self._summed(stretch, stretch.end, before)
+                block = yield from self._summed(stretch, stretch.end, samples, before)
                 found = yield from self._search.take(block, self._usual_loudness)
                 if found is not None:
                     yield from self._name(found)
@@ -206,12 +218,38 @@ class ChangeWatch:
     def _at_a_time(self) -> int:
         return _ONE_BY_ONE if self._estimator.forgets else _TOGETHER
 
-    def _summed(self, stretch: _Stretch, end: float, before: Learned) -> Pieces[Block]:
+    def _widened(self, samples: Sequence[Narrow | None]) -> Pieces[list[Sample]]:
+        """Return samples with the rows of all that is learned, of successive samples."""
+        whole: list[Sample] = []
+        waiting: list[Narrow] = []
+        for number, narrow in enumerate(samples, start=1):
+            if narrow is not None:
+                waiting.append(narrow)
+            if narrow is None or len(waiting) == _WIDENED or number == len(samples):
+                whole += self._with_beside(waiting)
+                waiting = []
+                yield
+            if narrow is None and self._beside is not None:
+                self._beside.reset()
+        return whole
+
+    def _with_beside(self, samples: Sequence[Narrow]) -> list[Sample]:
+        seeds = [seed for _, seed in samples if seed is not None]
+        if self._beside is None or not seeds:
+            return [sample for sample, _ in samples]
+        return [
+            sample._replace(rows=np.hstack([sample.rows, more]))
+            for (sample, _), more in zip(samples, self._beside.rows(seeds), strict=True)
+        ]
+
+    def _summed(
+        self, stretch: _Stretch, end: float, samples: Sequence[Sample], before: Learned
+    ) -> Pieces[Block]:
         """Sum up the rows of a block."""
         loudness, residuals, squares = self._loudness.value, [], 0.0
         size = len(self._wider.parameters)
         information, right = np.zeros((size, size)), np.zeros(size)
-        for part in _parts(stretch.samples, _TOGETHER):
+        for part in _parts(samples, _TOGETHER):
             rows, tau, weights = (np.stack(some) for some in zip(*part, strict=True))
             scale = self._estimator.scale(weights)
             residuals.append(scale * (tau - rows @ before.values))
@@ -220,13 +258,12 @@ class ChangeWatch:
             information += w.T @ w
             right += w.T @ (tau * scale / loudness).reshape(-1)
             yield
-        weights = np.stack([sample.weights for sample in stretch.samples])
+        weights = np.stack([sample.weights for sample in samples])
         self._loudness.learn(np.concatenate(residuals), weights)
         if weights.any():
             self._left.append(squares / float(np.sum(weights)))
         yield
-        samples = tuple(stretch.samples)
-        return Block(stretch.begin, end, information, right, before, stretch.asked, samples)
+        return Block(stretch.begin, end, information, right, before, stretch.asked, tuple(samples))
 
     @property
     def _usual_loudness(self) -> float:
@@ -249,10 +286,10 @@ class ChangeWatch:
         """Return to what was known when a block began, and learn what may have changed anew."""
         last = found.blocks[found.before]
         since = [sample for block in found.blocks[found.after :] for sample in block.samples]
-        for stretch in (*self._unseen, *([self._open] if self._open else ())):
-            since += stretch.samples
+        stretches = (*self._unseen, *([self._open] if self._open else ()))
         self._unseen.clear()
         self._open, self._late = None, []
+        since += yield from self._widened([one for part in stretches for one in part.samples])
         again = copy(self._estimator)
         for estimator, known, directions in (
             (self._wider, last.before, self._among_all(reopened)),
@@ -264,8 +301,8 @@ class ChangeWatch:
         yield from self._learn_both(again, since)
         while len(self._late) > self._at_a_time:
             late, self._late = self._late, []
-            yield from self._learn_both(again, late)
-        at_once(self._learn_both(again, self._late))
+            yield from self._learn_both(again, (yield from self._widened(late)))
+        at_once(self._learn_both(again, at_once(self._widened(self._late))))
         self._late = None
         self._estimator.restore(again.learned())
 

@@ -6,18 +6,23 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any, ClassVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.fitting.friction_beside import by_joint, FrictionBeside
 from armid_ros.identification.online.background import Background
+from armid_ros.identification.online.beside import RowsBeside, Seed
 from armid_ros.identification.online.change import Change, change_candidates
 from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.online.checks import StreamChecks
-from armid_ros.identification.online.recursive import check_forgetting, RecursiveLeastSquares
+from armid_ros.identification.online.recursive import (
+    check_forgetting,
+    RecursiveLeastSquares,
+    Sample,
+)
+from armid_ros.identification.online.sample import OnlineSample
 from armid_ros.identification.online.score_variance import ScoreVariance
 from armid_ros.identification.online.settings import OnlineSettings
 from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
@@ -39,35 +44,6 @@ _FORGOTTEN = 10.0
 _WINDOW = 4.0
 #: Pieces of work in the background per second, at the least; one for a sample at 1 kHz.
 _PIECES = 400.0
-
-
-@dataclass(frozen=True)
-class OnlineSample:
-    """
-    One sample that the estimator saw.
-
-    Attributes
-    ----------
-    t : float
-        When it was [s]: the stamp of the newest joint state minus the delay of the filters.
-    measured : ndarray, shape (n,)
-        Filtered measured torque [N m].
-    predicted : ndarray, shape (n,)
-        What the estimate before this sample predicts, filtered alike [N m].
-    used : ndarray of bool, shape (n,)
-        False for a joint at rest, which friction may hold with any torque.
-
-    """
-
-    t: float
-    measured: FloatArray
-    predicted: FloatArray
-    used: npt.NDArray[np.bool_]
-
-    @property
-    def residual(self) -> FloatArray:
-        """Measured minus predicted torque, shape (n,) [N m]."""
-        return self.measured - self.predicted
 
 
 class OnlineIdentifier:
@@ -155,13 +131,13 @@ class OnlineIdentifier:
         window = max(1, round(_WINDOW / self._row_period))
         self._work = Background()
         self._crowded = False
+        self._reopened = 0
         self._scores = ScoreVariance(window, settings.forgetting, self._work)
         self._watch = None
         if settings.changes is not None:
-            self._beside = FrictionBeside(arm)
             self._watch = ChangeWatch(
                 self._estimator,
-                self._beside.parameters,
+                RowsBeside(arm, settings.cutoff),
                 change_candidates(arm, self.base),
                 settings.changes,
                 self._work,
@@ -179,6 +155,7 @@ class OnlineIdentifier:
     def reset(self) -> None:
         """Forget everything that was learned, and set the counters to zero."""
         self._work.clear()
+        self._reopened = 0
         self._filter.reset()
         self._misfit.reset()
         self._checks.reset()
@@ -390,24 +367,22 @@ class OnlineIdentifier:
         self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_]
     ) -> OnlineSample:
         one = _one_sample(self.arm, motion)
-        stacked = np.column_stack([motion.tau, self._rows(one), self._rows_beside(one)])
+        stacked = np.column_stack([motion.tau, self._rows(one)])
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
-        last = 1 + self.base.rank
-        measured, rows, beside = filtered[:, 0], filtered[:, 1:last], filtered[:, last:]
+        measured, rows = filtered[:, 0], filtered[:, 1:]
         noise = self._row_noise()
         gain, independent = noise.gain, noise.independent(min(step, self._row_period))
         stamp = motion.t - (self.delay or 0.0)
         weights = np.asarray(used * independent)
-        sample = measured / gain, weights
+        sample = Sample(rows / gain, measured / gain, weights)
         if self._watch is None:
-            innovation = self._estimator.update(rows / gain, *sample)
+            innovation = self._estimator.update(*sample)
         else:
-            known = len(self._watch.changes)
-            wider = np.hstack([rows, by_joint(beside)]) / gain
-            innovation = self._watch.update(stamp, wider, *sample)
-            for change in self._watch.changes[known:]:
+            innovation = self._watch.update(stamp, sample, Seed(motion, step, gain))
+            for change in self._watch.changes[self._reopened :]:
                 self._scores.reopen(change.reopened, self._estimator.values)
-        self._misfit.learn(innovation, sample[0] - rows / gain @ self._estimator.values, weights)
+                self._reopened += 1
+        self._misfit.learn(innovation, sample.tau - sample.rows @ self._estimator.values, weights)
         scale = self._estimator.scale(weights) / gain
         self._scores.add(rows * scale[:, np.newaxis], measured * scale, self._estimator.values)
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
@@ -429,12 +404,6 @@ class OnlineIdentifier:
         rigid = rigid.reshape(robot.n_joints, -1)  # of a single joint it is a vector
         effects = self.arm.effect_columns(motion)[0]
         return np.concatenate([rigid, effects], axis=1).take(self.base.independent, axis=1)
-
-    def _rows_beside(self, motion: Motion) -> FloatArray:
-        """Return what the search for changes learns beside, joint by joint, shape (n, K)."""
-        if self._watch is None:
-            return np.empty((motion.n_joints, 0))
-        return self._beside.torques(motion)
 
     def _row_noise(self) -> RowNoise:
         """Return the noise of the rows since the filters were started."""

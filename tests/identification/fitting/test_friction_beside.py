@@ -31,7 +31,7 @@ def test_columns_are_those_of_the_effects_that_the_arm_lacks():
     q, dq, ddq = np.random.default_rng(0).normal(size=(3, arm.robot.n_joints))
     beside = FrictionBeside(arm)
     one = Motion(arm.robot.joints, np.zeros(1), q[None], 0.2 * dq[None], ddq[None])
-    rows = by_joint(beside.torques(one))
+    rows = by_joint(beside.torques(one)[0])
     expected = np.concatenate([effect.columns(one, arm)[0] for effect in lacking], axis=1)
     np.testing.assert_allclose(rows, expected, atol=1e-12)
     assert [p.joint for p in beside.parameters] == list(arm.robot.joints) * len(lacking)
@@ -45,4 +45,4 @@ def test_what_is_identified_is_not_beside_it():
     assert beside.parameters == ()
     n = everything.robot.n_joints
     one = Motion(everything.robot.joints, np.zeros(1), *np.ones((3, 1, n)))
-    assert beside.torques(one).shape == (n, 0)
+    assert beside.torques(one).shape == (1, n, 0)

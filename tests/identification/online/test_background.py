@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import copy
-import gc
 import time
 
 from armid_ros.identification.online import identifier as online_identifier
 from armid_ros.identification.online.background import at_once, Background, Foreground
 from armid_ros.identification.online.identifier import OnlineIdentifier
+from armid_ros.nodes.steady import steady
 import numpy as np
 import pytest
 
@@ -76,6 +76,7 @@ def test_pieces_of_work_change_nothing_of_what_is_learned(samples, monkeypatch):
     assert (found.candidate.label, found.t) == (expected.candidate.label, expected.t)
     np.testing.assert_allclose(found.size.values, expected.size.values, rtol=1e-6)
     assert pieces.samples == whole.samples
+    np.testing.assert_allclose(pieces.estimate().std, whole.estimate().std, rtol=0.2)
     np.testing.assert_allclose(
         pieces.estimate().values, whole.estimate().values, rtol=1e-5, atol=1e-7
     )
@@ -84,9 +85,7 @@ def test_pieces_of_work_change_nothing_of_what_is_learned(samples, monkeypatch):
 def test_no_update_takes_much_longer_than_others(samples):
     """Nor when blocks end, windows are full, a change is judged and rows are learned again."""
     times = []
-    gc.collect()
-    gc.disable()
-    try:
+    with steady():
         for _ in range(3):  # the same work each time: the least is free of what disturbs it
             online, elapsed = changes.identifier(), []
             for t, q, tau in samples:
@@ -94,12 +93,10 @@ def test_no_update_takes_much_longer_than_others(samples):
                 online.update(t, q, None, tau)
                 elapsed.append(time.thread_time() - begun)
             times.append(elapsed)
-    finally:
-        gc.enable()
     assert online.changes
     least = np.min(times, axis=0)
     longest, usual = np.percentile(least, (99.9, 50))
-    assert longest < 5.0 * usual
+    assert longest < 10.0 * usual  # 30 where all is done at once
 
 
 def test_a_copy_goes_on_from_where_the_original_was(samples):

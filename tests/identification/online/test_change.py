@@ -10,7 +10,7 @@ from armid_ros.estimate import ParameterName
 from armid_ros.identification.online.change import Candidate, change_candidates
 from armid_ros.identification.online.change_evidence import Block, evidence
 from armid_ros.identification.online.change_watch import ChangeWatch
-from armid_ros.identification.online.recursive import RecursiveLeastSquares
+from armid_ros.identification.online.recursive import RecursiveLeastSquares, Sample
 from armid_ros.identification.online.usual_size import UsualSize, Weighed
 import numpy as np
 import pytest
@@ -218,12 +218,12 @@ def test_a_window_that_the_model_fits_worse_than_usual_says_less_of_the_size():
     widths = []
     rows, noise = rng.normal(size=(6000, 4, 3)), rng.normal(size=(6000, 4))
     for louder in (1.0, 3.0):
-        watch = ChangeWatch(RecursiveLeastSquares(parameters, np.ones(4)), (), [candidate])
+        watch = ChangeWatch(RecursiveLeastSquares(parameters, np.ones(4)), None, [candidate])
         for k in range(6000):
             after = k >= 5000
             now = truth + 5.0 * after * step[:, 0]
             tau = rows[k] @ now + noise[k] * (louder if after else 1.0)
-            watch.update(0.005 * k, rows[k], tau, np.ones(4))
+            watch.update(0.005 * k, Sample(rows[k], tau, np.ones(4)))
         (change,) = watch.changes
         assert change.t == pytest.approx(25.0, abs=0.26)
         lower, upper = change.size.interval()[0]

@@ -1,0 +1,74 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rows of what is learned beside the parameters that were asked for, many samples at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from armid_ros.arm import ArmModel
+from armid_ros.identification.fitting.friction_beside import by_joint, FrictionBeside
+from armid_ros.identification.rows.causal import CausalMotion, TripleLag
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+
+
+class Seed(NamedTuple):
+    """
+    What the rows of one sample are made from.
+
+    Attributes
+    ----------
+    motion : CausalMotion
+        Behind the motion filter.
+    step : float
+        Time since the sample before [s].
+    gain : float
+        What the rows are divided by.
+
+    """
+
+    motion: CausalMotion
+    step: float
+    gain: float
+
+
+class RowsBeside:
+    """
+    Makes and filters the columns of friction that an arm model does not have.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        What it has already.
+    cutoff : float
+        Of the row filter [Hz].
+
+    Attributes
+    ----------
+    parameters : tuple of ParameterName
+        Of the columns.
+
+    """
+
+    def __init__(self, arm: ArmModel, cutoff: float) -> None:
+        self._joints = arm.robot.joints
+        self._friction = FrictionBeside(arm)
+        self._filter = TripleLag(cutoff)
+        self.parameters = self._friction.parameters
+
+    def reset(self) -> None:
+        """Begin a new stretch."""
+        self._filter.reset()
+
+    def rows(self, seeds: Sequence[Seed]) -> list[FloatArray]:
+        """Return the rows of successive samples, each of shape (n, K n)."""
+        moved = [(s.motion.q, s.motion.dq, s.motion.ddq) for s in seeds]
+        q, dq, ddq = (np.stack(part) for part in zip(*moved, strict=True))
+        motion = Motion(self._joints, np.array([s.motion.t for s in seeds]), q, dq, ddq)
+        rows = []
+        for seed, torques in zip(seeds, self._friction.torques(motion), strict=True):
+            filtered = self._filter.update(seed.step, torques.reshape(-1))[2]
+            rows.append(by_joint(filtered.reshape(torques.shape)) / seed.gain)
+        return rows
