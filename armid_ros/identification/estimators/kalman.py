@@ -6,8 +6,8 @@ An extended Kalman filter of positions, velocities and parameters.
 State x = (q, dq, theta), input the recorded torque, output the recorded position; theta is
 constant and begins at the values of least squares, with deviations widened. The arm is integrated
 from sample to sample with the parameters as believed so far, and each position corrects all
-three. Positions and torques are as recorded; only where the model is differentiated by its
-parameters, the acceleration is that of the smooth motion.
+three. Positions and torques are as recorded; only where the model is differentiated, velocity and
+acceleration are those of the smooth motion.
 Source: Gautier and Poignet 2001; Jazwinski 1970, section 8.3.
 
 """
@@ -40,13 +40,17 @@ from scipy.linalg import cho_factor, cho_solve, LinAlgError
 _RATE = 500.0
 #: Steps of differences of position [rad or m] and velocity.
 _STEP = 1e-6
-#: What a parameter may be off by at most: this share of its value ...
+#: What a parameter may be off by, if least squares knows it so well: this share of its value ...
 _PRIOR_SHARE = 0.3
 #: ... or what makes this share of the torque that is recorded, whichever is more: of effects, and
 #: of the body.
 _PRIOR_TORQUE = 0.1, 0.01
 #: Deviations of least squares are widened so many times, as the noise of encoders biases them.
 _DOUBT = 10.0
+#: The start and the filter have the same data, and the covariance of the two as if they were
+#: independent is too small; whatever their correlation, it is at most so many times that
+#: (covariance intersection with equal weights, Julier and Uhlmann 1997).
+_TWICE = 2.0
 #: A filter that leaves so many times the torque of least squares has not converged.
 _CONVERGED = 1.5
 #: Least position noise [rad or m]: below it rounding of the integration counts.
@@ -102,7 +106,7 @@ def fit_by_kalman_filter(
         fit,
         arm=arm,
         values=values,
-        solution=replace(fit.solution, values=values, covariance=covariance),
+        solution=replace(fit.solution, values=values, covariance=_TWICE * covariance),
         predicted=torques(arm, recordings, used),
     )
     ratio = _left(found) / max(_left(fit), 1e-300)
@@ -120,13 +124,21 @@ def _left(fit: FittedValues) -> float:
 
 
 def _prior(fit: FittedValues, values: FloatArray) -> FloatArray:
-    """Return the covariance of the parameters before the filter sees the data, shape (r, r)."""
+    """
+    Return the covariance of the parameters before the filter sees the data, shape (r, r).
+
+    The values are those of least squares. Nothing may be believed of them that is narrower than
+    their own deviations: what the data cannot tell would be taken for known. Much wider it may not
+    be either, or what a model lacks carries the filter off before the data hold it.
+
+    """
     size = np.sqrt(np.mean(np.concatenate([part.tau for part in fit.problem]) ** 2, axis=0))
     columns = np.concatenate([part.columns for part in fit.problem])
     reach = np.max(np.sqrt(np.mean(columns**2, axis=0)) / size[:, np.newaxis], axis=0)
     body = [parameter.rigid for parameter in fit.base.parameters]
     least = np.where(body, _PRIOR_TORQUE[1], _PRIOR_TORQUE[0])
-    alone = np.maximum(_PRIOR_SHARE * np.abs(values), least / reach)
+    known = np.maximum(_PRIOR_SHARE * np.abs(values), least / reach)
+    alone = np.maximum(known, np.sqrt(np.diag(fit.solution.covariance)))
     moved_by = np.diag((values - fit.values) ** 2)  # to an arm that can be simulated
     wide = _DOUBT**2 * fit.solution.covariance + moved_by
     scaled = wide / np.outer(alone, alone)
@@ -156,8 +168,8 @@ def _thinned(recording: Recording, motion: Motion, used: Conditioning) -> Motion
     Return positions and torques as recorded, at the rate of the Kalman filter.
 
     Velocity and acceleration are those of the smooth motion: they say where the model is
-    differentiated. The filter's own acceleration has the noise of the torques in it, as large as
-    the motion of light joints, and columns that go with the noise bias the parameters.
+    differentiated. The filter's own velocity and acceleration have the noise of encoders and
+    torques in them, and columns that go with the noise bias the parameters.
 
     """
     factor = max(1, round(used.rate_hz / _RATE))
@@ -243,7 +255,7 @@ class _Filter:
         p[2 * n :, 2 * n :] = covariance
         for k in range(1, len(self._motion)):
             tau = 0.5 * (self._motion.tau[k - 1] + self._motion.tau[k])
-            x, p = self._predict(x, p, self._motion.ddq[k - 1], tau)
+            x, p = self._predict(x, p, k - 1, tau)
             x, p = self._correct(x, p, self._motion.q[k])
             x[2 * n :] = np.clip(x[2 * n :], *limits)
             if not np.all(np.isfinite(x)):
@@ -251,17 +263,19 @@ class _Filter:
         return x[2 * n :], p[2 * n :, 2 * n :]
 
     def _predict(
-        self, x: FloatArray, p: FloatArray, along: FloatArray, tau: FloatArray
+        self, x: FloatArray, p: FloatArray, k: int, tau: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         n, dt = self._motion.n_joints, self._dt
         q, dq, theta = x[:n], x[n : 2 * n], x[2 * n :]
-        here = self._slopes(q + 0.5 * dt * dq, dq, along, theta)
+        smooth = self._motion.dq[k]
+        here = self._slopes(q + 0.5 * dt * dq, smooth, self._motion.ddq[k], theta)
+        torque = here.torque + here.by_dq @ (dq - smooth)
         try:
             factor = cho_factor(here.inertia)
         except (LinAlgError, ValueError):
             raise IdentificationError(_diverged(self._motion.t[-1])) from None
         implicit = here.inertia + 0.5 * dt * here.by_dq  # velocity terms at the middle of the step
-        ddq = np.asarray(np.linalg.solve(implicit, tau - here.torque), dtype=np.float64)
+        ddq = np.asarray(np.linalg.solve(implicit, tau - torque), dtype=np.float64)
         after = np.concatenate([q + dt * dq + 0.5 * dt**2 * ddq, dq + dt * ddq, theta])
         slopes = -np.linalg.solve(implicit, np.hstack([here.by_q, here.by_dq, here.columns]))
         moves = np.eye(len(x))

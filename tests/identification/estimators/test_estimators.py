@@ -77,19 +77,24 @@ def test_output_error_is_biased_less_by_encoder_noise_than_least_squares(arm, mo
     assert simulated < 0.8 * plain
 
 
-def test_intervals_of_instruments_hold_the_truth(arm, motion):
-    inside = []
+@pytest.mark.parametrize(
+    ('method', 'noise', 'signals'),
+    [('iv', 3e-4, SIGNALS), ('ekf', 3e-4, SIGNALS), ('ekf', 1e-5, SignalSettings())],
+)
+def test_intervals_hold_the_truth(arm, motion, method, noise, signals):
+    off = []
     for seed in range(3):
-        recording = recorded(arm, motion, seed, 0.05, 3e-4)
+        recording = recorded(arm, motion, seed, 0.05, noise)
         found = identify(
             ArmModel(arm.robot, arm.effects),
             [recording],
-            IdentificationSettings('iv', SIGNALS),
+            IdentificationSettings(method, signals),
             rng=np.random.default_rng(0),
         )
         error = found.estimate.values - found.base.values(arm.theta)
-        inside.append(np.abs(error) < 1.96 * found.estimate.std)
-    assert 0.85 < np.mean(inside) <= 1.0
+        off.append(np.abs(error) / found.estimate.std)
+    assert 0.85 < np.mean(np.array(off) < 1.96) <= 1.0
+    assert np.max(off) < 5.0
 
 
 def test_a_slow_model_has_no_inertia_to_simulate(arm, motion):
