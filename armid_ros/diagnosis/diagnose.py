@@ -228,11 +228,11 @@ def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
 
 
 def _helps(explanation: Explanation, unseen: Evidence | None) -> bool:
-    """Return whether data that names were not fitted to leave any of them."""
+    """Return whether names make data that they were not fitted to better, or do nothing there."""
     if unseen is None:
         return True
     seen = attribute(explanation, unseen)
-    return not all(seen.denied(k) for k in range(len(explanation.steps)))
+    return not seen.made.any() or seen.share(range(len(explanation.steps))) > 0.0
 
 
 def _second_choice(chosen: Chosen, asked: _Asked) -> Chosen:
