@@ -342,10 +342,32 @@ class SpikeGate:
         if 2 * self._went_on > self._max_gap:
             if len(self._held) > 1 and self._stepped(floor):
                 self._held[0] = replace(self._held[0], begins=True)
-            return self._accept(self._held)
+            return self._go_on(floor)
         self._leave_out(Excursion(tuple(self._held), self._off, self._limit), True)
         self._restart([])
         return []
+
+    def _go_on(self, floor: FloatArray | float) -> list[StreamSample]:
+        """Pass on what is held, for it is real; what among it is damaged is judged for itself."""
+        held, self._held = self._held, []
+        missed = [
+            missed_by(held[k : k + 2], held[k + 2], self._period) for k in range(len(held) - 2)
+        ]
+        steady = ~self._pulsing
+        straight = [bool(np.all(self._off_by(one, floor)[steady] <= 1.0)) for one in missed]
+        if all(straight) or not any(straight):
+            return self._accept(held)
+        start = straight.index(True)
+        if start:
+            of = self._off_by(missed[0], floor), self._limits(missed[0], floor)
+            self._leave_out(Excursion(tuple(held[:start]), *of))
+            held[start] = replace(held[start], begins=held[0].begins)
+        if all(straight[start:]):
+            return self._accept(held[start:])
+        good = self._accept(held[start : start + 2])
+        for sample in held[start + 2 :]:
+            good = good + self._judge(sample, floor)
+        return good
 
     def _goes_on(self, sample: StreamSample, off: FloatArray, floor: FloatArray | float) -> bool:
         """Return whether a sample goes on from what is held, as well as from what was before."""
