@@ -272,7 +272,8 @@ def _examined(
         if found.gain >= least and material(_size(found, trial, problem, beside, here), here):
             large.append(trial)
     best = large[:_COMPARED]
-    result = [trial for trial in ranking if trial not in best]
+    seen = {id(trial) for trial in best}
+    result = [trial for trial in ranking if id(trial) not in seen]
     gains = {}
     for trial, compared in zip(best, _compared(problem, beside, best, here), strict=True):
         own = problem.x[:, :, trial.group.columns]
