@@ -27,30 +27,6 @@ def rviz_config(base: str, namespace: str = '') -> str:
         Of the nodes; empty for none.
 
     """
-    at = topic_prefix(namespace)
-    displays = [
-        _display('rviz_default_plugins/Grid', 'Grid', {'Plane Cell Count': 8, 'Cell Size': 0.5}),
-        _display(
-            'rviz_default_plugins/RobotModel',
-            'Arm',
-            {
-                'Description Source': 'Topic',
-                'Description Topic': _topic(f'{at}robot_description', _LATCHED),
-                'Alpha': 0.6,
-                'Visual Enabled': True,
-                'Collision Enabled': False,
-                'TF Prefix': '',
-            },
-        ),
-        _display(
-            'rviz_default_plugins/MarkerArray',
-            'Residual and diagnosis',
-            {
-                'Topic': _topic(f'{at}residual_markers/markers', _STREAM),
-                'Namespaces': dict.fromkeys(('residual', 'share', 'joint', 'diagnosis'), True),
-            },
-        ),
-    ]
     document = {
         'Panels': [
             {'Class': 'rviz_common/Displays', 'Name': 'Displays'},
@@ -58,7 +34,7 @@ def rviz_config(base: str, namespace: str = '') -> str:
         ],
         'Visualization Manager': {
             'Class': '',
-            'Displays': displays,
+            'Displays': _displays(namespace),
             'Enabled': True,
             'Global Options': {
                 'Background Color': '255; 255; 255',
@@ -89,6 +65,34 @@ def rviz_config(base: str, namespace: str = '') -> str:
         'Window Geometry': {'Height': 900, 'Width': 1300},
     }
     return yaml.safe_dump(document, sort_keys=False)
+
+
+def _displays(namespace: str) -> list[dict[str, Any]]:
+    """Return what is drawn: a grid, the arm, and what is published of it."""
+    at = topic_prefix(namespace)
+    return [
+        _display('rviz_default_plugins/Grid', 'Grid', {'Plane Cell Count': 8, 'Cell Size': 0.5}),
+        _display(
+            'rviz_default_plugins/RobotModel',
+            'Arm',
+            {
+                'Description Source': 'Topic',
+                'Description Topic': _topic(f'{at}robot_description', _LATCHED),
+                'Alpha': 0.6,
+                'Visual Enabled': True,
+                'Collision Enabled': False,
+                'TF Prefix': '',
+            },
+        ),
+        _display(
+            'rviz_default_plugins/MarkerArray',
+            'Residual and diagnosis',
+            {
+                'Topic': _topic(f'{at}residual_markers/markers', _STREAM),
+                'Namespaces': dict.fromkeys(('residual', 'share', 'joint', 'diagnosis'), True),
+            },
+        ),
+    ]
 
 
 def _display(kind: str, name: str, more: dict[str, Any]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ LEFT = {
     'cli/springs.py': 4,
     'elastic/identification/output.py': 3,
     # knowledge that effects ought to have
+    'inspection/inspect.py': 1,
     'diagnosis/next_run/plan.py': 1,
     'diagnosis/search/shapes.py': 2,
     'diagnosis/verdict/pattern.py': 3,

@@ -15,11 +15,14 @@ PAGE = Path(__file__).parents[2] / 'docs' / 'reference' / 'nodes.md'
 EVERYWHERE = {'/rosout', '/parameter_events', '/diagnostics', '/clock'}
 #: They play and record whatever there is.
 ANYTHING = ('bag_player', 'recorder')
+#: What is heard, said and served has a table with so many columns; the others have fewer.
+COLUMNS = 4
 
 
 def documented(name, column):
     """Return the full names in a cell of the table; what goes with elastic joints is left out."""
-    (row,) = re.findall(rf'^\| `{name}` \|.*$', PAGE.read_text(), re.MULTILINE)
+    found = re.findall(rf'^\| `{name}` \|.*$', PAGE.read_text(), re.MULTILINE)
+    (row,) = [row for row in found if row.count('|') > COLUMNS]
     cell = row.split('|')[column].split(';')[0]
     names = re.findall(r'`([^`]+)`', cell)
     full = {re.sub('^~', f'/{name}', one) for one in names}

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from armid_ros.identification.online.background import at_once, Pieces
-from armid_ros.identification.online.recursive import Learned, Sample
+from armid_ros.identification.online.recursive import Learned, WeightedSample
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -52,7 +52,7 @@ class Block:
         What was known when it began.
     asked : Learned
         What the estimator that is asked for its parameters knew then.
-    samples : tuple of Sample
+    samples : tuple of WeightedSample
         What it was made of, to learn from it once more.
 
     """
@@ -63,7 +63,7 @@ class Block:
     right: FloatArray
     before: Learned
     asked: Learned
-    samples: tuple[Sample, ...]
+    samples: tuple[WeightedSample, ...]
 
     @cached_property
     def known(self) -> FloatArray:

@@ -66,7 +66,7 @@ class ChangeSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FoundChange:
     """
     A change that is clear.
 
@@ -152,7 +152,7 @@ class ChangeSearch:
         self._blocks: deque[Block] = deque(maxlen=_KEPT)
         self._waiting: deque[dict[int, Weighed]] = deque()
 
-    def take(self, block: Block, loudness: float) -> Pieces[Found | None]:
+    def take(self, block: Block, loudness: float) -> Pieces[FoundChange | None]:
         """
         Take in a block of rows, and say whether a change is clear by now.
 
@@ -187,7 +187,7 @@ class ChangeSearch:
                 self._work.begin(self._usual[m].learning(values))
         return None
 
-    def size(self, found: Found, loudness: float) -> Pieces[tuple[FloatArray, FloatArray]]:
+    def size(self, found: FoundChange, loudness: float) -> Pieces[tuple[FloatArray, FloatArray]]:
         """Return by how much a candidate has changed, and the covariance of that."""
         blocks = found.blocks
         window = yield from weighing(
@@ -211,7 +211,7 @@ class ChangeSearch:
             ratios[some] = window.ratios(first[:, np.newaxis] + np.arange(size))
         return ratios
 
-    def _judge(self, loudness: float) -> Pieces[Found | None]:
+    def _judge(self, loudness: float) -> Pieces[FoundChange | None]:
         """Find when the change was and what it is, if that is clear or time is up."""
         count, rows = len(self._blocks), []
         for k in range(count - 1):
@@ -231,7 +231,7 @@ class ChangeSearch:
         rivals = tuple(c for c in alike if not (c.includes(named) or named.includes(c)))
         if rivals and seen < _LATEST:
             return None
-        return Found(tuple(self._blocks), first, named, rivals, float(at[best]))
+        return FoundChange(tuple(self._blocks), first, named, rivals, float(at[best]))
 
     def _least_likelihood(self) -> float:
         """Return what counts as a change: soon after one, no mere correction of its size."""

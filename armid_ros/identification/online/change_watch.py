@@ -29,10 +29,14 @@ from armid_ros.identification.online.change_search import (
     BLOCK,
     ChangeSearch,
     ChangeSettings,
-    Found,
+    FoundChange,
 )
 from armid_ros.identification.online.loudness import Loudness
-from armid_ros.identification.online.recursive import Learned, RecursiveLeastSquares, Sample
+from armid_ros.identification.online.recursive import (
+    Learned,
+    RecursiveLeastSquares,
+    WeightedSample,
+)
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -51,7 +55,7 @@ _WIDENED = 5
 
 
 #: A sample, and what its rows beside are made from; None begins a new stretch.
-Narrow = tuple[Sample, Seed | None]
+Narrow = tuple[WeightedSample, Seed | None]
 
 
 @dataclass(eq=False)
@@ -149,7 +153,7 @@ class ChangeWatch:
         self._open.samples.append(None)
         self._hand_over(None)
 
-    def update(self, t: float, sample: Sample, seed: Seed | None = None) -> FloatArray:
+    def update(self, t: float, sample: WeightedSample, seed: Seed | None = None) -> FloatArray:
         """
         Let the estimator take in one sample; see ``RecursiveLeastSquares.update``.
 
@@ -157,7 +161,7 @@ class ChangeWatch:
         ----------
         t : float
             Time of the sample [s].
-        sample : Sample
+        sample : WeightedSample
             Of the estimator.
         seed : Seed, optional
             What the rows beside are made from, where there are any.
@@ -173,7 +177,7 @@ class ChangeWatch:
             self._open.samples.append((sample, seed))
         return self._estimator.update(*sample)
 
-    def _for_estimator(self, sample: Sample) -> Sample:
+    def _for_estimator(self, sample: WeightedSample) -> WeightedSample:
         return sample._replace(rows=sample.rows[:, : self._asked])
 
     def _among_all(self, directions: FloatArray) -> FloatArray:
@@ -209,7 +213,7 @@ class ChangeWatch:
         finally:
             self._searching = False
 
-    def _learn(self, estimator: RecursiveLeastSquares, samples: Sequence[Sample]) -> Job:
+    def _learn(self, estimator: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
         for part in _parts(samples, self._at_a_time):
             estimator.update_together(part)
             yield
@@ -218,9 +222,9 @@ class ChangeWatch:
     def _at_a_time(self) -> int:
         return _ONE_BY_ONE if self._estimator.forgets else _TOGETHER
 
-    def _widened(self, samples: Sequence[Narrow | None]) -> Pieces[list[Sample]]:
+    def _widened(self, samples: Sequence[Narrow | None]) -> Pieces[list[WeightedSample]]:
         """Return samples with the rows of all that is learned, of successive samples."""
-        whole: list[Sample] = []
+        whole: list[WeightedSample] = []
         waiting: list[Narrow] = []
         for number, narrow in enumerate(samples, start=1):
             if narrow is not None:
@@ -233,7 +237,7 @@ class ChangeWatch:
                 self._beside.reset()
         return whole
 
-    def _with_beside(self, samples: Sequence[Narrow]) -> list[Sample]:
+    def _with_beside(self, samples: Sequence[Narrow]) -> list[WeightedSample]:
         seeds = [seed for _, seed in samples if seed is not None]
         if self._beside is None or not seeds:
             return [sample for sample, _ in samples]
@@ -243,7 +247,7 @@ class ChangeWatch:
         ]
 
     def _summed(
-        self, stretch: _Stretch, end: float, samples: Sequence[Sample], before: Learned
+        self, stretch: _Stretch, end: float, samples: Sequence[WeightedSample], before: Learned
     ) -> Pieces[Block]:
         """Sum up the rows of a block."""
         loudness, residuals, squares = self._loudness.value, [], 0.0
@@ -269,7 +273,7 @@ class ChangeWatch:
     def _usual_loudness(self) -> float:
         return float(np.exp(np.mean(np.log(self._loudness.value))))
 
-    def _name(self, found: Found) -> Job:
+    def _name(self, found: FoundChange) -> Job:
         """Report a change in a block, and learn anew what it concerns."""
         values, covariance = yield from self._search.size(found, self._usual_loudness)
         yield
@@ -282,7 +286,7 @@ class ChangeWatch:
             replace(change, size=replace(size, covariance=louder * size.covariance))
         )
 
-    def _learn_again(self, found: Found, reopened: FloatArray) -> Job:
+    def _learn_again(self, found: FoundChange, reopened: FloatArray) -> Job:
         """Return to what was known when a block began, and learn what may have changed anew."""
         last = found.blocks[found.before]
         since = [sample for block in found.blocks[found.after :] for sample in block.samples]
@@ -306,7 +310,7 @@ class ChangeWatch:
         self._late = None
         self._estimator.restore(again.learned())
 
-    def _learn_both(self, again: RecursiveLeastSquares, samples: Sequence[Sample]) -> Job:
+    def _learn_both(self, again: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
         yield from self._learn(self._wider, samples)
         yield from self._learn(again, [self._for_estimator(sample) for sample in samples])
 
@@ -329,7 +333,7 @@ class ChangeWatch:
         return max(1.0, squares / (count - free) / float(np.median(self._left)))
 
 
-def _parts(samples: Sequence[Sample], size: int) -> Iterator[Sequence[Sample]]:
+def _parts(samples: Sequence[WeightedSample], size: int) -> Iterator[Sequence[WeightedSample]]:
     """Yield so many samples after the other."""
     for first in range(0, len(samples), size):
         yield samples[first : first + size]

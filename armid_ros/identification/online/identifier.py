@@ -20,7 +20,7 @@ from armid_ros.identification.online.checks import StreamChecks
 from armid_ros.identification.online.recursive import (
     check_forgetting,
     RecursiveLeastSquares,
-    Sample,
+    WeightedSample,
 )
 from armid_ros.identification.online.sample import OnlineSample
 from armid_ros.identification.online.score_variance import ScoreVariance
@@ -98,12 +98,7 @@ class OnlineIdentifier:
     ) -> None:
         settings = settings or OnlineSettings()
         robot = arm.robot
-        for effect in arm.effects:
-            if not effect.instantaneous:
-                raise IdentificationError(
-                    f'{effect.name} depends on the motion before, which single samples do not '
-                    'tell; identify it from a recording'
-                )
+        _require_instantaneous(arm)
         self.arm = arm
         self.settings = settings
         self.base: BaseParameters = arm.base_parameters(rng)
@@ -374,7 +369,7 @@ class OnlineIdentifier:
         gain, independent = noise.gain, noise.independent(min(step, self._row_period))
         stamp = motion.t - (self.delay or 0.0)
         weights = np.asarray(used * independent)
-        sample = Sample(rows / gain, measured / gain, weights)
+        sample = WeightedSample(rows / gain, measured / gain, weights)
         if self._watch is None:
             innovation = self._estimator.update(*sample)
         else:
@@ -430,3 +425,13 @@ def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
 def _one_sample(arm: ArmModel, motion: CausalMotion) -> Motion:
     state = (motion.q[None], motion.dq[None], motion.ddq[None])
     return Motion(arm.robot.joints, np.array([motion.t]), *state)
+
+
+def _require_instantaneous(arm: ArmModel) -> None:
+    """Refuse an arm with effects that single samples do not show."""
+    for effect in arm.effects:
+        if not effect.instantaneous:
+            raise IdentificationError(
+                f'{effect.name} depends on the motion before, which single samples do not tell; '
+                'identify it from a recording'
+            )

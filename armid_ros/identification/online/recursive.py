@@ -58,7 +58,7 @@ class Learned:
     samples: int
 
 
-class Sample(NamedTuple):
+class WeightedSample(NamedTuple):
     """
     What an estimator takes in at a time.
 
@@ -192,7 +192,7 @@ class RecursiveLeastSquares:
             self.samples += 1
         return innovation
 
-    def update_together(self, samples: Sequence[Sample]) -> None:
+    def update_together(self, samples: Sequence[WeightedSample]) -> None:
         """
         Take in several samples, in much less time than one after the other.
 

@@ -10,7 +10,7 @@ from armid_ros.estimate import ParameterName
 from armid_ros.identification.online.change import Candidate, change_candidates
 from armid_ros.identification.online.change_evidence import Block, evidence
 from armid_ros.identification.online.change_watch import ChangeWatch
-from armid_ros.identification.online.recursive import RecursiveLeastSquares, Sample
+from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 from armid_ros.identification.online.usual_size import UsualSize, Weighed
 import numpy as np
 import pytest
@@ -223,7 +223,7 @@ def test_a_window_that_the_model_fits_worse_than_usual_says_less_of_the_size():
             after = k >= 5000
             now = truth + 5.0 * after * step[:, 0]
             tau = rows[k] @ now + noise[k] * (louder if after else 1.0)
-            watch.update(0.005 * k, Sample(rows[k], tau, np.ones(4)))
+            watch.update(0.005 * k, WeightedSample(rows[k], tau, np.ones(4)))
         (change,) = watch.changes
         assert change.t == pytest.approx(25.0, abs=0.26)
         lower, upper = change.size.interval()[0]

@@ -3,7 +3,7 @@
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.least_squares import solve
-from armid_ros.identification.online.recursive import RecursiveLeastSquares, Sample
+from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 from armid_ros.identification.online.square_root import PRIOR_STD
 from armid_ros.identification.rows.regression import regressions
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
@@ -53,7 +53,7 @@ def test_samples_taken_together_teach_what_they_teach_one_by_one(forgetting):
     rng = np.random.default_rng(11)
     rows, tau, _ = linear_data(rng, samples=60)
     weights = np.where(rng.random((60, 1)) < 0.2, 0.0, rng.random(tau.shape))
-    samples = [Sample(*some) for some in zip(rows, tau, weights, strict=True)]
+    samples = [WeightedSample(*some) for some in zip(rows, tau, weights, strict=True)]
     single, several = (
         RecursiveLeastSquares(names(8), NOISE, forgetting=forgetting) for _ in range(2)
     )
