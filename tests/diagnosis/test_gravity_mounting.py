@@ -14,6 +14,8 @@ from scipy.spatial.transform import Rotation
 from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.cases import lived_case
 
+pytestmark = pytest.mark.slow
+
 EARTH, MOON = 9.81, 1.62
 
 

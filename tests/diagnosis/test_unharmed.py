@@ -9,6 +9,8 @@ import pytest
 from tests.diagnosis.conftest import TORQUE_NOISE
 from tests.diagnosis.test_floor import cut
 
+pytestmark = pytest.mark.slow
+
 SIZE = np.array([0.03, 0.05])
 
 
