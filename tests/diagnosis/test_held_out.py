@@ -9,7 +9,7 @@ from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.held_out import (
     held_out,
     lead,
-    products_of,
+    products,
     tried_beside,
     with_group,
 )
@@ -115,7 +115,8 @@ def test_a_group_that_was_there_before_has_its_old_value_free_beside_it(bench):
     twice = replace(problem, x=np.concatenate([own, own, beside], axis=2))
     (expected,), _ = held_out(twice, range(OWN, OWN + size), one, wide, to)
     both = np.concatenate([own, beside], axis=2)
-    known = with_group(products_of(problem, both), problem, both, own)
+    of_both = products(replace(problem, x=both), range(size), ())
+    known = with_group(of_both, problem, both, own)
     (trial,), _ = tried_beside(known, problem, one, wide, to)
     np.testing.assert_allclose(trial.values, expected.values, rtol=1e-8)
     np.testing.assert_allclose(trial.gains, expected.gains, rtol=1e-8)

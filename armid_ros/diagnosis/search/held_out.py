@@ -236,22 +236,6 @@ def with_group(known: Products, problem: Problem, beside: FloatArray, own: Float
     )
 
 
-def products_of(problem: Problem, free: FloatArray) -> Products:
-    """Return the products of columns (R, n, f) that are free, without any group."""
-    blocks = int(problem.block.max()) + 1
-    own, aim, power = [], [], []
-    for block in range(blocks):
-        rows = problem.block == block
-        x, y = free[rows].reshape(-1, free.shape[2]), problem.y[rows].ravel()
-        own.append(x.T @ x)
-        aim.append(x.T @ y)
-        power.append(y @ y)
-    none = np.zeros((blocks, free.shape[2], 0))
-    return Products(
-        np.array(own), np.array(aim), none, none[:, 0], none[:, 0], (), np.array(power)
-    )
-
-
 @dataclass(frozen=True)
 class _Base:
     """What is free, fitted to some blocks."""

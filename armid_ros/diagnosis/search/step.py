@@ -12,7 +12,6 @@ from armid_ros.diagnosis.data.rows import Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.held_out import (
     products,
-    products_of,
     Trial,
     tried_beside,
     with_group,
@@ -261,24 +260,28 @@ def _examined(
     """
     assert here.total is not None
     least = 0.0 if here.before is None else here.settings.thresholds.headline * here.total
-    there, large = [], []
+    free = beside.rows(problem)
+    there: list[Trial] = []
+    large: list[tuple[Trial, FloatArray]] = []
     for trial in ranking[:_LOOKED_AT]:
         if not acceptable(trial, here, tried):
             continue
-        found = _changed(problem, beside, trial, [trial], here)
-        if found is None or not acceptable(found, here, tried):
+        (change,) = _changes(problem, beside, [trial], [trial], here)
+        if change is None or not acceptable(change, here, tried):
             continue
-        there.append(found)
-        if found.gain >= least and material(_size(found, trial, problem, beside, here), here):
-            large.append(trial)
+        there.append(change)
+        own = problem.x[:, :, trial.group.columns]
+        takes = trial.joint_gains(problem, own, free)
+        if change.gain >= least and material(_size(change, takes, own, here), here):
+            large.append((trial, takes))
     best = large[:_COMPARED]
-    seen = {id(trial) for trial in best}
+    seen = {id(trial) for trial, _ in best}
     result = [trial for trial in ranking if id(trial) not in seen]
     gains = {}
-    for trial, compared in zip(best, _compared(problem, beside, best, here), strict=True):
-        own = problem.x[:, :, trial.group.columns]
-        gains[id(compared)] = trial.joint_gains(problem, own, beside.rows(problem))
-        result.append(compared)
+    compared = _compared(problem, beside, [trial for trial, _ in best], here)
+    for change, (_, takes) in zip(compared, best, strict=True):
+        gains[id(change)] = takes
+        result.append(change)
     result.sort(key=lambda t: -worth(t, here))
     there.sort(key=lambda t: -worth(t, here))
     return result, there, gains
@@ -296,7 +299,7 @@ def _compared(
     """
     if here.before is None or len(trials) < 2:
         return list(trials)
-    found = [_changed(problem, beside, trial, trials, here) for trial in trials]
+    found = _changes(problem, beside, trials, trials, here)
     changes = [trial if one is None else one for trial, one in zip(trials, found, strict=True)]
     first = max(range(len(trials)), key=lambda k: changes[k].gain)
     if changes[first].gain <= 0.0:
@@ -316,42 +319,44 @@ def _alone(
     return trials[0] if trials else None
 
 
-def _changed(
-    problem: Problem, beside: Beside, trial: Trial, before: Sequence[Trial], here: Round
-) -> Trial | None:
+def _changes(
+    problem: Problem,
+    beside: Beside,
+    trials: Sequence[Trial],
+    before: Sequence[Trial],
+    here: Round,
+) -> list[Trial | None]:
     """
-    Return the change of a cause since the recordings from before.
+    Return the changes of causes since the recordings from before; None where nothing is visible.
 
-    The values that some causes had before, itself among them, are free beside it.
+    The values that some causes had before, themselves among them, are free beside each.
 
     """
     if here.before is None:
-        return trial
-    group = replace(trial.group, columns=slice(0, trial.group.size))
-    own = problem.x[:, :, trial.group.columns]
-    had = [problem.x[:, :, one.group.columns] for one in before]
+        return list(trials)
     held = here.before.beside([one.group for one in before], here.work.arm, beside)
+    had = [problem.x[:, :, one.group.columns] for one in before]
     free = np.concatenate([*had, beside.rows(problem)], axis=2)
-    known = with_group(products_of(problem, free), problem, free, own)
-    trials, _ = tried_beside(known, problem, [group], held.hold, held.pull)
-    return replace(trials[0], group=trial.group) if trials else None
+    known = products(replace(problem, x=free), range(free.shape[2]), ())
+    result: list[Trial | None] = []
+    for trial in trials:
+        group = replace(trial.group, columns=slice(0, trial.group.size))
+        whole = with_group(known, problem, free, problem.x[:, :, trial.group.columns])
+        found, _ = tried_beside(whole, problem, [group], held.hold, held.pull)
+        result.append(replace(found[0], group=trial.group) if found else None)
+    return result
 
 
-def _size(
-    change: Trial, trial: Trial, problem: Problem, beside: Beside, here: Round
-) -> FloatArray:
+def _size(change: Trial, takes: FloatArray, own: FloatArray, here: Round) -> FloatArray:
     """
     Return the squares that a change makes in every joint, and no more than the cause takes, (n,).
 
     What the change takes beside the values from before is less where these are hardly known.
 
     """
-    own = problem.x[:, :, trial.group.columns]
-    takes = trial.joint_gains(problem, own, beside.rows(problem))
     if here.before is None:
         return takes
-    made = np.sum((own @ change.values) ** 2, axis=0)
-    return np.asarray(np.minimum(takes, made))
+    return np.asarray(np.minimum(takes, np.sum((own @ change.values) ** 2, axis=0)))
 
 
 def _passing(

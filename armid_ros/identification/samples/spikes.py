@@ -286,9 +286,7 @@ class SpikeGate:
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
         self._quantile = self._quantile_of(self._period)
-        missed = [
-            missed_by(first[k : k + 2], first[k + 2], self._period) for k in range(FIRST - 2)
-        ]
+        missed = self._lines_through(first)
         self._see_steps(np.abs(np.diff([s.x for s in first], axis=0)))
         self._most = np.maximum(self._most, np.max(np.abs([m.error for m in missed]), axis=0))
         if not self._usual:
@@ -305,9 +303,7 @@ class SpikeGate:
         start = straight.index(True)
         first = first[:start] + all_unwrapped(raw[start:], self._turn)  # not from what is damaged
         self._known = first[start], first[start + 1]
-        if start:
-            of = self._off_by(missed[0], floor), self._limits(missed[0], floor)
-            self._leave_out(Excursion(tuple(first[:start]), *of))
+        self._leave_out_ahead(first[:start], missed[0], floor)
         good = list(self._known)
         for sample in first[start + 2 :]:
             good += self._judge(sample, floor)
@@ -350,18 +346,14 @@ class SpikeGate:
     def _go_on(self, floor: FloatArray | float) -> list[StreamSample]:
         """Pass on what is held, for it is real; what among it is damaged is judged for itself."""
         held, self._held = self._held, []
-        missed = [
-            missed_by(held[k : k + 2], held[k + 2], self._period) for k in range(len(held) - 2)
-        ]
+        missed = self._lines_through(held)
         steady = ~self._pulsing
         straight = [bool(np.all(self._off_by(one, floor)[steady] <= 1.0)) for one in missed]
         if all(straight) or not any(straight):
             return self._accept(held)
         start = straight.index(True)
-        if start:
-            of = self._off_by(missed[0], floor), self._limits(missed[0], floor)
-            self._leave_out(Excursion(tuple(held[:start]), *of))
-            held[start] = replace(held[start], begins=held[0].begins)
+        self._leave_out_ahead(held[:start], missed[0], floor)
+        held[start] = replace(held[start], begins=held[0].begins)
         if all(straight[start:]):
             return self._accept(held[start:])
         good = self._accept(held[start : start + 2])
@@ -422,6 +414,19 @@ class SpikeGate:
         if len(self._errors) >= WINDOW:
             self._learn()
         return samples
+
+    def _lines_through(self, samples: Sequence[StreamSample]) -> list[Missed]:
+        """Return what the line through each two samples misses the next one by."""
+        pairs = range(len(samples) - 2)
+        return [missed_by(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
+
+    def _leave_out_ahead(
+        self, samples: Sequence[StreamSample], missed: Missed, floor: FloatArray | float
+    ) -> None:
+        """Count samples, if any, ahead of the first ones that are in line."""
+        if samples:
+            of = self._off_by(missed, floor), self._limits(missed, floor)
+            self._leave_out(Excursion(tuple(samples), *of))
 
     def _leave_out(self, excursion: Excursion, erratic: bool = False) -> None:
         """Count what is left out, by its reason."""
