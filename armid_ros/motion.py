@@ -76,7 +76,7 @@ class Motion:
     band_hz : float
         What positions that were measured have above this frequency is noise, as far as second
         derivatives of torques go; infinite for a reference.
-    beside : MovingPoints or None
+    partner : MovingPoints or None
         What moved beside the arm and was recorded with it.
 
     Examples
@@ -98,7 +98,7 @@ class Motion:
     ddq: FloatArray
     tau: FloatArray | None = None
     band_hz: float = field(default=np.inf, kw_only=True)
-    beside: MovingPoints | None = field(default=None, kw_only=True)
+    partner: MovingPoints | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check that their shapes agree."""
@@ -134,7 +134,7 @@ class Motion:
             dq=self.dq[samples],
             ddq=self.ddq[samples],
             tau=tau,
-            beside=None if self.beside is None else self.beside.select(samples),
+            partner=None if self.partner is None else self.partner.select(samples),
         )
 
     def at_rest(self) -> Motion:

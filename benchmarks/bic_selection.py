@@ -57,7 +57,7 @@ def bic_selection(
     base, _ = excited(arm, arm.base_parameters(rng), data)
     one = [np.ones(arm.robot.n_joints)] * len(data)
     reference = fit(arm, (), data, one, base)
-    told = np.concatenate([part.told for part in data])
+    told = np.concatenate([part.informative for part in data])
     left = np.concatenate(reference.residual)
     alike = [np.sqrt(np.sum(left**2, axis=0, where=told) / told.sum(axis=0))] * len(data)
     found = candidates(reference, data, alike, settings.kinds)

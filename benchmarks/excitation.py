@@ -32,11 +32,11 @@ from armid_ros.excitation import (
     check_limits,
     ClearanceModel,
     design,
+    DesignProblem,
     DesignSettings,
     evaluate,
     FourierTrajectory,
     Limits,
-    Problem,
     random_feasible,
 )
 from armid_ros.excitation.random_trajectory import feasible_pose, position_range
@@ -94,7 +94,7 @@ def humanoid(seed):
         rate=LUNAR_SAMPLES / 20.0,
     )
     (result, seconds, cpu) = timed(lambda: design(arm, settings, rng, collision=collision))
-    problem = Problem.of(arm, settings, rng)
+    problem = DesignProblem.of(arm, settings, rng)
     clearance = ClearanceModel.of(collision)
     plain = [narrow(arm, problem, clearance, rng) for _ in range(20)]
     unseen = [
@@ -155,7 +155,7 @@ def arm_table(name, arguments, python, file):
     clearance = ClearanceModel.of(collision)
     settings = DesignSettings(period=20.0, harmonics=5, n_periods=1, rate=RATE)
     rng = np.random.default_rng(arguments.seed)
-    problem = Problem.of(arm, settings, rng)
+    problem = DesignProblem.of(arm, settings, rng)
     print(f'\n{name}, {problem.base.rank} base parameters with friction')
     print(
         f'{"":34s}{"log det":>9s}{"condition":>11s}{"seconds":>9s}{"cpu s":>8s}'

@@ -111,7 +111,7 @@ def share_closed(case: Case, overlays: Sequence[Overlay]) -> float:
     truth = true_arm(case)
     e0, e1, e_true = np.zeros((3, truth.robot.n_joints))
     for one in overlays:
-        told = one.trajectory.told / one.sigma / np.sqrt(one.trajectory.told.sum())
+        told = one.trajectory.informative / one.sigma / np.sqrt(one.trajectory.informative.sum())
         left = one.measured - one.before, one.measured - one.after, one.trajectory.residual(truth)
         for total, part in zip((e0, e1, e_true), left, strict=True):
             total += np.sum((part * told) ** 2, axis=0)

@@ -225,7 +225,7 @@ def error_percent(found: Diagnosis) -> float:
     assert found.gap is not None
     squares = np.zeros(2)
     for one in found.gap.overlays:
-        told = one.trajectory.told
+        told = one.trajectory.informative
         squares += [np.sum(x**2, where=told) for x in (one.measured - one.after, one.measured)]
     return float(100.0 * np.sqrt(squares[0] / squares[1]))
 

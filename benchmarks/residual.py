@@ -45,7 +45,7 @@ def held_out_squares(learned, parts, joint, t, contribution):
     k = learned.base.robot.joints.index(joint)
     rows = joint_rows(learned.base, parts)[k]
     there = [
-        part.reduce(np.interp(part.motion.t, t, contribution[:, k]))[part.told[:, k]]
+        part.reduce(np.interp(part.motion.t, t, contribution[:, k]))[part.informative[:, k]]
         for part in parts
     ]
     own = next((one.learned for one in learned.joints if one.joint == joint), None)

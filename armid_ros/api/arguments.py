@@ -74,7 +74,7 @@ def recordings_of(
     return read
 
 
-def told_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
+def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
     """Return recordings of which each has a source of its own, numbered where two are alike."""
     taken: dict[str, int] = {}
 

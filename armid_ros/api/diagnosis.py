@@ -18,7 +18,7 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     source_of,
-    told_apart,
+    with_sources_apart,
 )
 from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel, save_model
@@ -246,7 +246,7 @@ def diagnose(
     if residual is not None:
         require_libraries()
     model = arm_of(arm, effects)
-    looked_at, held_out, before = told_apart(
+    looked_at, held_out, before = with_sources_apart(
         *(recordings_of(group, model.robot) for group in (recordings, validate, baseline))
     )
     more: dict[str, Any] = {'baseline': before} if before else {}

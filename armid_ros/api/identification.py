@@ -18,8 +18,8 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     source_of,
-    told_apart,
     USUAL,
+    with_sources_apart,
 )
 from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel, save_model
@@ -289,7 +289,7 @@ def identify(
 
     """
     model = arm_of(arm, effects)
-    training, held_out = told_apart(
+    training, held_out = with_sources_apart(
         recordings_of(recordings, model.robot), recordings_of(validate, model.robot)
     )
     known = PhysicalSettings() if physical is True else physical or None

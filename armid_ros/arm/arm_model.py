@@ -429,6 +429,6 @@ class ArmModel:
         if names:
             size = (len(motion), len(names), 3)
             points = MovingPoints(names, rng.normal(size=size), rng.normal(size=size))
-            motion = replace(motion, beside=points)
+            motion = replace(motion, partner=points)
         columns = self.columns(motion)
         return group_columns(columns.reshape(-1, columns.shape[-1]), self.parameters)

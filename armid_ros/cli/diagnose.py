@@ -19,7 +19,7 @@ from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, F
 from armid_ros.diagnosis.verdict.document import SCHEMA
 from armid_ros.effects.tied import Partner
 from armid_ros.files import json_text
-from armid_ros.identification.fitting.identifiability import told_from_zero
+from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.recording import Recording
 from armid_ros.report.notation import percent, probability, with_interval
 from armid_ros.residual import require_libraries, TABLE_FILE
@@ -255,7 +255,7 @@ def show(result: Diagnosis) -> None:
 def _rows(finding: Finding) -> list[dict[str, str]]:
     """Return a row for every value that is told from zero."""
     every = list(zip(finding.parameters, finding.values, finding.std, strict=True))
-    values = [row for row in every if told_from_zero(row[1], row[2])] or every
+    values = [row for row in every if excludes_zero(row[1], row[2])] or every
     return [
         {
             'effect': '' if number else finding.name.replace('_', ' '),

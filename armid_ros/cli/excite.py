@@ -35,9 +35,9 @@ from armid_ros.excitation import (
     CRITERIA,
     Design,
     design_speeds,
+    DesignProblem,
     DesignProgress,
     DesignSettings,
-    Problem,
     SPEED_CLASSES,
     TARGETS,
     transfer_limits,
@@ -291,7 +291,7 @@ def _known(arm: ArmModel, settings: DesignSettings, bags: Sequence[Path], seed: 
     """Return the information that recordings hold already, shape (r, r)."""
     recordings = options.read(bags, arm.robot, None)
     used = conditioning(recordings, SignalSettings())
-    problem = Problem.of(arm, settings, np.random.default_rng(seed))
+    problem = DesignProblem.of(arm, settings, np.random.default_rng(seed))
     size = len(problem.base.parameters)
     matrix = np.zeros((size, size))
     for recording in recordings:

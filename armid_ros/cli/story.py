@@ -180,7 +180,7 @@ def show_story(told: ToldStory, out: Path) -> None:
     show(told.diagnosis)
     gap, arm = told.diagnosis.gap, told.diagnosis.arm
     if gap is not None:
-        worst = int(np.argmax(gap.loss_before))
+        worst = int(np.argmax(gap.chi2_before))
         say(
             f'in the run that was not used, the error of {arm.robot.joints[worst]} was '
             f'{digits(float(gap.before[worst]))} N m and is {digits(float(gap.after[worst]))} N m '

@@ -13,7 +13,7 @@ from typing import Any, Self
 from armid_ros.errors import visible
 from armid_ros.estimate import Estimate
 from armid_ros.files import json_text
-from armid_ros.identification.fitting.identifiability import told_from_zero
+from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.motion import FloatArray
 import click
 from rich.console import Console
@@ -179,7 +179,7 @@ def print_parameters(rows: Sequence[dict[str, Any]]) -> None:
 
 
 def _told(row: dict[str, Any]) -> bool:
-    return row['std'] is None or bool(told_from_zero(row['value'], row['std']))
+    return row['std'] is None or bool(excludes_zero(row['value'], row['std']))
 
 
 def _cell(value: Any) -> str:

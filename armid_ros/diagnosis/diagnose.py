@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Trajectory
-from armid_ros.diagnosis.data.floor import Floor, noise_floor
+from armid_ros.diagnosis.data.floor import noise_floor, NoiseFloor
 from armid_ros.diagnosis.data.gate import check_data, Gate
 from armid_ros.diagnosis.data.prepare import choose_filters, prepare, Prepared
 from armid_ros.diagnosis.search.bodies import as_bodies
@@ -84,7 +84,7 @@ class Diagnosis:
         What the data are like.
     data : tuple of Trajectory
         What was looked at.
-    floors : tuple of Floor
+    floors : tuple of NoiseFloor
         Noise of each trajectory.
     not_visible : tuple of str
         Names of the catalogue that these data cannot show.
@@ -110,7 +110,7 @@ class Diagnosis:
     arm: ArmModel
     gate: Gate | None
     data: tuple[Trajectory, ...]
-    floors: tuple[Floor, ...]
+    floors: tuple[NoiseFloor, ...]
     not_visible: tuple[str, ...]
     refitted: bool
     pattern: Pattern | None
@@ -339,15 +339,15 @@ def _as_stated(
     rest: Explanation, shares: Attribution, unseen: Evidence | None, arm: ArmModel, least: float
 ) -> tuple[Explanation, Attribution, list[str]]:
     """Return names in the model as given, or beside a body common to both days, and a note."""
-    as_told = in_model_as_given(rest)
-    told = shares_of(as_told, unseen)[0]
-    names = range(len(as_told.steps))
+    as_described = in_model_as_given(rest)
+    told = shares_of(as_described, unseen)[0]
+    names = range(len(as_described.steps))
     if told.share(names) >= least:
         small = [k for k in names if told.share([k]) < least]
         if small and len(small) < len(names):
             fewer = rest.without(min(small, key=lambda k: told.share([k])))
             return _as_stated(fewer, shares_of(fewer, unseen)[0], unseen, arm, least)
-        return as_told, told, []
+        return as_described, told, []
     bodily, remarks = as_bodies(rest, arm)
     return bodily, shares, [_COMMON, *remarks]
 
@@ -404,7 +404,7 @@ def _left(
         residual = explanation.fitted.residual
     else:
         residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
-    excess = evidence.losses(residual) / (more * evidence.limits(residual, settings))
+    excess = evidence.chi2_per_row(residual) / (more * evidence.limits(residual, settings))
     return Left(excess, f'in {where}')
 
 

@@ -4,7 +4,7 @@
 What holds a link to a machine or a person whose motion was recorded beside that of the arm.
 
 The springs are those of ``interaction``. Where they end on the other side is known: points of
-``Motion.beside`` with the names of the ties. So neither attachments nor anchors are to be found.
+``Motion.partner`` with the names of the ties. So neither attachments nor anchors are to be found.
 
 """
 
@@ -61,7 +61,7 @@ class Tied(Attached):
             If nothing was recorded beside the motion, or other points.
 
         """
-        beside, names = motion.beside, self.points
+        beside, names = motion.partner, self.points
         if beside is None or not set(names) <= set(beside.names):
             raise ModelError(
                 f'{self.name} of {", ".join(self.joints)}: it ends at points of '

@@ -27,7 +27,7 @@ from armid_ros.excitation.limits import (
     used_shares,
     Violation,
 )
-from armid_ros.excitation.problem import Problem
+from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.random_trajectory import random_feasible
 from armid_ros.excitation.rehearsal import Rehearsal, RehearsalReport
 from armid_ros.excitation.run import plan_run, Run
@@ -65,7 +65,7 @@ __all__ = [
     'LowestPoint',
     'MeasuredPose',
     'Obstacle',
-    'Problem',
+    'DesignProblem',
     'DesignProgress',
     'Run',
     'SPEED_CLASSES',

@@ -16,7 +16,7 @@ from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.environment import Obstacle, with_obstacles
 from armid_ros.excitation.limits import Limits, SPEED_CLASSES
 from armid_ros.excitation.placing import placed
-from armid_ros.excitation.problem import Problem
+from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.search.criteria import Information
 from armid_ros.excitation.search.local import exact_cost, Found
@@ -112,7 +112,7 @@ def design(
         What stands around the arm; needs ``collision``.
     prior_information : ndarray, shape (r, r), optional
         Information of what was recorded before, over the same base parameters: the sum of
-        ``Problem.information(motion).matrix`` of the recordings.
+        ``DesignProblem.information(motion).matrix`` of the recordings.
     rival : ArmModel, optional
         With criterion 'T': the model to tell ``arm`` from.
     progress : callable, optional
@@ -132,7 +132,7 @@ def design(
         way.
 
     """
-    problem = Problem.of(arm, settings, rng, rival)
+    problem = DesignProblem.of(arm, settings, rng, rival)
     clearance = _clearance(collision, obstacles)
     prior = _checked_prior(problem, prior_information, rival)
 
@@ -194,7 +194,7 @@ def design_speeds(
 
 
 def evaluate(
-    problem: Problem,
+    problem: DesignProblem,
     excitation: Excitation | FourierTrajectory,
     prior_information: FloatArray | None = None,
     *,
@@ -205,7 +205,7 @@ def evaluate(
 
     Parameters
     ----------
-    problem : Problem
+    problem : DesignProblem
         What is wanted.
     excitation : Excitation or FourierTrajectory
         What is to be run.
@@ -246,7 +246,7 @@ def _clearance(
 
 
 def _checked_prior(
-    problem: Problem, prior: FloatArray | None, rival: ArmModel | None
+    problem: DesignProblem, prior: FloatArray | None, rival: ArmModel | None
 ) -> FloatArray | None:
     if prior is None:
         return None

@@ -9,7 +9,7 @@ from armid_ros.excitation.feasibility import excitation_faults
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.limits import check_limits
-from armid_ros.excitation.problem import Problem
+from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.motion import Motion
 import numpy as np
@@ -22,7 +22,7 @@ _LONGER, _TRIES = 1.5, 12
 
 
 def placed(
-    problem: Problem, trajectory: FourierTrajectory, clearance: ClearanceModel | None
+    problem: DesignProblem, trajectory: FourierTrajectory, clearance: ClearanceModel | None
 ) -> Excitation:
     """
     Make a run of a trajectory that is within all limits from rest to rest.
@@ -59,7 +59,7 @@ def placed(
     raise TrajectoryError(f'no way into the trajectory and out of it; {last}')
 
 
-def _effort(problem: Problem, run: Excitation) -> float:
+def _effort(problem: DesignProblem, run: Excitation) -> float:
     """Largest share of a velocity or acceleration limit on the way in."""
     way = run.at(np.linspace(0.0, run.run_in, 40))
     velocity = np.abs(way.dq) / problem.limits.velocity
@@ -67,7 +67,7 @@ def _effort(problem: Problem, run: Excitation) -> float:
     return float(max(velocity.max(), acceleration.max()))
 
 
-def _require_start(problem: Problem, clearance: ClearanceModel | None) -> None:
+def _require_start(problem: DesignProblem, clearance: ClearanceModel | None) -> None:
     """Raise a TrajectoryError where the start pose itself is not allowed."""
     start = problem.settings.start
     if start is None:

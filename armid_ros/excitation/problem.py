@@ -32,7 +32,7 @@ NOISE_SHARE = 0.01
 
 
 @dataclass(frozen=True)
-class Problem:
+class DesignProblem:
     """
     What a design is for, with everything that does not change while it is being solved.
 
@@ -74,7 +74,7 @@ class Problem:
         settings: DesignSettings,
         rng: np.random.Generator,
         rival: ArmModel | None = None,
-    ) -> Problem:
+    ) -> DesignProblem:
         """
         Derive limits, noise, base parameters and criterion.
 

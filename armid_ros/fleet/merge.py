@@ -24,7 +24,7 @@ from armid_ros.fleet.summary import (
     Refused,
     rows_of,
 )
-from armid_ros.identification.fitting.excited import bounds, told_apart
+from armid_ros.identification.fitting.excited import bounds, identifiable_base
 from armid_ros.identification.fitting.triangle import (
     fit_triangle,
     joint_std,
@@ -167,7 +167,7 @@ def rooted(branches: Sequence[Branch], job: Job) -> Root:
     branch = merged(branches)
     if branch.triangle is None:
         return Root(branch, None)
-    base, kept = told_apart(job.theory, branch.triangle)
+    base, kept = identifiable_base(job.theory, branch.triangle)
     fit = fit_triangle(
         branch.triangle.restrict(kept), weighted=job.weighted, bounds=bounds(job.arm, base)
     )

@@ -267,7 +267,7 @@ def _alike(group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Sp
     logs = np.log([_ratio(one, found[one.parameter]) for one in tested])
     own = [_trigamma(0.5 * _freedom(len(one.values))) for one in tested]
     sure = 1.0 - _ERROR / np.sqrt(len(logs))
-    beyond = sure * _usual_size(logs) ** 2 - float(np.mean(own))
+    beyond = sure * _robust_scale(logs) ** 2 - float(np.mean(own))
     return _inverse_trigamma(beyond)
 
 
@@ -283,10 +283,10 @@ def _freedom(bags: int) -> float:
     """Return the degrees of freedom of the variance that so many bags tell, from white noise."""
     noise = np.random.default_rng(0).normal(size=(_DRAWN, bags))
     medians = np.median(np.diff(noise, axis=1) ** 2, axis=1)
-    return _inverse_trigamma(_usual_size(np.log(medians)) ** 2)
+    return _inverse_trigamma(_robust_scale(np.log(medians)) ** 2)
 
 
-def _usual_size(values: FloatArray) -> float:
+def _robust_scale(values: FloatArray) -> float:
     return 1.4826 * float(np.median(np.abs(values - np.median(values))))
 
 

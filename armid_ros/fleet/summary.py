@@ -13,7 +13,7 @@ from armid_ros.estimate import ParameterName
 from armid_ros.fleet.bags import BagFile
 from armid_ros.fleet.job import Job
 from armid_ros.fleet.store import fetched
-from armid_ros.identification.fitting.excited import bounds, told_apart
+from armid_ros.identification.fitting.excited import bounds, identifiable_base
 from armid_ros.identification.fitting.least_squares import noise_products
 from armid_ros.identification.fitting.triangle import (
     fit_triangle,
@@ -280,7 +280,7 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> PreparedBag:
 
 def _own(rows: Iterable[Regression], triangle: Triangle, job: Job) -> OwnEstimate | None:
     """Fit a bag by itself."""
-    base, kept = told_apart(job.theory, triangle)
+    base, kept = identifiable_base(job.theory, triangle)
     if triangle.counts.sum() < 2 * base.rank:
         return None
     some = triangle.restrict(kept)

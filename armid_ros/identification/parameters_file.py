@@ -73,7 +73,7 @@ class ParameterFile:
             return np.asarray(np.diag(self.std[chosen] ** 2))
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
 
-    def told_as(self, other: ParameterFile) -> ParameterFile:
+    def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
         Return the values with those of another grouping that follow from them.
 

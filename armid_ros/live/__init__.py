@@ -10,7 +10,7 @@ arm, `Assistant` answers in a process of its own. Nothing here knows ROS.
 
 from armid_ros.live.assistant import Assistant, InProcess
 from armid_ros.live.belief import Belief, LiveDiagnosis, LiveSettings
-from armid_ros.live.question import Answer, Question
+from armid_ros.live.request import Answer, DiagnosisRequest
 from armid_ros.live.window import SampleWindow
 
 __all__ = [
@@ -20,6 +20,6 @@ __all__ = [
     'InProcess',
     'LiveDiagnosis',
     'LiveSettings',
-    'Question',
+    'DiagnosisRequest',
     'SampleWindow',
 ]

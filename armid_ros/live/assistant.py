@@ -25,7 +25,7 @@ from armid_ros.api.diagnosis import DiagnosisResult
 from armid_ros.diagnosis import Diagnosis, next_run
 from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.excitation.files import excitation_text
-from armid_ros.live.question import Answer, answer, Question
+from armid_ros.live.request import Answer, answer, DiagnosisRequest
 import numpy as np
 
 #: One thread of linear algebra: the matrices are small, and the other cores have the arm.
@@ -52,7 +52,7 @@ class Plan:
 @dataclass(frozen=True)
 class Done:
     """
-    What became of a job that is no question.
+    What became of a job that is no request.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Done:
     excitation: str = ''
 
 
-Job = Question | Save | Plan
+Job = DiagnosisRequest | Save | Plan
 Result = Answer | Done
 
 
@@ -95,7 +95,7 @@ class InProcess:
     """Answers at once, in the process that asks."""
 
     def __init__(self) -> None:
-        self._last: tuple[Question, Diagnosis] | None = None
+        self._last: tuple[DiagnosisRequest, Diagnosis] | None = None
         self._result: Result | None = None
 
     @property
@@ -119,16 +119,16 @@ class InProcess:
         """Nothing to end."""
 
     def _done(self, job: Job) -> Result:
-        if isinstance(job, Question):
+        if isinstance(job, DiagnosisRequest):
             said, diagnosis = answer(job)
             if diagnosis is not None:
                 self._last = job, diagnosis
             return said
         if self._last is None:
             raise IdentificationError('nothing has been diagnosed so far')
-        question, diagnosis = self._last
+        request, diagnosis = self._last
         if isinstance(job, Save):
-            result = DiagnosisResult(diagnosis, question.arm, (question.window,), ())
+            result = DiagnosisResult(diagnosis, request.arm, (request.window,), ())
             return Done(
                 f'wrote diagnosis.json, model.yaml, report.html to {result.save(job.folder)}'
             )

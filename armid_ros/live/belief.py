@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.errors import IdentificationError
-from armid_ros.live.question import Answer, Question, WAITING
+from armid_ros.live.request import Answer, DiagnosisRequest, WAITING
 from armid_ros.live.window import SampleWindow
 from armid_ros.recording import Recording
 import numpy.typing as npt
@@ -59,7 +59,7 @@ class LiveSettings:
     material: float = 0.01
 
     def __post_init__(self) -> None:
-        """Refuse what never comes to a question."""
+        """Refuse what never comes to a request."""
         if not 0.0 < self.shortest <= self.window:
             raise IdentificationError(
                 f'a window of {self.window:g} s is never as long as the shortest one that is '
@@ -210,7 +210,7 @@ class LiveDiagnosis:
 
     @property
     def due(self) -> bool:
-        """Whether enough motion came since the last question."""
+        """Whether enough motion came since the last request."""
         wanted = self.settings.learning if self.learning else self.settings.shortest
         if self.window.moved < wanted or self.window.end - self.window.begin < wanted:
             return False
@@ -226,12 +226,12 @@ class LiveDiagnosis:
             self._asked_at, self.window.moved = 0.0, 0.0  # a gap: the stretch is another one
         return kept
 
-    def question(self) -> Question:
+    def request(self) -> DiagnosisRequest:
         """Return what to ask now."""
         self._asked_at = self.window.moved
         self.asked += 1
         longest = self.settings.learning if self.learning else self.settings.window
-        return Question(
+        return DiagnosisRequest(
             self.belief.accepted,
             self.window.recording(self.window.end - longest, f'window {self.asked}'),
             self._baseline,

@@ -160,7 +160,7 @@ class LiveDiagnosisNode(ArmidNode):
         for sample in self._reader.read(message):
             self.live.add(*sample)
         if self.live.due and not self._helper.busy:
-            self._helper.ask(self.live.question())
+            self._helper.ask(self.live.request())
 
     def take_answer(self) -> bool:
         """Take what was answered, if anything; return whether something was."""

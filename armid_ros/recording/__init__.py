@@ -10,13 +10,13 @@ for the nodes; none of it needs ROS.
 """
 
 from armid_ros.recording.bag import Bag, iter_raw, topics
-from armid_ros.recording.beside import Beside
 from armid_ros.recording.joint_state.encoder import (
     joint_state_cdr,
     write_joint_states,
     write_recording,
 )
 from armid_ros.recording.mcap.recover import recover, RecoveryReport
+from armid_ros.recording.partner_motion import PartnerMotion
 from armid_ros.recording.qos import LATCHED, QosProfile
 from armid_ros.recording.reader import read_recording
 from armid_ros.recording.recording import ReadReport, Recording, TimeGap
@@ -37,7 +37,7 @@ __all__ = [
     'ReadReport',
     'ReadSettings',
     'TimeGap',
-    'Beside',
+    'PartnerMotion',
     'recorded_together',
     'read_recording',
     'read_robot_description',

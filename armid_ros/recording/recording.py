@@ -9,7 +9,7 @@ from typing import Literal
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray, read_only
-from armid_ros.recording.beside import Beside
+from armid_ros.recording.partner_motion import PartnerMotion
 import numpy as np
 import numpy.typing as npt
 
@@ -149,7 +149,7 @@ class Recording:
         Whose time the stamps are: the sender's header, or the recorder's reception.
     report : ReadReport
         What was repaired or dropped on the way.
-    beside : Beside or None
+    partner : PartnerMotion or None
         Another machine that was recorded with the arm.
 
     Examples
@@ -178,7 +178,7 @@ class Recording:
     topic: str = '/joint_states'
     clock: Clock = 'header'
     report: ReadReport = field(default_factory=ReadReport)
-    beside: Beside | None = None
+    partner: PartnerMotion | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check their shapes."""
@@ -236,5 +236,5 @@ class Recording:
             q=self.q[samples],
             dq=None if self.dq is None else self.dq[samples],
             tau=None if self.tau is None else self.tau[samples],
-            beside=None if self.beside is None else self.beside.select(samples),
+            partner=None if self.partner is None else self.partner.select(samples),
         )

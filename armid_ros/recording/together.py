@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.beside import Beside
+from armid_ros.recording.partner_motion import PartnerMotion
 from armid_ros.recording.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
@@ -63,4 +63,4 @@ def recorded_together(
             'record them together'
         )
     q = CubicSpline(other.t, other.q)(t[inside])
-    return replace(recording.select(inside), beside=Beside(robot, tuple(ties), q))
+    return replace(recording.select(inside), partner=PartnerMotion(robot, tuple(ties), q))

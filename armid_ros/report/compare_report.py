@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.comparison import Comparison, GroupChange, ParameterChange
-from armid_ros.identification.fitting.identifiability import HALF_WIDTH, told_from_zero
+from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, measured, pretty, robot_label
 from armid_ros.report.page import Page
@@ -131,7 +131,7 @@ def _sentence(change: ParameterChange) -> str:
     label = label[0].upper() + label[1:]
     share = ''
     ends = [_end(change.before, change.before_std), _end(change.after, change.after_std)]
-    if told_from_zero(change.before, change.before_std):
+    if excludes_zero(change.before, change.before_std):
         share = f' ({100.0 * change.difference / abs(change.before):+.0f} %)'
     sure = f'{abs(change.deviations):.0f} standard deviations' if change.std > 0.0 else 'exactly'
     by = ' ± '.join(measured(abs(change.difference), HALF_WIDTH * change.std))
@@ -139,13 +139,13 @@ def _sentence(change: ParameterChange) -> str:
 
 
 def _end(value: float, std: float) -> str:
-    return f'{value:.4g}' if told_from_zero(value, std) else 'what is not told from 0'
+    return f'{value:.4g}' if excludes_zero(value, std) else 'what is not told from 0'
 
 
 def _least_visible(changes: Sequence[ParameterChange]) -> str:
     """Say how large a change would have had to be, of the kinds that wear changes."""
     worn = [c for c in changes if not c.parameter.rigid] or list(changes)
-    known = [c for c in worn if told_from_zero(c.before, c.before_std)]
+    known = [c for c in worn if excludes_zero(c.before, c.before_std)]
     if not known:
         return 'Nothing is known of how large a change would have been seen.'
     shares = sorted(3.5 * c.std / abs(c.before) for c in known)

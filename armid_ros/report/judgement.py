@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from armid_ros.identification import Fit, Identification, Score, Verification
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.identification.fitting.identifiability import told_from_zero
+from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.recording import Recording
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, digits
@@ -225,7 +225,7 @@ def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caut
 def _excitation_findings(result: Identification) -> list[Caution]:
     findings = []
     estimate = result.estimate
-    told = told_from_zero(estimate.values, estimate.std)
+    told = excludes_zero(estimate.values, estimate.std)
     lost = [full_label(estimate.parameters[k]) for k in np.flatnonzero(~told)]
     if lost:
         findings.append(

@@ -72,7 +72,7 @@ def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:
     q, dq = (np.concatenate([getattr(link, name) for link in links]) for name in ('q', 'dq'))
     inputs = np.stack([q, dq, weight(arm.body, q)], axis=-1)
     left = np.concatenate([part.residual(arm) for part in data])
-    told = np.concatenate([part.told for part in data])
+    told = np.concatenate([part.informative for part in data])
     result = []
     for joint in range(left.shape[1]):
         use = told[:, joint]

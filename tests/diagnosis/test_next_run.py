@@ -144,14 +144,14 @@ def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen)
     )
     data = cut([recording])
     sigma = [noise_floor(data[0], bench.arm).sigma]
-    rows = data[0].told.sum(axis=0)
+    rows = data[0].informative.sum(axis=0)
 
     def squares(name):
         effect = CATALOGUE[name].on(bench.robot, ('elbow',))
         kept = tuple(range(len(effect.parameters(bench.robot))))
         fitted = fit(bench.arm, [Named(effect, kept)], data, sigma, None)
         evidence = Evidence(tuple(data), tuple(sigma), tuple(sigma))
-        return float(np.sum(evidence.losses(fitted.residual) * rows))
+        return float(np.sum(evidence.chi2_per_row(fitted.residual) * rows))
 
     own = squares('torque_offset')
     for pair in chosen.separations:

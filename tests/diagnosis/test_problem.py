@@ -29,7 +29,7 @@ def test_a_loss_is_the_mean_over_the_rows_that_count(problem):
     expected = [
         np.mean(y[w > 0.0] ** 2) for y, w in zip(problem.y.T, problem.weight.T, strict=True)
     ]
-    np.testing.assert_allclose(problem.losses(problem.y), expected)
+    np.testing.assert_allclose(problem.chi2_per_row(problem.y), expected)
 
 
 def test_products_of_what_is_left_need_not_know_what_is_left(problem):

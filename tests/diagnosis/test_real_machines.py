@@ -50,10 +50,12 @@ def test_friction_of_a_positioning_system_in_the_order_of_the_gap(real_data, tmp
         'asymmetric_friction',
     }
     left = sum(
-        float(np.sum(((o.measured - o.after) * o.trajectory.told) ** 2))
+        float(np.sum(((o.measured - o.after) * o.trajectory.informative) ** 2))
         for o in found.gap.overlays
     )
-    whole = sum(float(np.sum((o.measured * o.trajectory.told) ** 2)) for o in found.gap.overlays)
+    whole = sum(
+        float(np.sum((o.measured * o.trajectory.informative) ** 2)) for o in found.gap.overlays
+    )
     assert np.sqrt(left / whole) < 0.032
 
 

@@ -47,7 +47,7 @@ def test_a_value_that_parts_tell_otherwise_is_as_unsure_as_they_differ(bench):
 def test_a_value_is_as_unsure_as_what_the_rest_has_along_any_cause(bench):
     fitted, evidence = coulomb_of(bench, lambda m, tau: on_elbow(0.2 * np.sign(m.dq[:, 1])))
     rows = np.concatenate([columns[:, 1, 0] for columns in fitted.columns])
-    told = np.concatenate([part.told[:, 1] for part in evidence.data])
+    told = np.concatenate([part.informative[:, 1] for part in evidence.data])
     white = 0.03 / np.sqrt(np.sum(rows[told] ** 2))
     noise = widened(fitted, evidence, None, 1.0)
     wide = widened(fitted, evidence, None, 101.0)

@@ -21,7 +21,7 @@ def drag(motion, tau):
 
 def left(arm, data):
     """Return the root mean square that an arm leaves of each joint [N m]."""
-    rows = [np.where(part.told, part.residual(arm), np.nan) for part in data]
+    rows = [np.where(part.informative, part.residual(arm), np.nan) for part in data]
     return np.sqrt(np.nanmean(np.concatenate(rows) ** 2, axis=0))
 
 

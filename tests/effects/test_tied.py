@@ -117,6 +117,6 @@ def test_where_the_partner_was_not_recorded_there_is_a_gap(pair, motions) -> Non
     other = Recording(joints=pair.other.joints, t=t[kept], q=motions.other.q[kept])
     both = recorded_together(own, other, pair.other, pair.ties)
     assert not np.any((both.t > 0.15) & (both.t < 0.3))
-    assert both.beside is not None
+    assert both.partner is not None
     expected = motions.other.q[np.isin(t, both.t)]
-    np.testing.assert_allclose(both.beside.q, expected, atol=1e-9)
+    np.testing.assert_allclose(both.partner.q, expected, atol=1e-9)

@@ -12,10 +12,10 @@ from armid_ros.excitation import (
     ClearanceModel,
     design,
     design_speeds,
+    DesignProblem,
     evaluate,
     Limits,
     Obstacle,
-    Problem,
     random_feasible,
 )
 from armid_ros.excitation.search.parallel import search_all, Task
@@ -39,7 +39,7 @@ def humanoid_design(humanoid, humanoid_collision, with_effects, quick):
 
 def test_design_beats_a_hundred_random_trajectories(two_link_arm, quick):
     rng = np.random.default_rng(1)
-    problem = Problem.of(two_link_arm, quick, rng)
+    problem = DesignProblem.of(two_link_arm, quick, rng)
     chance = [
         evaluate(problem, random_feasible(two_link_arm, problem.limits, 6.0, 3, rng))
         for _ in range(100)
@@ -53,7 +53,7 @@ def test_design_beats_a_hundred_random_trajectories(two_link_arm, quick):
 def test_every_criterion_improves_what_it_is_for(two_link_arm, quick, criterion):
     settings = replace(quick, criterion=criterion, starts=1)
     rng = np.random.default_rng(1)
-    problem = Problem.of(two_link_arm, settings, rng)
+    problem = DesignProblem.of(two_link_arm, settings, rng)
     chance = [
         evaluate(problem, random_feasible(two_link_arm, problem.limits, 6.0, 3, rng)).cost
         for _ in range(30)
@@ -84,7 +84,7 @@ def test_predicted_deviations_are_the_scatter_of_repeats(humanoid_design):
     arm, result = humanoid_design
     rng = np.random.default_rng(3)
     settings = replace(result.settings, rate=20.0)
-    problem = Problem.of(arm, settings, rng)
+    problem = DesignProblem.of(arm, settings, rng)
     predicted = evaluate(problem, result.excitation).information.std
     run = result.excitation.motion(20.0)
     slices = result.excitation.period_slices(20.0)
@@ -149,7 +149,7 @@ def test_progress_grows_to_one_and_cost_only_falls(two_link_arm, quick):
 
 
 def test_error_in_a_process_of_its_own_is_raised_here(two_link_arm, quick):
-    problem = Problem.of(two_link_arm, replace(quick, processes=2), np.random.default_rng(0))
+    problem = DesignProblem.of(two_link_arm, replace(quick, processes=2), np.random.default_rng(0))
     weak = replace(
         problem.limits,
         lower=np.array([1.2, -0.1]),
@@ -178,7 +178,7 @@ def test_speed_classes_come_from_one_call(two_link_arm, quick):
 def test_design_after_a_recording_adds_what_it_lacks(two_link_arm, quick):
     """The first run holds the elbow still; what is added is about the elbow."""
     rng = np.random.default_rng(0)
-    problem = Problem.of(two_link_arm, quick, rng)
+    problem = DesignProblem.of(two_link_arm, quick, rng)
     first = random_feasible(two_link_arm, problem.limits, 6.0, 3, rng).scaled([1.0, 1e-3])
     known = evaluate(problem, first).information.matrix
     blind = design(two_link_arm, quick, np.random.default_rng(1))
@@ -210,7 +210,7 @@ def test_design_against_a_rival_leaves_it_more_to_explain(two_link, with_effects
     rival = with_effects(two_link, 'coulomb_friction')
     settings = replace(quick, criterion='T', starts=1)
     rng = np.random.default_rng(0)
-    problem = Problem.of(arm, settings, rng, rival)
+    problem = DesignProblem.of(arm, settings, rng, rival)
     chance = [
         evaluate(problem, random_feasible(arm, problem.limits, 6.0, 3, rng)).cost
         for _ in range(20)

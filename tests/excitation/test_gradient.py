@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.excitation import DesignSettings, Problem
+from armid_ros.excitation import DesignProblem, DesignSettings
 from armid_ros.excitation.geometry.chain import Chain
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.random_trajectory import random_feasible
@@ -77,7 +77,7 @@ EFFECTS = {
 def test_gradient_of_each_criterion(tree, with_effects, criterion, effects):
     settings = DesignSettings(period=5.0, harmonics=2, samples=40, criterion=criterion)
     arm = with_effects(tree, *effects)
-    problem = Problem.of(arm, settings, np.random.default_rng(3))
+    problem = DesignProblem.of(arm, settings, np.random.default_rng(3))
     assert_gradient(Objective.of(problem), problem)
 
 
@@ -91,13 +91,15 @@ def test_gradient_of_each_criterion(tree, with_effects, criterion, effects):
 )
 def test_gradient_of_each_target(humanoid, with_effects, target, effects):
     settings = DesignSettings(period=5.0, harmonics=2, samples=40, target=target)
-    problem = Problem.of(with_effects(humanoid, *effects), settings, np.random.default_rng(3))
+    problem = DesignProblem.of(
+        with_effects(humanoid, *effects), settings, np.random.default_rng(3)
+    )
     assert_gradient(Objective.of(problem), problem)
 
 
 def test_gradient_of_a_subset(two_link_arm):
     settings = DesignSettings(period=5.0, harmonics=2, samples=40, focus=('coulomb_friction',))
-    problem = Problem.of(two_link_arm, settings, np.random.default_rng(3))
+    problem = DesignProblem.of(two_link_arm, settings, np.random.default_rng(3))
     assert_gradient(Objective.of(problem), problem)
 
 
@@ -105,14 +107,14 @@ def test_gradient_against_a_rival(two_link, with_effects):
     settings = DesignSettings(period=5.0, harmonics=2, samples=40, criterion='T')
     arm = ArmModel(two_link).with_effect(make_effect('viscous_friction', two_link), [0.5, 0.2])
     rival = with_effects(two_link, 'coulomb_friction', 'torque_offset')
-    problem = Problem.of(arm, settings, np.random.default_rng(3), rival)
+    problem = DesignProblem.of(arm, settings, np.random.default_rng(3), rival)
     assert_gradient(Objective.of(problem), problem)
 
 
 def test_gradient_with_prior_information(two_link_arm):
     settings = DesignSettings(period=5.0, harmonics=2, samples=40)
     rng = np.random.default_rng(3)
-    problem = Problem.of(two_link_arm, settings, rng)
+    problem = DesignProblem.of(two_link_arm, settings, rng)
     known = problem.information(random_motion(two_link_arm.robot, 50, rng)).matrix
     assert_gradient(Objective.of(problem, known), problem)
 
@@ -141,7 +143,7 @@ def test_gradient_of_the_constraints(humanoid, humanoid_collision, with_effects,
     arm = with_effects(humanoid, *effects)
     arm = replace(arm, values=tuple(v + 0.3 for v in arm.values))
     rng = np.random.default_rng(5)
-    problem = Problem.of(arm, settings, rng)
+    problem = DesignProblem.of(arm, settings, rng)
     constraints = Constraints.of(
         problem,
         ClearanceModel.of(humanoid_collision),
@@ -161,7 +163,7 @@ def test_gradient_of_the_constraints(humanoid, humanoid_collision, with_effects,
 def test_soft_maximum_is_never_below_the_maximum(two_link_arm):
     settings = DesignSettings(period=5.0, harmonics=2, samples=40)
     rng = np.random.default_rng(6)
-    problem = Problem.of(two_link_arm, settings, rng)
+    problem = DesignProblem.of(two_link_arm, settings, rng)
     constraints = Constraints.of(
         problem, None, margin=0.0, reserve=0.0, sharpness=60.0, more_times=np.empty(0)
     )

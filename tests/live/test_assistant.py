@@ -11,7 +11,7 @@ import time
 
 from armid_ros.errors import IdentificationError
 from armid_ros.excitation.files import read_excitation
-from armid_ros.live import Answer, Assistant, InProcess, Question
+from armid_ros.live import Answer, Assistant, DiagnosisRequest, InProcess
 from armid_ros.live.assistant import Plan, Save
 import pytest
 
@@ -37,19 +37,19 @@ def wait(assistant):
 
 
 @pytest.fixture(scope='module')
-def question(known_arm, changed):
-    return Question(known_arm, changed, end=20.0)
+def asked(known_arm, changed):
+    return DiagnosisRequest(known_arm, changed, end=20.0)
 
 
-def test_a_process_of_its_own_answers_as_this_one_does(question, tmp_path):
+def test_a_process_of_its_own_answers_as_this_one_does(asked, tmp_path):
     here = InProcess()
-    here.ask(question)
+    here.ask(asked)
     expected = here.poll()
     with working() as assistant:
-        assistant.ask(question)
+        assistant.ask(asked)
         assert assistant.busy
         with pytest.raises(IdentificationError, match='under way'):
-            assistant.ask(question)
+            assistant.ask(asked)
         answer = wait(assistant)
         assert isinstance(answer, Answer)
         assert not assistant.busy
@@ -87,7 +87,7 @@ def test_the_process_ends_when_nobody_can_ask_it_any_more():
 
 def test_a_plan_is_a_motion_that_can_be_read(known_arm, changed):
     here = InProcess()
-    here.ask(Question(known_arm, changed))
+    here.ask(DiagnosisRequest(known_arm, changed))
     if not any(f.rivals for f in here.poll().findings):
         here.ask(Plan())
         done = here.poll()

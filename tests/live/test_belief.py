@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.live import Answer, LiveDiagnosis, LiveSettings
-from armid_ros.live.question import WAITING
+from armid_ros.live.request import WAITING
 import numpy as np
 import pytest
 
@@ -73,7 +73,7 @@ def test_what_was_accepted_is_what_is_asked_about(live, patched):
         live.take(said(patched, 'named', FRICTION))
     live.accept()
     assert live.belief.accepted is patched
-    assert live.question().arm is patched
+    assert live.request().arm is patched
 
 
 def test_what_was_rejected_is_not_proposed_again(live, known_arm, patched):
@@ -102,7 +102,7 @@ def stream(live, duration, moving=True, begin=0.0):
         live.add(t, q, np.zeros(6), np.zeros(6))
         if live.due:
             asked.append(round(t, 1))
-            live.question()
+            live.request()
     return asked
 
 
@@ -119,7 +119,7 @@ def test_an_arm_at_rest_is_not_asked_about(live):
 def test_windows_are_as_long_as_is_set(known_arm):
     live = LiveDiagnosis(known_arm, LiveSettings(window=10.0, learning=0.0))
     stream(live, 30.0)
-    assert live.question().window.duration == pytest.approx(10.0, abs=0.1)
+    assert live.request().window.duration == pytest.approx(10.0, abs=0.1)
 
 
 def test_after_a_gap_the_motion_counts_anew(live):
@@ -135,7 +135,7 @@ def test_the_misfit_is_learned_first(known_arm):
     measured = replace(said(known_arm, 'consistent'), misfit=object())
     assert not live.take(measured)
     assert not live.learning
-    assert live.question().misfit is measured.misfit
+    assert live.request().misfit is measured.misfit
 
 
 def test_settings_that_never_ask_are_refused():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import json
 import re
 
-from armid_ros.excitation import DesignSettings, evaluate, Obstacle, Problem
+from armid_ros.excitation import DesignProblem, DesignSettings, evaluate, Obstacle
 from armid_ros.report.excitation_report import excitation_report
 from armid_ros.report.sections.plan import PlannedClearance
 from armid_ros.report.silhouettes import draw_silhouettes
@@ -27,7 +27,9 @@ BARE = (
 def planned(case):
     """Return what evaluating the excitation of the case gives."""
     settings = DesignSettings(period=8.0, n_periods=1)
-    return evaluate(Problem.of(case.truth, settings, np.random.default_rng(1)), case.excitation)
+    return evaluate(
+        DesignProblem.of(case.truth, settings, np.random.default_rng(1)), case.excitation
+    )
 
 
 @pytest.fixture(scope='module')

@@ -53,7 +53,7 @@ class Baseline:
         """Measure the misfit of a model."""
         residual = [part.residual(arm) for part in data]
         _, columns = excited(arm, arm.base_parameters(rng), data)
-        informative = np.concatenate([part.told for part in data])
+        informative = np.concatenate([part.informative for part in data])
         left = np.concatenate(residual)
         w = np.concatenate(columns)
         informative[:, ~informative.any(axis=0)] = True  # of a joint that never moved, all of it

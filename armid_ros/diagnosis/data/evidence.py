@@ -62,7 +62,7 @@ class Trajectory:
         From motion to rows.
     rows : ndarray of int, shape (M,)
         Samples of the motion that the rows sit on.
-    told : ndarray of bool, shape (M, n)
+    informative : ndarray of bool, shape (M, n)
         False where a joint rests or turns round: friction is undetermined there.
     sensors : SensorNoise or None
         What their noise does beside another machine; None where there is none.
@@ -74,7 +74,7 @@ class Trajectory:
     motion: Motion
     used: Conditioning
     rows: npt.NDArray[np.intp]
-    told: npt.NDArray[np.bool_]
+    informative: npt.NDArray[np.bool_]
     sensors: SensorNoise | None = None
 
     def reduce(self, values: FloatArray) -> FloatArray:
@@ -140,7 +140,7 @@ class Evidence:
     @cached_property
     def count(self) -> FloatArray:
         """Informative rows of each joint, shape (n,)."""
-        parts = [part.told.sum(axis=0) for part in self.data]
+        parts = [part.informative.sum(axis=0) for part in self.data]
         return np.asarray(np.sum(parts, axis=0, dtype=float))
 
     @cached_property
@@ -149,14 +149,14 @@ class Evidence:
         squares = np.zeros_like(self.count)
         for part in self.data:
             assert part.motion.tau is not None
-            squares += np.sum(part.reduce(part.motion.tau) ** 2, axis=0, where=part.told)
+            squares += np.sum(part.reduce(part.motion.tau) ** 2, axis=0, where=part.informative)
         return np.sqrt(squares / np.maximum(self.count, 1.0))
 
-    def losses(self, residual: Sequence[FloatArray]) -> FloatArray:
+    def chi2_per_row(self, residual: Sequence[FloatArray]) -> FloatArray:
         """Return the mean square over the unit of each joint, shape (n,)."""
         squares = np.zeros_like(self.count)
         for part, sigma, left in zip(self.data, self.sigma, residual, strict=True):
-            squares += np.sum((left / sigma) ** 2, axis=0, where=part.told)
+            squares += np.sum((left / sigma) ** 2, axis=0, where=part.informative)
         return np.asarray(squares / np.maximum(self.count, 1.0))
 
     def split(self, weighted: FloatArray, weight: FloatArray) -> list[FloatArray]:
@@ -198,7 +198,7 @@ class Evidence:
         """Return for how many rows what is left lasts, as squares go, shape (n,)."""
         products = np.zeros((_LAGS + 1, len(self.count)))
         for part, left in zip(self.data, residual, strict=True):
-            rows = np.where(part.told, left, 0.0)
+            rows = np.where(part.informative, left, 0.0)
             for lag in range(min(_LAGS + 1, len(rows))):
                 products[lag] += np.sum(rows[lag:] * rows[: len(rows) - lag], axis=0)
         correlation = products[1:] / np.maximum(products[0], 1e-300)
@@ -211,7 +211,7 @@ class Evidence:
         total = np.zeros_like(self.count)
         for part, sigma, noise in zip(self.data, self.sigma, self.noise, strict=True):
             misfit = share * np.maximum(sigma**2 - noise**2, 0.0)
-            total += part.told.sum(axis=0) * np.maximum(wanted, misfit) / sigma**2
+            total += part.informative.sum(axis=0) * np.maximum(wanted, misfit) / sigma**2
         return np.maximum(total, 1e-12)
 
 
@@ -238,7 +238,7 @@ def trajectories(
                 f'{recording.source}: no stretch is long enough to be filtered at '
                 f'{used.cutoff_hz:g} Hz'
             )
-        if recording.beside is not None and arm is not None:
+        if recording.partner is not None and arm is not None:
             sensors = SensorNoise(arm.robot, recording, used)
             found = [replace(part, sensors=sensors) for part in found]
         result += found
@@ -256,8 +256,8 @@ def _trajectory(source: str, fold: int, motion: Motion, used: Conditioning) -> T
         motion = motion.select(kept).with_torque(decimate(motion.tau, first))
         used = Conditioning(used.rate_hz / thin, used.cutoff_hz, used.decimation // thin)
     rows = np.array(decimated_samples(len(motion), used), dtype=np.intp)
-    told = ~(_at_rest(motion) | _turning(motion, used))[rows]
-    return Trajectory(source, fold, motion, used, rows, told)
+    informative = ~(_at_rest(motion) | _turning(motion, used))[rows]
+    return Trajectory(source, fold, motion, used, rows, informative)
 
 
 def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:

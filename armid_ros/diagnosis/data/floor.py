@@ -39,7 +39,7 @@ _SLOW_HZ, _FAST_HZ, _WINDOW = 4.0, (6.0, 12.0), 2.5
 
 
 @dataclass(frozen=True)
-class Floor:
+class NoiseFloor:
     """
     Noise of one trajectory.
 
@@ -68,7 +68,7 @@ class Floor:
         return np.asarray(self.structure < _STRUCTURED)
 
 
-def noise_floor(trajectory: Trajectory, arm: ArmModel) -> Floor:
+def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     """
     Measure the noise of a trajectory beside a model.
 
@@ -90,7 +90,7 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> Floor:
     least = _least(trajectory, arm)
     if found is None:
         sigma = np.maximum(_assumed(trajectory, smooth), least)
-        return Floor(sigma, None, *np.ones((2, motion.n_joints)))
+        return NoiseFloor(sigma, None, *np.ones((2, motion.n_joints)))
     lag, where = found
     first = np.arange(max(where.start, half), min(where.stop, len(motion) - lag - half))
     rows = first[:: trajectory.used.decimation]
@@ -106,7 +106,7 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> Floor:
         growth[joint] = _over(spectrum, (2.0 * kept / 3.0, kept), (kept / 12.0, kept / 3.0))
     structure[sigma < least] = growth[sigma < least] = 1.0
     sigma = np.maximum(sigma, least)
-    return Floor(sigma, lag * float(motion.t[1] - motion.t[0]), structure, growth)
+    return NoiseFloor(sigma, lag * float(motion.t[1] - motion.t[0]), structure, growth)
 
 
 def _difference(
@@ -136,7 +136,7 @@ def _between_rows(
 ) -> npt.NDArray[np.bool_]:
     """Return whether the nearest rows of a joint tell something, shape (K,)."""
     nearest = np.clip(np.searchsorted(trajectory.rows, samples), 0, len(trajectory.rows) - 1)
-    return np.asarray(trajectory.told[nearest, joint])
+    return np.asarray(trajectory.informative[nearest, joint])
 
 
 def _spectrum(difference: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
@@ -167,7 +167,7 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     rows beside those do not count.
 
     """
-    rows, told = smooth[trajectory.rows], trajectory.told
+    rows, told = smooth[trajectory.rows], trajectory.informative
     bend = np.diff(rows, 2, axis=0)
     between = told[:-2] & told[1:-1] & told[2:]
     between[:, between.sum(axis=0) < _FEW] = True

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import trajectories, Trajectory
-from armid_ros.diagnosis.data.floor import Floor, noise_floor
+from armid_ros.diagnosis.data.floor import noise_floor, NoiseFloor
 from armid_ros.diagnosis.search.fit import excited, fit
 from armid_ros.diagnosis.search.question import with_friction
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -47,9 +47,9 @@ class Prepared:
         Stretches of the recordings in rows.
     base : BaseParameters
         What the motion excites of the arm.
-    floors : tuple of Floor
+    floors : tuple of NoiseFloor
         Noise of each trajectory beside the arm that is fitted to it.
-    as_told : tuple of ndarray, shape (n,)
+    as_described : tuple of ndarray, shape (n,)
         Noise beside the arm as it is described [N m].
 
     """
@@ -57,8 +57,8 @@ class Prepared:
     used: Conditioning
     data: tuple[Trajectory, ...]
     base: BaseParameters
-    floors: tuple[Floor, ...]
-    as_told: tuple[FloatArray, ...]
+    floors: tuple[NoiseFloor, ...]
+    as_described: tuple[FloatArray, ...]
 
     @property
     def sigma(self) -> list[FloatArray]:
@@ -116,7 +116,7 @@ def prepare(
 
 def _told(data: Sequence[Trajectory]) -> FloatArray:
     """Return in what share of the rows each joint moves, shape (n,)."""
-    return np.asarray(np.concatenate([part.told for part in data]).mean(axis=0))
+    return np.asarray(np.concatenate([part.informative for part in data]).mean(axis=0))
 
 
 def _measured(
@@ -126,5 +126,5 @@ def _measured(
     told = [noise_floor(part, arm) for part in data]
     refit = fit(arm, (), data, [floor.sigma for floor in told], base)
     floors = tuple(noise_floor(part, refit.arm) for part in data)
-    as_told = tuple((a if a.period else b).sigma for a, b in zip(told, floors, strict=True))
-    return Prepared(used, tuple(data), base, floors, as_told)
+    as_described = tuple((a if a.period else b).sigma for a, b in zip(told, floors, strict=True))
+    return Prepared(used, tuple(data), base, floors, as_described)

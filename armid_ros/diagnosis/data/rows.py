@@ -54,7 +54,7 @@ class Problem:
         """Which entries count, shape (R, n)."""
         return np.asarray(self.weight > 0.0)
 
-    def losses(self, residual: FloatArray) -> FloatArray:
+    def chi2_per_row(self, residual: FloatArray) -> FloatArray:
         """Return the mean square of a weighted residual of each joint, shape (n,)."""
         return np.asarray(np.sum(residual**2, axis=0) / np.maximum(self.used.sum(axis=0), 1))
 
@@ -96,7 +96,7 @@ def block_rows(
 
 def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
     """Return one over the noise of all rows, zero where they tell nothing, (R, n) [1/(N m)]."""
-    return np.concatenate([part.told / s for part, s in zip(data, sigma, strict=True)])
+    return np.concatenate([part.informative / s for part, s in zip(data, sigma, strict=True)])
 
 
 def weighted_rows(

@@ -22,10 +22,10 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
     design,
+    DesignProblem,
     DesignSettings,
     Excitation,
     FourierTrajectory,
-    Problem,
 )
 from armid_ros.excitation.placing import placed
 from armid_ros.robots import collision_model, CollisionModel
@@ -40,7 +40,7 @@ _SURE = 5.0
 _NOTHING = 1.0
 #: Pairs of names that a sentence has.
 _SAID = 3
-#: Rivals of a provisional name that has none: the next best of its league.
+#: Rivals of a provisional name that has none: the next best of its ranking.
 _RUNNERS_UP = 3
 #: A search for a better motion than the templates: few steps, as each costs as much as a template.
 _STARTS, _CANDIDATES, _ITERATIONS = 1, 4, 25
@@ -164,7 +164,7 @@ def next_run(
         runs += _designed(diagnosis, doubts, best, collision, rng)
     for run in _in_order(runs):
         settings = _settings(run.template)
-        problem = Problem.of(arm, settings, rng)
+        problem = DesignProblem.of(arm, settings, rng)
         try:
             excitation = placed(problem, run.trajectory, clearance)
         except TrajectoryError as error:

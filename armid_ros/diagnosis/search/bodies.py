@@ -59,8 +59,8 @@ def as_bodies(explanation: Explanation, arm: ArmModel) -> tuple[Explanation, tup
         changed = fitted.arm.with_theta(np.concatenate([theta, fitted.arm.theta[known:]]))
         residual = tuple(part.residual(changed) for part in data)
         bodily = replace(fitted, arm=changed, residual=residual)
-        allowed = np.maximum(_ALIKE * explanation.losses, 1.0)
-        if np.all(evidence.losses(residual) <= allowed):
+        allowed = np.maximum(_ALIKE * explanation.chi2_per_row, 1.0)
+        if np.all(evidence.chi2_per_row(residual) <= allowed):
             return replace(explanation, fitted=bodily), ()
     return explanation, (
         'no links that are bodies explain the data as well: what was named, or not found, is in '
@@ -95,4 +95,4 @@ def _triangle(
         own, left = told.columns, told.left - told.columns @ fitted.change
         factors.append(np.column_stack([own, left + own @ values]))
     whole = scipy.linalg.qr(np.concatenate(factors), mode='r')[0][: rank + 1]
-    return np.asarray(whole), float(sum(part.told.sum() for part in data))
+    return np.asarray(whole), float(sum(part.informative.sum() for part in data))

@@ -96,7 +96,7 @@ def explained(
         return _beside(arm, prepared, written, settings, rng, tell)
     few, many = settings.thresholds.few_causes, settings.thresholds.many_causes
     given = as_given(arm, prepared.data, few, settings.library)
-    told = Evidence(prepared.data, prepared.as_told, prepared.as_told)
+    told = Evidence(prepared.data, prepared.as_described, prepared.as_described)
     tell(0.2, 'the model as given')
     first = explain(given, told, settings)
     nothing = np.zeros(arm.robot.n_joints)
@@ -110,7 +110,7 @@ def explained(
         misfit, words = nothing, NOISE
     else:
         tell(0.7, 'the model as given')
-        sigma = tuple(np.maximum(one, misfit) for one in prepared.as_told)
+        sigma = tuple(np.maximum(one, misfit) for one in prepared.as_described)
         first = explain(given, replace(told, sigma=sigma), settings)
         words = ESTIMATED
     if _as_good(first, anew, settings):
@@ -134,7 +134,7 @@ def _beside(
 
     """
     tell(0.2, 'what has changed')
-    noise = prepared.as_told
+    noise = prepared.as_described
     evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
     given = as_given(arm, prepared.data, 2 * settings.thresholds.few_causes, settings.library)
     found = explain(given, evidence, settings)
@@ -159,7 +159,7 @@ def _since(
 ) -> Chosen:
     """Explain what has changed since the baseline."""
     tell(0.2, 'what has changed')
-    noise = prepared.as_told
+    noise = prepared.as_described
     misfit = baseline.misfit * _louder(prepared, baseline)
     sigma = tuple(np.maximum(one, misfit) for one in noise)
     evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
@@ -210,14 +210,16 @@ def in_model_as_given(found: Explanation) -> Explanation:
 def _at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
     evidence = explanation.evidence
     limits = evidence.limits(explanation.fitted.residual, settings)
-    return bool(np.all(explanation.losses <= limits))
+    return bool(np.all(explanation.chi2_per_row <= limits))
 
 
 def _left_by(explanation: Explanation) -> FloatArray:
     """Return the root mean square that an explanation leaves of each joint, (n,) [N m]."""
     evidence = explanation.evidence
     newton_metres = (np.ones_like(evidence.count),) * len(evidence.data)
-    return np.sqrt(replace(evidence, sigma=newton_metres).losses(explanation.fitted.residual))
+    return np.sqrt(
+        replace(evidence, sigma=newton_metres).chi2_per_row(explanation.fitted.residual)
+    )
 
 
 def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings) -> bool:
@@ -230,13 +232,13 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     """
     evidence = first.evidence
     left, fitted = first.fitted.residual, anew.fitted.residual
-    after, least = evidence.losses(left), evidence.losses(fitted)
+    after, least = evidence.chi2_per_row(left), evidence.chi2_per_row(fitted)
     same = settings.thresholds.same_fit * least
     if np.all(after <= np.maximum(evidence.limits(left, settings), same)):
         return True
     if _at_floor(anew, settings):
         return False
-    gap = max(float(evidence.count @ evidence.losses(first.reference.residual)), 1e-300)
+    gap = max(float(evidence.count @ evidence.chi2_per_row(first.reference.residual)), 1e-300)
     price = settings.thresholds.price * (_freedom(anew, settings) - _freedom(first, settings))
     return float(evidence.count @ (after - least)) <= price * gap
 

@@ -90,14 +90,14 @@ class Explanation:
         return replace(self, fitted=fitted, steps=steps, minor=minor)
 
     @property
-    def losses(self) -> FloatArray:
+    def chi2_per_row(self) -> FloatArray:
         """Loss of each joint with the patched arm, shape (n,)."""
-        return self.evidence.losses(self.fitted.residual)
+        return self.evidence.chi2_per_row(self.fitted.residual)
 
     @property
-    def reference_losses(self) -> FloatArray:
+    def reference_chi2_per_row(self) -> FloatArray:
         """Loss of each joint before, shape (n,)."""
-        return self.evidence.losses(self.reference.residual)
+        return self.evidence.chi2_per_row(self.reference.residual)
 
 
 def explain(

@@ -22,7 +22,7 @@ from armid_ros.effects.load import described_spread
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.least_squares import solve
-from armid_ros.identification.fitting.normal_equations import told_solution
+from armid_ros.identification.fitting.normal_equations import informative_solution
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
@@ -129,7 +129,7 @@ class Told:
             Regression(
                 part.at_rows.with_torque(rest - rows @ change),
                 np.concatenate([rows, np.zeros((*rest.shape, named))], axis=2),
-                part.told,
+                part.informative,
                 part.source,
             )
             for part, rows, rest in zip(self.data, self.rows, self.rest, strict=True)
@@ -337,7 +337,7 @@ def _step(
     aim[:known] += pull
     seen = np.diag(own) > _ROUNDING * np.diag(own).max(initial=1e-300)
     step = np.zeros(size)
-    step[seen] = told_solution(own[np.ix_(seen, seen)], aim[seen])
+    step[seen] = informative_solution(own[np.ix_(seen, seen)], aim[seen])
     return step
 
 
@@ -360,7 +360,7 @@ def _covariance(
         Regression(
             part.at_rows.with_torque(left),
             block[:, :, kept],
-            part.told,
+            part.informative,
             part.source,
         )
         for part, block, left in zip(data, weighted, lefts, strict=True)

@@ -21,7 +21,7 @@ from functools import cached_property
 
 from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.identification.fitting.normal_equations import told_basis
+from armid_ros.identification.fitting.normal_equations import informative_basis
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -250,7 +250,7 @@ class _Base:
         cls, known: Products, train: npt.NDArray[np.bool_], hold: FloatArray, pull: FloatArray
     ) -> _Base:
         own = known.free[train].sum(axis=0) + hold
-        basis = told_basis(own)
+        basis = informative_basis(own)
         inverse = basis @ basis.T
         border = known.border[train].sum(axis=0)
         return cls(

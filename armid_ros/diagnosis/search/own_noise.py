@@ -33,8 +33,8 @@ def made_of_noise(trial: Trial, problem: Problem, projection: Projection, work: 
     rough = problem.x[:, :, trial.group.columns]
     if _taken(smooth, projection, left) < _NOT_NOISE * _taken(rough, projection, left):
         return True
-    after = problem.losses(left - projection.rest(rough) @ trial.values)
-    before = np.minimum(problem.losses(left), 1.0)
+    after = problem.chi2_per_row(left - projection.rest(rough) @ trial.values)
+    before = np.minimum(problem.chi2_per_row(left), 1.0)
     return bool(np.any(after < _TAUTOLOGY * before)) and work.reads_torque(effect, kept)
 
 

@@ -17,7 +17,10 @@ from dataclasses import replace
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import fold_rows, make_problem
 from armid_ros.diagnosis.search.fit import Fitted, Told
-from armid_ros.identification.fitting.normal_equations import told_basis, told_solution
+from armid_ros.identification.fitting.normal_equations import (
+    informative_basis,
+    informative_solution,
+)
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import stats
@@ -55,7 +58,7 @@ def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float
         variance += (len(changes) - 1) * np.var(changes, axis=0)
         freedom += len(changes) - 1
     few = float(stats.t.ppf(_LEVEL, freedom) / stats.norm.ppf(_LEVEL))
-    basis = told_basis(own.sum(axis=0) + fitted.hold)
+    basis = informative_basis(own.sum(axis=0) + fitted.hold)
     along = max(chance - 1.0, 0.0) * np.sum(basis[-size:] ** 2, axis=1)
     spread = np.sqrt(few**2 * variance + along)
     factor = np.maximum(spread / np.maximum(fitted.estimate.std, 1e-300), 1.0)
@@ -82,7 +85,7 @@ def _left_out(
     size = len(fitted.estimate.values)
     all_own, all_aim = own.sum(axis=0) + fitted.hold, aim.sum(axis=0) + fitted.pull
     pairs = zip(own, aim, strict=True)
-    yield np.array([told_solution(all_own - n, all_aim - b)[-size:] for n, b in pairs])
+    yield np.array([informative_solution(all_own - n, all_aim - b)[-size:] for n, b in pairs])
     if told is None:
         return
     before = []
@@ -91,6 +94,6 @@ def _left_out(
         less_own, less_aim = all_own.copy(), all_aim.copy()
         less_own[:rank, :rank] -= x.T @ x
         less_aim[:rank] -= x.T @ y
-        before.append(told_solution(less_own, less_aim)[-size:])
+        before.append(informative_solution(less_own, less_aim)[-size:])
     if len(before) > 1:
         yield np.array(before)

@@ -40,7 +40,10 @@ def _worse(
 ) -> npt.NDArray[np.bool_]:
     data, sigma = evidence.data, evidence.sigma
     squares = [
-        [(part.residual(arm) * part.told / s) ** 2 for part, s in zip(data, sigma, strict=True)]
+        [
+            (part.residual(arm) * part.informative / s) ** 2
+            for part, s in zip(data, sigma, strict=True)
+        ]
         for arm in (before, after)
     ]
     block, _ = block_rows(data)
@@ -54,7 +57,7 @@ def _worse(
     total = more.sum(axis=1)
     floor = np.maximum(sums[0].sum(axis=1), evidence.count)
     left = [part.residual(after) for part in evidence.data]
-    gap = evidence.losses(left) > evidence.as_good(settings) + evidence.matters(settings)
+    gap = evidence.chi2_per_row(left) > evidence.as_good(settings) + evidence.matters(settings)
     surely = (total > _SURELY * spread) & (total > _SLIGHTLY * floor)
     by_far = total > (settings.thresholds.same_fit - 1.0) * floor
     return np.asarray((surely | by_far) & gap)

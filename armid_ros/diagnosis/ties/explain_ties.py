@@ -84,7 +84,7 @@ def _within_its_noise(
     where there is less of it, the described one would seem to be wrong.
 
     """
-    evidence = Evidence(prepared.data, prepared.as_told, prepared.as_told)
+    evidence = Evidence(prepared.data, prepared.as_described, prepared.as_described)
     described = fit(arm, (), evidence.data, evidence.sigma, None)
     found = Explanation(arm, None, described, described, (), None, evidence)
     if _open(found, settings):
@@ -94,7 +94,7 @@ def _within_its_noise(
 
 def _open(found: Explanation, settings: DiagnosisSettings) -> bool:
     limits = found.evidence.limits(found.fitted.residual, replace(settings, material=0.0))
-    return bool(np.any(found.losses > np.maximum(limits, settings.thresholds.same_fit)))
+    return bool(np.any(found.chi2_per_row > np.maximum(limits, settings.thresholds.same_fit)))
 
 
 def _as_described(found: Explanation, arm: ArmModel, settings: DiagnosisSettings) -> Explanation:
@@ -105,7 +105,7 @@ def _as_described(found: Explanation, arm: ArmModel, settings: DiagnosisSettings
     reference = fit(arm, (), evidence.data, evidence.sigma, None)
     described = replace(found, base=None, fitted=fitted, reference=reference)
     limits = evidence.limits(fitted.residual, settings)
-    if np.any(described.losses > np.maximum(limits, _ALIKE * found.losses)):
+    if np.any(described.chi2_per_row > np.maximum(limits, _ALIKE * found.chi2_per_row)):
         return found
     return described
 

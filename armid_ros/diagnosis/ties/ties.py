@@ -117,7 +117,7 @@ class Ties:
         ]
         if named != list(found.named):
             found = self.fitted(named)
-        noise = max(1.0, float(np.max(self.losses(found))))
+        noise = max(1.0, float(np.max(self.chi2_per_row(found))))
         gain = self._squares(taut) - self._squares(found)
         return found if gain > _LEAST_GAIN * noise else taut
 
@@ -125,9 +125,9 @@ class Ties:
         """Fit the arm with what is named, from values to start from."""
         return fit(self.arm, named, self.data, self.sigma, self.base, start)
 
-    def losses(self, fitted: Fitted) -> FloatArray:
+    def chi2_per_row(self, fitted: Fitted) -> FloatArray:
         """Return the loss of each joint, shape (n,)."""
-        return Evidence(self.data, self.sigma, self.sigma).losses(fitted.residual)
+        return Evidence(self.data, self.sigma, self.sigma).chi2_per_row(fitted.residual)
 
     def surely(self, named: Sequence[Named]) -> Fitted:
         """Fit, and take ties away, the weakest first, until all are surely there."""
@@ -188,7 +188,7 @@ class Ties:
     def _damped(self, fitted: Fitted) -> Fitted:
         """Return springs with dampers, where something is left that those surely take."""
         evidence = Evidence(self.data, self.sigma, self.sigma)
-        if np.all(self.losses(fitted) < evidence.limits(fitted.residual, self.settings)):
+        if np.all(self.chi2_per_row(fitted) < evidence.limits(fitted.residual, self.settings)):
             return fitted
         springs = [isinstance(own.effect, TiedInteraction) for own in fitted.named]
         both = [
@@ -203,8 +203,8 @@ class Ties:
         return self.fitted(named) if named != list(fitted.named) else fitted
 
     def _squares(self, fitted: Fitted) -> float:
-        count = np.sum([part.told.sum(axis=0) for part in self.data], axis=0)
-        return float(self.losses(fitted) @ count)
+        count = np.sum([part.informative.sum(axis=0) for part in self.data], axis=0)
+        return float(self.chi2_per_row(fitted) @ count)
 
 
 def _certainty(fitted: Fitted, *, last: bool = False) -> list[float]:

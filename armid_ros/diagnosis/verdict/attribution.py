@@ -183,7 +183,7 @@ def _squares(
 ) -> FloatArray:
     """Return the squares over the unit of torques (M, n) of each trajectory in every block."""
     rows = [
-        np.sum((values * part.told / sigma) ** 2, axis=1)
+        np.sum((values * part.informative / sigma) ** 2, axis=1)
         for values, part, sigma in zip(torque, evidence.data, evidence.sigma, strict=True)
     ]
     return np.asarray(np.bincount(blocks, np.concatenate(rows)))

@@ -52,7 +52,7 @@ class Gap:
     ----------
     before, after, floor : ndarray, shape (n,)
         Root mean square error of each joint without and with what was named, and the noise [N m].
-    loss_before, loss_after : ndarray, shape (n,)
+    chi2_before, chi2_after : ndarray, shape (n,)
         Mean square over noise.
     closed : float
         Share of the excess over the noise that is gone, 0 to 1, in the joints that had a gap or
@@ -67,8 +67,8 @@ class Gap:
     before: FloatArray
     after: FloatArray
     floor: FloatArray
-    loss_before: FloatArray
-    loss_after: FloatArray
+    chi2_before: FloatArray
+    chi2_after: FloatArray
     closed: float
     predicted: bool
     overlays: tuple[Overlay, ...]
@@ -99,7 +99,7 @@ def measure_gap(
     evidence = explanation.evidence if unseen is None else unseen
     parts = list(zip(evidence.data, evidence.sigma, floor, strict=True))
     overlays = [_overlay(part, sigma, before, after) for part, sigma, _ in parts]
-    told = np.concatenate([part.told for part, _, _ in parts])
+    told = np.concatenate([part.informative for part, _, _ in parts])
     count = np.maximum(told.sum(axis=0), 1)
 
     def mean(rows: Sequence[FloatArray]) -> FloatArray:
@@ -109,7 +109,7 @@ def measure_gap(
     left = [[o.measured - o.before for o in overlays], [o.measured - o.after for o in overlays]]
     unit = [[row / o.sigma for row, o in zip(rows, overlays, strict=True)] for rows in left]
     losses = [mean(rows) for rows in unit]
-    least = mean([np.broadcast_to(s, part.told.shape) for part, _, s in parts])
+    least = mean([np.broadcast_to(s, part.informative.shape) for part, _, s in parts])
     beyond = [np.maximum(mean(rows) - least, 0.0) / np.maximum(least, 1e-24) for rows in left]
     gap = beyond[0] > _A_GAP
     closed = 1.0 - beyond[1][gap].sum() / beyond[0][gap].sum() if gap.any() else 0.0

@@ -83,12 +83,12 @@ def locate(
         Joints below this loss have no gap.
 
     """
-    losses = evidence.losses(residual)
+    losses = evidence.chi2_per_row(residual)
     beyond = np.where(losses > limits, losses - 1.0, 0.0)
     data = evidence.data
     total = max(float(beyond.sum()), 1e-300)
     rows = [_quantities(arm, part) for part in data]
-    told = np.concatenate([part.told for part in data])
+    told = np.concatenate([part.informative for part in data])
     left = np.concatenate(residual)
     result = []
     for joint in np.argsort(-beyond):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.floor import Floor
+from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -66,7 +66,7 @@ class Verdict:
 
 def decide(
     findings: Sequence[Finding],
-    floors: Sequence[Floor],
+    floors: Sequence[NoiseFloor],
     left: Sequence[Left],
     arm: ArmModel,
     floor_in_words: str,
@@ -80,7 +80,7 @@ def decide(
     ----------
     findings : sequence of Finding
         What was named.
-    floors : sequence of Floor
+    floors : sequence of NoiseFloor
         Noise of the recordings.
     left : sequence of Left
         What the patched model leaves, of each set of data.
@@ -153,7 +153,7 @@ def _with_degrees(value: float, std: float, unit: str) -> str:
     return text
 
 
-def _not_repeating(floors: Sequence[Floor], arm: ArmModel) -> list[str]:
+def _not_repeating(floors: Sequence[NoiseFloor], arm: ArmModel) -> list[str]:
     """Return the joints that did not do the same in equal periods."""
     known = [floor for floor in floors if floor.period is not None]
     if not known:

@@ -64,7 +64,7 @@ class SpringEstimate:
     inertia: float
 
     @property
-    def told(self) -> bool:
+    def informative(self) -> bool:
         """Whether the twist follows the load, so that there is a stiffness to speak of."""
         fit = self.transmission
         return fit.explained > _EXPLAINED and bool(np.isfinite(fit.stiffness).all())

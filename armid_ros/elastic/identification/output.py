@@ -89,7 +89,7 @@ def springs_document(found: Sequence[SpringEstimate], robot: str) -> dict[str, A
         'joints': [
             {
                 'joint': one.joint,
-                'told': one.told,
+                'told': one.informative,
                 'stiffness': number(one.transmission.stiffness[0]),
                 'stiffness_interval': [number(x) for x in one.transmission.stiffness[1:]],
                 'stiffness_unit': 'N m/rad',

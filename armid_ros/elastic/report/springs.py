@@ -41,8 +41,8 @@ class Springs(Section):
             rows.append(
                 (
                     one.joint,
-                    f'{value:.4g}' if one.told else 'not told',
-                    f'{low:.4g} to {high:.4g}' if one.told else '',
+                    f'{value:.4g}' if one.informative else 'not told',
+                    f'{low:.4g} to {high:.4g}' if one.informative else '',
                     f'{play[1]:.2g} to {play[2]:.2g}'
                     if np.isfinite(play).all()
                     else 'no reversals',
@@ -59,7 +59,7 @@ class Springs(Section):
         for one in self.found:
             own = ['', '', ''] if one.motor is None else [f'{x:.3g}' for x in one.motor]
             both = [
-                f'{x:.1f}' if one.told and np.isfinite(x) else ''
+                f'{x:.1f}' if one.informative and np.isfinite(x) else ''
                 for x in (one.antiresonance, one.resonance)
             ]
             rows.append(

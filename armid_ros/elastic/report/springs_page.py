@@ -37,8 +37,8 @@ def springs_report(
 
 
 def _verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
-    told = [one for one in found if one.told]
-    lost = [one.joint for one in found if not one.told]
+    told = [one for one in found if one.informative]
+    lost = [one.joint for one in found if not one.informative]
     beware = ['Inertias are those of the description or model: a stiffness is as right as they.']
     if lost:
         beware.append(

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from armid_ros.arm import TorqueSlope
 from armid_ros.excitation.fourier import fourier_basis
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.problem import Problem
+from armid_ros.excitation.problem import DesignProblem
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
@@ -49,7 +49,7 @@ class Constraints:
 
     Attributes
     ----------
-    problem : Problem
+    problem : DesignProblem
         Gives limits and prior model.
     clearance : ClearanceModel or None
         Bodies to keep apart.
@@ -68,7 +68,7 @@ class Constraints:
 
     """
 
-    problem: Problem
+    problem: DesignProblem
     clearance: ClearanceModel | None
     margin: float
     reserve: float
@@ -80,7 +80,7 @@ class Constraints:
     @classmethod
     def of(
         cls,
-        problem: Problem,
+        problem: DesignProblem,
         clearance: ClearanceModel | None,
         *,
         margin: float,

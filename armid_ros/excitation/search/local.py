@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from armid_ros.excitation.feasibility import Faults, trajectory_faults
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.problem import Problem
+from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.random_trajectory import position_range, random_feasible
 from armid_ros.excitation.search.constraints import Constraints
 from armid_ros.excitation.search.objective import Objective
@@ -73,7 +73,7 @@ class Found:
 class _Best:
     """The best feasible trajectory so far, and who wants to know."""
 
-    problem: Problem
+    problem: DesignProblem
     prior: FloatArray | None
     report: Report
     found: Found | None = None
@@ -99,7 +99,7 @@ class Stopped(Exception):
 
 
 def search(
-    problem: Problem,
+    problem: DesignProblem,
     clearance: ClearanceModel | None,
     prior: FloatArray | None,
     rng: np.random.Generator,
@@ -110,7 +110,7 @@ def search(
 
     Parameters
     ----------
-    problem : Problem
+    problem : DesignProblem
         What is wanted.
     clearance : ClearanceModel or None
         Bodies to keep apart.
@@ -139,7 +139,9 @@ def search(
     return best.found
 
 
-def exact_cost(problem: Problem, trajectory: FourierTrajectory, prior: FloatArray | None) -> float:
+def exact_cost(
+    problem: DesignProblem, trajectory: FourierTrajectory, prior: FloatArray | None
+) -> float:
     """Return the cost with the true direction of motion and many samples."""
     settings = problem.settings
     count = 4 * settings.samples
@@ -150,7 +152,7 @@ def exact_cost(problem: Problem, trajectory: FourierTrajectory, prior: FloatArra
 
 
 def _best_of_random(
-    problem: Problem,
+    problem: DesignProblem,
     clearance: ClearanceModel | None,
     rng: np.random.Generator,
     best: _Best,
@@ -228,7 +230,7 @@ def _improve(
 
 
 def _watched(
-    problem: Problem, clearance: ClearanceModel | None, rng: np.random.Generator
+    problem: DesignProblem, clearance: ClearanceModel | None, rng: np.random.Generator
 ) -> ClearanceModel | None:
     """Leave out the pairs of bodies that stay apart in all of many poses."""
     if clearance is None:
@@ -238,7 +240,7 @@ def _watched(
     return clearance.watched(poses, problem.settings.clearance + _WATCHED)
 
 
-def _trajectory(problem: Problem, x: FloatArray) -> FourierTrajectory:
+def _trajectory(problem: DesignProblem, x: FloatArray) -> FourierTrajectory:
     h = problem.settings.harmonics
     return FourierTrajectory(
         problem.limits.joints, problem.settings.period, x[:, 0], x[:, 1 : 1 + h], x[:, 1 + h :]
@@ -246,7 +248,7 @@ def _trajectory(problem: Problem, x: FloatArray) -> FourierTrajectory:
 
 
 def _faulty_times(
-    problem: Problem,
+    problem: DesignProblem,
     clearance: ClearanceModel | None,
     trajectory: FourierTrajectory,
     margin: float,
@@ -265,7 +267,7 @@ def _faulty_times(
 
 
 def _made_feasible(
-    problem: Problem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
+    problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FourierTrajectory | None:
     """Make a trajectory a little smaller until nothing is wrong with it, if that is enough."""
     for _ in range(_SHRINKS):

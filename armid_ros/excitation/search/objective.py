@@ -11,7 +11,7 @@ from armid_ros.effects import Effect
 from armid_ros.effects.smooth import Gradient, SmoothColumns
 from armid_ros.excitation.fourier import fourier_basis
 from armid_ros.excitation.geometry.chain import Chain
-from armid_ros.excitation.problem import Problem
+from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.search.effect_gradient import columns_by_state, rigid_columns, STEP
 from armid_ros.excitation.search.rigid_gradient import RigidRegressor
 from armid_ros.motion import FloatArray, Motion
@@ -31,7 +31,7 @@ class Objective:
 
     Attributes
     ----------
-    problem : Problem
+    problem : DesignProblem
         What is wanted.
     prior : ndarray, shape (r, r), or None
         Information that is there already.
@@ -48,7 +48,7 @@ class Objective:
 
     """
 
-    problem: Problem
+    problem: DesignProblem
     prior: FloatArray | None
     chain: Chain
     t: FloatArray
@@ -57,7 +57,7 @@ class Objective:
     width: FloatArray
 
     @classmethod
-    def of(cls, problem: Problem, prior: FloatArray | None = None) -> Objective:
+    def of(cls, problem: DesignProblem, prior: FloatArray | None = None) -> Objective:
         """Prepare for the samples of the settings."""
         settings = problem.settings
         t: FloatArray = np.linspace(0.0, settings.period, settings.samples, endpoint=False)

@@ -19,7 +19,7 @@ from types import ModuleType
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.problem import Problem
+from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.search.local import Found, search, Stopped
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -38,7 +38,7 @@ _PATIENCE = 0.2
 class Task:
     """Everything one search needs, apart from its randomness."""
 
-    problem: Problem
+    problem: DesignProblem
     clearance: ClearanceModel | None
     prior: FloatArray | None
 

@@ -193,7 +193,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     """
     _require_one_robot(before, after)
     first, second = max(
-        ((before.told_as(after), after), (before, after.told_as(before))),
+        ((before.regrouped_as(after), after), (before, after.regrouped_as(before))),
         key=lambda pair: len(pair[0].values.keys() & pair[1].values.keys()),
     )
     shared = [name for name in first.values if name in second.values]

@@ -182,7 +182,7 @@ def _thinned(recording: Recording, motion: Motion, used: Conditioning) -> Motion
         q, tau = decimate(q, raw), decimate(motion.tau, raw)
     else:
         tau = motion.tau
-    return replace(motion.select(rows), q=q, tau=tau, beside=None)
+    return replace(motion.select(rows), q=q, tau=tau, partner=None)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.fitting.normal_equations import told_solution
+from armid_ros.identification.fitting.normal_equations import informative_solution
 from armid_ros.identification.rows.regression import Regression, regressions
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
@@ -136,4 +136,4 @@ def _fit(
     """Fit weighted rows by least squares, shape (r,)."""
     weights = told * weight
     rows = (x * weights[:, :, np.newaxis]).reshape(-1, x.shape[2])
-    return told_solution(rows.T @ rows, rows.T @ (y * weights).ravel())
+    return informative_solution(rows.T @ rows, rows.T @ (y * weights).ravel())

@@ -39,11 +39,13 @@ def excited(
         The columns of that.
 
     """
-    base, kept = told_apart(theory, Triangle.of(problem))
+    base, kept = identifiable_base(theory, Triangle.of(problem))
     return base, tuple(part.restrict(kept) for part in problem)
 
 
-def told_apart(theory: BaseParameters, triangle: Triangle) -> tuple[BaseParameters, list[int]]:
+def identifiable_base(
+    theory: BaseParameters, triangle: Triangle
+) -> tuple[BaseParameters, list[int]]:
     """
     Group further what the rows of a triangle do not tell apart.
 

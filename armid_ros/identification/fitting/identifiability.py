@@ -41,7 +41,7 @@ class Unidentified:
     reason: Reason
 
 
-def told_from_zero(values: npt.ArrayLike, std: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+def excludes_zero(values: npt.ArrayLike, std: npt.ArrayLike) -> npt.NDArray[np.bool_]:
     """Return where the 95 % interval of an estimate leaves out zero."""
     return np.asarray(np.abs(values) > HALF_WIDTH * np.asarray(std, dtype=float))
 
@@ -80,7 +80,7 @@ def unidentified(
                     else 'this motion does not show it',
                 )
             )
-    told = told_from_zero(estimate.values, estimate.std)
+    told = excludes_zero(estimate.values, estimate.std)
     found += [
         Unidentified(name, 'not told from zero')
         for name, sure in zip(estimate.parameters, told, strict=True)

@@ -9,10 +9,10 @@ import numpy as np
 
 #: Directions of columns scaled to one length with less than this share of the largest eigenvalue
 #: are not told: products of columns hold no more digits.
-UNTOLD = 1e-10
+UNINFORMATIVE = 1e-10
 
 
-def told_basis(products: FloatArray, tolerance: float = UNTOLD) -> FloatArray:
+def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) -> FloatArray:
     """
     Return directions that data tell.
 
@@ -36,7 +36,7 @@ def told_basis(products: FloatArray, tolerance: float = UNTOLD) -> FloatArray:
     return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
 
 
-def told_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
+def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     """
     Solve normal equations; what data do not tell stays where it is.
 
@@ -52,5 +52,5 @@ def told_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     ndarray, shape (p,)
 
     """
-    basis = told_basis(products)
+    basis = informative_basis(products)
     return np.asarray(basis @ (basis.T @ aim))

@@ -4,7 +4,7 @@
 Search the last blocks of rows for a change: when it was, and what it is.
 
 After each block windows of half a second to two seconds that end with it are tested
-(``change_evidence``). When a test is positive, all begins of the change are compared, and it is
+(``change_score``). When a test is positive, all begins of the change are compared, and it is
 named as soon as nothing else explains the torques as well, or when time is up.
 
 """
@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.online.background import Background, Pieces
 from armid_ros.identification.online.change import Candidate
-from armid_ros.identification.online.change_evidence import Block, Evidence, weighing
-from armid_ros.identification.online.usual_size import UsualSize, Weighed
+from armid_ros.identification.online.change_score import Block, ScoreStatistics, weighing
+from armid_ros.identification.online.null_calibration import NullCalibration, Weighed
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -143,7 +143,7 @@ class ChangeSearch:
     def reset(self) -> None:
         """Forget what noise usually does, and all blocks."""
         places = {c.joint for c in self._candidates}
-        self._usual = {m: UsualSize(self._sizes.tolist(), m, len(places)) for m in _LENGTHS}
+        self._usual = {m: NullCalibration(self._sizes.tolist(), m, len(places)) for m in _LENGTHS}
         self._fresh = -np.inf, 0.0
         self.interrupt()
 
@@ -152,7 +152,7 @@ class ChangeSearch:
         self._blocks: deque[Block] = deque(maxlen=_KEPT)
         self._waiting: deque[dict[int, Weighed]] = deque()
 
-    def take(self, block: Block, loudness: float) -> Pieces[FoundChange | None]:
+    def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
         """
         Take in a block of rows, and say whether a change is clear by now.
 
@@ -160,7 +160,7 @@ class ChangeSearch:
         ----------
         block : Block
             Its rows in units of their noise.
-        loudness : float
+        residual_scale : float
             That noise over the one of what was learned before.
 
         """
@@ -168,7 +168,7 @@ class ChangeSearch:
         lengths = [m for m in _LENGTHS if m <= len(self._blocks)]
         weighed, positive = {}, False
         for m in lengths:
-            window = yield from self._window(len(self._blocks) - m, loudness)
+            window = yield from self._window(len(self._blocks) - m, residual_scale)
             yield
             weighed[m] = Weighed(self._ratios(window), window.strength)
             if self._chance > 0.0:
@@ -176,7 +176,7 @@ class ChangeSearch:
                 positive = positive or bool(np.any(excess > 1.0))
             yield
         if positive:
-            found = yield from self._judge(loudness)
+            found = yield from self._judge(residual_scale)
             if found is not None:
                 self._fresh = block.end, found.likelihood
                 self.interrupt()
@@ -187,11 +187,13 @@ class ChangeSearch:
                 self._work.begin(self._usual[m].learning(values))
         return None
 
-    def size(self, found: FoundChange, loudness: float) -> Pieces[tuple[FloatArray, FloatArray]]:
+    def size(
+        self, found: FoundChange, residual_scale: float
+    ) -> Pieces[tuple[FloatArray, FloatArray]]:
         """Return by how much a candidate has changed, and the covariance of that."""
         blocks = found.blocks
         window = yield from weighing(
-            blocks[found.after :], blocks[found.before], self._directions, loudness
+            blocks[found.after :], blocks[found.before], self._directions, residual_scale
         )
         yield
         number = self._candidates.index(found.best)
@@ -199,23 +201,23 @@ class ChangeSearch:
         usual = np.nanmax([u.factors[number] for u in self._usual.values()])
         return values, covariance * usual
 
-    def _window(self, first: int, loudness: float) -> Pieces[Evidence]:
+    def _window(self, first: int, residual_scale: float) -> Pieces[ScoreStatistics]:
         """Weigh the blocks from one on against what was known before it."""
         blocks = list(self._blocks)[first:]
-        return weighing(blocks, blocks[0], self._directions, loudness)
+        return weighing(blocks, blocks[0], self._directions, residual_scale)
 
-    def _ratios(self, window: Evidence) -> FloatArray:
+    def _ratios(self, window: ScoreStatistics) -> FloatArray:
         ratios = np.empty(len(self._candidates))
         for size, some in self._of_size.items():
             first = np.array([self._slices[k].start for k in some])
             ratios[some] = window.ratios(first[:, np.newaxis] + np.arange(size))
         return ratios
 
-    def _judge(self, loudness: float) -> Pieces[FoundChange | None]:
+    def _judge(self, residual_scale: float) -> Pieces[FoundChange | None]:
         """Find when the change was and what it is, if that is clear or time is up."""
         count, rows = len(self._blocks), []
         for k in range(count - 1):
-            window = yield from self._window(k, loudness)
+            window = yield from self._window(k, residual_scale)
             yield
             rows.append(self._likelihood(self._ratios(window)))
             yield

@@ -22,21 +22,21 @@ from dataclasses import dataclass, field, replace
 
 from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import at_once, Background, Foreground, Job, Pieces
-from armid_ros.identification.online.beside import RowsBeside, Seed
 from armid_ros.identification.online.change import Candidate, Change
-from armid_ros.identification.online.change_evidence import Block
+from armid_ros.identification.online.change_score import Block
 from armid_ros.identification.online.change_search import (
     BLOCK,
     ChangeSearch,
     ChangeSettings,
     FoundChange,
 )
-from armid_ros.identification.online.loudness import Loudness
+from armid_ros.identification.online.nuisance_rows import NuisanceRows, Seed
 from armid_ros.identification.online.recursive import (
     Learned,
     RecursiveLeastSquares,
     WeightedSample,
 )
+from armid_ros.identification.online.residual_scale import ResidualScale
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -50,11 +50,11 @@ _REMEMBERED = 240
 #: Samples that are learned in one piece of work, together or one by one, as with forgetting. More
 #: than come in the meantime, so that what came late is caught up with.
 _TOGETHER, _ONE_BY_ONE = 10, 4
-#: Samples whose rows beside are made in one piece of work.
+#: Samples whose nuisance rows are made in one piece of work.
 _WIDENED = 5
 
 
-#: A sample, and what its rows beside are made from; None begins a new stretch.
+#: A sample, and what its nuisance rows are made from; None begins a new stretch.
 Narrow = tuple[WeightedSample, Seed | None]
 
 
@@ -76,7 +76,7 @@ class ChangeWatch:
     ----------
     estimator : RecursiveLeastSquares
         Learns.
-    beside : RowsBeside or None
+    nuisance : NuisanceRows or None
         Makes rows of what is learned for the tests alone.
     candidates : sequence of Candidate
         What may change.
@@ -95,15 +95,15 @@ class ChangeWatch:
     def __init__(
         self,
         estimator: RecursiveLeastSquares,
-        beside: RowsBeside | None,
+        nuisance: NuisanceRows | None,
         candidates: Sequence[Candidate],
         settings: ChangeSettings | None = None,
         work: Background | None = None,
     ) -> None:
         settings = settings or ChangeSettings()
         self._estimator = estimator
-        self._beside = beside
-        self._wider = estimator.with_more(() if beside is None else beside.parameters)
+        self._nuisance = nuisance
+        self._wider = estimator.with_more(() if nuisance is None else nuisance.parameters)
         self._asked = len(estimator.parameters)
         self._work = work or Foreground()
         self._search = ChangeSearch(
@@ -119,14 +119,16 @@ class ChangeWatch:
         self.changes: list[Change] = []
         self._wider.reset()
         self._search.reset()
-        self._loudness = Loudness(_LEAST_NOISE if self._estimator.noise_is_relative else 1.0)
+        self._residual_scale = ResidualScale(
+            _LEAST_NOISE if self._estimator.noise_is_relative else 1.0
+        )
         self._left: deque[float] = deque(maxlen=_REMEMBERED)
         self._open: _Stretch | None = None
         self._unseen: deque[_Stretch] = deque()
         self._late: list[Narrow | None] | None = None
         self._searching = False
-        if self._beside is not None:
-            self._beside.reset()
+        if self._nuisance is not None:
+            self._nuisance.reset()
 
     def use(self, settings: ChangeSettings | None, forgetting: float) -> None:
         """
@@ -164,7 +166,7 @@ class ChangeWatch:
         sample : WeightedSample
             Of the estimator.
         seed : Seed, optional
-            What the rows beside are made from, where there are any.
+            What the nuisance rows are made from, where there are any.
 
         """
         if self._open is not None and t - self._open.begin >= BLOCK:
@@ -207,7 +209,7 @@ class ChangeWatch:
                     self._search.interrupt()
                     continue
                 block = yield from self._summed(stretch, stretch.end, samples, before)
-                found = yield from self._search.take(block, self._usual_loudness)
+                found = yield from self._search.take(block, self._residual_scale_of_all)
                 if found is not None:
                     yield from self._name(found)
         finally:
@@ -230,52 +232,52 @@ class ChangeWatch:
             if narrow is not None:
                 waiting.append(narrow)
             if narrow is None or len(waiting) == _WIDENED or number == len(samples):
-                whole += self._with_beside(waiting)
+                whole += self._with_nuisance(waiting)
                 waiting = []
                 yield
-            if narrow is None and self._beside is not None:
-                self._beside.reset()
+            if narrow is None and self._nuisance is not None:
+                self._nuisance.reset()
         return whole
 
-    def _with_beside(self, samples: Sequence[Narrow]) -> list[WeightedSample]:
+    def _with_nuisance(self, samples: Sequence[Narrow]) -> list[WeightedSample]:
         seeds = [seed for _, seed in samples if seed is not None]
-        if self._beside is None or not seeds:
+        if self._nuisance is None or not seeds:
             return [sample for sample, _ in samples]
         return [
             sample._replace(rows=np.hstack([sample.rows, more]))
-            for (sample, _), more in zip(samples, self._beside.rows(seeds), strict=True)
+            for (sample, _), more in zip(samples, self._nuisance.rows(seeds), strict=True)
         ]
 
     def _summed(
         self, stretch: _Stretch, end: float, samples: Sequence[WeightedSample], before: Learned
     ) -> Pieces[Block]:
         """Sum up the rows of a block."""
-        loudness, residuals, squares = self._loudness.value, [], 0.0
+        residual_scale, residuals, squares = self._residual_scale.value, [], 0.0
         size = len(self._wider.parameters)
         information, right = np.zeros((size, size)), np.zeros(size)
         for part in _parts(samples, _TOGETHER):
             rows, tau, weights = (np.stack(some) for some in zip(*part, strict=True))
             scale = self._estimator.scale(weights)
             residuals.append(scale * (tau - rows @ before.values))
-            squares += float(np.sum((residuals[-1] / loudness) ** 2))
-            w = (rows * (scale / loudness)[:, :, np.newaxis]).reshape(-1, size)
+            squares += float(np.sum((residuals[-1] / residual_scale) ** 2))
+            w = (rows * (scale / residual_scale)[:, :, np.newaxis]).reshape(-1, size)
             information += w.T @ w
-            right += w.T @ (tau * scale / loudness).reshape(-1)
+            right += w.T @ (tau * scale / residual_scale).reshape(-1)
             yield
         weights = np.stack([sample.weights for sample in samples])
-        self._loudness.learn(np.concatenate(residuals), weights)
+        self._residual_scale.learn(np.concatenate(residuals), weights)
         if weights.any():
             self._left.append(squares / float(np.sum(weights)))
         yield
         return Block(stretch.begin, end, information, right, before, stretch.asked, tuple(samples))
 
     @property
-    def _usual_loudness(self) -> float:
-        return float(np.exp(np.mean(np.log(self._loudness.value))))
+    def _residual_scale_of_all(self) -> float:
+        return float(np.exp(np.mean(np.log(self._residual_scale.value))))
 
     def _name(self, found: FoundChange) -> Job:
         """Report a change in a block, and learn anew what it concerns."""
-        values, covariance = yield from self._search.size(found, self._usual_loudness)
+        values, covariance = yield from self._search.size(found, self._residual_scale_of_all)
         yield
         size = Estimate(found.best.parameters, values, covariance)
         begin, detected = found.blocks[found.first].begin, found.blocks[-1].end
@@ -325,7 +327,7 @@ class ChangeWatch:
         for block in blocks:
             rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
             residual = self._estimator.scale(weights) * (tau - rows @ self._wider.values)
-            squares += float(np.sum((residual / self._loudness.value) ** 2))
+            squares += float(np.sum((residual / self._residual_scale.value) ** 2))
             count += float(np.sum(weights))
             yield
         if not self._left or count <= free:

@@ -13,20 +13,20 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import Background
-from armid_ros.identification.online.beside import RowsBeside, Seed
 from armid_ros.identification.online.change import Change, change_candidates
 from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.online.checks import StreamChecks
+from armid_ros.identification.online.nuisance_rows import NuisanceRows, Seed
 from armid_ros.identification.online.recursive import (
     check_forgetting,
     RecursiveLeastSquares,
     WeightedSample,
 )
+from armid_ros.identification.online.robust_covariance import RobustCovariance
 from armid_ros.identification.online.sample import OnlineSample
-from armid_ros.identification.online.score_variance import ScoreVariance
 from armid_ros.identification.online.settings import OnlineSettings
 from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
-from armid_ros.identification.rows.row_noise import Misfit, RowNoise, sensor_noise
+from armid_ros.identification.rows.row_noise import ResidualDeviation, RowNoise, sensor_noise
 from armid_ros.identification.samples.joint_gate import joint_gate
 from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.identification.samples.straight_line import StreamSample
@@ -127,12 +127,12 @@ class OnlineIdentifier:
         self._work = Background()
         self._crowded = False
         self._reopened = 0
-        self._scores = ScoreVariance(window, settings.forgetting, self._work)
+        self._scores = RobustCovariance(window, settings.forgetting, self._work)
         self._watch = None
         if settings.changes is not None:
             self._watch = ChangeWatch(
                 self._estimator,
-                RowsBeside(arm, settings.cutoff),
+                NuisanceRows(arm, settings.cutoff),
                 change_candidates(arm, self.base),
                 settings.changes,
                 self._work,
@@ -145,14 +145,14 @@ class OnlineIdentifier:
         self._last_moving = np.full(robot.n_joints, -np.inf)
         self._last_useless: FloatArray | None = None
         self._noise: RowNoise | None = None
-        self._misfit = Misfit(robot.n_joints, settings.forgetting)
+        self._residual_deviation = ResidualDeviation(robot.n_joints, settings.forgetting)
 
     def reset(self) -> None:
         """Forget everything that was learned, and set the counters to zero."""
         self._work.clear()
         self._reopened = 0
         self._filter.reset()
-        self._misfit.reset()
+        self._residual_deviation.reset()
         self._checks.reset()
         self.latest = ()
         if self._gate is not None:
@@ -280,7 +280,7 @@ class OnlineIdentifier:
         self.check(settings)
         self.settings = settings
         self._filter.max_gap = settings.max_gap
-        for part in (self._estimator, self._scores, self._misfit):
+        for part in (self._estimator, self._scores, self._residual_deviation):
             part.forgetting = settings.forgetting
         if self._watch is not None:
             self._watch.use(settings.changes, settings.forgetting)
@@ -377,7 +377,9 @@ class OnlineIdentifier:
             for change in self._watch.changes[self._reopened :]:
                 self._scores.reopen(change.reopened, self._estimator.values)
                 self._reopened += 1
-        self._misfit.learn(innovation, sample.tau - sample.rows @ self._estimator.values, weights)
+        self._residual_deviation.learn(
+            innovation, sample.tau - sample.rows @ self._estimator.values, weights
+        )
         scale = self._estimator.scale(weights) / gain
         self._scores.add(rows * scale[:, np.newaxis], measured * scale, self._estimator.values)
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
@@ -388,7 +390,7 @@ class OnlineIdentifier:
         n = self.arm.robot.n_joints
         floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
         if self._filter.pole is not None and self._filter.period is not None:
-            floor[-n:] = self._misfit.size * self._row_noise().single
+            floor[-n:] = self._residual_deviation.size * self._row_noise().single
         return floor
 
     def _rows(self, motion: Motion) -> FloatArray:

@@ -64,7 +64,7 @@ class RowNoise:
         return min(1.0, self.bandwidth * step)
 
 
-class Misfit:
+class ResidualDeviation:
     """
     What an estimator leaves of the torque of every joint, as noise of single samples.
 

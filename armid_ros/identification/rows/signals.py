@@ -19,7 +19,7 @@ from functools import cached_property
 from armid_ros.errors import IdentificationError
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
-from armid_ros.recording import Beside, Recording
+from armid_ros.recording import PartnerMotion, Recording
 import numpy as np
 import numpy.typing as npt
 from scipy import fft, signal
@@ -194,8 +194,8 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
             'JointState.effort: fill it in, or leave joints out with --joints'
         )
     positions = recording.q
-    if recording.beside is not None:
-        positions = np.hstack([positions, recording.beside.q])
+    if recording.partner is not None:
+        positions = np.hstack([positions, recording.partner.q])
     period = 1.0 / used.rate_hz
     shortest = 2 * _HALF_TAPS * used.decimation + 10 * used.rate_hz / used.cutoff_hz
     longest = GAP_PERIODS * max(period, recording.period)
@@ -273,13 +273,13 @@ def _differentiated(
     inner = slice(edge, len(t) - edge)
     band = _CURVATURE_BANDS * _motion_band([smooth[:, :n]], used.rate_hz, [used.cutoff_hz])
     beside = None
-    if recording.beside is not None:
-        beside = _points(recording.beside, smooth[inner, n:], dq[inner, n:])
+    if recording.partner is not None:
+        beside = _points(recording.partner, smooth[inner, n:], dq[inner, n:])
     parts = (part[inner] for part in (smooth[:, :n], dq[:, :n], ddq, tau))
-    return Motion(recording.joints, t[inner], *parts, band_hz=band, beside=beside)
+    return Motion(recording.joints, t[inner], *parts, band_hz=band, partner=beside)
 
 
-def _points(beside: Beside, q: FloatArray, dq: FloatArray) -> MovingPoints:
+def _points(beside: PartnerMotion, q: FloatArray, dq: FloatArray) -> MovingPoints:
     """Follow the other machine's ends of the ties along its positions and velocities (N, m)."""
     position, jacobian = points_motion(
         beside.robot,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from armid_ros.identification.samples.straight_line import share_of_noise, Usual, usual_size
+from armid_ros.identification.samples.straight_line import robust_scale, share_of_noise, Usual
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -133,7 +133,7 @@ def _usual(period: float, errors: FloatArray, window: int, share: float) -> Usua
         errors[cut:].reshape(windows - longer, size, signals),
     ]
     parts = [part.swapaxes(0, 1) for part in parts if len(part)]
-    sizes = [usual_size(part, share) for part in parts]
+    sizes = [robust_scale(part, share) for part in parts]
     noisy = np.concatenate([share_of_noise(*both) for both in zip(parts, sizes, strict=True)])
     every = np.concatenate(sizes)
     loudest = np.argmax(every, axis=0)[np.newaxis]

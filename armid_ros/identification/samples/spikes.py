@@ -41,11 +41,11 @@ from armid_ros.identification.samples.straight_line import (
     Excursion,
     Missed,
     missed_by,
+    robust_scale,
     share_of_noise,
     StreamSample,
     unwrapped,
     Usual,
-    usual_size,
 )
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -291,7 +291,7 @@ class SpikeGate:
         self._most = np.maximum(self._most, np.max(np.abs([m.error for m in missed]), axis=0))
         if not self._usual:
             errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
-            size = np.maximum(usual_size(errors, _USUAL_FIRST), self._resolution)
+            size = np.maximum(robust_scale(errors, _USUAL_FIRST), self._resolution)
             self._noise = Usual(self._period, size, share_of_noise(errors, size))
         straight = [bool(np.all(self._off_by(m, floor) <= 1.0)) for m in missed]
         if not any(straight):  # or the noise is not what it was: it is learned anew
@@ -448,7 +448,7 @@ class SpikeGate:
         """Learn what is usual from a window of errors."""
         errors = np.array(self._errors)
         self._most = np.maximum(self._most, np.abs(errors).max(axis=0))
-        size = usual_size(errors, _USUAL)
+        size = robust_scale(errors, _USUAL)
         self._usual.append((size, share_of_noise(errors, size)))
         self._see_steps(np.abs(self._moves))
         self._errors, self._moves = [], []

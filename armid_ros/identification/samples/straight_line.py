@@ -171,7 +171,7 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
     return found
 
 
-def usual_size(missed: FloatArray, share: float) -> FloatArray:
+def robust_scale(missed: FloatArray, share: float) -> FloatArray:
     """Return the standard deviation of which a normal variable exceeds so few of the errors."""
     size = np.quantile(np.abs(missed), share, axis=0)
     return np.asarray(size / _normal_quantile(share))

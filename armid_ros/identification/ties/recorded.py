@@ -121,7 +121,7 @@ def together_interaction_problem(
         If there is too little of it.
 
     """
-    beside, n = recording.beside, len(recording.joints)
+    beside, n = recording.partner, len(recording.joints)
     assert beside is not None
     both = _one_machine(recording)
     assert both.tau is not None
@@ -169,15 +169,15 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
 def _one_machine(recording: Recording) -> Recording:
     """Return a recording and what is beside it as of one machine, without torques of the other."""
-    assert recording.beside is not None and recording.tau is not None
-    far = recording.beside.q
+    assert recording.partner is not None and recording.tau is not None
+    far = recording.partner.q
     return replace(
         recording,
-        joints=(*recording.joints, *recording.beside.robot.joints),
+        joints=(*recording.joints, *recording.partner.robot.joints),
         q=np.hstack([recording.q, far]),
         dq=None,
         tau=np.hstack([recording.tau, np.zeros_like(far)]),
-        beside=None,
+        partner=None,
     )
 
 

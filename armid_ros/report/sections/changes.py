@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.identification.assess.comparison import Comparison, ParameterChange
-from armid_ros.identification.fitting.identifiability import HALF_WIDTH, told_from_zero
+from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.report.families import parameter_families
 from armid_ros.report.notation import measured, pretty
 from armid_ros.report.page import Section
@@ -62,7 +62,7 @@ class ChangeRow:
 def _value(value: float, std: float) -> str:
     """Return a value with its 95 % interval; one that is not told from zero is no number."""
     number, reach = measured(value, HALF_WIDTH * std)
-    return f'{number} ± {reach}' if told_from_zero(value, std) else f'not told from 0, ± {reach}'
+    return f'{number} ± {reach}' if excludes_zero(value, std) else f'not told from 0, ± {reach}'
 
 
 @dataclass(frozen=True)

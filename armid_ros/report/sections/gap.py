@@ -110,7 +110,7 @@ class GapOverlay(Section):
     @property
     def joint(self) -> int:
         """The joint with the largest gap."""
-        return int(np.argmax(self.gap.loss_before))
+        return int(np.argmax(self.gap.chi2_before))
 
     @property
     def name(self) -> str:
@@ -138,7 +138,7 @@ class GapOverlay(Section):
         """Torques while the joint moves, and residuals with a band of two standard deviations."""
         j, shown = self.joint, self.overlay
         unit = torque_unit(self.robot, j)
-        told = np.flatnonzero(shown.trajectory.told[:, j])
+        told = np.flatnonzero(shown.trajectory.informative[:, j])
         moving = slice(told[0], told[-1] + 1)
         measured, before, after = (
             x[moving, j] for x in (shown.measured, shown.before, shown.after)

@@ -128,7 +128,7 @@ class Story(Section):
         gap = self.diagnosis.gap
         if gap is None:
             return ['Not measured.']
-        j = int(np.argmax(gap.loss_before))
+        j = int(np.argmax(gap.chi2_before))
         robot = self.diagnosis.arm.robot
         unit = torque_unit(robot, j)
         before, after, floor = (

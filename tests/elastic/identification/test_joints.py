@@ -74,7 +74,7 @@ def found(bag):
 
 def test_stiffness_of_every_joint_that_carries_a_load(found):
     for one, wanted in list(zip(found, STIFFNESS, strict=True))[:3]:
-        assert one.told, one.joint
+        assert one.informative, one.joint
         assert one.transmission.stiffness[0] == pytest.approx(wanted, rel=0.01), one.joint
 
 

@@ -4,7 +4,7 @@
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.estimate import ParameterName
-from armid_ros.excitation import DesignSettings, Information, Problem
+from armid_ros.excitation import DesignProblem, DesignSettings, Information
 from armid_ros.excitation.search.criteria import RivalCriterion, SpectralCriterion, SubsetCriterion
 from armid_ros.model import random_motion
 import numpy as np
@@ -126,7 +126,7 @@ def test_rival_columns_that_a_motion_does_not_tell_apart_are_no_reason_to_stop(w
 def test_models_that_no_motion_can_tell_apart_are_refused(two_link, with_effects):
     arm = with_effects(two_link, 'torque_offset')
     with pytest.raises(TrajectoryError, match=r'no motion can tell .* torque_offset'):
-        Problem.of(
+        DesignProblem.of(
             arm, DesignSettings(criterion='T'), np.random.default_rng(0), with_effects(two_link)
         )
 
@@ -134,14 +134,14 @@ def test_models_that_no_motion_can_tell_apart_are_refused(two_link, with_effects
 def test_rival_needs_criterion_t_and_the_other_way_round(two_link_arm, two_link, with_effects):
     rng = np.random.default_rng(0)
     with pytest.raises(TrajectoryError, match="criterion 'T'"):
-        Problem.of(two_link_arm, DesignSettings(), rng, with_effects(two_link))
+        DesignProblem.of(two_link_arm, DesignSettings(), rng, with_effects(two_link))
     with pytest.raises(TrajectoryError, match='needs a rival'):
-        Problem.of(two_link_arm, DesignSettings(criterion='T'), rng)
+        DesignProblem.of(two_link_arm, DesignSettings(criterion='T'), rng)
 
 
 def test_gravity_target_has_the_gravity_composites_only(humanoid, with_effects):
     settings = DesignSettings(target='gravity')
-    problem = Problem.of(with_effects(humanoid), settings, np.random.default_rng(0))
+    problem = DesignProblem.of(with_effects(humanoid), settings, np.random.default_rng(0))
     assert problem.base.rank == 12
     assert not any(p.name.startswith('I') for p in problem.base.parameters)
 
@@ -149,9 +149,9 @@ def test_gravity_target_has_the_gravity_composites_only(humanoid, with_effects):
 def test_payload_is_visible_when_the_arm_is_known(humanoid, with_effects):
     arm = with_effects(humanoid, 'payload')
     rng = np.random.default_rng(0)
-    assert Problem.of(arm, DesignSettings(target='effects'), rng).base.rank == 10
+    assert DesignProblem.of(arm, DesignSettings(target='effects'), rng).base.rank == 10
     with pytest.raises(TrajectoryError, match=r"payload cannot be told.*target 'effects'"):
-        Problem.of(arm, DesignSettings(focus=('payload',)), rng)
+        DesignProblem.of(arm, DesignSettings(focus=('payload',)), rng)
 
 
 def test_unknown_names_are_refused_with_those_that_exist(two_link_arm):
@@ -162,7 +162,9 @@ def test_unknown_names_are_refused_with_those_that_exist(two_link_arm):
         with pytest.raises(TrajectoryError, match=f"no {kind} 'X'; there are"):
             DesignSettings(**settings)
     with pytest.raises(TrajectoryError, match='it has viscous_friction, coulomb_friction'):
-        Problem.of(two_link_arm, DesignSettings(focus=('backlash',)), np.random.default_rng(0))
+        DesignProblem.of(
+            two_link_arm, DesignSettings(focus=('backlash',)), np.random.default_rng(0)
+        )
 
 
 @pytest.mark.parametrize(
@@ -183,7 +185,7 @@ def test_settings_out_of_range_are_refused(settings):
 
 def test_information_of_two_recordings_adds_up(two_link_arm):
     rng = np.random.default_rng(0)
-    problem = Problem.of(two_link_arm, DesignSettings(), rng)
+    problem = DesignProblem.of(two_link_arm, DesignSettings(), rng)
     motion = random_motion(two_link_arm.robot, 60, rng)
     whole = problem.information(motion).matrix
     parts = [problem.information(motion.select(s)).matrix for s in (slice(0, 20), slice(20, 60))]

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Normal equations of which data do not tell every direction."""
 
-from armid_ros.identification.fitting.normal_equations import told_basis
+from armid_ros.identification.fitting.normal_equations import informative_basis
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 def test_a_fit_is_the_same_in_any_units(seed, size):
     rng = np.random.default_rng(seed)
     columns = rng.normal(size=(40, size)) * 10.0 ** rng.uniform(-6.0, 6.0, size)
-    basis = told_basis(columns.T @ columns, 1e-10)
+    basis = informative_basis(columns.T @ columns, 1e-10)
     y = rng.normal(size=40)
     fitted = columns @ (basis @ (basis.T @ (columns.T @ y)))
     scaled = columns / np.linalg.norm(columns, axis=0)
@@ -22,7 +22,7 @@ def test_a_fit_is_the_same_in_any_units(seed, size):
 
 def test_a_direction_that_is_not_told_stays_where_it_is():
     columns = np.column_stack([np.ones(10), np.ones(10), np.arange(10.0), np.zeros(10)])
-    basis = told_basis(columns.T @ columns, 1e-10)
+    basis = informative_basis(columns.T @ columns, 1e-10)
     values = basis @ (basis.T @ (columns.T @ np.full(10, 3.0)))
     np.testing.assert_allclose(values, [1.5, 1.5, 0.0, 0.0], atol=1e-9)
     assert basis.shape == (4, 2)

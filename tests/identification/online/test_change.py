@@ -8,10 +8,10 @@ from dataclasses import replace
 
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.online.change import Candidate, change_candidates
-from armid_ros.identification.online.change_evidence import Block, evidence
+from armid_ros.identification.online.change_score import Block, score_statistics
 from armid_ros.identification.online.change_watch import ChangeWatch
+from armid_ros.identification.online.null_calibration import NullCalibration, Weighed
 from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
-from armid_ros.identification.online.usual_size import UsualSize, Weighed
 import numpy as np
 import pytest
 from scipy import stats
@@ -44,7 +44,7 @@ def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows():
     """Before and after in one problem, with a column for the change: the same answer."""
     rng = np.random.default_rng(0)
     _, block, w, tau = learned_and_block(rng, 0.7, seen=5)
-    found, covariance = evidence([block], block, CHANGED).size(slice(0, 1))
+    found, covariance = score_statistics([block], block, CHANGED).size(slice(0, 1))
     top = np.hstack([block.before.root, np.zeros((5, 1))])
     both = np.vstack([top, np.hstack([w, w @ CHANGED])])
     aim = np.concatenate([block.before.root @ block.before.values, tau])
@@ -57,8 +57,8 @@ def test_what_was_learned_in_another_unit_of_noise_is_as_certain():
     rng = np.random.default_rng(6)
     _, block, w, tau = learned_and_block(rng, 0.7, seen=5)
     loud = replace(block, information=w.T @ w / 9.0, right=w.T @ tau / 9.0)
-    found, covariance = evidence([loud], block, CHANGED, 3.0).size(slice(0, 1))
-    expected, certain = evidence([block], block, CHANGED).size(slice(0, 1))
+    found, covariance = score_statistics([loud], block, CHANGED, 3.0).size(slice(0, 1))
+    expected, certain = score_statistics([block], block, CHANGED).size(slice(0, 1))
     assert found[0] == pytest.approx(expected[0], rel=1e-6)
     assert covariance[0, 0] == pytest.approx(9.0 * certain[0, 0], rel=1e-6)
 
@@ -68,7 +68,7 @@ def test_without_a_change_the_ratio_is_chi_square():
     ratios = []
     for _ in range(150):
         _, block, _, _ = learned_and_block(rng, 0.0, seen=5)
-        ratios.append(evidence([block], block, CHANGED).ratio(slice(0, 1)))
+        ratios.append(score_statistics([block], block, CHANGED).ratio(slice(0, 1)))
     assert stats.kstest(ratios, stats.chi2(1).cdf).pvalue > 1e-3
 
 
@@ -76,7 +76,7 @@ def test_what_was_never_known_cannot_be_seen_to_change():
     rng = np.random.default_rng(2)
     _, block, _, _ = learned_and_block(rng, 5.0)
     unknown = np.eye(5)[:, [4]]
-    assert evidence([block], block, unknown).ratio(slice(0, 1)) < 1e-3
+    assert score_statistics([block], block, unknown).ratio(slice(0, 1)) < 1e-3
 
 
 def test_reopening_forgets_one_direction_and_nothing_else():
@@ -97,7 +97,7 @@ def test_reopening_forgets_one_direction_and_nothing_else():
 
 def test_a_statistic_that_is_usually_large_is_not_surprising():
     rng = np.random.default_rng(4)
-    usual, strength = UsualSize([1, 3], 1, 2), np.ones(4)
+    usual, strength = NullCalibration([1, 3], 1, 2), np.ones(4)
     for _ in range(400):
         usual.learn(Weighed(100.0 * np.array([rng.chisquare(1), rng.chisquare(3)]), strength))
     np.testing.assert_allclose(usual.factors, 100.0, rtol=0.3)
@@ -198,7 +198,11 @@ def test_noise_that_lasts_hides_a_step_better():
 def test_a_statistic_with_rare_large_values_is_judged_by_those():
     """One joint in the six has a spike in one window of thirty."""
     rng = np.random.default_rng(5)
-    plain, spiky, strength = UsualSize([1] * 6, 2, 6), UsualSize([1] * 6, 2, 6), np.ones(6)
+    plain, spiky, strength = (
+        NullCalibration([1] * 6, 2, 6),
+        NullCalibration([1] * 6, 2, 6),
+        np.ones(6),
+    )
     for k in range(600):
         ratios = rng.chisquare(1, 6)
         plain.learn(Weighed(ratios, strength))

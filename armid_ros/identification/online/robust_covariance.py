@@ -65,7 +65,7 @@ class _Bands:
         return np.asarray(self.products.sum(axis=(0, 1))[:-1, :-1])
 
 
-class ScoreVariance:
+class RobustCovariance:
     """
     Sums up windows of rows, and says what covariance their residuals give an estimate.
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class PartnerMotion:
     """
     Positions of another machine at the samples of a recording.
 
@@ -40,6 +40,8 @@ class Beside:
         """Freeze the positions."""
         object.__setattr__(self, 'q', read_only(self.q))
 
-    def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Beside:
+    def select(
+        self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
+    ) -> PartnerMotion:
         """Return it at some of the samples."""
         return replace(self, q=self.q[samples])

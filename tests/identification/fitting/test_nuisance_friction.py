@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Friction beside a model: what the effects of the catalogue make of it, and no more of it."""
+"""Friction as a nuisance: what the effects of the catalogue make of it, and no more of it."""
 
 from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification.fitting.friction_beside import by_joint, FrictionBeside
+from armid_ros.identification.fitting.nuisance_friction import by_joint, NuisanceFriction
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 import numpy as np
@@ -29,20 +29,20 @@ def test_columns_are_those_of_the_effects_that_the_arm_lacks():
         make_effect('load_dependent_friction', arm.robot),
     )
     q, dq, ddq = np.random.default_rng(0).normal(size=(3, arm.robot.n_joints))
-    beside = FrictionBeside(arm)
+    nuisance = NuisanceFriction(arm)
     one = Motion(arm.robot.joints, np.zeros(1), q[None], 0.2 * dq[None], ddq[None])
-    rows = by_joint(beside.torques(one)[0])
+    rows = by_joint(nuisance.torques(one)[0])
     expected = np.concatenate([effect.columns(one, arm)[0] for effect in lacking], axis=1)
     np.testing.assert_allclose(rows, expected, atol=1e-12)
-    assert [p.joint for p in beside.parameters] == list(arm.robot.joints) * len(lacking)
+    assert [p.joint for p in nuisance.parameters] == list(arm.robot.joints) * len(lacking)
 
 
-def test_what_is_identified_is_not_beside_it():
+def test_what_is_identified_is_not_nuisance():
     everything = arm_with(
         'viscous_friction', 'coulomb_friction', 'stribeck_friction', 'load_dependent_friction'
     )
-    beside = FrictionBeside(everything)
-    assert beside.parameters == ()
+    nuisance = NuisanceFriction(everything)
+    assert nuisance.parameters == ()
     n = everything.robot.n_joints
     one = Motion(everything.robot.joints, np.zeros(1), *np.ones((3, 1, n)))
-    assert beside.torques(one).shape == (1, n, 0)
+    assert nuisance.torques(one).shape == (1, n, 0)

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How large likelihood ratios usually are, and what is too large for them.
+Distribution of likelihood ratios while nothing changes, and the limit that it gives.
 
 Twice the logarithm is chi-square of p degrees only if noise is white and the model right. Noise
 that is coloured, and what the model lacks, make it larger, by a factor that is measured for every
@@ -65,7 +65,7 @@ class Weighed:
     strength: FloatArray
 
 
-class UsualSize:
+class NullCalibration:
     """
     How large statistics usually are, compared with those of white noise.
 

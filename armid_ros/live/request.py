@@ -20,7 +20,7 @@ WAITING = 'waiting'
 
 
 @dataclass(frozen=True)
-class Question:
+class DiagnosisRequest:
     """
     What is asked.
 
@@ -113,42 +113,40 @@ class Answer:
         return tuple((finding.name, finding.joints) for finding in self.findings)
 
 
-def answer(question: Question) -> tuple[Answer, Diagnosis | None]:
+def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
     """
     Diagnose a window; the diagnosis is None where that cannot be done.
 
     What came before the residual of the model changed is of another arm, and is left out.
 
     """
-    begun, arm, window = time.process_time(), question.arm, question.window
+    begun, arm, window = time.process_time(), request.arm, request.window
 
     def said(
         verdict: str, summary: str, findings: Sequence[Finding] = (), patched: ArmModel = arm
     ) -> Answer:
         spent = time.process_time() - begun
         more = () if found is None else _gap(found)
-        return Answer(
-            verdict, summary, tuple(findings), more, patched, window, question.end, spent
-        )
+        return Answer(verdict, summary, tuple(findings), more, patched, window, request.end, spent)
 
     found: Diagnosis | None = None
     try:
-        if question.learn:
+        if request.learn:
             text = 'the misfit of the model was measured'
             return replace(said('consistent', text), misfit=own_misfit(arm, window)), None
         changed = onset(arm, window)
         if changed is not None:
             window = since(window, changed)
-        if window.duration < question.shortest:
+        if window.duration < request.shortest:
             text = f'the arm changed {window.duration:.0f} s ago: more motion is needed'
             return said(WAITING, text), None
         found = diagnose(
             arm,
             [window],
-            baseline=question.baseline,
-            misfit=None if question.baseline else question.misfit,
-            settings=DiagnosisSettings(material=question.material),
-            rng=np.random.default_rng(question.seed),
+            baseline=request.baseline,
+            misfit=None if request.baseline else request.misfit,
+            settings=DiagnosisSettings(material=request.material),
+            rng=np.random.default_rng(request.seed),
         )
     except ArmidError as error:
         return said('bad_data', str(error)), None

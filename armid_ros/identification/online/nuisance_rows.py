@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Rows of what is learned beside the parameters that were asked for, many samples at a time."""
+"""Rows of nuisance parameters of the online identification, many samples at a time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.fitting.friction_beside import by_joint, FrictionBeside
+from armid_ros.identification.fitting.nuisance_friction import by_joint, NuisanceFriction
 from armid_ros.identification.rows.causal import CausalMotion, TripleLag
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -34,7 +34,7 @@ class Seed(NamedTuple):
     gain: float
 
 
-class RowsBeside:
+class NuisanceRows:
     """
     Makes and filters the columns of friction that an arm model does not have.
 
@@ -54,7 +54,7 @@ class RowsBeside:
 
     def __init__(self, arm: ArmModel, cutoff: float) -> None:
         self._joints = arm.robot.joints
-        self._friction = FrictionBeside(arm)
+        self._friction = NuisanceFriction(arm)
         self._filter = TripleLag(cutoff)
         self.parameters = self._friction.parameters
 

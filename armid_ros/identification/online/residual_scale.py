@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How loud the residuals of every joint usually are, compared with what was assumed."""
+"""Scale of the residuals of every joint, relative to the noise that was assumed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FEWEST = 16
 _MEDIAN = float(stats.chi2(1).median())
 
 
-class Loudness:
+class ResidualScale:
     """
     Standard deviation of residuals that last, per joint, relative to noise as assumed.
 

@@ -14,7 +14,7 @@ of the likelihood ratio. What was not known before, where A D is nothing, cannot
 Source: Willsky and Jones 1976, the generalised likelihood ratio test.
 
 Twice the logarithm is chi-square of p degrees only if noise is white and the model right; how
-large it is otherwise is measured while nothing changes (``usual_size``).
+large it is otherwise is measured while nothing changes (``null_calibration``).
 
 """
 
@@ -72,7 +72,7 @@ class Block:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class ScoreStatistics:
     """
     What a window says of Q possible changes.
 
@@ -111,16 +111,16 @@ class Evidence:
         return np.asarray(covariance @ self.score[some]), np.asarray(covariance)
 
 
-def evidence(
-    blocks: Sequence[Block], before: Block, directions: FloatArray, loudness: float = 1.0
-) -> Evidence:
+def score_statistics(
+    blocks: Sequence[Block], before: Block, directions: FloatArray, residual_scale: float = 1.0
+) -> ScoreStatistics:
     """Weigh possible changes by a window of rows; see `weighing`."""
-    return at_once(weighing(blocks, before, directions, loudness))
+    return at_once(weighing(blocks, before, directions, residual_scale))
 
 
 def weighing(
-    blocks: Sequence[Block], before: Block, directions: FloatArray, loudness: float = 1.0
-) -> Pieces[Evidence]:
+    blocks: Sequence[Block], before: Block, directions: FloatArray, residual_scale: float = 1.0
+) -> Pieces[ScoreStatistics]:
     """
     Weigh possible changes by a window of rows, piece by piece.
 
@@ -132,7 +132,7 @@ def weighing(
         What was known when this one began is compared with the window.
     directions : ndarray, shape (P, Q)
         What the changes do to the parameters.
-    loudness : float
+    residual_scale : float
         Noise of what was learned before, in the unit of the window's.
 
     """
@@ -140,7 +140,7 @@ def weighing(
     for block in blocks[1:]:
         information, right = information + block.information, right + block.right
     yield
-    known = before.known / loudness**2
+    known = before.known / residual_scale**2
     both = known + information
     scale = 1.0 / np.sqrt(np.diag(both))
     both *= scale * scale[:, np.newaxis]
@@ -152,4 +152,4 @@ def weighing(
     solved = linalg.cho_solve(factor, scale[:, np.newaxis] * moved, check_finite=False)
     shared = (known @ directions).T @ (scale[:, np.newaxis] * solved)
     strength = np.sum(directions * moved[:, :-1], axis=0)
-    return Evidence((shared[:, :-1] + shared[:, :-1].T) / 2.0, shared[:, -1], strength)
+    return ScoreStatistics((shared[:, :-1] + shared[:, :-1].T) / 2.0, shared[:, -1], strength)

@@ -21,7 +21,7 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
 
-class FrictionBeside:
+class NuisanceFriction:
     """
     Columns of friction that an arm model does not have.
 

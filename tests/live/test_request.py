@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from armid_ros.live import Question
-from armid_ros.live.question import answer, own_misfit, since, WAITING
+from armid_ros.live import DiagnosisRequest
+from armid_ros.live.request import answer, own_misfit, since, WAITING
 import numpy as np
 
 
 def test_what_changed_is_named_from_what_came_since(known_arm, changed):
-    said, _ = answer(Question(known_arm, changed))
+    said, _ = answer(DiagnosisRequest(known_arm, changed))
     assert said.named[0] == ('viscous_friction', ('elbow_pitch',))
     assert abs(said.findings[0].values[0] - 0.3) < 0.05
     assert 11.0 < said.window.duration < 13.0
@@ -21,7 +21,7 @@ def test_what_changed_is_named_from_what_came_since(known_arm, changed):
 
 
 def test_a_healthy_arm_is_consistent(known_arm, healthy):
-    said, _ = answer(Question(known_arm, healthy))
+    said, _ = answer(DiagnosisRequest(known_arm, healthy))
     assert (said.verdict, said.named) == ('consistent', ())
     assert said.arm is known_arm
 
@@ -33,7 +33,7 @@ def test_too_little_motion_since_a_change_waits_for_more(known_arm, changed):
         joints=early.joints, t=early.t[kept], q=early.q[kept], dq=early.dq[kept],
         tau=early.tau[kept], source='early',
     )  # fmt: skip
-    said, diagnosis = answer(Question(known_arm, early, shortest=8.0))
+    said, diagnosis = answer(DiagnosisRequest(known_arm, early, shortest=8.0))
     assert (said.verdict, diagnosis) == (WAITING, None)
 
 
@@ -42,7 +42,7 @@ def test_a_window_that_cannot_be_diagnosed_is_bad_data(known_arm, healthy):
         joints=healthy.joints, t=healthy.t, q=np.ones_like(healthy.q) * healthy.q[0],
         dq=np.zeros_like(healthy.q), tau=healthy.tau, source='still',
     )  # fmt: skip
-    said, _ = answer(Question(known_arm, still))
+    said, _ = answer(DiagnosisRequest(known_arm, still))
     assert said.verdict == 'bad_data'
     assert said.summary
 
