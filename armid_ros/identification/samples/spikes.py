@@ -29,20 +29,19 @@ successive ones of white noise have the correlation -2/3, those of an accelerati
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 import math
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.samples.line_errors import line_errors, LineErrors
+from armid_ros.identification.samples.noise_level import NoiseLevel, SEEN, SHARE, WINDOW
 from armid_ros.identification.samples.straight_line import (
     all_unwrapped,
     Excursion,
     Missed,
     missed_by,
-    robust_scale,
-    share_of_noise,
     StreamSample,
     unwrapped,
     Usual,
@@ -54,16 +53,6 @@ from scipy import stats
 
 #: Samples from which noise and period are learned before the first one is judged.
 FIRST = 20
-#: Predictions whose usual error is measured together.
-WINDOW = 100
-#: Such windows that are remembered: a minute at 1 kHz.
-_REMEMBERED = 600
-#: Share of predictions that tells the usual error. The others may be steps of friction, or damage.
-_USUAL = 0.95
-#: The same for the first few samples: one damaged sample spoils three predictions.
-_USUAL_FIRST = 0.75
-#: How often a step has to be seen to be one that the signal makes.
-_SEEN = 3
 #: A sample goes on from others that are nearer by this factor than where the line leads.
 _NEARER = 0.5
 #: Periods without a sample after which one waits for the next, which may contradict its stamp.
@@ -129,12 +118,8 @@ class SpikeGate:
         self.left_out: list[Excursion] = []
         self._early: StreamSample | None = None
         count = len(self._turn)
-        self._steps, self._most = np.full((_SEEN, count), np.inf), np.zeros(count)
-        self._usual: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=_REMEMBERED)
         self._lowest, self._highest = np.full(count, np.inf), np.full(count, -np.inf)
-        self._errors: list[FloatArray] = []
-        self._moves: list[FloatArray] = []
-        self._noise = Usual(np.inf, np.zeros(count), np.zeros(count))
+        self._level = NoiseLevel(count)
         self._restart([])
 
     def take(self, t: float, x: FloatArray, floor: FloatArray | float = 0.0) -> list[StreamSample]:
@@ -204,9 +189,7 @@ class SpikeGate:
             What the prediction of the last of them missed, over a period.
 
         """
-        self._usual.clear()
-        self._usual.append((usual.size, usual.noisy))
-        self._noise = usual
+        self._level.set(usual)
         self._restart(None if known else [], known, bent)
         if known:
             self._period, self._quantile = usual.period, self._quantile_of(usual.period)
@@ -214,7 +197,7 @@ class SpikeGate:
     def line_errors(self, t: FloatArray, x: FloatArray) -> LineErrors:
         """Return how far off the samples of a whole recording are, as `take` would predict."""
         lines = line_errors(
-            t, x, self._turn, max_gap=self._max_gap, window=WINDOW, share=_USUAL, seen=_SEEN
+            t, x, self._turn, max_gap=self._max_gap, window=WINDOW, share=SHARE, seen=SEEN
         )
         return replace(lines, quantile=self._quantile_of(lines.usual.period))
 
@@ -287,17 +270,12 @@ class SpikeGate:
         self._period = float(np.median(np.diff([s.t for s in first])))
         self._quantile = self._quantile_of(self._period)
         missed = self._lines_through(first)
-        self._see_steps(np.abs(np.diff([s.x for s in first], axis=0)))
-        self._most = np.maximum(self._most, np.max(np.abs([m.error for m in missed]), axis=0))
-        if not self._usual:
-            errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
-            size = np.maximum(robust_scale(errors, _USUAL_FIRST), self._resolution)
-            self._noise = Usual(self._period, size, share_of_noise(errors, size))
+        self._level.begin(missed, np.diff([s.x for s in first], axis=0), self._period)
         straight = [bool(np.all(self._off_by(m, floor) <= 1.0)) for m in missed]
         if not any(straight):  # or the noise is not what it was: it is learned anew
             off = np.max([self._off_by(m, floor) for m in missed], axis=0)
             self._leave_out(Excursion(tuple(first), off, self._limits(missed[0], floor)), True)
-            self._usual.clear()
+            self._level.forget()
             self._restart([])
             return []
         start = straight.index(True)
@@ -316,7 +294,7 @@ class SpikeGate:
             return []
         missed = missed_by(self._known, sample, self._period)
         # a smooth signal goes on bending as it does
-        bent = self._noise.smoothness * self._bent * missed.bend
+        bent = self._level.usual.smoothness * self._bent * missed.bend
         off = self._off_by(missed._replace(error=missed.error - bent), floor)
         if not self._held:
             if float(np.max(off)) <= 1.0:
@@ -390,7 +368,7 @@ class SpikeGate:
 
     def _limits(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
         """Return what a sample may be off its prediction by, shape (m,)."""
-        limits = self._noise.limits(self._quantile, missed.noise, missed.bend)
+        limits = self._level.usual.limits(self._quantile, missed.noise, missed.bend)
         return np.maximum(limits, floor)
 
     def _off_by(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
@@ -405,14 +383,12 @@ class SpikeGate:
         self._held = []
         for sample in samples:
             one = missed or missed_by(self._known, sample, self._period)
-            self._errors.append(one.error / self._noise.growth(one.noise, one.bend))
+            self._level.learn(one, sample.x - self._known[1].x)
             self._bent = one.error / one.bend
-            self._moves.append(sample.x - self._known[1].x)
             np.minimum(self._lowest, sample.x, out=self._lowest)
             np.maximum(self._highest, sample.x, out=self._highest)
             self._known = self._known[1], sample
-        if len(self._errors) >= WINDOW:
-            self._learn()
+        self._level.settle(self._period)
         return samples
 
     def _lines_through(self, samples: Sequence[StreamSample]) -> list[Missed]:
@@ -442,32 +418,4 @@ class SpikeGate:
             self.spikes[int(np.argmax(excursion.off))] += count
         values = np.stack([sample.x for sample in excursion.samples])
         before = self._known[1].x[np.newaxis] if self._known else values[:1]
-        self._see_steps(np.abs(np.diff(values, axis=0, prepend=before)))
-
-    def _learn(self) -> None:
-        """Learn what is usual from a window of errors."""
-        errors = np.array(self._errors)
-        self._most = np.maximum(self._most, np.abs(errors).max(axis=0))
-        size = robust_scale(errors, _USUAL)
-        self._usual.append((size, share_of_noise(errors, size)))
-        self._see_steps(np.abs(self._moves))
-        self._errors, self._moves = [], []
-        sizes, shares = (np.array(part) for part in zip(*self._usual, strict=True))
-        loudest = np.argmax(sizes, axis=0)[np.newaxis]
-        size = np.maximum(np.take_along_axis(sizes, loudest, 0)[0], self._resolution)
-        self._noise = Usual(self._period, size, np.take_along_axis(shares, loudest, 0)[0])
-
-    def _see_steps(self, steps: FloatArray) -> None:
-        """Learn the resolution from steps of shape (k, m)."""
-        steps = np.concatenate([self._steps, np.where(steps > 0.0, steps, np.inf)])
-        self._steps = np.partition(steps, _SEEN - 1, axis=0)[:_SEEN]
-
-    @property
-    def _resolution(self) -> FloatArray:
-        """
-        The smallest step of every signal, 0 where it is not known.
-
-        A signal that moves fast makes no small steps; but by its resolution it leaves any line.
-
-        """
-        return np.minimum(self._most, np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0))
+        self._level.see_steps(np.diff(values, axis=0, prepend=before))
