@@ -20,7 +20,7 @@ from armid_ros.errors import ArmidError
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 from armid_ros.identification.assess.forward import forward_validation, unlimited
 from armid_ros.identification.estimators.names import ESTIMATORS
-from armid_ros.identification.estimators.side_by_side import compare_methods
+from armid_ros.identification.estimators.side_by_side import compare_methods, ComparisonSettings
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording, Recording
 from armid_ros.robots import load_robot
@@ -83,7 +83,7 @@ def halves(recording):
 def compared(title, arm, training, held_out):
     """Compare all on one machine."""
     scores = compare_methods(
-        arm, [training], [held_out], ESTIMATORS, SignalSettings(), seed=0, clock=time.process_time
+        arm, [training], [held_out], ComparisonSettings(ESTIMATORS), clock=time.process_time
     )
     table(title, scores)
 

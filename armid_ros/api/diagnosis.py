@@ -120,14 +120,13 @@ class DiagnosisResult(Shown):
 
     def report(self, path: str | Path = 'report.html') -> Path:
         """Write the page with the verdict and the evidence; return where it is."""
-        from armid_ros.report.diagnosis_report import diagnosis_report
+        from armid_ros.report.diagnosis_report import DiagnosedRecordings, diagnosis_report, Extras
 
         page = diagnosis_report(
             self.core,
+            DiagnosedRecordings(self.recordings, self.held_out),
             robot=self._robot,
-            recordings=self.recordings,
-            validation=self.held_out,
-            residual=self.residual,
+            extras=Extras(residual=self.residual),
         )
         write_file(Path(path), page)
         return Path(path)

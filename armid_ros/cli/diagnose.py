@@ -10,7 +10,7 @@ from pathlib import Path
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.cli import columns, options
 from armid_ros.cli import partner as partner_options
-from armid_ros.cli.diagnosis_files import DiagnosisCase, Extras, make_extras, write_results
+from armid_ros.cli.diagnosis_files import DiagnosisCase, make_extras, write_results
 from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
@@ -21,6 +21,7 @@ from armid_ros.effects.tied import Partner
 from armid_ros.files import json_text
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.recording import Recording
+from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import percent, probability, with_interval
 from armid_ros.residual import require_libraries, TABLE_FILE
 from armid_ros.robots import Robot
@@ -217,9 +218,7 @@ def diagnose(
             arm,
             robot.robot_source,
             options.kept_source(robot.robot_source, loaded, out),
-            recordings,
-            held_out,
-            before,
+            DiagnosedRecordings(recordings, held_out, before),
             settings,
             misfit,
             provenance([*data.bags, *data.validate, *data.baseline], seed=seed),

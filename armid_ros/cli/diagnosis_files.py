@@ -10,7 +10,7 @@ or a simulation. Whatever happens to those, the results are there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,19 +22,16 @@ from armid_ros.diagnosis import (
     DiagnosisSettings,
     EXPERIMENT_FILE,
     next_run,
-    NextRun,
 )
 from armid_ros.excitation import save_excitation
 from armid_ros.files import json_text, write_file
 from armid_ros.identification.assess.verification import ForwardValidation, simulate_held_out
 from armid_ros.identification.rows.signals import conditioning
-from armid_ros.recording import Recording
-from armid_ros.report.diagnosis_report import diagnosis_report
+from armid_ros.report.diagnosis_report import DiagnosedRecordings, diagnosis_report, Extras
 from armid_ros.report.provenance import Provenance
 from armid_ros.residual import (
     learn_residual,
     lookup_table,
-    Residual,
     TABLE_FILE,
     WORTH_A_MAP,
 )
@@ -55,8 +52,8 @@ class DiagnosisCase:
         The model as given.
     robot, source : str
         What the robot is called, and how model.yaml refers to it.
-    recordings, held_out, baseline : sequence of Recording
-        Data that were looked at, that were only predicted, and from before.
+    data : DiagnosedRecordings
+        Its recordings.
     settings : DiagnosisSettings
         What was asked.
     misfit : Misfit or None
@@ -71,37 +68,11 @@ class DiagnosisCase:
     arm: ArmModel
     robot: str
     source: str
-    recordings: Sequence[Recording]
-    held_out: Sequence[Recording] = ()
-    baseline: Sequence[Recording] = ()
+    data: DiagnosedRecordings
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
     misfit: Misfit | None = None
     provenance: Provenance = field(default_factory=Provenance)
     learns: bool = False
-
-
-@dataclass(frozen=True)
-class Extras:
-    """
-    What was made of a diagnosis.
-
-    Attributes
-    ----------
-    forward : tuple of ForwardValidation
-        Held-out recordings simulated.
-    next_run : NextRun or None
-        A motion that separates names in doubt.
-    notes : tuple of str
-        Why there is not more.
-    residual : Residual or None
-        What is left without a name, learned.
-
-    """
-
-    forward: tuple[ForwardValidation, ...] = ()
-    next_run: NextRun | None = None
-    notes: tuple[str, ...] = ()
-    residual: Residual | None = None
 
 
 def write_results(
@@ -124,14 +95,10 @@ def write_results(
         save_excitation(extras.next_run.excitation, out / EXPERIMENT_FILE)
     page = diagnosis_report(
         result,
+        case.data,
         robot=case.robot,
-        recordings=case.recordings,
-        validation=case.held_out,
-        baseline=case.baseline,
         settings=case.settings,
-        forward=extras.forward,
-        next_run=extras.next_run,
-        residual=learned,
+        extras=extras,
         patch=(out / 'model.yaml').read_text(encoding='utf-8'),
         provenance=case.provenance,
     )
@@ -146,7 +113,7 @@ def make_extras(result: Diagnosis, case: DiagnosisCase, seed: int, tick: Tick) -
         tick(1.0, 'learning what is left')
         extras = _learned(result, seed)
     arm = result.arm if extras.residual is None else extras.residual.arm
-    if case.held_out and result.gap is not None:
+    if case.data.held_out and result.gap is not None:
         found, why = _tried('a simulation', lambda: _simulated(arm, case, tick))
         simulated, left_out = found or ((), ())
         extras = replace(extras, forward=simulated, notes=(*extras.notes, *left_out, *why))
@@ -171,9 +138,9 @@ def _learned(result: Diagnosis, seed: int) -> Extras:
 def _simulated(
     arm: ArmModel, case: DiagnosisCase, tick: Tick
 ) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
-    used = conditioning(list(case.recordings), case.settings.signals)
+    used = conditioning(list(case.data.recordings), case.settings.signals)
     return simulate_held_out(
-        case.arm, arm, used, case.held_out, progress=lambda _, what: tick(1.0, what)
+        case.arm, arm, used, case.data.held_out, progress=lambda _, what: tick(1.0, what)
     )
 
 

@@ -23,6 +23,7 @@ from armid_ros.excitation import (
     save_excitation,
     TransferPlanner,
     used_shares,
+    with_obstacles,
 )
 from armid_ros.files import json_text, write_file
 from armid_ros.motion import FloatArray
@@ -62,6 +63,11 @@ class CollisionScene:
     floor: Floor
     obstacles: Sequence[Obstacle]
     clearance: float
+
+    @property
+    def bodies(self) -> CollisionModel:
+        """The bodies of the robot together with what stands around it."""
+        return with_obstacles(self.collision, self.obstacles)
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,6 @@ from armid_ros.excitation import (
     TARGETS,
     transfer_limits,
     TransferPlanner,
-    with_obstacles,
 )
 from armid_ros.excitation.fitness import FIT
 from armid_ros.excitation.search.parallel import INTERRUPTED
@@ -254,8 +253,7 @@ class _Task:
             self.settings,
             np.random.default_rng(self.plan.seed),
             speeds=[speed],
-            collision=self.plan.workspace.collision,
-            obstacles=self.plan.workspace.obstacles,
+            collision=self.plan.workspace.bodies,
             prior_information=self.known,
             rival=self.rival,
             progress=told,
@@ -272,7 +270,7 @@ def _planner(
     return TransferPlanner(
         arm,
         transfer_limits(arm.robot, speed, settings.acceleration),
-        ClearanceModel.of(with_obstacles(space.collision, space.obstacles)),
+        ClearanceModel.of(space.bodies),
         settings.clearance,
     )
 

@@ -11,7 +11,7 @@ from armid_ros.cli.excitation_files import BAG, CollisionScene, require_free, SC
 from armid_ros.cli.excite_options import MotionOptions
 from armid_ros.cli.terminal import say
 from armid_ros.elastic.plant.courses import multisine_course, step_course
-from armid_ros.excitation import Limits, not_checked, with_obstacles
+from armid_ros.excitation import Limits, not_checked
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
 import click
@@ -42,7 +42,7 @@ def write_course(motion: MotionOptions, space: CollisionScene, seed: int, out: P
     robot = space.collision.robot
     options.hold(out, SCHEMA, robot.name)
     require_free(out)
-    bodies = with_obstacles(space.collision, space.obstacles)
+    bodies = space.bodies
 
     def clear(q: FloatArray) -> bool:
         inside = np.all((q >= robot.lower) & (q <= robot.upper))

@@ -36,7 +36,11 @@ from armid_ros.identification import (
     identify as run,
 )
 from armid_ros.identification.estimators.names import Estimator, ESTIMATORS, estimators_of
-from armid_ros.identification.estimators.side_by_side import compare_methods, MethodScore
+from armid_ros.identification.estimators.side_by_side import (
+    compare_methods,
+    ComparisonSettings,
+    MethodScore,
+)
 from armid_ros.identification.output import SCHEMA
 from armid_ros.recording import Recording
 from armid_ros.report import identification_report
@@ -293,15 +297,9 @@ def _work(
     verification = None
     if verifies:
         verification = verify(result, arm, recordings, held_out, rng=rng, progress=tick)
+    comparison = ComparisonSettings(compared, settings.signals, seed)
     scores = compare_methods(
-        arm,
-        recordings,
-        held_out,
-        compared,
-        settings.signals,
-        seed=seed,
-        clock=time.process_time,
-        progress=tick,
+        arm, recordings, held_out, comparison, clock=time.process_time, progress=tick
     )
     return _Work(recordings, held_out, result, validation, graded, verification, scores)
 

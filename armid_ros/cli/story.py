@@ -17,7 +17,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli.diagnose import show
-from armid_ros.cli.diagnosis_files import DiagnosisCase, Extras, write_results
+from armid_ros.cli.diagnosis_files import DiagnosisCase, write_results
 from armid_ros.cli.terminal import progress, say
 from armid_ros.diagnosis import diagnose, Diagnosis
 from armid_ros.effects import CATALOGUE, Effect, make_effect, parse_effect
@@ -25,6 +25,7 @@ from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import read_recording, Recording
+from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import digits, pretty
 from armid_ros.robots import collision_model
 from armid_ros.simulation import Sensors, SimulatedArm
@@ -169,7 +170,8 @@ def tell_story(
             progress=tick,
         )
         robot = known.robot.name
-        case = DiagnosisCase(known, robot, robot, recordings[:-1], recordings[-1:], [baseline])
+        data = DiagnosedRecordings(recordings[:-1], recordings[-1:], [baseline])
+        case = DiagnosisCase(known, robot, robot, data)
         write_results(out, found, case, Extras())
     return ToldStory(hidden, found)
 

@@ -13,7 +13,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.geometry.environment import Obstacle, with_obstacles
 from armid_ros.excitation.limits import Limits, SPEED_CLASSES
 from armid_ros.excitation.placing import placed
 from armid_ros.excitation.problem import DesignProblem
@@ -89,7 +88,6 @@ def design(
     rng: np.random.Generator,
     *,
     collision: CollisionModel | None = None,
-    obstacles: Sequence[Obstacle] = (),
     prior_information: FloatArray | None = None,
     rival: ArmModel | None = None,
     progress: Callable[[DesignProgress], None] | None = None,
@@ -107,9 +105,8 @@ def design(
     rng : Generator
         Source of randomness; the same state gives the same trajectory.
     collision : CollisionModel, optional
-        Bodies to keep apart by ``settings.clearance``, such as ``collision_model(arm.robot)``.
-    obstacles : sequence of Obstacle, optional
-        What stands around the arm; needs ``collision``.
+        Bodies to keep apart by ``settings.clearance``, such as ``collision_model(arm.robot)``, or
+        ``with_obstacles`` of it.
     prior_information : ndarray, shape (r, r), optional
         Information of what was recorded before, over the same base parameters: the sum of
         ``DesignProblem.information(motion).matrix`` of the recordings.
@@ -133,7 +130,7 @@ def design(
 
     """
     problem = DesignProblem.of(arm, settings, rng, rival)
-    clearance = _clearance(collision, obstacles)
+    clearance = None if collision is None else ClearanceModel.of(collision)
     prior = _checked_prior(problem, prior_information, rival)
 
     def watch(done: float, found: Found) -> None:
@@ -152,7 +149,6 @@ def design_speeds(
     *,
     speeds: Sequence[str | float] = tuple(SPEED_CLASSES),
     collision: CollisionModel | None = None,
-    obstacles: Sequence[Obstacle] = (),
     prior_information: FloatArray | None = None,
     rival: ArmModel | None = None,
     progress: Callable[[str | float, DesignProgress], None] | None = None,
@@ -183,7 +179,6 @@ def design_speeds(
             replace(settings, speed=speed),
             deepcopy(rng),
             collision=collision,
-            obstacles=obstacles,
             prior_information=prior_information,
             rival=rival,
             progress=tell,
@@ -230,19 +225,6 @@ def evaluate(
     return Design(
         excitation, information, described, problem.noise, cost, problem.limits, settings, stopped
     )
-
-
-def _clearance(
-    collision: CollisionModel | None, obstacles: Sequence[Obstacle]
-) -> ClearanceModel | None:
-    if collision is None:
-        if obstacles:
-            raise TrajectoryError(
-                f"obstacle '{obstacles[0].name}': the collision bodies of the robot are needed "
-                'to keep clear of it'
-            )
-        return None
-    return ClearanceModel.of(with_obstacles(collision, obstacles))
 
 
 def _checked_prior(

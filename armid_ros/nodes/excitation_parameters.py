@@ -23,7 +23,6 @@ from armid_ros.excitation import (
     load_environment,
     load_excitation,
     not_checked,
-    Obstacle,
     SPEED_CLASSES,
     trajectory_faults,
     transfer_limits,
@@ -102,10 +101,8 @@ class Surroundings:
     ----------
     robot : Robot
         The arm.
-    collision : CollisionModel
-        Its bodies.
-    obstacles : tuple of Obstacle
-        What stands around it, the floor among it.
+    bodies : CollisionModel
+        Its bodies, and what stands around it, the floor among it.
     planner : TransferPlanner
         Plans the way to an excitation.
     unchecked : tuple of str
@@ -114,8 +111,7 @@ class Surroundings:
     """
 
     robot: Robot
-    collision: CollisionModel
-    obstacles: tuple[Obstacle, ...]
+    bodies: CollisionModel
     planner: TransferPlanner
     unchecked: tuple[str, ...]
 
@@ -141,13 +137,11 @@ def make_surroundings(value: Values) -> Surroundings:
     around = load_environment(value('environment'), robot) if value('environment') else ()
     floor = find_floor(collision, value('floor'), around)
     around = (*around, *floor_obstacles(collision, floor, margin))
-    clearance = ClearanceModel.of(with_obstacles(collision, around))
-    planner = TransferPlanner(
-        ArmModel(robot), transfer_limits(robot, value('speed')), clearance, margin
-    )
-    limits = Limits.of(robot, speed=1.0)
-    unchecked = not_checked(limits, collision, floor, around)
-    return Surroundings(robot, collision, around, planner, unchecked)
+    bodies = with_obstacles(collision, around)
+    limits = transfer_limits(robot, value('speed'))
+    planner = TransferPlanner(ArmModel(robot), limits, ClearanceModel.of(bodies), margin)
+    unchecked = not_checked(Limits.of(robot, speed=1.0), collision, floor, around)
+    return Surroundings(robot, bodies, planner, unchecked)
 
 
 def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> Excitation:
@@ -189,13 +183,7 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
         processes=1,  # a signal to the node must not leave others behind
     )
     rng = np.random.default_rng(value('seed'))
-    return design(
-        arm,
-        settings,
-        rng,
-        collision=surroundings.collision,
-        obstacles=surroundings.obstacles,
-    ).excitation
+    return design(arm, settings, rng, collision=surroundings.bodies).excitation
 
 
 def _loaded(path: str, surroundings: Surroundings) -> Excitation:

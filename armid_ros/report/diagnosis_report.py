@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, NextRun
 from armid_ros.diagnosis.verdict.detectable import detectable
@@ -36,17 +36,58 @@ from armid_ros.residual import Residual
 TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
 
 
+@dataclass(frozen=True)
+class DiagnosedRecordings:
+    """
+    Recordings of a diagnosis.
+
+    Attributes
+    ----------
+    recordings : sequence of Recording
+        Data that were looked at.
+    held_out : sequence of Recording
+        Data that were only predicted.
+    baseline : sequence of Recording
+        Data from before.
+
+    """
+
+    recordings: Sequence[Recording] = ()
+    held_out: Sequence[Recording] = ()
+    baseline: Sequence[Recording] = ()
+
+
+@dataclass(frozen=True)
+class Extras:
+    """
+    What was made of a diagnosis.
+
+    Attributes
+    ----------
+    forward : tuple of ForwardValidation
+        Held-out recordings simulated, with the model as it was and as it is patched.
+    next_run : NextRun or None
+        A motion that separates names in doubt.
+    notes : tuple of str
+        Why there is not more.
+    residual : Residual or None
+        What is left without a name, learned.
+
+    """
+
+    forward: tuple[ForwardValidation, ...] = ()
+    next_run: NextRun | None = None
+    notes: tuple[str, ...] = ()
+    residual: Residual | None = None
+
+
 def diagnosis_report(
     diagnosis: Diagnosis,
+    data: DiagnosedRecordings,
     *,
     robot: str,
-    recordings: Sequence[Recording],
-    validation: Sequence[Recording] = (),
-    baseline: Sequence[Recording] = (),
     settings: DiagnosisSettings | None = None,
-    forward: Sequence[ForwardValidation] = (),
-    next_run: NextRun | None = None,
-    residual: Residual | None = None,
+    extras: Extras | None = None,
     patch: str = '',
     provenance: Provenance | None = None,
 ) -> str:
@@ -57,22 +98,14 @@ def diagnosis_report(
     ----------
     diagnosis : Diagnosis
         What was found.
+    data : DiagnosedRecordings
+        Where it was found.
     robot : str
         Shipped name or path of the description.
-    recordings : sequence of Recording
-        Data that were looked at.
-    validation : sequence of Recording
-        Data that were only predicted.
-    baseline : sequence of Recording
-        Data from before.
     settings : DiagnosisSettings, optional
         What was asked.
-    forward : sequence of ForwardValidation
-        Those data simulated, with the model as it was and as it is patched.
-    next_run : NextRun, optional
-        The motion that was written to separate names.
-    residual : Residual, optional
-        What is left without a name, learned.
+    extras : Extras, optional
+        What was made of it.
     patch : str
         model.yaml of the patched model.
     provenance : Provenance, optional
@@ -84,18 +117,18 @@ def diagnosis_report(
         One HTML file that loads nothing.
 
     """
-    settings = settings or DiagnosisSettings()
-    read = {'training': recordings, 'held-out': validation, 'baseline': baseline}
+    settings, extras = settings or DiagnosisSettings(), extras or Extras()
+    read = {'training': data.recordings, 'held-out': data.held_out, 'baseline': data.baseline}
     names = short_names([one.source for every in read.values() for one in every])
     sections: list[Section] = [
         _verdict(diagnosis, names),
-        *_story(diagnosis, names, residual),
-        *([] if residual is None else [ResidualMap(residual)]),
-        NextSteps([*_next_steps(diagnosis, next_run), *_of_maps(residual)]),
+        *_story(diagnosis, names, extras.residual),
+        *([] if extras.residual is None else [ResidualMap(extras.residual)]),
+        NextSteps([*_next_steps(diagnosis, extras.next_run), *_of_maps(extras.residual)]),
         *_small_print(diagnosis, settings),
     ]
-    if forward:
-        pairs = [_renamed(pair, names) for pair in forward]
+    if extras.forward:
+        pairs = [_renamed(pair, names) for pair in extras.forward]
         sections.append(Forward(diagnosis.arm.robot, pairs, ('as it was', 'patched')))
     sections.append(
         DataQuality([_quality(r, role, names) for role, every in read.items() for r in every])
@@ -104,11 +137,11 @@ def diagnosis_report(
         sections.append(PatchSection(diagnosis.findings, patch))
     sections.append(Origin(provenance or Provenance()))
     subtitle = (
-        f'{robot_label(robot)} · {counted(len(recordings), "recording")} · '
-        f'{counted(len(validation), "held-out recording")}'
+        f'{robot_label(robot)} · {counted(len(data.recordings), "recording")} · '
+        f'{counted(len(data.held_out), "held-out recording")}'
     )
-    if baseline:
-        subtitle += f' · {counted(len(baseline), "recording")} from before'
+    if data.baseline:
+        subtitle += f' · {counted(len(data.baseline), "recording")} from before'
     return Page(f'Diagnosis of {diagnosis.arm.robot.name}', subtitle, sections).html()
 
 

@@ -17,6 +17,7 @@ from armid_ros.excitation import (
     Limits,
     Obstacle,
     random_feasible,
+    with_obstacles,
 )
 from armid_ros.excitation.search.parallel import search_all, Task
 from armid_ros.robots import collision_model
@@ -258,18 +259,7 @@ def test_start_pose_in_a_wall_is_refused_with_the_wall(two_link_arm, quick):
             two_link_arm,
             settings,
             np.random.default_rng(0),
-            collision=collision_model(two_link_arm.robot),
-            obstacles=[wall],
-        )
-
-
-def test_obstacles_without_bodies_are_refused(two_link_arm, quick):
-    with pytest.raises(TrajectoryError, match="obstacle 'wall'"):
-        design(
-            two_link_arm,
-            quick,
-            np.random.default_rng(0),
-            obstacles=[Obstacle('wall', 'sphere', (0.3,))],
+            collision=with_obstacles(collision_model(two_link_arm.robot), [wall]),
         )
 
 

@@ -13,11 +13,7 @@ LONG = {'diagnosis/diagnose.py:diagnose', 'diagnosis/diagnose.py:_said'}
 MANY = {
     'api/diagnosis.py:diagnose',  # what a user types is spelled out
     'api/identification.py:identify',
-    'excitation/design.py:design',
-    'excitation/design.py:design_speeds',
-    'identification/estimators/side_by_side.py:compare_methods',
     'nodes/lockstep.py:run_lockstep',
-    'report/diagnosis_report.py:diagnosis_report',
 }
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import re
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.report.diagnosis_report import diagnosis_report
+from armid_ros.report.diagnosis_report import DiagnosedRecordings, diagnosis_report
 from armid_ros.report.notation import DASH, digits, percent, with_interval
 from armid_ros.report.sections.candidates import CandidateTable
 from armid_ros.report.sources import short_names, with_names
@@ -45,8 +45,8 @@ def html(found, recordings):
     """Return the report."""
     return diagnosis_report(
         found,
+        DiagnosedRecordings(recordings),
         robot='/home/me/two_links.urdf',
-        recordings=recordings,
         patch='effects:\n- name: <b>x</b>\n',
     )
 
@@ -57,7 +57,7 @@ def quiet():
     bench = Bench()
     recordings = bench.recordings()
     found = diagnose(bench.arm, recordings, rng=np.random.default_rng(0))
-    return diagnosis_report(found, robot='two_links', recordings=recordings)
+    return diagnosis_report(found, DiagnosedRecordings(recordings), robot='two_links')
 
 
 def test_the_story_comes_first_and_what_was_looked_at_last(html):

@@ -12,7 +12,7 @@ known.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from armid_ros.arm import ArmModel
@@ -41,6 +41,30 @@ import numpy as np
 TWINS = 4
 #: At most this much of each held-out recording is simulated [s].
 _LONGEST = 30.0
+
+
+@dataclass(frozen=True)
+class ComparisonSettings:
+    """
+    How estimators are compared.
+
+    Attributes
+    ----------
+    methods : sequence of str
+        Estimators.
+    signals : SignalSettings
+        Filters, the same for all.
+    seed : int
+        Of every random number.
+    twins : int
+        Simulated recordings for the bias; none for no bias.
+
+    """
+
+    methods: Sequence[Estimator]
+    signals: SignalSettings = field(default_factory=SignalSettings)
+    seed: int = 0
+    twins: int = TWINS
 
 
 @dataclass(frozen=True)
@@ -94,12 +118,9 @@ def compare_methods(
     arm: ArmModel,
     recordings: Sequence[Recording],
     held_out: Sequence[Recording],
-    methods: Sequence[Estimator],
-    signals: SignalSettings,
+    settings: ComparisonSettings,
     *,
-    seed: int,
     clock: Callable[[], float],
-    twins: int = TWINS,
     progress: Callable[[float, str], None] = lambda share, what: None,
 ) -> tuple[MethodScore, ...]:
     """
@@ -111,16 +132,10 @@ def compare_methods(
         Structure and description.
     recordings, held_out : sequence of Recording
         What is fitted, and what is predicted.
-    methods : sequence of str
-        Estimators.
-    signals : SignalSettings
-        Filters, the same for all.
-    seed : int
-        Of every random number.
+    settings : ComparisonSettings
+        What is compared, and how.
     clock : callable
         Returns the time that is counted [s].
-    twins : int
-        Simulated recordings for the bias; none for no bias.
     progress : callable, optional
         Told the share that is done, 0 to 1, and what is being done.
 
@@ -130,18 +145,19 @@ def compare_methods(
         If weighted least squares, which all are held against, cannot identify anything.
 
     """
+    methods, seed = settings.methods, settings.seed
     if not methods:
         return ()
-    plain = _fit(arm, recordings, 'wls', signals, seed)
-    nominal = _simulated(arm, recordings, plain, signals, seed)
-    pairs = _twins(plain, recordings, twins, seed)
+    plain = _fit(arm, recordings, 'wls', settings.signals, seed)
+    nominal = _simulated(arm, recordings, plain, settings.signals, seed)
+    pairs = _twins(plain, recordings, settings.twins, seed)
     fixed = SignalSettings(plain.used.cutoff_hz, plain.used.decimation)
     scores = []
     for index, method in enumerate(methods):
         progress(index / len(methods), f'comparing methods: {method}')
         begin = clock()
         try:
-            result = _fit(arm, recordings, method, signals, seed)
+            result = _fit(arm, recordings, method, settings.signals, seed)
         except ArmidError as error:
             spent = clock() - begin
             scores.append(MethodScore(method, None, None, None, None, None, spent, str(error)))

@@ -7,7 +7,7 @@ import itertools
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import SignalSettings
-from armid_ros.identification.estimators.side_by_side import compare_methods
+from armid_ros.identification.estimators.side_by_side import compare_methods, ComparisonSettings
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -30,11 +30,8 @@ def scores():
         ArmModel(arm.robot, arm.effects),
         [first],
         [second],
-        ('wls', 'iv'),
-        SignalSettings(20.0, 4),
-        seed=0,
+        ComparisonSettings(('wls', 'iv'), SignalSettings(20.0, 4), twins=2),
         clock=lambda: float(next(ticks)),
-        twins=2,
     )
 
 
@@ -59,8 +56,7 @@ def test_an_estimator_that_cannot_be_used_is_a_row_with_the_reason():
     for name in ('rotor_inertia', 'time_delay'):
         arm = arm.with_effect(make_effect(name, arm.robot))
     recording = recorded(arm, multisine(arm.robot.joints, 8.0, 200.0, 1), 1, 0.05)
-    (score,) = compare_methods(
-        arm, [recording], [], ('ekf',), SignalSettings(20.0, 4), seed=0, clock=lambda: 0.0, twins=0
-    )
+    settings = ComparisonSettings(('ekf',), SignalSettings(20.0, 4), twins=0)
+    (score,) = compare_methods(arm, [recording], [], settings, clock=lambda: 0.0)
     assert score.training is None
     assert 'ekf takes effects without a memory' in score.note
