@@ -13,8 +13,9 @@ from armid_ros.cli import options
 from armid_ros.cli.story import show_story, tell_story
 from armid_ros.cli.terminal import ConvergenceTable, progress, say
 from armid_ros.effects import make_effect
+from armid_ros.errors import ModelError
 from armid_ros.excitation import design, DesignSettings, Excitation, save_excitation
-from armid_ros.files import json_text
+from armid_ros.files import json_text, load_yaml, read_text
 from armid_ros.identification import (
     grade,
     identification_document,
@@ -28,6 +29,7 @@ from armid_ros.identification.output import SCHEMA
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_recording
 from armid_ros.robots import collision_model, load_robot, Robot
+from armid_ros.robots.shipped import shipped_path
 from armid_ros.simulation import Sensors, SimulatedArm
 import click
 import numpy as np
@@ -37,14 +39,6 @@ if TYPE_CHECKING:
 
 ROBOT = 'humanoid_arm'
 
-#: What the arm has beside its rigid body, joint by joint from shoulder to wrist.
-TRUE_EFFECTS = {
-    'viscous_friction': (0.10, 0.10, 0.04, 0.04, 0.012, 0.010),
-    'coulomb_friction': (0.08, 0.08, 0.03, 0.03, 0.010, 0.008),
-    'torque_offset': (0.02, -0.03, 0.01, 0.00, -0.005, 0.004),
-}
-#: How far the masses of the links are from those of the description.
-MASS_ERRORS = (1.08, 0.94, 1.05, 0.92, 1.10, 0.95)
 SENSORS = Sensors(
     torque_noise=np.array([0.02, 0.02, 0.01, 0.01, 0.004, 0.004]), resolution=2.0 * np.pi / 2**18
 )
@@ -148,9 +142,12 @@ def _run(
 
 def true_arm(robot: Robot) -> ArmModel:
     """Return the arm that is to be identified: other masses than described, and friction."""
-    parameters = robot.rigid_parameters.reshape(-1, 10) * np.array(MASS_ERRORS)[:, np.newaxis]
+    path = shipped_path(ROBOT).with_name('demo.yaml')
+    true = load_yaml(read_text(path, ModelError))
+    factors = np.array(true['mass_factors'])[:, np.newaxis]
+    parameters = robot.rigid_parameters.reshape(-1, 10) * factors
     arm = ArmModel(robot.with_inertias(parameters.ravel()))
-    for name, values in TRUE_EFFECTS.items():
+    for name, values in true['effects'].items():
         arm = arm.with_effect(make_effect(name, robot), values)
     return arm
 

@@ -12,6 +12,7 @@ from armid_ros.cli import options
 from armid_ros.cli.groups import gathered, RobotChoice
 from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.effects import Effect, parse_effect
+from armid_ros.effects.catalogue import EXAMPLES
 from armid_ros.elastic.identification import write_runs
 from armid_ros.elastic.plant.arm import ElasticArm, record
 from armid_ros.elastic.plant.setup import (
@@ -102,7 +103,7 @@ class NoiseOptions:
     'texts',
     multiple=True,
     metavar='NAME:k=v',
-    help='Such as viscous_friction:viscous_coefficient=0.1 or payload@wrist:payload_m=0.3.',
+    help=f'Such as {EXAMPLES}.',
 )
 @click.option('--model', type=click.Path(path_type=Path), help='A model.yaml of armid identify.')
 @click.option(

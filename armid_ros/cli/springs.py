@@ -6,13 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from armid_ros.arm import load_model
 from armid_ros.cli import options
 from armid_ros.cli.terminal import progress, say
 from armid_ros.elastic.identification.files import read_sides
-from armid_ros.elastic.identification.joints import fit_springs
+from armid_ros.elastic.identification.joints import fit_springs, SpringEstimate
 from armid_ros.elastic.identification.output import springs_document, SPRINGS_SCHEMA
 from armid_ros.elastic.report.springs_page import springs_report
 from armid_ros.errors import RecordingError
@@ -57,26 +56,27 @@ def identify_springs(
     if as_json:
         click.echo(json_text(document))
         return
-    for joint in document['joints']:
+    for joint in found:
         say(_line(joint))
     say(f'{out}: elastic.json, report.html')
 
 
-def _line(joint: dict[str, Any]) -> str:
+def _line(found: SpringEstimate) -> str:
     """Return what was found of a joint in words."""
-    if not joint['told']:
-        return f'{joint["joint"]}: the twist does not follow the load; no stiffness is told'
-    low, high = joint['stiffness_interval']
-    parts = [f'{joint["stiffness"]:.4g} N m/rad ({low:.4g} to {high:.4g}, 95 %)']
-    if joint['backlash_seen']:
-        parts.append(f'backlash {joint["backlash"]:.2g} rad')
-    elif joint['correlation'] is None:
-        parts.append('too few reversals of load to see backlash')
+    if not found.informative:
+        return f'{found.joint}: the twist does not follow the load; no stiffness is told'
+    fit = found.transmission
+    stiffness, low, high = fit.stiffness
+    parts = [f'{stiffness:.4g} N m/rad ({low:.4g} to {high:.4g}, 95 %)']
+    if fit.backlash_seen:
+        parts.append(f'free play {fit.backlash[0]:.2g} rad')
+    elif not np.isfinite(fit.correlation):
+        parts.append('too few reversals of load to see free play')
     else:
-        parts.append('no backlash seen')
-    if joint['rotor_inertia'] is not None:
-        parts.append(f'rotor {joint["rotor_inertia"]:.3g} kg m^2')
-    frequencies = f'antiresonance {joint["antiresonance_hz"]:.1f} Hz'
-    if joint['resonance_hz'] is not None:
-        frequencies += f', resonance {joint["resonance_hz"]:.1f} Hz'
-    return f'{joint["joint"]}: {"; ".join([*parts, frequencies])}'
+        parts.append('no free play seen')
+    if found.motor is not None:
+        parts.append(f'rotor {found.motor[0]:.3g} kg m^2')
+    frequencies = f'antiresonance {found.antiresonance:.1f} Hz'
+    if np.isfinite(found.resonance):
+        frequencies += f', resonance {found.resonance:.1f} Hz'
+    return f'{found.joint}: {"; ".join([*parts, frequencies])}'

@@ -160,6 +160,10 @@ def make_effect(text: str, robot: Robot) -> Effect:
     return CATALOGUE.find(name).on(robot, tuple(joints.split('+')) if joints else None)
 
 
+#: Two texts that `parse_effect` takes, for those who are asked for one.
+EXAMPLES = 'viscous_friction:viscous_coefficient=0.1 or payload@wrist:payload_m=0.3'
+
+
 def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
     """
     Make an effect and its values from one line of text.

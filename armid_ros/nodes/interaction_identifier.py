@@ -131,7 +131,7 @@ class InteractionIdentifierNode(ArmidNode):
             values |= _named(core.slack.interaction, ' with slack')
             if core.slack.seen:
                 return (
-                    f'interface_slack: straps give {1e3 * core.slack.value:.1f} mm before they '
+                    f'the straps are slack: they give {1e3 * core.slack.value:.1f} mm before they '
                     'pull; tighten them, or read the stiffness with slack'
                 ), values
         if not self.received:
