@@ -36,7 +36,7 @@ from armid_ros.report.sections.fleet import (
     TableRow,
     Wear,
 )
-from armid_ros.report.sections.verdict import VerdictSection
+from armid_ros.report.sections.frame import VerdictSection
 from markupsafe import Markup
 
 #: Parameters that have a column of curves in the overview.

@@ -14,9 +14,7 @@ from armid_ros.report.notation import counted, measured, pretty, robot_label
 from armid_ros.report.page import Page
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.changes import Changes
-from armid_ros.report.sections.facts import Asked
-from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import VerdictSection
+from armid_ros.report.sections.frame import Asked, Origin, VerdictSection
 
 #: Changes that are told in a sentence each; the table has all.
 _TOLD = 8

@@ -15,20 +15,20 @@ from armid_ros.report.notation import counted, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.candidates import CandidateTable
-from armid_ros.report.sections.could_be_seen import CouldBeSeen
 from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
-from armid_ros.report.sections.evidence import EvidenceSection
+from armid_ros.report.sections.diagnosed import (
+    CouldBeSeen,
+    EvidenceSection,
+    NamedParameters,
+    PatchSection,
+    Shares,
+    SmallPrint,
+)
 from armid_ros.report.sections.forward import Forward
+from armid_ros.report.sections.frame import NextSteps, Origin, VerdictSection
 from armid_ros.report.sections.gap import GapBars, GapOverlay
-from armid_ros.report.sections.named import NamedParameters
-from armid_ros.report.sections.next_steps import NextSteps
-from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.patch import PatchSection
 from armid_ros.report.sections.residual_map import ResidualMap
-from armid_ros.report.sections.shares import Shares
-from armid_ros.report.sections.small_print import SmallPrint
 from armid_ros.report.sections.story import Story
-from armid_ros.report.sections.verdict import VerdictSection
 from armid_ros.report.sources import short_names, with_names
 from armid_ros.residual import Residual
 

@@ -30,8 +30,7 @@ from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, digits, pretty, robot_label, torque_unit
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.facts import Asked
-from armid_ros.report.sections.origin import Origin
+from armid_ros.report.sections.frame import Asked, Origin, VerdictSection
 from armid_ros.report.sections.plan import (
     ArmPoses,
     Foreseen,
@@ -39,7 +38,6 @@ from armid_ros.report.sections.plan import (
     PlannedClearance,
     PlannedMotion,
 )
-from armid_ros.report.sections.verdict import VerdictSection
 from armid_ros.report.silhouettes import draw_silhouettes
 from armid_ros.robots import CollisionModel
 import numpy as np

@@ -17,21 +17,20 @@ from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.assessment import (
+    EncoderNoise,
+    Methods,
+    PhysicalSection,
+    WhitenessSection,
+)
 from armid_ros.report.sections.correlations import Correlations
 from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
-from armid_ros.report.sections.encoder_noise import EncoderNoise
 from armid_ros.report.sections.excitation import ExcitationSection
-from armid_ros.report.sections.facts import Asked
 from armid_ros.report.sections.fit import FitSection
 from armid_ros.report.sections.forward import Forward
-from armid_ros.report.sections.methods import Methods
-from armid_ros.report.sections.next_steps import NextSteps
-from armid_ros.report.sections.origin import Origin
+from armid_ros.report.sections.frame import Asked, NextSteps, Origin, VerdictSection
 from armid_ros.report.sections.parameters import ParameterSection
-from armid_ros.report.sections.physical import PhysicalSection
 from armid_ros.report.sections.residuals import Residuals
-from armid_ros.report.sections.verdict import VerdictSection
-from armid_ros.report.sections.whiteness import WhitenessSection
 from armid_ros.report.statistics import directions, torque_reach, torque_scale
 
 #: Colour of each grade.

@@ -10,9 +10,8 @@ from armid_ros.inspection import Inspection
 from armid_ros.report.notation import counted
 from armid_ros.report.page import Page
 from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.frame import Origin, VerdictSection
 from armid_ros.report.sections.inspection import ContentsSection, JointTable, RecordingCurves
-from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import VerdictSection
 
 
 def inspection_report(

@@ -15,8 +15,7 @@ from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.report.notation import counted, digits
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import VerdictSection
+from armid_ros.report.sections.frame import Origin, VerdictSection
 from armid_ros.robots.two_link import TwoLinkParameters
 
 #: How far the measured, decoupled response may be from that of the parameters [dB rms].

@@ -11,8 +11,7 @@ from armid_ros.elastic.report.springs import Springs
 from armid_ros.report.notation import counted
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import VerdictSection
+from armid_ros.report.sections.frame import Origin, VerdictSection
 
 
 def springs_report(

@@ -17,8 +17,7 @@ from armid_ros.pair.report.walk import CycleByTorque, Driven, FootForces, Walk
 from armid_ros.pair.torque_driven import GaitCheck
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.origin import Origin
-from armid_ros.report.sections.verdict import VerdictSection
+from armid_ros.report.sections.frame import Origin, VerdictSection
 from armid_ros.robots.assumptions import Assumption
 import numpy as np
 

@@ -1,0 +1,250 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The short sections of the page of a diagnosis: what was named, and where it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from typing import ClassVar
+
+from armid_ros.diagnosis import Diagnosis, Finding
+from armid_ros.diagnosis.verdict.detectable import Detectable
+from armid_ros.diagnosis.verdict.where import Where
+from armid_ros.effects import CATALOGUE
+from armid_ros.report.bars import Bar, BarChart
+from armid_ros.report.charts import Chart, Series
+from armid_ros.report.notation import digits, percent, pretty, probability, with_interval
+from armid_ros.report.page import Section
+
+#: Joints that are shown.
+_MOST = 3
+
+
+@dataclass(frozen=True)
+class Shares(Section):
+    """
+    Shares of the held-out gap.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis
+        What was found; something was.
+
+    """
+
+    title: ClassVar[str] = 'What explains the gap'
+    template: ClassVar[str] = 'shares.html'
+
+    diagnosis: Diagnosis
+
+    @property
+    def bars(self) -> BarChart:
+        """One bar a cause, and one for the rest, in per cent of the gap."""
+        rows = []
+        for one in self.diagnosis.findings:
+            where = ', '.join(one.place_of(joint) for joint in one.joints) or 'whole arm'
+            low, high = one.share_interval
+            text = f'{percent(one.share)} ({percent(low)} to {percent(high)})'
+            bar = Bar(max(one.share, 0.0), 'after', text)
+            rows.append((f'{one.name.replace("_", " ")}, {where}', [bar]))
+        rest = max(1.0 - sum(max(one.share, 0.0) for one in self.diagnosis.findings), 0.0)
+        rows.append(('the rest', [Bar(rest, 'floor', percent(rest))]))
+        return BarChart(rows, '', full=1.0)
+
+    @property
+    def data(self) -> str:
+        """What the shares were measured on."""
+        gap = self.diagnosis.gap
+        if gap is not None and gap.predicted:
+            return 'on recordings that were not used'
+        return 'on parts of the recordings, each predicted from the others'
+
+
+@dataclass(frozen=True)
+class NamedParameters(Section):
+    """
+    Values with 95 % intervals.
+
+    Attributes
+    ----------
+    findings : sequence of Finding
+        What was named.
+
+    """
+
+    title: ClassVar[str] = 'Parameters'
+    template: ClassVar[str] = 'named.html'
+
+    findings: Sequence[Finding]
+
+    @property
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """Effect, parameter, joint or segment, and value with its interval, as text."""
+        return [
+            (
+                finding.name.replace('_', ' '),
+                name.name.replace('_', ' '),
+                finding.place_of(name.joint) or 'whole arm',
+                with_interval(value, std, name.unit),
+            )
+            for finding in self.findings
+            for name, value, std in zip(
+                finding.parameters, finding.values, finding.std, strict=True
+            )
+        ]
+
+
+@dataclass(frozen=True)
+class EvidenceSection(Section):
+    """
+    Residuals without what was named.
+
+    Attributes
+    ----------
+    places : sequence of Where
+        Joints, the worst first.
+
+    """
+
+    title: ClassVar[str] = 'Where it lives'
+    template: ClassVar[str] = 'evidence.html'
+
+    places: Sequence[Where]
+
+    @property
+    def shown(self) -> Sequence[Where]:
+        """The worst joints."""
+        return self.places[:_MOST]
+
+    def charts(self, place: Where) -> list[tuple[str, Chart]]:
+        """Return a caption and a chart per quantity."""
+        return [
+            (
+                f'{axis.name}: {100.0 * axis.share:.0f} % of the power',
+                Chart(
+                    axis.centres,
+                    [Series('mean residual', axis.means, 'before', 'trend')],
+                    f'{axis.name} [{axis.unit}]',
+                    'residual [N m]',
+                    height=170,
+                    symmetric=True,
+                    legend=False,
+                ),
+            )
+            for axis in place.axes
+        ]
+
+
+@dataclass(frozen=True)
+class SmallPrint(Section):
+    """
+    Minor effects.
+
+    Attributes
+    ----------
+    minor : sequence of Finding
+        What is there beyond chance and smaller than what matters.
+    patched : bool
+        Whether it was added to the model all the same.
+
+    """
+
+    title: ClassVar[str] = 'Small print'
+    template: ClassVar[str] = 'small_print.html'
+
+    minor: Sequence[Finding]
+    patched: bool = False
+
+    @property
+    def rows(self) -> list[tuple[str, str, str, str, str]]:
+        """Effect, joints, first value, share and p, as text."""
+        return [
+            (
+                one.name.replace('_', ' '),
+                ', '.join(one.joints) or 'whole arm',
+                with_interval(one.values[0], one.std[0], one.parameters[0].unit)
+                if one.values
+                else '',
+                percent(one.share),
+                probability(one.p),
+            )
+            for one in self.minor
+        ]
+
+
+@dataclass(frozen=True)
+class CouldBeSeen(Section):
+    """
+    Smallest sizes that show, by effect.
+
+    Attributes
+    ----------
+    sizes : sequence of Detectable
+        Of all effects on all joints, those of an effect together.
+
+    """
+
+    title: ClassVar[str] = 'What could have been seen'
+    template: ClassVar[str] = 'could_be_seen.html'
+
+    sizes: Sequence[Detectable]
+
+    @property
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """Effect, size where it shows best and where worst, and where it does not, as text."""
+        rows = []
+        for name in dict.fromkeys(size.name for size in self.sizes):
+            own = [size for size in self.sizes if size.name == name]
+            told = sorted((s for s in own if math.isfinite(s.size)), key=lambda s: s.size)
+            best, worst = (_size(told[0]), _size(told[-1])) if told else ('', '')
+            never = '; '.join(_place(s) for s in own if not math.isfinite(s.size))
+            rows.append((name.replace('_', ' '), best, worst if worst != best else '', never))
+        return rows
+
+
+@dataclass(frozen=True)
+class PatchSection(Section):
+    """
+    What was added to the model, to be read and to be copied.
+
+    Attributes
+    ----------
+    findings : sequence of Finding
+        What was named.
+    text : str
+        model.yaml.
+
+    """
+
+    title: ClassVar[str] = 'Patch'
+    template: ClassVar[str] = 'patch.html'
+
+    findings: Sequence[Finding]
+    text: str
+
+    @property
+    def added(self) -> list[tuple[str, str]]:
+        """Name of each effect, and what it is."""
+        return [
+            (f.name, CATALOGUE[f.name].summary if f.name in CATALOGUE else 'an effect of your own')
+            for f in self.findings
+        ]
+
+    @property
+    def yaml(self) -> str:
+        """The effects of the patched model."""
+        start = max(self.text.find('effects:'), 0)
+        end = self.text.find('\nmisfit:')
+        return self.text[start:end] if end > start else self.text[start:]
+
+
+def _size(one: Detectable) -> str:
+    unit = '' if one.parameter is None else pretty(one.parameter.unit)
+    where = f' in {_place(one)}' if one.joints else ''
+    return f'{digits(one.size)} {unit}'.strip() + where
+
+
+def _place(one: Detectable) -> str:
+    return ', '.join(one.joints) or 'the arm'
