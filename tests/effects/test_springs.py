@@ -4,11 +4,12 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.effects.interaction import RecordedPoint
 from armid_ros.model import LinkFrames, point_motion
 from armid_ros.motion import Motion
 import numpy as np
 import pytest
+
+from tests.effects.recorded_point import RecordedPoint
 
 
 def closed_loop_path(robot, points=4000):

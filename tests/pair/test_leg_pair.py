@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects.interaction import HumanInteraction, RecordedPoint
+from armid_ros.effects.interaction import HumanInteraction
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics, random_motion
 from armid_ros.pair.gait import read_gait
@@ -23,6 +23,7 @@ from armid_ros.robots import Robot
 import numpy as np
 import pytest
 
+from tests.effects.recorded_point import RecordedPoint
 from tests.model.newton_euler import joint_torques, Segment
 
 SIGNS = (1.0, -1.0, 1.0, -1.0, 1.0, -1.0)
