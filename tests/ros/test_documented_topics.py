@@ -29,6 +29,11 @@ def documented(name, column):
     return {one if one.startswith('/') else f'/{one}' for one in full} - EVERYWHERE
 
 
+def test_every_executable_has_a_place_in_the_reference():
+    scripts = Path(__file__).parents[2] / 'scripts'
+    assert set(NODES) == {path.name for path in scripts.iterdir()} - {'armid'}
+
+
 @pytest.mark.parametrize('name', [name for name in NODES if name not in ANYTHING])
 def test_topics_and_services_are_those_of_the_table(name, bench):
     node = bench.add(NODES[name])

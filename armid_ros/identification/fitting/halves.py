@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from armid_ros.identification.fitting.normal_equations import informative_solution
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -62,7 +63,8 @@ def _fit(columns: FloatArray, rest: FloatArray, tau: FloatArray, weight: FloatAr
     Fit changes of the description, each of which may make as much torque as there is.
 
     That is a Bayesian estimate in units of the residual; without it, what a half does not tell at
-    all would be any number.
+    all would be any number. Where next to nothing is left, the residual is no unit, and what a
+    half does not tell stays as it is described.
 
     """
     stacked = (columns * weight[:, :, np.newaxis]).reshape(-1, columns.shape[2])
@@ -72,4 +74,4 @@ def _fit(columns: FloatArray, rest: FloatArray, tau: FloatArray, weight: FloatAr
     stacked = stacked / size
     normal = stacked.T @ stacked
     normal[np.diag_indices_from(normal)] += 1.0 / max(torque, 1.0) ** 2
-    return np.asarray(np.linalg.solve(normal, stacked.T @ (rest * weight).ravel()) / size)
+    return np.asarray(informative_solution(normal, stacked.T @ (rest * weight).ravel()) / size)
