@@ -29,8 +29,8 @@ import time
 
 from armid_ros.errors import ArmidError
 from armid_ros.files import load_yaml
-from armid_ros.nodes.domains import private_context
-from armid_ros.nodes.process import make_executor
+from armid_ros.nodes.running.domains import private_context
+from armid_ros.nodes.running.process import make_executor
 from armid_ros.recording import read_recording, Recording, write_recording
 import numpy as np
 from rclpy.node import Node

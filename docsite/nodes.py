@@ -12,7 +12,7 @@ from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
 from armid_ros.nodes.joint_state_merger import JointStateMergerNode
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
-from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.residual_markers import ResidualMarkersNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode

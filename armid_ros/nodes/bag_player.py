@@ -12,10 +12,10 @@ from typing import Any
 from armid_ros.errors import RecordingError
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.jump_guard import JumpGuard
-from armid_ros.nodes.message_classes import message_class
-from armid_ros.nodes.parameters import names, NodeParameter
-from armid_ros.nodes.process import run
+from armid_ros.nodes.messages.classes import message_class
+from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import offered
+from armid_ros.nodes.running.process import run
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.message_types import JOINT_TRAJECTORY
 from armid_ros.recording.source import RawMessage

@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.complaints import Complaints
-from armid_ros.nodes.parameters import as_declared, declare, is_as, NodeParameter
-from armid_ros.nodes.surviving import FATAL, surviving
+from armid_ros.nodes.parameters.table import as_declared, declare, is_as, NodeParameter
+from armid_ros.nodes.running.surviving import FATAL, surviving
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node

@@ -28,19 +28,19 @@ from armid_ros.excitation.files import load_excitation, read_excitation
 from armid_ros.excitation.supervision import HANDOVER, Speedometer
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.excitation_parameters import (
+from armid_ros.nodes.parameters.excitation import (
     checked,
     EXCITATION_PARAMETERS,
     make_excitation,
     make_surroundings,
 )
-from armid_ros.nodes.parameters import declare, NodeParameter
-from armid_ros.nodes.process import run
+from armid_ros.nodes.parameters.run import RUN_PARAMETERS, SIMULATION
+from armid_ros.nodes.parameters.table import declare, NodeParameter
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.nodes.run_parameters import RUN_PARAMETERS, SIMULATION
-from armid_ros.nodes.trajectories import write_trajectory
-from armid_ros.nodes.trajectory_action import Tolerances
-from armid_ros.nodes.trajectory_senders import TrajectorySenders
+from armid_ros.nodes.running.process import run
+from armid_ros.nodes.trajectory.action import Tolerances
+from armid_ros.nodes.trajectory.messages import write_trajectory
+from armid_ros.nodes.trajectory.senders import TrajectorySenders
 import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.time import Time

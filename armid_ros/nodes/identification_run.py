@@ -15,8 +15,8 @@ from typing import Any
 
 from armid_ros.errors import ArmidError, RecordingError, TrajectoryError
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.parameters import names, NodeParameter
-from armid_ros.nodes.process import run
+from armid_ros.nodes.parameters.table import names, NodeParameter
+from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.client import Client
 from rclpy.clock import Clock, ClockType

@@ -18,9 +18,9 @@ from armid_ros.identification.ties.online import InteractionSettings, OnlineInte
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
-from armid_ros.nodes.parameters import NodeParameter
-from armid_ros.nodes.process import run
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
+from armid_ros.nodes.running.process import run
 from armid_ros.pair.leg_pair import leg_pair
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np

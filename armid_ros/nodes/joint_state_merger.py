@@ -15,11 +15,11 @@ from armid_ros.identification.samples.joint_merge import JointMerger
 from armid_ros.inspection.band import LEAST, standing_bands
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.effort_messages import effort_reader, Reader
-from armid_ros.nodes.message_classes import message_class
-from armid_ros.nodes.parameters import names, NodeParameter, ParameterError
-from armid_ros.nodes.process import run
+from armid_ros.nodes.messages.classes import message_class
+from armid_ros.nodes.messages.efforts import effort_reader, Reader
+from armid_ros.nodes.parameters.table import names, NodeParameter, ParameterError
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, STREAM
+from armid_ros.nodes.running.process import run
 from armid_ros.robots import robot_from_urdf
 import numpy as np
 from rclpy.clock import Clock, ClockType

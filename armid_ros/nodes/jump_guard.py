@@ -7,7 +7,7 @@ from __future__ import annotations
 from armid_ros.errors import ArmidError
 from armid_ros.excitation import jump_fault, MeasuredPose
 from armid_ros.motion import FloatArray
-from armid_ros.nodes.trajectories import read_trajectory
+from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.robots import robot_from_urdf
 from armid_ros.simulation import Reference
 import numpy as np

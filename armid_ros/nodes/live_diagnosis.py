@@ -15,17 +15,17 @@ from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.live import Answer, Assistant, LiveDiagnosis
 from armid_ros.live.assistant import Done, Helper, Plan, Save
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.diagnoses import diagnosis_message, diagnosis_status
 from armid_ros.nodes.freshness import Freshness
-from armid_ros.nodes.joint_states import JointStateReader
-from armid_ros.nodes.live_parameters import (
+from armid_ros.nodes.messages.diagnoses import diagnosis_message, diagnosis_status
+from armid_ros.nodes.messages.joint_states import JointStateReader
+from armid_ros.nodes.parameters.live import (
     LIVE_PARAMETERS,
     LIVE_SETTINGS,
     make_diagnosis,
     settings_of,
 )
-from armid_ros.nodes.process import run
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
+from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState

@@ -26,14 +26,14 @@ from armid_ros.excitation import Excitation, TransferPlanner
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.domains import private_context
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
-from armid_ros.nodes.process import make_executor
 from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.recorder import RecorderNode
+from armid_ros.nodes.running.domains import private_context
+from armid_ros.nodes.running.process import make_executor
+from armid_ros.nodes.running.steady import steady
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
-from armid_ros.nodes.steady import steady
 from armid_ros.simulation import SimulatedArm
 from rclpy.context import Context
 from rclpy.executors import Executor

@@ -24,18 +24,18 @@ from armid_ros.identification.online.identifier import (
 from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.estimates import estimate_message, save_identification
 from armid_ros.nodes.freshness import Freshness
-from armid_ros.nodes.identifier_parameters import (
+from armid_ros.nodes.messages.estimates import estimate_message, save_identification
+from armid_ros.nodes.messages.joint_states import JointSample, JointStateReader
+from armid_ros.nodes.messages.learning_status import change_status, parameter_status
+from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,
     make_identifier,
     settings_of,
 )
-from armid_ros.nodes.joint_states import JointSample, JointStateReader
-from armid_ros.nodes.learning_status import change_status, parameter_status
-from armid_ros.nodes.parameters import NodeParameter
-from armid_ros.nodes.process import run
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, STREAM
+from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.clock import Clock, ClockType

@@ -18,10 +18,10 @@ from typing import Any, NoReturn
 from armid_ros.errors import ArmidError, RecordingEnded, RecordingError
 from armid_ros.files import size_text
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.message_classes import installed_definition, is_stamped, message_class
-from armid_ros.nodes.parameters import names, NodeParameter
-from armid_ros.nodes.process import run
+from armid_ros.nodes.messages.classes import installed_definition, is_stamped, message_class
+from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import MatchedSubscription, recorded
+from armid_ros.nodes.running.process import run
 from armid_ros.recording import BagWriter
 from rclpy.clock import Clock, ClockType
 

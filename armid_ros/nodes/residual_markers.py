@@ -11,10 +11,10 @@ from typing import Any
 from armid_msgs.msg import Diagnosis
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.joint_states import JointStateReader
-from armid_ros.nodes.parameters import NodeParameter
-from armid_ros.nodes.process import run
+from armid_ros.nodes.messages.joint_states import JointStateReader
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import DEPTH, LATCHED, MatchedSubscription, STREAM
+from armid_ros.nodes.running.process import run
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
 from armid_ros.view.scene import joint_axes, joint_frames
 from builtin_interfaces.msg import Duration

@@ -13,7 +13,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import read_model
 from armid_ros.elastic.plant.arm import ElasticArm, ElasticSample
 from armid_ros.errors import ArmidError, ModelError, TrajectoryError
-from armid_ros.nodes.arm_parameters import (
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.messages.elastic_topics import ElasticTopics
+from armid_ros.nodes.parameters.arm import (
     ARM_PARAMETERS,
     bare_arm,
     make_arm,
@@ -21,12 +23,10 @@ from armid_ros.nodes.arm_parameters import (
     sensors_of,
     with_effects,
 )
-from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.elastic_topics import ElasticTopics
-from armid_ros.nodes.parameters import NodeParameter
-from armid_ros.nodes.process import run
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, STREAM
-from armid_ros.nodes.trajectories import read_trajectory
+from armid_ros.nodes.running.process import run
+from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.simulation import Reference, SimulatedArm
 from armid_ros.simulation.run import whole_steps
 from rclpy.clock import Clock, ClockType

@@ -11,9 +11,9 @@ import time
 from typing import Any
 
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.parameters import names, NodeParameter
-from armid_ros.nodes.process import run
+from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import STREAM
+from armid_ros.nodes.running.process import run
 from armid_ros.pair.gait import read_gait
 from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
 from armid_ros.pair.simulated_pair import PairSensors, SimulatedPair

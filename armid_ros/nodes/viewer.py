@@ -10,10 +10,10 @@ from typing import Any
 
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.joint_states import JointStateReader
-from armid_ros.nodes.parameters import NodeParameter
-from armid_ros.nodes.process import run
+from armid_ros.nodes.messages.joint_states import JointStateReader
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import DEPTH, LATCHED, MatchedSubscription
+from armid_ros.nodes.running.process import run
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
 from armid_ros.view.live import LiveLog
 from armid_ros.view.rerun_log import open_stream

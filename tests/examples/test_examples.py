@@ -68,7 +68,7 @@ def test_every_example_is_in_the_list_of_them():
 
 
 def test_the_node_of_the_example_learns_the_friction_while_the_arm_moves():
-    from armid_ros.nodes.domains import private_context
+    from armid_ros.nodes.running.domains import private_context
     from sensor_msgs.msg import JointState
 
     spec = importlib.util.spec_from_file_location('online', ROOT / 'examples' / 'online.py')

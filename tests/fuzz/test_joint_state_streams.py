@@ -19,7 +19,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.motion import Motion
-from armid_ros.nodes.joint_states import JointStateReader
+from armid_ros.nodes.messages.joint_states import JointStateReader
 from armid_ros.robots import load_robot
 from builtin_interfaces.msg import Time
 from hypothesis import example, given, HealthCheck, settings, strategies

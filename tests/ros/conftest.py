@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 import time
 from typing import Any, TypeVar
 
-from armid_ros.nodes.domains import private_context
-from armid_ros.nodes.process import make_executor
 from armid_ros.nodes.qos import LATCHED
+from armid_ros.nodes.running.domains import private_context
+from armid_ros.nodes.running.process import make_executor
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest

@@ -20,7 +20,7 @@ import gc
 from armid_ros.arm import ArmModel
 from armid_ros.motion import Motion
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.nodes.trajectories import read_trajectory
+from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.simulation import Reference
 from builtin_interfaces.msg import Time
 from control_msgs.action import FollowJointTrajectory

@@ -18,7 +18,7 @@ from armid_ros.excitation import (
 from armid_ros.excitation.files import excitation_text
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.qos import LATCHED, STREAM
-from armid_ros.nodes.trajectories import read_trajectory
+from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest

@@ -21,7 +21,7 @@ from armid_ros.excitation import (
 )
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.nodes.trajectories import read_trajectory
+from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.recording import read_joint_trajectory
 from armid_ros.robots import load_robot
 from builtin_interfaces.msg import Time

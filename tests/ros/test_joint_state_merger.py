@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.nodes.joint_state_merger import JointStateMergerNode
-from armid_ros.nodes.parameters import ParameterError
+from armid_ros.nodes.parameters.table import ParameterError
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.robots import load_robot
 from control_msgs.msg import DynamicJointState, InterfaceValue

@@ -13,7 +13,7 @@ from armid_ros.motion import Motion
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
-from armid_ros.nodes.trajectories import write_trajectory
+from armid_ros.nodes.trajectory.messages import write_trajectory
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest

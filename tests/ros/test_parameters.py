@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.nodes.base import EXECUTOR
-from armid_ros.nodes.parameters import declare, NodeParameter, ParameterError
+from armid_ros.nodes.parameters.table import declare, NodeParameter, ParameterError
 from armid_ros.nodes.recorder import RecorderNode
 import pytest
 from rclpy.node import Node

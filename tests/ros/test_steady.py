@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import gc
 
-from armid_ros.nodes.domains import private_context
 from armid_ros.nodes.lockstep import Stage
-from armid_ros.nodes.steady import steady
+from armid_ros.nodes.running.domains import private_context
+from armid_ros.nodes.running.steady import steady
 import numpy as np
 from threadpoolctl import threadpool_info, threadpool_limits
 

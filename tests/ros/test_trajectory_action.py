@@ -9,8 +9,8 @@ import sys
 
 from action_msgs.msg import GoalStatus
 from armid_ros.errors import TrajectoryError
-from armid_ros.nodes.trajectories import read_trajectory
-from armid_ros.nodes.trajectory_action import beside
+from armid_ros.nodes.trajectory.action import beside
+from armid_ros.nodes.trajectory.messages import read_trajectory
 from control_msgs.action import FollowJointTrajectory
 import numpy as np
 import pytest
@@ -193,7 +193,7 @@ def test_a_controller_that_is_gone_is_said(bench, arm, excitation):
 
 
 def test_a_controller_that_never_answers_is_said(bench, arm, excitation, monkeypatch):
-    monkeypatch.setattr('armid_ros.nodes.trajectory_action._ANSWER', 0.0)
+    monkeypatch.setattr('armid_ros.nodes.trajectory.action._ANSWER', 0.0)
     node = publisher(bench, arm, excitation)
     node.start()
     node.look()

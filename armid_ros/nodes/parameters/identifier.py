@@ -11,7 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
-from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.robots import load_robot, parse_gravity, robot_from_urdf
 import numpy as np
 

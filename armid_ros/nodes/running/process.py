@@ -11,7 +11,7 @@ import sys
 
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.steady import steady
+from armid_ros.nodes.running.steady import steady
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context

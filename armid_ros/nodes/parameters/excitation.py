@@ -30,7 +30,7 @@ from armid_ros.excitation import (
     whole_period,
     with_obstacles,
 )
-from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.robots import collision_model, CollisionModel, load_robot, Robot
 import numpy as np
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.nodes.qos import LATCHED, STREAM
-from armid_ros.nodes.trajectory_action import (
+from armid_ros.nodes.trajectory.action import (
     ANYWHERE,
     beside,
     find_action,

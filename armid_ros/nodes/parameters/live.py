@@ -13,7 +13,7 @@ from armid_ros.api.arguments import read_recording
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.effects import parse_effect
 from armid_ros.live import LiveDiagnosis, LiveSettings
-from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
 
 Values = Callable[[str], Any]

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter
 
 SIMULATION = NodeParameter(
     'simulation',

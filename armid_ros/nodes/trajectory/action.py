@@ -12,7 +12,7 @@ from typing import Any
 
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
-from armid_ros.nodes.surviving import surviving
+from armid_ros.nodes.running.surviving import surviving
 from builtin_interfaces.msg import Duration
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle

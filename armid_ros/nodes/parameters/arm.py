@@ -20,7 +20,7 @@ from armid_ros.elastic.plant.setup import (
 )
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray
-from armid_ros.nodes.parameters import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.robots import load_robot, parse_gravity
 from armid_ros.robots.two_link import TwoLinkSet
 from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Sensors, SimulatedArm
