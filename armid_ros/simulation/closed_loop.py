@@ -4,46 +4,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armid_ros.motion import FloatArray, Motion
-from armid_ros.simulation.controller import Controller
+from armid_ros.motion import FloatArray
+from armid_ros.simulation.controller import Controller, Targets
 from armid_ros.simulation.integrator import step
 from armid_ros.simulation.plant import Plant, State
 import numpy as np
-
-
-@dataclass(frozen=True, eq=False)
-class Targets:
-    """
-    What a controller is to do at N successive steps.
-
-    Attributes
-    ----------
-    q, dq, ddq : ndarray, shape (N, n)
-        The reference [rad or m, s].
-    feedforward : ndarray, shape (N, n)
-        What the controller derives from the reference alone [N m].
-
-    """
-
-    q: FloatArray
-    dq: FloatArray
-    ddq: FloatArray
-    feedforward: FloatArray
-
-    @classmethod
-    def of(cls, desired: Motion, controller: Controller) -> Targets:
-        """Return the targets of a reference that has one row per step."""
-        return cls(desired.q, desired.dq, desired.ddq, controller.feedforward(desired))
-
-    def __getitem__(self, rows: slice) -> Targets:
-        """Return some of the steps."""
-        return Targets(self.q[rows], self.dq[rows], self.ddq[rows], self.feedforward[rows])
-
-    def __len__(self) -> int:
-        """Return the number of steps N."""
-        return len(self.q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,31 +21,35 @@ class Trace:
 
     Attributes
     ----------
-    q, dq : ndarray, shape (N, n)
-        State at the beginning of each step.
-    ddq, tau : ndarray, shape (N, n)
-        Mean acceleration, and the torque that the drives were asked for, of each step.
-    state : State
-        The state after the last step.
-    torque : ndarray, shape (n,)
-        The torque that the controller asks for there, as far as the drives have it.
+    states : list of State
+        From the beginning of the first step to the end of the last, N + 1 of them.
+    tau : ndarray, shape (N + 1, n)
+        The torque that the drives were asked for in each step, and in the one that comes next, as
+        far as they have it [N m].
 
     """
 
-    q: FloatArray
-    dq: FloatArray
-    ddq: FloatArray
+    states: list[State]
     tau: FloatArray
-    state: State
-    torque: FloatArray
+
+    @property
+    def state(self) -> State:
+        """The state after the last step."""
+        return self.states[-1]
+
+    @property
+    def torque(self) -> FloatArray:
+        """The torque that the controller asks for there, shape (n,) [N m]."""
+        return np.asarray(self.tau[-1])
 
 
 def command(
     plant: Plant, controller: Controller, state: State, targets: Targets, row: int
 ) -> FloatArray:
     """Return the torque for one row of the targets, within the limits of the drives, (n,)."""
+    q, dq, _ = plant.motors(state)
     desired = targets.q[row], targets.dq[row], targets.ddq[row]
-    asked = controller.torque(state.q, state.dq, desired, targets.feedforward[row])
+    asked = controller.torque(q, dq, desired, targets.feedforward[row])
     limit = plant.torque_limit
     return np.minimum(np.maximum(asked, -limit), limit)
 
@@ -102,11 +74,16 @@ def run(
         What to do at the end of each step.
 
     """
-    q, dq, ddq, tau = np.empty((4, len(targets), len(torque)))
-    drive = plant.action.drive
+    states, asked, drive = [state], [torque], plant.action.drive
     for k in range(len(targets)):
-        q[k], dq[k], tau[k] = state.q, state.dq, torque
         state = step(plant, state, torque if drive is None else drive(torque))
-        ddq[k] = state.ddq
         torque = command(plant, controller, state, targets, k)
-    return Trace(q, dq, ddq, tau, state, torque)
+        states.append(state)
+        asked.append(torque)
+    return Trace(states, np.array(asked))
+
+
+def motor_rows(plant: Plant, states: Sequence[State]) -> FloatArray:
+    """Return positions, velocities and accelerations of the motors, shape (3, N, n)."""
+    rows = np.concatenate([part for state in states for part in plant.motors(state)])
+    return rows.reshape(len(states), 3, -1).transpose(1, 0, 2)

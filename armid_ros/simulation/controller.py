@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
@@ -21,14 +22,69 @@ import pinocchio as pin
 BANDWIDTH = 50.0
 
 
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """
+    What a controller is to do at N successive steps.
+
+    Attributes
+    ----------
+    q, dq, ddq : ndarray, shape (N, n)
+        Where the motors are to be [rad or m, s].
+    feedforward : ndarray, shape (N, n)
+        Torque that the controller derives from the reference alone [N m].
+
+    """
+
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+    feedforward: FloatArray
+
+    def __getitem__(self, rows: slice) -> Targets:
+        """Return some of the steps."""
+        return Targets(self.q[rows], self.dq[rows], self.ddq[rows], self.feedforward[rows])
+
+    def __len__(self) -> int:
+        """Return the number of steps N."""
+        return len(self.q)
+
+
 class Controller(ABC):
     """
     A law from where the arm is, and where it should be, to the torque it is given.
 
     It sees the true position and velocity: sensors distort what is recorded, not what moves the
-    arm. Torque limits are the drives', applied to what it asks for.
+    arm; where joints give way, those of the motors. Torque limits are the drives', applied to what
+    it asks for.
+
+    Attributes
+    ----------
+    acts_once : bool
+        Whether it keeps something from step to step, so that it may act once a step only.
 
     """
+
+    acts_once: ClassVar[bool] = False
+
+    def started(self) -> Controller:
+        """Return one that has kept nothing yet: this one, where it never does."""
+        return self
+
+    def targets(self, desired: Motion, asked: FloatArray | None = None) -> Targets:
+        """
+        Return what to do at successive steps.
+
+        Parameters
+        ----------
+        desired : Motion
+            The reference, one row per step.
+        asked : ndarray, shape (n,), optional
+            Position that was the target of the first of these steps, for which the controller
+            has acted already.
+
+        """
+        return Targets(desired.q, desired.dq, desired.ddq, self.feedforward(desired))
 
     def feedforward(self, desired: Motion) -> FloatArray:
         """Return torques that depend on the reference only, shape (N, n) [N m]."""

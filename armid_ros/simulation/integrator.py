@@ -3,11 +3,12 @@
 """
 One step of the plant.
 
-The rigid body and the smooth effects are taken at the middle of the step, half a step ahead of the
-state, which makes the integration second order in the step with one evaluation of the dynamics;
-the torque is constant over a step, as a drive gives it. Damping is linearly implicit. Dry friction
-and joint stops are complementarity conditions on the velocity at the end of the step, so that what
-sticks has velocity zero, not a small one.
+Where joints give way, `spring_integrator` has it. Where they are rigid, the rigid body and the
+smooth effects are taken at the middle of the step, half a step ahead of the state, which makes the
+integration second order in the step with one evaluation of the dynamics; the torque is constant
+over a step, as a drive gives it. Damping is linearly implicit. Dry friction and joint stops are
+complementarity conditions on the velocity at the end of the step, so that what sticks has velocity
+zero, not a small one.
 
 """
 
@@ -17,7 +18,10 @@ from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.bodies import no_body
 from armid_ros.simulation.box_complementarity import Modes, solve_box_complementarity
-from armid_ros.simulation.plant import Contacts, Plant, State
+from armid_ros.simulation.contacts import Contacts
+from armid_ros.simulation.plant import Plant, State
+from armid_ros.simulation.spring_integrator import spring_substep
+from armid_ros.simulation.springs import ElasticJoints
 import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dposv
@@ -42,19 +46,18 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
         Where it is one step later.
 
     """
+    if plant.springs is not None and state.rotors is not None:
+        return _on_springs(plant, plant.springs, state, torque)
     dt, half = plant.spans
     model, data, dq = plant.robot.model, plant.data, state.dq
     q_middle = state.q + half * dq
     dq_middle = dq + half * state.ddq
     weight = pin.nonLinearEffects(model, data, q_middle, dq_middle)
-    force = torque - weight
-    force -= plant.constant
-    force -= plant.damping.dot(dq)
-    if plant.torque is not None:
-        force -= plant.torque(np.asarray(state.t + half), q_middle, dq_middle)
     memory, slipping = state.memory, plant.action.hysteresis
-    if slipping is not None:
-        force -= slipping.torque(slipping.advance(memory, half * dq))
+    middle = memory if slipping is None else slipping.advance(memory, half * dq)
+    force = plant.drive_force(torque, np.asarray(state.t + half), q_middle, dq_middle, middle)
+    force -= weight
+    force -= plant.damping.dot(dq)
     mass = pin.crba(model, data, q_middle)
     contacts, load = plant.contacts, None
     if contacts.friction is not None:
@@ -73,6 +76,15 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
         memory = slipping.advance(memory, q_next - state.q)
     steps = state.steps + 1
     return State(steps, steps * plant.dt, q_next, dq_next, (dq_next - dq) / dt, modes, memory)
+
+
+def _on_springs(plant: Plant, springs: ElasticJoints, state: State, torque: FloatArray) -> State:
+    """Integrate one step, in parts, where joints give way."""
+    steps = state.steps + 1
+    for _ in range(springs.substeps):
+        assert state.rotors is not None
+        state = spring_substep(plant, springs, state.rotors, state, torque)
+    return state._replace(steps=steps, t=steps * plant.dt)
 
 
 def _solve(
