@@ -48,10 +48,9 @@ def command(
 ) -> FloatArray:
     """Return the torque for one row of the targets, within the limits of the drives, (n,)."""
     q, dq, _ = plant.motors(state)
-    desired = targets.q[row], targets.dq[row], targets.ddq[row]
-    asked = controller.torque(q, dq, desired, targets.feedforward[row])
-    limit = plant.torque_limit
-    return np.minimum(np.maximum(asked, -limit), limit)
+    asked = controller.torque(q, dq, *targets.row(row))
+    lowest, highest = plant.torque_range
+    return np.minimum(np.maximum(asked, lowest), highest)
 
 
 def run(

@@ -41,6 +41,10 @@ class Targets:
     ddq: FloatArray
     feedforward: FloatArray
 
+    def row(self, k: int) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
+        """Return position, velocity and acceleration of one step, and its feedforward, (n,)."""
+        return (self.q[k], self.dq[k], self.ddq[k]), self.feedforward[k]
+
     def __getitem__(self, rows: slice) -> Targets:
         """Return some of the steps."""
         return Targets(self.q[rows], self.dq[rows], self.ddq[rows], self.feedforward[rows])
@@ -139,7 +143,7 @@ class ComputedTorque(Controller):
     _robot: Robot = field(init=False, repr=False)
     _data: pin.Data = field(init=False, repr=False)
     _gains: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
-    _inertia: FloatArray = field(init=False, repr=False)
+    _inertia: FloatArray | None = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the gains and collect what the effects of the nominal arm do."""
@@ -147,19 +151,18 @@ class ComputedTorque(Controller):
         robot = action.robot or self.arm.robot
         omega = _per_joint(self.bandwidth, robot, 'bandwidth')
         zeta = _per_joint(self.damping_ratio, robot, 'damping ratio')
-        n = robot.n_joints
         object.__setattr__(self, '_robot', robot)
         object.__setattr__(self, '_data', robot.model.createData())
         object.__setattr__(self, '_gains', (omega**2, 2.0 * zeta * omega))
-        inertia = np.zeros((n, n)) if action.inertia is None else action.inertia
-        object.__setattr__(self, '_inertia', inertia)
+        object.__setattr__(self, '_inertia', action.inertia)
 
     def feedforward(self, desired: Motion) -> FloatArray:
         """Return damping, dry friction and other torques at the reference, shape (N, n)."""
         action = self.arm.action()
         depends = action.dry_friction is not None and action.dry_friction.load_share is not None
         load = self.arm.load(desired) if depends else np.zeros_like(desired.q)
-        return action.effort(desired, desired, load) - desired.ddq @ self._inertia.T
+        effort = action.effort(desired, desired, load)
+        return effort if self._inertia is None else effort - desired.ddq @ self._inertia.T
 
     def torque(
         self,
@@ -175,7 +178,8 @@ class ComputedTorque(Controller):
         ddq += damping * (dq_desired - dq)
         ddq += ddq_desired
         tau = pin.rnea(self._robot.model, self._data, q, dq, ddq)
-        tau += self._inertia.dot(ddq)
+        if self._inertia is not None:
+            tau += self._inertia.dot(ddq)
         tau += feedforward
         return np.asarray(tau)
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
 from typing import NamedTuple
 
@@ -107,7 +107,7 @@ class Plant:
     inertia : ndarray, shape (n, n)
         What is added to the inertia matrix of the rigid body: rotors, and the implicit part of
         the damping [kg m^2].
-    constant : ndarray, shape (n,)
+    constant : ndarray, shape (n,), or None
         Constant torque that the actuators have to supply [N m].
     torque : callable (t, q, dq) -> ndarray (n,), or None
         Anything else that they have to supply; with springs, that the motors have to.
@@ -117,8 +117,8 @@ class Plant:
         What is between motors and links; None where all joints are rigid.
     spans : tuple of ndarray, each of shape ()
         The step and half of it [s]; numpy multiplies by these in half the time of a float.
-    torque_limit : ndarray, shape (n,)
-        What the drives have [N m].
+    torque_range : tuple of ndarray, each of shape (n,)
+        What the drives have, backwards and forwards [N m].
     stops : list of (float, float)
         Lower and upper position limit of every joint [rad or m].
     data : pinocchio.Data
@@ -138,10 +138,10 @@ class Plant:
     springs: ElasticJoints | None = field(init=False, repr=False)
     data: pin.Data = field(init=False, repr=False)
     damping: FloatArray = field(init=False, repr=False)
-    constant: FloatArray = field(init=False, repr=False)
+    constant: FloatArray | None = field(init=False, repr=False)
     inertia: FloatArray = field(init=False, repr=False)
     spans: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
-    torque_limit: FloatArray = field(init=False, repr=False)
+    torque_range: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
     stops: list[tuple[float, float]] = field(init=False, repr=False)
     _at_stops: dict[tuple[bytes, bytes], Contacts] = field(
         init=False, repr=False, default_factory=dict
@@ -172,14 +172,14 @@ class Plant:
             'robot': robot,
             'contacts': Contacts.of(friction),
             'spans': (np.array(self.dt), np.array(self.dt / 2)),
-            'torque_limit': robot.torque_limit,
+            'torque_range': (-robot.torque_limit, robot.torque_limit),
             'stops': list(zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)),
             'data': data,
             'torque': torque,
             'action': action,
             'springs': springs,
             'damping': damping,
-            'constant': constant,
+            'constant': constant if constant.any() else None,
             'inertia': inertia + weight * self.dt * damping,
         }
         for name, value in values.items():
@@ -232,22 +232,17 @@ class Plant:
         dq[joints], ddq[joints] = rotors.dq, rotors.ddq
         return q, dq, ddq
 
-    def drive_force(
-        self,
-        torque: FloatArray,
-        t: FloatArray,
-        q: FloatArray,
-        dq: FloatArray,
-        memory: FloatArray,
-    ) -> FloatArray:
+    def resist(
+        self, force: FloatArray, t: float, q: FloatArray, dq: FloatArray, memory: FloatArray
+    ) -> None:
         """
-        Return what is left of actuator torques when the smooth effects have theirs, (n,) [N m].
+        Subtract from forces on the motors, (n,) [N m], what smooth effects take.
 
         Parameters
         ----------
-        torque : ndarray, shape (n,)
-            What the actuators give [N m].
-        t : ndarray, shape ()
+        force : ndarray, shape (n,)
+            Is changed [N m].
+        t : float
             Time [s].
         q, dq : ndarray, shape (n,)
             Positions and velocities of the motors.
@@ -255,12 +250,12 @@ class Plant:
             States of the friction that has some.
 
         """
-        force = torque - self.constant
+        if self.constant is not None:
+            force -= self.constant
         if self.torque is not None:
-            force -= self.torque(t, q, dq)
+            force -= self.torque(np.asarray(t), q, dq)
         if self.action.hysteresis is not None:
             force -= self.action.hysteresis.torque(memory)
-        return force
 
     @property
     def sensing(self) -> Action:
@@ -294,16 +289,16 @@ class Plant:
         key = (at_lower.tobytes(), at_upper.tobytes())
         if key not in self._at_stops:
             friction, hit = self.contacts, np.flatnonzero(at_lower | at_upper)
-            self._at_stops[key] = Contacts.of(
-                DryFriction(
-                    np.vstack([friction.directions, np.eye(self.robot.n_joints)[hit]]),
-                    np.append(friction.law.lower, np.where(at_lower[hit], -np.inf, 0.0)),
-                    np.append(friction.law.upper, np.where(at_upper[hit], np.inf, 0.0)),
-                    None
-                    if friction.friction is None or friction.friction.load_share is None
-                    else np.append(friction.friction.load_share, np.zeros(len(hit))),
-                )
+            loaded = friction.friction
+            elements = DryFriction(
+                np.vstack([friction.directions, np.eye(self.robot.n_joints)[hit]]),
+                np.append(friction.law.lower, np.where(at_lower[hit], -np.inf, 0.0)),
+                np.append(friction.law.upper, np.where(at_upper[hit], np.inf, 0.0)),
+                None
+                if loaded is None or loaded.load_share is None
+                else np.append(loaded.load_share, np.zeros(len(hit))),
             )
+            self._at_stops[key] = replace(Contacts.of(elements), own=False)
         return self._at_stops[key]
 
 

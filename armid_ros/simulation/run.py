@@ -140,7 +140,7 @@ def simulate(
             progress(state.steps / (last + 1))
 
     q, dq, ddq, tau = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    saturated = np.mean(np.abs(tau) >= plant.torque_limit, axis=0)
+    saturated = np.mean(np.abs(tau) >= plant.torque_range[1], axis=0)
     given = tau if plant.action.drive is None else plant.action.drive(tau)
     ddq, given, asked = (np.concatenate([x[:1], (x[1:] + x[:-1]) / 2]) for x in (ddq, given, tau))
     truth = Motion(plant.robot.joints, plant.times(0, last + 1), q, dq, ddq, given)

@@ -108,17 +108,18 @@ def _force(
     """Return what acts on motors and links at the middle of a substep, and the new memory."""
     q, v, twist = middle
     robot, action, e = plant.robot, plant.action, len(springs.joints)
-    t = np.asarray(state.t + 0.5 * springs.dt)
+    t = state.t + 0.5 * springs.dt
     motor_speed = springs.to_motors.dot(v)
     memory, middle_memory = state.memory, state.memory
     if action.hysteresis is not None:
         middle_memory = action.hysteresis.advance(memory, 0.5 * springs.dt * motor_speed)
         memory = action.hysteresis.advance(memory, springs.dt * motor_speed)
-    drive = plant.drive_force(torque, t, springs.at_motors(q, twist), motor_speed, middle_memory)
+    drive = torque.copy()
+    plant.resist(drive, t, springs.at_motors(q, twist), motor_speed, middle_memory)
     force = springs.to_motors.T.dot(drive)
     force[e:] -= pin.nonLinearEffects(robot.model, plant.data, q, v[e:])
     if action.link_torque is not None:
-        force[e:] -= action.link_torque(t, q, v[e:])
+        force[e:] -= action.link_torque(np.asarray(t), q, v[e:])
     if plant.hard_stops:
         beyond = q - np.minimum(np.maximum(q, robot.lower), robot.upper)
         if beyond.any():
