@@ -4,11 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.motion import FloatArray
-from armid_ros.simulation.controller import Controller, Targets
+from armid_ros.simulation.controller import Controller, Target, Targets
 from armid_ros.simulation.integrator import step
 from armid_ros.simulation.plant import Plant, State
 import numpy as np
@@ -21,36 +20,28 @@ class Trace:
 
     Attributes
     ----------
-    states : list of State
-        From the beginning of the first step to the end of the last, N + 1 of them.
+    motors, links : ndarray, shape (3, N + 1, n)
+        Positions, velocities and accelerations from the beginning of the first step to the end of
+        the last; one array where all joints are rigid.
     tau : ndarray, shape (N + 1, n)
         The torque that the drives were asked for in each step, and in the one that comes next, as
         far as they have it [N m].
+    state : State
+        The state after the last step.
 
     """
 
-    states: list[State]
+    motors: FloatArray
+    links: FloatArray
     tau: FloatArray
-
-    @property
-    def state(self) -> State:
-        """The state after the last step."""
-        return self.states[-1]
-
-    @property
-    def torque(self) -> FloatArray:
-        """The torque that the controller asks for there, shape (n,) [N m]."""
-        return np.asarray(self.tau[-1])
+    state: State
 
 
-def command(
-    plant: Plant, controller: Controller, state: State, targets: Targets, row: int
-) -> FloatArray:
-    """Return the torque for one row of the targets, within the limits of the drives, (n,)."""
+def command(plant: Plant, controller: Controller, state: State, target: Target) -> FloatArray:
+    """Return the torque for a target, within the limits of the drives, shape (n,) [N m]."""
     q, dq, _ = plant.motors(state)
-    asked = controller.torque(q, dq, *targets.row(row))
     lowest, highest = plant.torque_range
-    return np.minimum(np.maximum(asked, lowest), highest)
+    return np.minimum(np.maximum(controller.torque(q, dq, *target), lowest), highest)
 
 
 def run(
@@ -73,16 +64,17 @@ def run(
         What to do at the end of each step.
 
     """
-    states, asked, drive = [state], [torque], plant.action.drive
-    for k in range(len(targets)):
-        state = step(plant, state, torque if drive is None else drive(torque))
-        torque = command(plant, controller, state, targets, k)
-        states.append(state)
-        asked.append(torque)
-    return Trace(states, np.array(asked))
-
-
-def motor_rows(plant: Plant, states: Sequence[State]) -> FloatArray:
-    """Return positions, velocities and accelerations of the motors, shape (3, N, n)."""
-    rows = np.concatenate([part for state in states for part in plant.motors(state)])
-    return rows.reshape(len(states), 3, -1).transpose(1, 0, 2)
+    count, drive = len(targets), plant.action.drive
+    tau = np.empty((count + 1, len(torque)))
+    links = np.empty((3, *tau.shape))
+    motors = links if plant.springs is None else np.empty_like(links)
+    q, dq, ddq = links
+    steps = iter(targets)
+    for k in range(count + 1):
+        q[k], dq[k], ddq[k], tau[k] = state.q, state.dq, state.ddq, torque
+        if motors is not links:
+            motors[:, k] = plant.motors(state)
+        if k < count:
+            state = step(plant, state, torque if drive is None else drive(torque))
+            torque = command(plant, controller, state, next(steps))
+    return Trace(motors, links, tau, state)

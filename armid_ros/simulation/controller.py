@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -20,6 +21,10 @@ import pinocchio as pin
 #: Natural frequency of the closed loop [rad/s]: 8 Hz, stiff for an arm, and slow enough for 1 kHz
 #: control of a joint that is half as heavy as its model.
 BANDWIDTH = 50.0
+
+
+#: Position, velocity and acceleration to have, and torque of the feedforward, each of shape (n,).
+Target = tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +46,9 @@ class Targets:
     ddq: FloatArray
     feedforward: FloatArray
 
-    def row(self, k: int) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
-        """Return position, velocity and acceleration of one step, and its feedforward, (n,)."""
-        return (self.q[k], self.dq[k], self.ddq[k]), self.feedforward[k]
+    def __iter__(self) -> Iterator[Target]:
+        """Yield what to do at one step after the other."""
+        return zip(zip(self.q, self.dq, self.ddq, strict=True), self.feedforward, strict=True)
 
     def __getitem__(self, rows: slice) -> Targets:
         """Return some of the steps."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_ros.effects import Action
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.simulation.closed_loop import motor_rows, Trace
+from armid_ros.simulation.closed_loop import Trace
 from armid_ros.simulation.plant import Plant, State
 import numpy as np
 
@@ -85,7 +85,7 @@ class RecentPast:
         drive = plant.action.drive
         given = asked if drive is None else drive(asked)
         rows = np.empty((len(asked) - 1, 5, asked.shape[1]))
-        rows[:, :3] = motor_rows(plant, trace.states[1:]).transpose(1, 0, 2)
+        rows[:, :3] = trace.motors[:, 1:].transpose(1, 0, 2)
         for column, tau in ((3, given), (4, asked)):
             rows[:, column] = (tau[1:] + tau[:-1]) / 2 if plant.springs is None else tau[1:]
         self._rows = np.concatenate([self._rows, rows])[-self._length :]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.simulation.closed_loop import command, motor_rows, run
+from armid_ros.simulation.closed_loop import command, run
 from armid_ros.simulation.controller import ComputedTorque, Controller, Targets
 from armid_ros.simulation.plant import Plant
 from armid_ros.simulation.readings import readings
@@ -126,16 +126,16 @@ def simulate(
 
     start = curve.sample(np.zeros(1))
     state = plant.state(start.q[0], start.dq[0], start.ddq[0])
-    torque = command(plant, controller, state, targets(0, 1), 0)
+    torque = command(plant, controller, state, next(iter(targets(0, 1))))
     pieces = []
     while state.steps <= last:
         count = min(_BLOCK, last + 1 - state.steps)
         with np.errstate(over='ignore', invalid='ignore'):  # looked for below
             trace = run(plant, controller, state, torque, targets(state.steps + 1, count))
-        q, dq, ddq = motor_rows(plant, trace.states)
+        q, dq, ddq = trace.motors
         _require_motion(plant, dq[:-1], state.steps)
         pieces.append((q[:-1], dq[:-1], ddq[1:], trace.tau[:-1]))
-        state, torque = trace.state, trace.torque
+        state, torque = trace.state, trace.tau[-1]
         if progress is not None:
             progress(state.steps / (last + 1))
 
@@ -145,8 +145,8 @@ def simulate(
     ddq, given, asked = (np.concatenate([x[:1], (x[1:] + x[:-1]) / 2]) for x in (ddq, given, tau))
     truth = Motion(plant.robot.joints, plant.times(0, last + 1), q, dq, ddq, given)
     q, dq, asked = readings(plant.sensing, truth, asked)
-    rows = np.arange(0, last + 1, stride)
-    late = asked[np.maximum(rows - sensors.torque_delay, 0)]
+    rows = slice(None, None, stride)
+    late = asked[np.maximum(np.arange(0, last + 1, stride) - sensors.torque_delay, 0)]
     measured = sensors.measure(q[rows], dq[rows], late, stride * plant.dt, rng)
     truth = truth.select(rows)
     desired = curve.sample(truth.t)

@@ -252,7 +252,7 @@ class SimulatedArm:
             taken = min(left, len(self._targets) - row)
             targets = self._targets[row : row + taken]
             trace = run(self.plant, self._acting, self._state, self._torque, targets)
-            self._state, self._torque = trace.state, trace.torque
+            self._state, self._torque = trace.state, trace.tau[-1]
             self._past.extend(trace)
             left -= taken
         return self.read(steps)
@@ -296,7 +296,7 @@ class SimulatedArm:
 
     def _act(self) -> None:
         """Let the controller do what the course says now."""
-        self._torque = command(self.plant, self._acting, self._state, self._targets, 0)
+        self._torque = command(self.plant, self._acting, self._state, next(iter(self._targets)))
 
     def _look_ahead(self, asked: FloatArray | None = None) -> None:
         """Evaluate the reference from now on, for some time; motors were to be here now."""

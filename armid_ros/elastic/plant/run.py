@@ -10,15 +10,12 @@ from dataclasses import dataclass, replace
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
-from armid_ros.simulation.closed_loop import command, motor_rows, run
+from armid_ros.simulation.closed_loop import command, run
 from armid_ros.simulation.controller import Targets
 from armid_ros.simulation.motor_control import MotorControl, VelocityLoop
 from armid_ros.simulation.plant import limit_slack, Plant, State
 import numpy as np
 import numpy.typing as npt
-
-#: Names of the motion of the links in a state.
-_LINK = ('q', 'dq', 'ddq')
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,14 +124,13 @@ def run_elastic(plant: Plant, loop: VelocityLoop, experiment: Experiment) -> Ela
     extra = still if experiment.torque is None else experiment.torque
     targets = Targets(still, experiment.velocity, still, extra)
     state = plant.state(experiment.q)
-    torque = command(plant, control, state, targets, 0)
+    torque = command(plant, control, state, next(iter(targets)))
     trace = run(plant, control, state, torque, targets[1:])
     _require_range(plant.robot, trace.state)
     joints, t = plant.robot.joints, plant.times(0, len(targets))
-    q, dq, _ = motor_rows(plant, trace.states)
-    link = (np.array([getattr(state, name) for state in trace.states]) for name in _LINK)
+    q, dq, _ = trace.motors
     motor = Motion(joints, t, q, dq, still, trace.tau)
-    return ElasticRun(motor, Motion(joints, t, *link), experiment.velocity)
+    return ElasticRun(motor, Motion(joints, t, *trace.links), experiment.velocity)
 
 
 def run_all(
