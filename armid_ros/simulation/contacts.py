@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 
-class Pattern(NamedTuple):
+class KnownModes(NamedTuple):
     """
     What is constant of a step as long as every element does what it does.
 
@@ -62,7 +62,7 @@ class Contacts:
     axes: tuple[int, ...]
     own: bool
     friction: DryFriction | None = None
-    _patterns: dict[Modes, Pattern] = field(init=False, repr=False, default_factory=dict)
+    _patterns: dict[Modes, KnownModes] = field(init=False, repr=False, default_factory=dict)
 
     @classmethod
     def of(cls, friction: DryFriction) -> Contacts:
@@ -75,7 +75,7 @@ class Contacts:
         own = unit and -1 not in axes and loaded is None
         return cls(directions, law, axes, own, loaded)
 
-    def pattern(self, modes: Modes) -> Pattern | None:
+    def pattern(self, modes: Modes) -> KnownModes | None:
         """
         Return what a step is made of in which all elements do what they do; None if not known.
 
@@ -88,12 +88,12 @@ class Contacts:
             found = self._patterns[modes] = self._new_pattern(np.array(modes, dtype=int))
         return found
 
-    def _new_pattern(self, modes: npt.NDArray[np.intp]) -> Pattern:
+    def _new_pattern(self, modes: npt.NDArray[np.intp]) -> KnownModes:
         bound = np.where(modes > 0, self.law.upper, np.where(modes < 0, self.law.lower, 0.0))
         taken = np.asarray(bound @ self.directions)
         free = 1.0 - np.any(self.directions[modes == 0], axis=0)
         moving = None if free.all() else free
-        return Pattern(taken, moving, np.outer(free, free), np.diag(1.0 - free))
+        return KnownModes(taken, moving, np.outer(free, free), np.diag(1.0 - free))
 
     def obeyed(self, dq: FloatArray, modes: Modes, taken: FloatArray | None) -> bool:
         """Tell whether elements obey their laws at joint velocities and torques, (n,)."""
