@@ -29,7 +29,6 @@ from armid_ros.elastic.plant.run import (
     ElasticSensors,
     Experiment,
     run_all,
-    VelocityLoop,
 )
 from armid_ros.elastic.plant.signals import (
     EXCITATION_RMS,
@@ -42,6 +41,7 @@ from armid_ros.elastic.plant.signals import (
 from armid_ros.elastic.plant.two_link import modes, two_link_loop, two_link_plant
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters
+from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np
 
 DT = 1e-3

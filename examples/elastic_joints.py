@@ -6,7 +6,7 @@ from pathlib import Path
 
 import armid_ros as ar
 from armid_ros.elastic.identification.joints import fit_springs
-from armid_ros.elastic.plant.arm import record
+from armid_ros.elastic.plant.record import record
 from armid_ros.elastic.plant.setup import make_elastic_arm
 from armid_ros.simulation import Reference, Sensors
 import numpy as np

@@ -21,7 +21,7 @@ from armid_ros.elastic.identification import (
 )
 from armid_ros.elastic.identification.output import elastic_document, SCHEMA
 from armid_ros.elastic.identification.story import TuningStory
-from armid_ros.elastic.plant.run import ElasticSensors, run_all, VelocityLoop
+from armid_ros.elastic.plant.run import ElasticSensors, run_all
 from armid_ros.elastic.plant.signals import (
     EXCITATION_RMS,
     resonance_experiments,
@@ -44,6 +44,7 @@ from armid_ros.robots.two_link import (
     TwoLinkParameters,
     TwoLinkSet,
 )
+from armid_ros.simulation.motor_control import VelocityLoop
 import click
 import numpy as np
 

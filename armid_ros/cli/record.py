@@ -14,7 +14,7 @@ from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.effects import Effect, parse_effect
 from armid_ros.effects.catalogue import EXAMPLES
 from armid_ros.elastic.identification import write_runs
-from armid_ros.elastic.plant.arm import ElasticArm, record
+from armid_ros.elastic.plant.record import record
 from armid_ros.elastic.plant.setup import (
     elastic_joints,
     make_elastic_arm,
@@ -28,7 +28,7 @@ from armid_ros.recording import read_waypoints, write_recording
 from armid_ros.recording import recover as recover_bag
 from armid_ros.robots import collision_model, Robot
 from armid_ros.robots.two_link import TwoLinkSet
-from armid_ros.simulation import Reference, Sensors
+from armid_ros.simulation import Reference, Sensors, SimulatedArm
 from armid_ros.simulation import simulate as run
 from armid_ros.simulation.bodies import require_masses
 import click
@@ -196,7 +196,9 @@ def _reference(robot: Robot, path: Path | None, rng: np.random.Generator) -> Ref
     )
 
 
-def _both_sides(out: Path, arm: ElasticArm, reference: Reference, rate: float, tick: Tick) -> int:
+def _both_sides(
+    out: Path, arm: SimulatedArm, reference: Reference, rate: float, tick: Tick
+) -> int:
     """Let an arm with elastic joints follow a trajectory, and write what both sides did."""
     measured = record(arm, reference, rate=rate, progress=tick)
     write_runs(out, [measured], arm.plant.robot, arm.accelerometers)

@@ -19,7 +19,6 @@ import time
 from typing import Any, TypeVar
 
 from armid_ros.arm import ArmModel
-from armid_ros.elastic.plant.arm import ElasticArm
 from armid_ros.errors import ArmidError
 from armid_ros.estimate import Estimate
 from armid_ros.excitation import Excitation, TransferPlanner
@@ -86,7 +85,7 @@ OnProgress = Callable[[Progress], None]
 
 
 def run_lockstep(
-    arm: SimulatedArm | ElasticArm,
+    arm: SimulatedArm,
     excitation: Excitation,
     identifier: OnlineIdentifier,
     bag: Path,
@@ -107,7 +106,7 @@ def run_lockstep(
 
     Parameters
     ----------
-    arm : SimulatedArm or ElasticArm
+    arm : SimulatedArm
         The arm.
     excitation : Excitation
         What it shall do.

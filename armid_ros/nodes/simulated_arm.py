@@ -11,7 +11,6 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import read_model
-from armid_ros.elastic.plant.arm import ElasticArm, ElasticSample
 from armid_ros.errors import ArmidError, ModelError, TrajectoryError
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.elastic_topics import ElasticTopics
@@ -93,7 +92,7 @@ class SimulatedArmNode(ArmidNode):
 
     def __init__(
         self,
-        arm: SimulatedArm | ElasticArm | None = None,
+        arm: SimulatedArm | None = None,
         start_ns: int | None = None,
         **kwargs: Any,
     ) -> None:
@@ -102,7 +101,7 @@ class SimulatedArmNode(ArmidNode):
 
         Parameters
         ----------
-        arm : SimulatedArm or ElasticArm, optional
+        arm : SimulatedArm, optional
             The arm; by default the one the parameters describe.
         start_ns : int, optional
             Stamp of the beginning [ns]; by default that of the node's clock.
@@ -129,7 +128,7 @@ class SimulatedArmNode(ArmidNode):
         )
         self._message = JointState(name=list(self._arm.joints))
         self._sides = None
-        if isinstance(self._arm, ElasticArm):
+        if self._arm.plant.springs is not None:
             self._sides = ElasticTopics(self, self._arm)
         self._clock_publisher: Publisher | None = None
         self._timer: Timer | None = None
@@ -203,8 +202,8 @@ class SimulatedArmNode(ArmidNode):
         message.velocity = sample.dq.tolist()
         message.effort = sample.tau.tolist()
         self._states.publish(message)
-        if self._sides is not None and isinstance(sample, ElasticSample):
-            self._sides.publish(sample, stamp)
+        if self._sides is not None and sample.link is not None:
+            self._sides.publish(sample.link, stamp)
         return stamp_ns
 
     def publish_clock(self) -> None:
@@ -260,7 +259,7 @@ class SimulatedArmNode(ArmidNode):
             sensors_of(lambda name: values.get(name, self.value(name)), n_joints)
             self._steps_at(values.get('rate', self.value('rate')))
             if 'effects' in values:
-                self._check(self._with_effects(values['effects']))
+                self._arm.successor(self._with_effects(values['effects']))
         except ArmidError as error:
             return f'parameter {", ".join(map(repr, values))}: {error}'
         return ''
@@ -281,14 +280,7 @@ class SimulatedArmNode(ArmidNode):
             raise ModelError('this arm was made in a program; the parameter describes none')
         return with_effects(self._bare, texts)
 
-    def _check(self, arm: ArmModel) -> None:
-        """Raise a ModelError for an arm that this one cannot become."""
-        if not isinstance(self._arm, SimulatedArm):
-            raise ModelError('an arm with elastic joints keeps its effects; start it with others')
-        self._arm.successor(arm)
-
     def _become(self, arm: ArmModel) -> None:
-        self._check(arm)
         self._arm.become(arm)
         named = ', '.join(effect.name for effect in arm.effects) or 'no effect'
         self.get_logger().info(f'goes on with {named}')

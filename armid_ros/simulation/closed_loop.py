@@ -6,44 +6,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.motion import FloatArray, Motion
-from armid_ros.simulation.controller import Controller
+from armid_ros.motion import FloatArray
+from armid_ros.simulation.controller import Controller, Target, Targets
 from armid_ros.simulation.integrator import step
 from armid_ros.simulation.plant import Plant, State
 import numpy as np
-
-
-@dataclass(frozen=True, eq=False)
-class Targets:
-    """
-    What a controller is to do at N successive steps.
-
-    Attributes
-    ----------
-    q, dq, ddq : ndarray, shape (N, n)
-        The reference [rad or m, s].
-    feedforward : ndarray, shape (N, n)
-        What the controller derives from the reference alone [N m].
-
-    """
-
-    q: FloatArray
-    dq: FloatArray
-    ddq: FloatArray
-    feedforward: FloatArray
-
-    @classmethod
-    def of(cls, desired: Motion, controller: Controller) -> Targets:
-        """Return the targets of a reference that has one row per step."""
-        return cls(desired.q, desired.dq, desired.ddq, controller.feedforward(desired))
-
-    def __getitem__(self, rows: slice) -> Targets:
-        """Return some of the steps."""
-        return Targets(self.q[rows], self.dq[rows], self.ddq[rows], self.feedforward[rows])
-
-    def __len__(self) -> int:
-        """Return the number of steps N."""
-        return len(self.q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,33 +20,28 @@ class Trace:
 
     Attributes
     ----------
-    q, dq : ndarray, shape (N, n)
-        State at the beginning of each step.
-    ddq, tau : ndarray, shape (N, n)
-        Mean acceleration, and the torque that the drives were asked for, of each step.
+    motors, links : ndarray, shape (3, N + 1, n)
+        Positions, velocities and accelerations from the beginning of the first step to the end of
+        the last; one array where all joints are rigid.
+    tau : ndarray, shape (N + 1, n)
+        The torque that the drives were asked for in each step, and in the one that comes next, as
+        far as they have it [N m].
     state : State
         The state after the last step.
-    torque : ndarray, shape (n,)
-        The torque that the controller asks for there, as far as the drives have it.
 
     """
 
-    q: FloatArray
-    dq: FloatArray
-    ddq: FloatArray
+    motors: FloatArray
+    links: FloatArray
     tau: FloatArray
     state: State
-    torque: FloatArray
 
 
-def command(
-    plant: Plant, controller: Controller, state: State, targets: Targets, row: int
-) -> FloatArray:
-    """Return the torque for one row of the targets, within the limits of the drives, (n,)."""
-    desired = targets.q[row], targets.dq[row], targets.ddq[row]
-    asked = controller.torque(state.q, state.dq, desired, targets.feedforward[row])
-    limit = plant.torque_limit
-    return np.minimum(np.maximum(asked, -limit), limit)
+def command(plant: Plant, controller: Controller, state: State, target: Target) -> FloatArray:
+    """Return the torque for a target, within the limits of the drives, shape (n,) [N m]."""
+    q, dq, _ = plant.motors(state)
+    lowest, highest = plant.torque_range
+    return np.minimum(np.maximum(controller.torque(q, dq, *target), lowest), highest)
 
 
 def run(
@@ -102,11 +64,17 @@ def run(
         What to do at the end of each step.
 
     """
-    q, dq, ddq, tau = np.empty((4, len(targets), len(torque)))
-    drive = plant.action.drive
-    for k in range(len(targets)):
-        q[k], dq[k], tau[k] = state.q, state.dq, torque
-        state = step(plant, state, torque if drive is None else drive(torque))
-        ddq[k] = state.ddq
-        torque = command(plant, controller, state, targets, k)
-    return Trace(q, dq, ddq, tau, state, torque)
+    count, drive = len(targets), plant.action.drive
+    tau = np.empty((count + 1, len(torque)))
+    links = np.empty((3, *tau.shape))
+    motors = links if plant.springs is None else np.empty_like(links)
+    q, dq, ddq = links
+    steps = iter(targets)
+    for k in range(count + 1):
+        q[k], dq[k], ddq[k], tau[k] = state.q, state.dq, state.ddq, torque
+        if motors is not links:
+            motors[:, k] = plant.motors(state)
+        if k < count:
+            state = step(plant, state, torque if drive is None else drive(torque))
+            torque = command(plant, controller, state, next(steps))
+    return Trace(motors, links, tau, state)

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
@@ -21,14 +23,77 @@ import pinocchio as pin
 BANDWIDTH = 50.0
 
 
+#: Position, velocity and acceleration to have, and torque of the feedforward, each of shape (n,).
+Target = tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """
+    What a controller is to do at N successive steps.
+
+    Attributes
+    ----------
+    q, dq, ddq : ndarray, shape (N, n)
+        Where the motors are to be [rad or m, s].
+    feedforward : ndarray, shape (N, n)
+        Torque that the controller derives from the reference alone [N m].
+
+    """
+
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+    feedforward: FloatArray
+
+    def __iter__(self) -> Iterator[Target]:
+        """Yield what to do at one step after the other."""
+        return zip(zip(self.q, self.dq, self.ddq, strict=True), self.feedforward, strict=True)
+
+    def __getitem__(self, rows: slice) -> Targets:
+        """Return some of the steps."""
+        return Targets(self.q[rows], self.dq[rows], self.ddq[rows], self.feedforward[rows])
+
+    def __len__(self) -> int:
+        """Return the number of steps N."""
+        return len(self.q)
+
+
 class Controller(ABC):
     """
     A law from where the arm is, and where it should be, to the torque it is given.
 
     It sees the true position and velocity: sensors distort what is recorded, not what moves the
-    arm. Torque limits are the drives', applied to what it asks for.
+    arm; where joints give way, those of the motors. Torque limits are the drives', applied to what
+    it asks for.
+
+    Attributes
+    ----------
+    acts_once : bool
+        Whether it keeps something from step to step, so that it may act once a step only.
 
     """
+
+    acts_once: ClassVar[bool] = False
+
+    def started(self) -> Controller:
+        """Return one that has kept nothing yet: this one, where it never does."""
+        return self
+
+    def targets(self, desired: Motion, asked: FloatArray | None = None) -> Targets:
+        """
+        Return what to do at successive steps.
+
+        Parameters
+        ----------
+        desired : Motion
+            The reference, one row per step.
+        asked : ndarray, shape (n,), optional
+            Position that was the target of the first of these steps, for which the controller
+            has acted already.
+
+        """
+        return Targets(desired.q, desired.dq, desired.ddq, self.feedforward(desired))
 
     def feedforward(self, desired: Motion) -> FloatArray:
         """Return torques that depend on the reference only, shape (N, n) [N m]."""
@@ -83,7 +148,7 @@ class ComputedTorque(Controller):
     _robot: Robot = field(init=False, repr=False)
     _data: pin.Data = field(init=False, repr=False)
     _gains: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
-    _inertia: FloatArray = field(init=False, repr=False)
+    _inertia: FloatArray | None = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the gains and collect what the effects of the nominal arm do."""
@@ -91,19 +156,18 @@ class ComputedTorque(Controller):
         robot = action.robot or self.arm.robot
         omega = _per_joint(self.bandwidth, robot, 'bandwidth')
         zeta = _per_joint(self.damping_ratio, robot, 'damping ratio')
-        n = robot.n_joints
         object.__setattr__(self, '_robot', robot)
         object.__setattr__(self, '_data', robot.model.createData())
         object.__setattr__(self, '_gains', (omega**2, 2.0 * zeta * omega))
-        inertia = np.zeros((n, n)) if action.inertia is None else action.inertia
-        object.__setattr__(self, '_inertia', inertia)
+        object.__setattr__(self, '_inertia', action.inertia)
 
     def feedforward(self, desired: Motion) -> FloatArray:
         """Return damping, dry friction and other torques at the reference, shape (N, n)."""
         action = self.arm.action()
         depends = action.dry_friction is not None and action.dry_friction.load_share is not None
         load = self.arm.load(desired) if depends else np.zeros_like(desired.q)
-        return action.effort(desired, desired, load) - desired.ddq @ self._inertia.T
+        effort = action.effort(desired, desired, load)
+        return effort if self._inertia is None else effort - desired.ddq @ self._inertia.T
 
     def torque(
         self,
@@ -119,7 +183,8 @@ class ComputedTorque(Controller):
         ddq += damping * (dq_desired - dq)
         ddq += ddq_desired
         tau = pin.rnea(self._robot.model, self._data, q, dq, ddq)
-        tau += self._inertia.dot(ddq)
+        if self._inertia is not None:
+            tau += self._inertia.dot(ddq)
         tau += feedforward
         return np.asarray(tau)
 

@@ -3,11 +3,12 @@
 """
 One step of the plant.
 
-The rigid body and the smooth effects are taken at the middle of the step, half a step ahead of the
-state, which makes the integration second order in the step with one evaluation of the dynamics;
-the torque is constant over a step, as a drive gives it. Damping is linearly implicit. Dry friction
-and joint stops are complementarity conditions on the velocity at the end of the step, so that what
-sticks has velocity zero, not a small one.
+Where joints give way, `spring_integrator` has it. Where they are rigid, the rigid body and the
+smooth effects are taken at the middle of the step, half a step ahead of the state, which makes the
+integration second order in the step with one evaluation of the dynamics; the torque is constant
+over a step, as a drive gives it. Damping is linearly implicit. Dry friction and joint stops are
+complementarity conditions on the velocity at the end of the step, so that what sticks has velocity
+zero, not a small one.
 
 """
 
@@ -17,7 +18,10 @@ from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.bodies import no_body
 from armid_ros.simulation.box_complementarity import Modes, solve_box_complementarity
-from armid_ros.simulation.plant import Contacts, Plant, State
+from armid_ros.simulation.contacts import Contacts
+from armid_ros.simulation.plant import Plant, State
+from armid_ros.simulation.spring_integrator import spring_substep
+from armid_ros.simulation.springs import ElasticJoints
 import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dposv
@@ -42,19 +46,18 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
         Where it is one step later.
 
     """
-    dt, half = plant.spans
+    if plant.springs is not None and state.rotors is not None:
+        return _on_springs(plant, plant.springs, state, torque)
+    half = plant.spans[1]
     model, data, dq = plant.robot.model, plant.data, state.dq
     q_middle = state.q + half * dq
     dq_middle = dq + half * state.ddq
     weight = pin.nonLinearEffects(model, data, q_middle, dq_middle)
     force = torque - weight
-    force -= plant.constant
     force -= plant.damping.dot(dq)
-    if plant.torque is not None:
-        force -= plant.torque(np.asarray(state.t + half), q_middle, dq_middle)
     memory, slipping = state.memory, plant.action.hysteresis
-    if slipping is not None:
-        force -= slipping.torque(slipping.advance(memory, half * dq))
+    middle = memory if slipping is None else slipping.advance(memory, half * dq)
+    plant.resist(force, state.t + 0.5 * plant.dt, q_middle, dq_middle, middle)
     mass = pin.crba(model, data, q_middle)
     contacts, load = plant.contacts, None
     if contacts.friction is not None:
@@ -62,56 +65,84 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
         contacts = contacts.under(load)
     inertia = mass + plant.inertia
 
-    solution = _solve(plant, inertia, force, contacts.directions)
-    dq_next, modes = dq + dt * solution[:, 0], state.modes
-    if modes:
-        dq_next, modes = _rub(contacts, dt * solution[:, 1:], dq_next, modes)
+    dq_next, ddq, modes = _end_velocity(plant, contacts, inertia, force, dq, state.modes)
     q_next = q_middle + half * dq_next
     if plant.hard_stops and not _inside(plant.stops, q_next):
-        q_next, dq_next, modes = _stop(plant, inertia, force, state, q_middle, q_next, load)
+        q_next, dq_next, ddq, modes = _stop(plant, inertia, force, state, q_next, load)
     if slipping is not None:
         memory = slipping.advance(memory, q_next - state.q)
     steps = state.steps + 1
-    return State(steps, steps * plant.dt, q_next, dq_next, (dq_next - dq) / dt, modes, memory)
+    return State(steps, steps * plant.dt, q_next, dq_next, ddq, modes, memory)
 
 
-def _solve(
-    plant: Plant, inertia: FloatArray, force: FloatArray, directions: FloatArray
-) -> FloatArray:
-    """Return the inverse inertia times (force, directions^T), shape (n, 1 + m)."""
+def _on_springs(plant: Plant, springs: ElasticJoints, state: State, torque: FloatArray) -> State:
+    """Integrate one step, in parts, where joints give way."""
+    steps = state.steps + 1
+    for _ in range(springs.substeps):
+        assert state.rotors is not None
+        state = spring_substep(plant, springs, state.rotors, state, torque)
+    return state._replace(steps=steps, t=steps * plant.dt)
+
+
+def _end_velocity(
+    plant: Plant,
+    contacts: Contacts,
+    inertia: FloatArray,
+    force: FloatArray,
+    dq: FloatArray,
+    modes: Modes,
+) -> tuple[FloatArray, FloatArray, Modes]:
+    """
+    Return velocity at the end and acceleration of a step, and what friction elements and stops do.
+
+    Mostly that is what they did: then what slips takes a known torque and what sticks is no part
+    of the system, and it remains to see that all obey their laws.
+
+    """
+    dt, pattern = plant.spans[0], contacts.pattern(modes)
+    if pattern is not None:
+        right, system = force - pattern.taken, inertia
+        if pattern.free is not None:
+            right *= pattern.free
+            system = inertia * pattern.both
+            system += pattern.stuck
+        ddq = _solve(plant, system, right)
+        dq_next = dq + dt * ddq
+        taken = None if pattern.free is None else force - inertia.dot(ddq)
+        if contacts.obeyed(dq_next, modes, taken):
+            return dq_next, ddq, modes
+    directions = contacts.directions
     right = np.empty((1 + len(directions), len(force)))
-    right[0] = force
-    right[1:] = directions
-    _, solution, failed = dposv(inertia, right.T, 0, 0, 1)
+    right[0], right[1:] = force, directions
+    solution = dt * _solve(plant, inertia, right.T)
+    dq_free, response = dq + solution[:, 0], solution[:, 1:]
+    taken, modes = solve_box_complementarity(
+        contacts.law, directions.dot(response), directions.dot(dq_free), modes
+    )
+    dq_next = dq_free - response.dot(taken)
+    if 0 in modes:
+        _clear_stuck(dq_next, contacts, modes)
+    return dq_next, (dq_next - dq) / dt, modes
+
+
+def _solve(plant: Plant, inertia: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the inverse inertia times columns, which are written over."""
+    _, solution, failed = dposv(inertia, right, 0, 0, 1)
     if failed:
         raise ModelError(no_body(plant.robot))
     return np.asarray(solution)
 
 
-def _rub(
-    contacts: Contacts, response: FloatArray, dq_free: FloatArray, modes: Modes
-) -> tuple[FloatArray, Modes]:
-    """Let friction elements and stops act on the velocity at the end of the step."""
-    directions = contacts.directions
-    torque, modes = solve_box_complementarity(
-        contacts.law, directions.dot(response), directions.dot(dq_free), modes
-    )
-    dq = dq_free - response.dot(torque)
-    if 0 in modes:
-        _clear_stuck(dq, contacts, modes)
-    return dq, modes
-
-
 def _clear_stuck(dq: FloatArray, contacts: Contacts, modes: Modes) -> None:
     """Make the velocity of what sticks exactly zero, where the solution has rounding errors."""
-    fixed = []
-    for axis, mode in zip(contacts.axes, modes, strict=True):
-        if mode == 0 and axis >= 0:
-            dq[axis] = 0.0
-            fixed.append(axis)
-    for element, (axis, mode) in enumerate(zip(contacts.axes, modes, strict=True)):
+    fixed = [axis for axis, mode in zip(contacts.axes, modes, strict=True) if mode == 0]
+    if -1 not in fixed:
+        dq[fixed] = 0.0
+        return
+    fixed = [axis for axis in fixed if axis >= 0]
+    dq[fixed] = 0.0
+    for direction, axis, mode in zip(contacts.directions, contacts.axes, modes, strict=True):
         if mode == 0 and axis < 0:
-            direction = contacts.directions[element]
             free = np.abs(direction)
             free[fixed] = 0.0
             pivot = int(np.argmax(free))
@@ -122,7 +153,10 @@ def _clear_stuck(dq: FloatArray, contacts: Contacts, modes: Modes) -> None:
 
 
 def _inside(stops: list[tuple[float, float]], q: FloatArray) -> bool:
-    return all(lower <= x <= upper for x, (lower, upper) in zip(q.tolist(), stops, strict=True))
+    for position, (lower, upper) in zip(q.tolist(), stops, strict=True):
+        if not lower <= position <= upper:
+            return False
+    return True
 
 
 def _stop(
@@ -130,10 +164,9 @@ def _stop(
     inertia: FloatArray,
     force: FloatArray,
     state: State,
-    q_middle: FloatArray,
     q_next: FloatArray,
     load: FloatArray | None,
-) -> tuple[FloatArray, FloatArray, Modes]:
+) -> tuple[FloatArray, FloatArray, FloatArray, Modes]:
     """Repeat the step with the stops that it ran into."""
     robot, count = plant.robot, len(state.modes)
     at_upper, at_lower = q_next > robot.upper, q_next < robot.lower
@@ -141,12 +174,10 @@ def _stop(
         contacts = plant.contacts_at(at_lower, at_upper)
         if load is not None:
             contacts = contacts.under(load)
-        solution = _solve(plant, inertia, force, contacts.directions)
-        dq_free = state.dq + plant.dt * solution[:, 0]
         guess = state.modes + (0,) * (len(contacts.axes) - count)
-        dq, modes = _rub(contacts, plant.dt * solution[:, 1:], dq_free, guess)
-        q = q_middle + 0.5 * plant.dt * dq
+        dq, ddq, modes = _end_velocity(plant, contacts, inertia, force, state.dq, guess)
+        q = state.q + 0.5 * plant.dt * (state.dq + dq)
         beyond_upper, beyond_lower = q > robot.upper, q < robot.lower
         if not np.any((beyond_upper & ~at_upper) | (beyond_lower & ~at_lower)):
-            return np.clip(q, robot.lower, robot.upper), dq, modes[:count]
+            return np.clip(q, robot.lower, robot.upper), dq, ddq, modes[:count]
         at_upper, at_lower = at_upper | beyond_upper, at_lower | beyond_lower

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 import math
+from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Action, DryFriction, TorqueLaw
@@ -13,7 +14,9 @@ from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
 from armid_ros.simulation.bodies import no_body
-from armid_ros.simulation.box_complementarity import BoxLaw, Modes
+from armid_ros.simulation.box_complementarity import Modes
+from armid_ros.simulation.contacts import Contacts, split_constant
+from armid_ros.simulation.springs import Elasticity, ElasticJoints
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -23,8 +26,25 @@ from scipy.linalg import eigh, LinAlgError
 LIMIT_TOLERANCE = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
-class State:
+class Rotors(NamedTuple):
+    """
+    The motion of the e motors whose transmissions give way, as seen at the joints.
+
+    Attributes
+    ----------
+    twist : ndarray, shape (e,)
+        By how much they are ahead of their links [rad or m].
+    dq, ddq : ndarray, shape (e,)
+        Velocity and acceleration.
+
+    """
+
+    twist: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+
+
+class State(NamedTuple):
     """
     The state of a plant at the beginning of a step.
 
@@ -35,13 +55,15 @@ class State:
     t : float
         Time [s], steps times the step.
     q, dq : ndarray, shape (n,)
-        Position [rad or m] and velocity.
+        Position [rad or m] and velocity of the links.
     ddq : ndarray, shape (n,)
-        Mean acceleration of the step that led here.
+        Mean acceleration of the step that led here; with springs, acceleration now.
     modes : tuple of int, length m
         What each dry friction element did: 1 slipped forwards, -1 backwards, 0 stuck.
     memory : ndarray, shape (h,)
         States of the friction that has some.
+    rotors : Rotors, or None
+        The motors that move on their own; None where all joints are rigid.
 
     """
 
@@ -52,51 +74,17 @@ class State:
     ddq: FloatArray
     modes: Modes
     memory: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Contacts:
-    """
-    Elements that can hold: dry friction, and joint stops.
-
-    Attributes
-    ----------
-    directions : ndarray, shape (m, n)
-        Velocity of each element as a combination of the joint velocities.
-    law : BoxLaw
-        What torques they take.
-    axes : tuple of int, length m
-        The joint that an element acts on alone; -1 if it acts on several.
-    friction : DryFriction
-        What they are without a load, where the load matters.
-
-    """
-
-    directions: FloatArray
-    law: BoxLaw
-    axes: tuple[int, ...]
-    friction: DryFriction | None = None
-
-    @classmethod
-    def of(cls, friction: DryFriction) -> Contacts:
-        """Return the contacts of friction elements."""
-        axes = tuple(_axis(direction) for direction in friction.directions)
-        law = BoxLaw(friction.lower, friction.upper)
-        loaded = None if friction.load_share is None else friction
-        return cls(friction.directions, law, axes, loaded)
-
-    def under(self, load: FloatArray) -> Contacts:
-        """Return the contacts as they are under a torque of the rigid body, shape (n,) [N m]."""
-        if self.friction is None:
-            return self
-        more = self.friction.widening(load)
-        return replace(self, law=BoxLaw(self.friction.lower - more, self.friction.upper + more))
+    rotors: Rotors | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Plant:
     """
     An arm ready to be integrated.
+
+    A rigid joint is an infinitely stiff spring: its motor and its link have one velocity. Where
+    elasticity is given, joints with joint_elasticity and rotor_inertia have two; without it they
+    move as one, and their springs show as a twist of the readings only.
 
     Attributes
     ----------
@@ -105,7 +93,11 @@ class Plant:
     dt : float
         Step [s].
     hard_stops : bool
-        Whether the joints stop, without bouncing, at the position limits of the robot.
+        Whether the joints stop at the position limits of the robot: rigid ones without bouncing;
+        links on springs meet a damped spring there, of 32 Hz with the inertia in the middle of
+        the ranges at the usual step, and get some milliradians beyond.
+    elasticity : Elasticity, or None
+        How joints that give way are simulated; None to take them for rigid ones.
     robot : Robot
         The rigid body as the effects make it.
     contacts : Contacts
@@ -115,16 +107,18 @@ class Plant:
     inertia : ndarray, shape (n, n)
         What is added to the inertia matrix of the rigid body: rotors, and the implicit part of
         the damping [kg m^2].
-    constant : ndarray, shape (n,)
+    constant : ndarray, shape (n,), or None
         Constant torque that the actuators have to supply [N m].
     torque : callable (t, q, dq) -> ndarray (n,), or None
-        Anything else that they have to supply.
+        Anything else that they have to supply; with springs, that the motors have to.
     action : Action
         What the effects do, to the arm and to its sensors.
+    springs : ElasticJoints, or None
+        What is between motors and links; None where all joints are rigid.
     spans : tuple of ndarray, each of shape ()
         The step and half of it [s]; numpy multiplies by these in half the time of a float.
-    torque_limit : ndarray, shape (n,)
-        What the drives have [N m].
+    torque_range : tuple of ndarray, each of shape (n,)
+        What the drives have, backwards and forwards [N m].
     stops : list of (float, float)
         Lower and upper position limit of every joint [rad or m].
     data : pinocchio.Data
@@ -136,16 +130,18 @@ class Plant:
     arm: ArmModel
     dt: float = 1e-3
     hard_stops: bool = True
+    elasticity: Elasticity | None = None
     robot: Robot = field(init=False)
     contacts: Contacts = field(init=False, repr=False)
     torque: TorqueLaw | None = field(init=False, repr=False)
     action: Action = field(init=False, repr=False)
+    springs: ElasticJoints | None = field(init=False, repr=False)
     data: pin.Data = field(init=False, repr=False)
     damping: FloatArray = field(init=False, repr=False)
-    constant: FloatArray = field(init=False, repr=False)
+    constant: FloatArray | None = field(init=False, repr=False)
     inertia: FloatArray = field(init=False, repr=False)
     spans: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
-    torque_limit: FloatArray = field(init=False, repr=False)
+    torque_range: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
     stops: list[tuple[float, float]] = field(init=False, repr=False)
     _at_stops: dict[tuple[bytes, bytes], Contacts] = field(
         init=False, repr=False, default_factory=dict
@@ -161,22 +157,29 @@ class Plant:
         zero = np.zeros((n, n))
         damping = zero if action.damping is None else action.damping
         inertia = zero if action.inertia is None else action.inertia
-        friction, constant = _split_constant(action.dry_friction, n)
+        friction, constant = split_constant(action.dry_friction, n)
         data = robot.model.createData()
         pin.crba(robot.model, data, middle_position(robot))
         _require_inertia(robot, np.diag(np.array(data.M) + inertia))
         weight = _damping_weight(robot, np.array(data.M) + inertia, damping, self.dt)
+        springs, torque = None, _both(action.torque, action.link_torque)
+        if self.elasticity is not None:
+            directions, torque = friction.directions, action.torque
+            springs = ElasticJoints.of(
+                self.arm, self.elasticity, directions, np.array(data.M), self.dt
+            )
         values = {
             'robot': robot,
             'contacts': Contacts.of(friction),
             'spans': (np.array(self.dt), np.array(self.dt / 2)),
-            'torque_limit': robot.torque_limit,
+            'torque_range': (-robot.torque_limit, robot.torque_limit),
             'stops': list(zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)),
             'data': data,
-            'torque': _both(action.torque, action.link_torque),
+            'torque': torque,
             'action': action,
+            'springs': springs,
             'damping': damping,
-            'constant': constant,
+            'constant': constant if constant.any() else None,
             'inertia': inertia + weight * self.dt * damping,
         }
         for name, value in values.items():
@@ -191,6 +194,8 @@ class Plant:
     ) -> State:
         """
         Make a state, at rest unless told otherwise.
+
+        Springs carry the weight of their links, and motors move with them.
 
         Raises
         ------
@@ -208,7 +213,54 @@ class Plant:
         modes = tuple(np.sign(self.contacts.directions @ velocity).astype(int).tolist())
         slipping = self.action.hysteresis
         memory = np.empty(0) if slipping is None else slipping.start(velocity)
-        return State(steps, steps * self.dt, position, velocity, acceleration, modes, memory)
+        rotors = None
+        if self.springs is not None:
+            load = pin.computeGeneralizedGravity(self.robot.model, self.data, position)
+            joints = self.springs.joints
+            rotors = Rotors(self.springs.twist(load), velocity[joints], acceleration[joints])
+        t = steps * self.dt
+        return State(steps, t, position, velocity, acceleration, modes, memory, rotors)
+
+    def motors(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return positions, velocities and accelerations of the motors at the joints, (n,)."""
+        _, _, q, dq, ddq, _, _, rotors = state
+        if rotors is None or self.springs is None:
+            return q, dq, ddq
+        joints = self.springs.joints
+        q, dq, ddq = q.copy(), dq.copy(), ddq.copy()
+        q[joints] += rotors.twist
+        dq[joints], ddq[joints] = rotors.dq, rotors.ddq
+        return q, dq, ddq
+
+    def resist(
+        self, force: FloatArray, t: float, q: FloatArray, dq: FloatArray, memory: FloatArray
+    ) -> None:
+        """
+        Subtract from forces on the motors, (n,) [N m], what smooth effects take.
+
+        Parameters
+        ----------
+        force : ndarray, shape (n,)
+            Is changed [N m].
+        t : float
+            Time [s].
+        q, dq : ndarray, shape (n,)
+            Positions and velocities of the motors.
+        memory : ndarray, shape (h,)
+            States of the friction that has some.
+
+        """
+        if self.constant is not None:
+            force -= self.constant
+        if self.torque is not None:
+            force -= self.torque(np.asarray(t), q, dq)
+        if self.action.hysteresis is not None:
+            force -= self.action.hysteresis.torque(memory)
+
+    @property
+    def sensing(self) -> Action:
+        """What effects make of the readings of motors."""
+        return self.action if self.springs is None else self.springs.sensing
 
     def _within_stops(self, q: FloatArray) -> FloatArray:
         lower, upper = self.robot.lower, self.robot.upper
@@ -237,16 +289,16 @@ class Plant:
         key = (at_lower.tobytes(), at_upper.tobytes())
         if key not in self._at_stops:
             friction, hit = self.contacts, np.flatnonzero(at_lower | at_upper)
-            self._at_stops[key] = Contacts.of(
-                DryFriction(
-                    np.vstack([friction.directions, np.eye(self.robot.n_joints)[hit]]),
-                    np.append(friction.law.lower, np.where(at_lower[hit], -np.inf, 0.0)),
-                    np.append(friction.law.upper, np.where(at_upper[hit], np.inf, 0.0)),
-                    None
-                    if friction.friction is None or friction.friction.load_share is None
-                    else np.append(friction.friction.load_share, np.zeros(len(hit))),
-                )
+            loaded = friction.friction
+            elements = DryFriction(
+                np.vstack([friction.directions, np.eye(self.robot.n_joints)[hit]]),
+                np.append(friction.law.lower, np.where(at_lower[hit], -np.inf, 0.0)),
+                np.append(friction.law.upper, np.where(at_upper[hit], np.inf, 0.0)),
+                None
+                if loaded is None or loaded.load_share is None
+                else np.append(loaded.load_share, np.zeros(len(hit))),
             )
+            self._at_stops[key] = replace(Contacts.of(elements), own=False)
         return self._at_stops[key]
 
 
@@ -272,26 +324,6 @@ def middle_position(robot: Robot) -> FloatArray:
     return np.asarray((lower + upper) / 2)
 
 
-def _split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFriction, FloatArray]:
-    """Part the elements that cannot stick, whose levels are one constant torque, from the rest."""
-    if friction is None:
-        return DryFriction(np.empty((0, n_joints)), np.empty(0), np.empty(0)), np.zeros(n_joints)
-    if np.any(friction.lower > friction.upper):
-        raise ModelError(
-            'dry friction that pushes: the torque of an element forwards is less than backwards '
-            f'({friction.upper} against {friction.lower}); friction torques have to be positive'
-        )
-    share = np.zeros(len(friction.lower)) if friction.load_share is None else friction.load_share
-    constant = (friction.lower == friction.upper) & (share == 0.0)
-    sticking = DryFriction(
-        np.ascontiguousarray(friction.directions[~constant]),
-        friction.lower[~constant],
-        friction.upper[~constant],
-        None if friction.load_share is None else share[~constant],
-    )
-    return sticking, np.asarray(friction.lower[constant] @ friction.directions[constant])
-
-
 def _both(motors: TorqueLaw | None, links: TorqueLaw | None) -> TorqueLaw | None:
     """Add the torques of two sides that a rigid transmission makes one."""
     if motors is None or links is None:
@@ -301,12 +333,6 @@ def _both(motors: TorqueLaw | None, links: TorqueLaw | None) -> TorqueLaw | None
         return np.asarray(motors(t, q, dq) + links(t, q, dq))
 
     return torque
-
-
-def _axis(direction: FloatArray) -> int:
-    """Return the joint that an element acts on alone, -1 if it acts on several."""
-    joints = np.flatnonzero(direction)
-    return int(joints[0]) if len(joints) == 1 else -1
 
 
 def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:

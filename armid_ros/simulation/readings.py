@@ -51,86 +51,54 @@ class RecentPast:
 
     Parameters
     ----------
-    action : Action
-        What the effects do to the readings.
-    dt : float
-        Time between samples [s].
-    joints : tuple of str
-        Their names.
+    plant : Plant
+        The arm.
+    state : State
+        Where it starts.
+    torque : ndarray, shape (n,)
+        What its drives are asked for there [N m].
     delay : int
         Steps by which the torque sensors are late.
 
     """
 
-    def __init__(self, action: Action, dt: float, joints: tuple[str, ...], delay: int = 0) -> None:
-        self._action = action
-        self._dt = dt
-        self._joints = joints
+    def __init__(self, plant: Plant, state: State, torque: FloatArray, delay: int = 0) -> None:
+        self._plant = plant
         self._delay = delay
-        self._length = int(np.ceil(action.reading_memory / dt)) + delay + _NEIGHBOURS
-        self._rows = np.empty((0, 5, len(joints)))
-
-    @classmethod
-    def of(cls, plant: Plant, state: State, torque: FloatArray, delay: int = 0) -> RecentPast:
-        """
-        Return the past of an arm that stands at its beginning.
-
-        Parameters
-        ----------
-        plant : Plant
-            The arm.
-        state : State
-            Where it starts.
-        torque : ndarray, shape (n,)
-            What its drives are asked for there.
-        delay : int
-            Steps by which the torque sensors are late.
-
-        """
-        past = cls(plant.action, plant.dt, plant.robot.joints, delay)
-        zero = np.zeros_like(torque)
-        now = np.stack([state.q, state.dq, zero, torque, torque])
-        past.append(now[np.newaxis], state.steps)
-        return past
-
-    def append(self, rows: FloatArray, steps: int) -> None:
-        """
-        Take in samples.
-
-        Parameters
-        ----------
-        rows : ndarray, shape (N, 5, n)
-            Position, velocity, acceleration, torque that drives gave and were asked for.
-        steps : int
-            Step of the last of them.
-
-        """
-        self._rows = np.concatenate([self._rows, rows])[-self._length :]
-        self._steps = steps
+        memory = int(np.ceil(plant.sensing.reading_memory / plant.dt))
+        self._length = memory + delay + _NEIGHBOURS
+        given = torque if plant.action.drive is None else plant.action.drive(torque)
+        q, dq, _ = plant.motors(state)
+        self._rows = np.stack([q, dq, np.zeros_like(q), given, torque])[np.newaxis]
+        self._steps = state.steps
 
     def extend(self, trace: Trace) -> None:
-        """Take in what happened."""
-        drive, state = self._action.drive, trace.state
-        rows = np.empty((len(trace.q), 5, len(self._joints)))
-        rows[:-1, 0], rows[-1, 0] = trace.q[1:], state.q
-        rows[:-1, 1], rows[-1, 1] = trace.dq[1:], state.dq
-        rows[:, 2] = trace.ddq
-        asked = np.empty((len(trace.tau) + 1, len(self._joints)))
-        asked[:-1], asked[-1] = trace.tau, trace.torque
-        rows[:, 4] = (asked[1:] + asked[:-1]) / 2
+        """
+        Take in what happened.
+
+        Torque is constant over a step. Where joints are rigid, what is read between two steps is
+        the mean of both, as the acceleration jumps with it; where motors have rotors of their
+        own, it is what is given from now on.
+
+        """
+        plant, asked = self._plant, trace.tau
+        drive = plant.action.drive
         given = asked if drive is None else drive(asked)
-        rows[:, 3] = rows[:, 4] if drive is None else (given[1:] + given[:-1]) / 2
-        self.append(rows, state.steps)
+        rows = np.empty((len(asked) - 1, 5, asked.shape[1]))
+        rows[:, :3] = trace.motors[:, 1:].transpose(1, 0, 2)
+        for column, tau in ((3, given), (4, asked)):
+            rows[:, column] = (tau[1:] + tau[:-1]) / 2 if plant.springs is None else tau[1:]
+        self._rows = np.concatenate([self._rows, rows])[-self._length :]
+        self._steps = trace.state.steps
 
     def latest(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return position, velocity and torque as read now, each of shape (n,)."""
-        count = len(self._rows)
+        count, sensing = len(self._rows), self._plant.sensing
         q, dq, ddq, given, asked = self._rows.transpose(1, 0, 2)
         late = max(-1 - self._delay, -count)
-        if count == 1 or (self._action.reading is None and self._action.displacement is None):
+        if count == 1 or (sensing.reading is None and sensing.displacement is None):
             return q[-1], dq[-1], asked[late]
-        steps = np.arange(self._steps - count + 1, self._steps + 1)
-        t = np.asarray(self._dt * steps, dtype=np.float64)
-        truth = Motion(self._joints, t, q, dq, ddq, given)
-        q, dq, tau = readings(self._action, truth, asked)
+        t = self._plant.times(self._steps - count + 1, count)
+        truth = Motion(self._plant.robot.joints, t, q, dq, ddq, given)
+        q, dq, tau = readings(sensing, truth, asked)
         return q[-1], dq[-1], tau[late]

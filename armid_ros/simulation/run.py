@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.robots import Robot
-from armid_ros.simulation.closed_loop import command, run, Targets, Trace
-from armid_ros.simulation.controller import ComputedTorque, Controller
+from armid_ros.simulation.closed_loop import command, run
+from armid_ros.simulation.controller import ComputedTorque, Controller, Targets
 from armid_ros.simulation.plant import Plant
 from armid_ros.simulation.readings import readings
 from armid_ros.simulation.reference import Reference
@@ -102,10 +101,15 @@ def simulate(
     TrajectoryError
         If the reference does not fit the robot or passes a limit; the message names both.
     ModelError
-        If the rate does not fit the step.
+        If the rate does not fit the step, or the plant has springs.
 
     """
     plant = arm if isinstance(arm, Plant) else Plant(arm)
+    if plant.springs is not None:
+        raise ModelError(
+            f'{plant.robot.name}: joints that give way are read on both sides, which a run of '
+            'rigid joints has not; use SimulatedArm, or a plant without elasticity'
+        )
     controller = controller or ComputedTorque(plant.arm)
     sensors = sensors or Sensors()
     if not rate > 0.0:
@@ -118,48 +122,45 @@ def simulate(
     last = stride * int(np.floor(duration / (stride * plant.dt) + 1e-9))
 
     def targets(first: int, count: int) -> Targets:
-        return Targets.of(curve.sample(plant.times(first, count)), controller)
+        return controller.targets(curve.sample(plant.times(first, count)))
 
     start = curve.sample(np.zeros(1))
     state = plant.state(start.q[0], start.dq[0], start.ddq[0])
-    torque = command(plant, controller, state, targets(0, 1), 0)
+    torque = command(plant, controller, state, next(iter(targets(0, 1))))
     pieces = []
     while state.steps <= last:
         count = min(_BLOCK, last + 1 - state.steps)
         with np.errstate(over='ignore', invalid='ignore'):  # looked for below
             trace = run(plant, controller, state, torque, targets(state.steps + 1, count))
-        _require_motion(plant.robot, trace)
-        pieces.append(trace)
-        state, torque = trace.state, trace.torque
+        q, dq, ddq = trace.motors
+        _require_motion(plant, dq[:-1], state.steps)
+        pieces.append((q[:-1], dq[:-1], ddq[1:], trace.tau[:-1]))
+        state, torque = trace.state, trace.tau[-1]
         if progress is not None:
             progress(state.steps / (last + 1))
 
-    q, dq, ddq, tau = (
-        np.concatenate([getattr(piece, name) for piece in pieces])
-        for name in ('q', 'dq', 'ddq', 'tau')
-    )
-    saturated = np.mean(np.abs(tau) >= plant.torque_limit, axis=0)
+    q, dq, ddq, tau = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    saturated = np.mean(np.abs(tau) >= plant.torque_range[1], axis=0)
     given = tau if plant.action.drive is None else plant.action.drive(tau)
     ddq, given, asked = (np.concatenate([x[:1], (x[1:] + x[:-1]) / 2]) for x in (ddq, given, tau))
     truth = Motion(plant.robot.joints, plant.times(0, last + 1), q, dq, ddq, given)
-    q, dq, asked = readings(plant.action, truth, asked)
-    rows = np.arange(0, last + 1, stride)
-    late = asked[np.maximum(rows - sensors.torque_delay, 0)]
+    q, dq, asked = readings(plant.sensing, truth, asked)
+    rows = slice(None, None, stride)
+    late = asked[np.maximum(np.arange(0, last + 1, stride) - sensors.torque_delay, 0)]
     measured = sensors.measure(q[rows], dq[rows], late, stride * plant.dt, rng)
     truth = truth.select(rows)
     desired = curve.sample(truth.t)
     return SimulatedRun(truth.joints, truth.t, *measured, truth, desired, saturated)
 
 
-def _require_motion(robot: Robot, trace: Trace) -> None:
-    """Raise a ModelError if a simulated arm has left all bounds."""
-    lost = ~(np.abs(trace.dq) < _LOST)
+def _require_motion(plant: Plant, dq: FloatArray, first: int) -> None:
+    """Raise a ModelError if an arm has left all bounds in some steps from the first on."""
+    lost = ~(np.abs(dq) < _LOST)
     if np.any(lost):
         step, joint = np.argwhere(lost)[0]
-        t = trace.state.t * (1.0 - (len(lost) - step) / trace.state.steps)
         raise ModelError(
-            f'{robot.name}: the simulated arm does not follow; {robot.joints[joint]} is faster '
-            f'than {_LOST:g} rad/s (or m/s) after {t:.3g} s'
+            f'{plant.robot.name}: the simulated arm does not follow; {plant.robot.joints[joint]} '
+            f'is faster than {_LOST:g} rad/s (or m/s) after {plant.dt * (first + step):.3g} s'
         )
 
 

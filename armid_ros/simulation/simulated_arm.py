@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
-from armid_ros.simulation.closed_loop import command, run, Targets, Trace
-from armid_ros.simulation.controller import ComputedTorque, Controller
+from armid_ros.simulation.accelerometers import LinkAccelerometers
+from armid_ros.simulation.closed_loop import command, run
+from armid_ros.simulation.controller import ComputedTorque, Controller, Targets
 from armid_ros.simulation.course import Course
+from armid_ros.simulation.motor_control import MotorControl
 from armid_ros.simulation.plant import middle_position, Plant, State
 from armid_ros.simulation.readings import RecentPast
 from armid_ros.simulation.reference import Reference
@@ -21,6 +23,32 @@ import numpy.typing as npt
 
 #: Steps of the reference that are evaluated in one go.
 _BLOCK = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class LinkSample:
+    """
+    What is read of an arm whose joints give way, beside its motors.
+
+    Attributes
+    ----------
+    q, dq : ndarray, shape (n,)
+        Encoders at the links [rad or m].
+    ddq : ndarray, shape (n,)
+        True acceleration of the links [rad/s^2 or m/s^2].
+    acceleration : ndarray, shape (n, 3)
+        Accelerometers on the links [m/s^2].
+    asked_q, asked_dq : ndarray, shape (n,)
+        Where the loop wants the motors, and its velocity over the last step.
+
+    """
+
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+    acceleration: FloatArray
+    asked_q: FloatArray
+    asked_dq: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +63,10 @@ class Sample:
     t : float
         Time [s].
     q, dq, tau : ndarray, shape (n,)
-        Position [rad or m], velocity and torque [N m or N] as measured.
+        Position [rad or m], velocity and torque [N m or N] as measured; where joints give way,
+        of the motors at the joints, and the torque is what the drives give from now on.
+    link : LinkSample, or None
+        The other side of the springs, where there are any.
 
     """
 
@@ -44,6 +75,7 @@ class Sample:
     q: FloatArray
     dq: FloatArray
     tau: FloatArray
+    link: LinkSample | None = None
 
 
 class SimulatedArm:
@@ -55,13 +87,16 @@ class SimulatedArm:
     Parameters
     ----------
     arm : ArmModel or Plant
-        The arm; an ArmModel is integrated at 1 kHz with hard stops.
+        The arm; an ArmModel is integrated at 1 kHz with rigid joints and hard stops.
     rng : numpy.random.Generator
         Source of the sensors' noise.
     controller : Controller, optional
-        Computed torque of the true arm by default.
+        Computed torque of the true arm by default; where joints give way, velocity loops of the
+        motors that suit the plant.
     sensors : Sensors, optional
-        Perfect by default.
+        Of motors and links alike; perfect by default.
+    accelerometers : LinkAccelerometers, optional
+        Of links on springs; in their centroids by default.
     start : array_like, shape (n,), optional
         Where it stands [rad or m]: the middle of the range of motion by default.
 
@@ -79,15 +114,23 @@ class SimulatedArm:
         rng: np.random.Generator,
         controller: Controller | None = None,
         sensors: Sensors | None = None,
+        accelerometers: LinkAccelerometers | None = None,
         start: npt.ArrayLike | None = None,
     ) -> None:
         self.plant = arm if isinstance(arm, Plant) else Plant(arm)
-        self.controller = controller or ComputedTorque(self.plant.arm)
+        self.controller = controller or _suitable(self.plant)
         self.sensors = sensors or Sensors()
+        self.accelerometers = accelerometers or LinkAccelerometers(self.plant.robot)
         self._rng = rng
         start = middle_position(self.plant.robot) if start is None else start
-        self._home = start
+        self._home = self.plant.state(start).q
         self._course = Course(self.plant.robot, self.plant.dt)
+        self._state: State
+        self._acting: Controller
+        self._targets: Targets
+        self._torque: FloatArray
+        self._previous: FloatArray | None
+        self._previous_link: FloatArray | None
         self.reset()
 
     @property
@@ -115,12 +158,22 @@ class SimulatedArm:
             What time it is then, in steps of the plant.
 
         """
-        self._state = self.plant.state(self._home, steps=steps)
-        self._previous: FloatArray | None = None
-        self._course.hold(self._state.q, steps)
-        self._set_off()
-        delay = self.sensors.torque_delay
-        self._past = RecentPast.of(self.plant, self._state, self._torque, delay)
+        hold = Reference(self.joints, np.zeros(1), self._home[np.newaxis])
+        self._begin(hold, steps)
+
+    def start_on(self, reference: Reference) -> None:
+        """
+        Put the arm on the first point of a reference, at its velocity, and begin it there.
+
+        Raises
+        ------
+        TrajectoryError
+            If the reference does not fit the robot or passes a limit; the message names both.
+
+        """
+        curve = reference.for_robot(self.plant.robot)
+        curve.require_limits(self.plant.robot, self.plant.dt)
+        self._begin(curve, 0)
 
     def become(self, arm: ArmModel) -> None:
         """
@@ -136,15 +189,13 @@ class SimulatedArm:
         Raises
         ------
         ModelError
-            If it is another robot.
+            If it is another robot, or joints give way.
 
         """
         now = self._state
         self.plant = self.successor(arm)
         self._state = self.plant.state(now.q, now.dq, now.ddq, now.steps)
-        self._past = RecentPast.of(
-            self.plant, self._state, self._torque, self.sensors.torque_delay
-        )
+        self._past = self._new_past()
 
     def successor(self, arm: ArmModel) -> Plant:
         """
@@ -153,9 +204,11 @@ class SimulatedArm:
         Raises
         ------
         ModelError
-            If it is another robot, or no body.
+            If it is another robot, or no body, or joints give way.
 
         """
+        if self.plant.springs is not None:
+            raise ModelError('an arm with elastic joints keeps its effects; start it with others')
         if arm.robot.joints != self.joints:
             raise ModelError(
                 f'{arm.robot.name}: an arm with the joints {", ".join(self.joints)} cannot become '
@@ -174,7 +227,9 @@ class SimulatedArm:
 
         """
         self._course.begin(reference, self._state.steps)
-        self._set_off()
+        self._look_ahead(self._targets.q[self._row])
+        if not self.controller.acts_once:
+            self._act()
 
     def advance(self, steps: int = 1) -> Sample:
         """
@@ -190,34 +245,70 @@ class SimulatedArm:
             raise ValueError(f'an arm advances by 1 step or more, not {steps}')
         left = steps
         while left:
-            row = self._state.steps + 1 - self._first
+            row = self._row + 1
             if row >= len(self._targets):
-                self._look_ahead()
+                self._look_ahead(self._targets.q[-1])
                 row = 1
             taken = min(left, len(self._targets) - row)
             targets = self._targets[row : row + taken]
-            self._record(run(self.plant, self.controller, self._state, self._torque, targets))
+            trace = run(self.plant, self._acting, self._state, self._torque, targets)
+            self._state, self._torque = trace.state, trace.tau[-1]
+            self._past.extend(trace)
             left -= taken
-        return self._read(steps * self.plant.dt)
+        return self.read(steps)
 
-    def _set_off(self) -> None:
-        """Do what the course says from now on."""
-        self._look_ahead()
-        self._torque = command(self.plant, self.controller, self._state, self._targets, 0)
-
-    def _look_ahead(self) -> None:
-        """Evaluate the reference from now on, for some time."""
-        self._first = self._state.steps
-        self._targets = Targets.of(self._course.desired(self._first, _BLOCK + 1), self.controller)
-
-    def _record(self, trace: Trace) -> None:
-        """Keep where the arm is, and what the sensors have yet to read."""
-        self._state, self._torque = trace.state, trace.torque
-        self._past.extend(trace)
-
-    def _read(self, dt: float) -> Sample:
-        state = self._state
+    def read(self, steps: int = 1) -> Sample:
+        """Read the sensors now, some steps after they were read last."""
+        state, dt = self._state, steps * self.plant.dt
         q, dq, tau = (row[np.newaxis] for row in self._past.latest())
         q, dq, tau = self.sensors.measure(q, dq, tau, dt, self._rng, self._previous)
         self._previous = q[0]
-        return Sample(state.steps, state.t, q[0], dq[0], tau[0])
+        link = None if self.plant.springs is None else self._read_links(dt)
+        return Sample(state.steps, state.t, q[0], dq[0], tau[0], link)
+
+    def _read_links(self, dt: float) -> LinkSample:
+        """Read the other side of the springs."""
+        state, targets, row = self._state, self._targets, self._row
+        q, dq = state.q[np.newaxis], state.dq[np.newaxis]
+        none = np.zeros_like(q)
+        q, dq, _ = self.sensors.measure(q, dq, none, dt, self._rng, self._previous_link)
+        self._previous_link = q[0]
+        felt = self.accelerometers.read(state.q, state.dq, state.ddq)
+        if np.any(self.sensors.acceleration_noise):
+            felt = felt + self.sensors.acceleration_noise * self._rng.standard_normal(felt.shape)
+        return LinkSample(q[0], dq[0], state.ddq, felt, targets.q[row], targets.dq[row])
+
+    def _begin(self, reference: Reference, steps: int) -> None:
+        """Put the arm on a reference, with nothing before it."""
+        first = reference.sample(np.zeros(1))
+        self._state = self.plant.state(first.q[0], first.dq[0], steps=steps)
+        self._course.follow(reference, steps)
+        self._acting = self.controller.started()
+        self._previous = self._previous_link = None
+        self._look_ahead()
+        self._act()
+        self._past = self._new_past()
+
+    @property
+    def _row(self) -> int:
+        """Row of the targets that belongs to now."""
+        return self._state.steps - self._first
+
+    def _act(self) -> None:
+        """Let the controller do what the course says now."""
+        self._torque = command(self.plant, self._acting, self._state, next(iter(self._targets)))
+
+    def _look_ahead(self, asked: FloatArray | None = None) -> None:
+        """Evaluate the reference from now on, for some time; motors were to be here now."""
+        self._first = self._state.steps
+        desired = self._course.desired(self._first, _BLOCK + 1)
+        self._targets = self.controller.targets(desired, asked)
+
+    def _new_past(self) -> RecentPast:
+        """Return what the sensors know of an arm that begins here."""
+        return RecentPast(self.plant, self._state, self._torque, self.sensors.torque_delay)
+
+
+def _suitable(plant: Plant) -> Controller:
+    """Return what makes an arm follow, that knows it."""
+    return ComputedTorque(plant.arm) if plant.springs is None else MotorControl.of(plant)

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from armid_ros.elastic.identification.names import SIZE, unpack
-from armid_ros.elastic.plant.run import ElasticRun, VelocityLoop
+from armid_ros.elastic.plant.run import ElasticRun
 from armid_ros.motion import FloatArray
 from armid_ros.robots.two_link import TwoLinkParameters
+from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np
 import numpy.typing as npt
 

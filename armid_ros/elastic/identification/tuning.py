@@ -26,11 +26,12 @@ from armid_ros.elastic.identification.response import (
     Steps,
     velocities,
 )
-from armid_ros.elastic.plant.run import ElasticRun, VelocityLoop
+from armid_ros.elastic.plant.run import ElasticRun
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.motion import FloatArray
 from armid_ros.robots.two_link import TwoLinkParameters
+from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np
 from scipy.optimize import least_squares
 

@@ -7,52 +7,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from armid_ros.elastic.plant.integrator import elastic_step
-from armid_ros.elastic.plant.plant import ElasticPlant
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.errors import TrajectoryError
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+from armid_ros.simulation.closed_loop import command, run
+from armid_ros.simulation.controller import Targets
+from armid_ros.simulation.motor_control import MotorControl, VelocityLoop
+from armid_ros.simulation.plant import limit_slack, Plant, State
 import numpy as np
 import numpy.typing as npt
-
-
-@dataclass(frozen=True, eq=False)
-class VelocityLoop:
-    """
-    Proportional-integral control of the motors' velocities, sampled at every step of the plant.
-
-    tau_k = kp e_k + ki s_k, with e_k = reference - velocity and s_k = s_k-1 + dt e_k.
-
-    Attributes
-    ----------
-    proportional : ndarray, shape (n,)
-        kp [N m s/rad], at the joints.
-    integral : ndarray, shape (n,)
-        ki [N m/rad].
-
-    """
-
-    proportional: FloatArray
-    integral: FloatArray
-
-    def __post_init__(self) -> None:
-        """Freeze the gains."""
-        object.__setattr__(self, 'proportional', read_only(self.proportional))
-        object.__setattr__(self, 'integral', read_only(self.integral))
-
-    def torque(self, error: FloatArray, integral: FloatArray) -> FloatArray:
-        """Return the torque for errors of velocity [rad/s] and their integral [rad], (n,)."""
-        return np.asarray(self.proportional * error + self.integral * integral)
-
-    @classmethod
-    def of_drive(
-        cls,
-        proportional: npt.ArrayLike,
-        integral: npt.ArrayLike,
-        torque_per_volt: FloatArray,
-        gear: FloatArray,
-    ) -> VelocityLoop:
-        """Convert gains of drives, V s/rad and V/rad at the motors, to the joints."""
-        scale = torque_per_volt * gear
-        return cls(np.asarray(proportional) * scale, np.asarray(integral) * scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +107,7 @@ class ElasticSensors:
         return replace(run, motor=motor, link=link)
 
 
-def run_elastic(plant: ElasticPlant, loop: VelocityLoop, experiment: Experiment) -> ElasticRun:
+def run_elastic(plant: Plant, loop: VelocityLoop, experiment: Experiment) -> ElasticRun:
     """
     Run one experiment from rest, one row per step, and return the true motion.
 
@@ -157,27 +120,21 @@ def run_elastic(plant: ElasticPlant, loop: VelocityLoop, experiment: Experiment)
         If a link gets beyond its limits.
 
     """
-    count, n = experiment.velocity.shape
-    limit = plant.rigid.torque_limit
-    extra = np.zeros((count, n)) if experiment.torque is None else experiment.torque
-    q_m, v_m, q_l, v_l, a_l, tau = np.empty((6, count, n))
-    state, integral = plant.state(experiment.q), np.zeros(n)
-    for k in range(count):
-        q_m[k], v_m[k] = plant.motor(state)
-        q_l[k], v_l[k], a_l[k] = plant.link(state)
-        error = experiment.velocity[k] - v_m[k]
-        integral += plant.dt * error
-        asked = loop.torque(error, integral) + extra[k]
-        tau[k] = np.clip(asked, -limit, limit)
-        state = elastic_step(plant, state, tau[k])
-    plant.require_range(state)
-    t = plant.rigid.times(0, count) * plant.substeps
-    motor = Motion(plant.joints, t, q_m, v_m, np.zeros_like(v_m), tau)
-    return ElasticRun(motor, Motion(plant.joints, t, q_l, v_l, a_l), experiment.velocity)
+    control, still = MotorControl(loop, plant.dt), np.zeros_like(experiment.velocity)
+    extra = still if experiment.torque is None else experiment.torque
+    targets = Targets(still, experiment.velocity, still, extra)
+    state = plant.state(experiment.q)
+    torque = command(plant, control, state, next(iter(targets)))
+    trace = run(plant, control, state, torque, targets[1:])
+    _require_range(plant.robot, trace.state)
+    joints, t = plant.robot.joints, plant.times(0, len(targets))
+    q, dq, _ = trace.motors
+    motor = Motion(joints, t, q, dq, still, trace.tau)
+    return ElasticRun(motor, Motion(joints, t, *trace.links), experiment.velocity)
 
 
 def run_all(
-    plant: ElasticPlant,
+    plant: Plant,
     loop: VelocityLoop,
     experiments: list[Experiment],
     progress: Callable[[float], None] | None = None,
@@ -189,3 +146,15 @@ def run_all(
         if progress is not None:
             progress((number + 1) / len(experiments))
     return runs
+
+
+def _require_range(robot: Robot, state: State) -> None:
+    """Raise TrajectoryError if a link is beyond a limit."""
+    slack = limit_slack(robot)
+    beyond = (state.q < robot.lower - slack) | (state.q > robot.upper + slack)
+    for joint in np.flatnonzero(beyond)[:1]:
+        raise TrajectoryError(
+            f"{robot.name}: joint '{robot.joints[joint]}' reaches {state.q[joint]:.4g} at "
+            f'{state.t:.3f} s, beyond its limits of {robot.lower[joint]:.4g} and '
+            f'{robot.upper[joint]:.4g}'
+        )

@@ -5,17 +5,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.elastic.plant.arm import ElasticArm
-from armid_ros.elastic.plant.motor_control import MotorControl
-from armid_ros.elastic.plant.plant import ElasticPlant
-from armid_ros.elastic.plant.run import VelocityLoop
 from armid_ros.elastic.plant.two_link import two_link_arm, two_link_loop
 from armid_ros.robots import Robot
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkSet
 from armid_ros.simulation.accelerometers import LinkAccelerometers
+from armid_ros.simulation.motor_control import MotorControl, VelocityLoop
+from armid_ros.simulation.plant import Plant
 from armid_ros.simulation.sensors import Sensors
+from armid_ros.simulation.simulated_arm import SimulatedArm
+from armid_ros.simulation.springs import Elasticity
 import numpy as np
 import numpy.typing as npt
 
@@ -69,7 +70,7 @@ def make_elastic_arm(
     dt: float = 1e-3,
     sensors: Sensors | None = None,
     start: npt.ArrayLike | None = None,
-) -> ElasticArm:
+) -> SimulatedArm:
     """
     Make a simulated arm with elastic joints.
 
@@ -87,7 +88,7 @@ def make_elastic_arm(
     dt : float
         Step of plant and loops [s].
     sensors, start
-        As for `ElasticArm`.
+        As for `SimulatedArm`.
 
     Raises
     ------
@@ -96,17 +97,18 @@ def make_elastic_arm(
 
     """
     if drives is None:
-        plant, places = ElasticPlant(arm, dt), None
+        plant, places = Plant(arm, dt, elasticity=Elasticity()), None
         control = MotorControl.of(plant)
     else:
-        plant = ElasticPlant(arm, dt, link_damping=drives.parameters.link_damping)
-        control = MotorControl(two_link_loop(drives))
+        elasticity = Elasticity(link_damping=drives.parameters.link_damping)
+        plant = Plant(arm, dt, elasticity=elasticity)
+        control = MotorControl(two_link_loop(drives), dt)
         places = np.outer(drives.assumptions['accelerometer_radius'], [1.0, 0.0, 0.0])
     loop = VelocityLoop(gain * control.loop.proportional, gain * control.loop.integral)
-    return ElasticArm(
+    return SimulatedArm(
         plant,
         rng=rng,
-        control=MotorControl(loop, control.guide),
+        controller=replace(control, loop=loop),
         sensors=sensors,
         accelerometers=LinkAccelerometers(plant.robot, places),
         start=start,

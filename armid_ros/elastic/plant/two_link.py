@@ -6,11 +6,13 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.elastic.plant.plant import ElasticPlant
-from armid_ros.elastic.plant.run import VelocityLoop
+from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.two_link import ROBOT, TwoLinkParameters, TwoLinkSet
+from armid_ros.simulation.motor_control import VelocityLoop
+from armid_ros.simulation.plant import Plant
+from armid_ros.simulation.springs import Elasticity
 import numpy as np
 import pinocchio as pin
 
@@ -35,12 +37,10 @@ def two_link_arm(parameters: TwoLinkParameters, robot: Robot | None = None) -> A
     return arm
 
 
-def two_link_plant(
-    parameters: TwoLinkParameters, *, dt: float = 1e-3, substeps: int = 2
-) -> ElasticPlant:
+def two_link_plant(parameters: TwoLinkParameters, *, dt: float = 1e-3, substeps: int = 2) -> Plant:
     """Return the two links ready to be integrated."""
     arm = two_link_arm(parameters)
-    return ElasticPlant(arm, dt, substeps, link_damping=parameters.link_damping)
+    return Plant(arm, dt, elasticity=Elasticity(substeps, parameters.link_damping))
 
 
 def two_link_loop(shipped: TwoLinkSet, share: float = 1.0) -> VelocityLoop:
@@ -54,14 +54,14 @@ def two_link_loop(shipped: TwoLinkSet, share: float = 1.0) -> VelocityLoop:
     )
 
 
-def modes(plant: ElasticPlant, q: FloatArray, *, locked: bool = False) -> FloatArray:
+def modes(plant: Plant, q: FloatArray, *, locked: bool = False) -> FloatArray:
     """
     Return the natural frequencies and damping ratios of an elastic arm without dry friction.
 
     Parameters
     ----------
-    plant : ElasticPlant
-        The arm.
+    plant : Plant
+        The arm, with springs.
     q : ndarray, shape (n,)
         Position of the links [rad].
     locked : bool
@@ -72,13 +72,21 @@ def modes(plant: ElasticPlant, q: FloatArray, *, locked: bool = False) -> FloatA
     ndarray, shape (K, 2)
         Undamped frequency [Hz] and damping ratio of each oscillation, lowest first.
 
+    Raises
+    ------
+    ModelError
+        If all joints are rigid.
+
     """
-    robot, e = plant.rigid.robot, len(plant.elastic)
-    inertia = plant.rotors.copy()
-    inertia[e:, e:] += pin.crba(robot.model, robot.model.createData(), np.asarray(q, dtype=float))
-    w = plant.to_twists
-    resist = plant.damping + (w.T * plant.springs.damping) @ w
-    spring = w.T * plant.springs.stiffness
+    springs = plant.springs
+    if springs is None:
+        raise ModelError(f'{plant.robot.name}: its joints are rigid and do not oscillate')
+    model, e = plant.robot.model, len(springs.joints)
+    inertia = springs.rotors.copy()
+    inertia[e:, e:] += pin.crba(model, model.createData(), np.asarray(q, dtype=float))
+    w = springs.to_twists
+    resist = springs.damping + (w.T * springs.transmission.damping) @ w
+    spring = w.T * springs.transmission.stiffness
     if locked:
         inertia, resist, spring, w = inertia[e:, e:], resist[e:, e:], spring[e:], w[:, e:]
     size = e + len(inertia)

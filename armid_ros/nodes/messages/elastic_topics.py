@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from armid_ros.elastic.plant.arm import ElasticArm, ElasticSample
 from armid_ros.nodes.qos import STREAM
 from armid_ros.recording.elastic_topics import imu_topic, LINK, REFERENCE
+from armid_ros.simulation.simulated_arm import LinkSample, SimulatedArm
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -21,12 +21,12 @@ class ElasticTopics:
     ----------
     node : Node
         Whose topics they are.
-    arm : ElasticArm
-        The arm.
+    arm : SimulatedArm
+        The arm, with springs.
 
     """
 
-    def __init__(self, node: Node, arm: ElasticArm) -> None:
+    def __init__(self, node: Node, arm: SimulatedArm) -> None:
         def publisher(kind: type, topic: str) -> tuple:  # type: ignore[type-arg]
             return node.create_publisher(
                 kind,
@@ -44,10 +44,10 @@ class ElasticTopics:
             message.orientation_covariance[0] = message.angular_velocity_covariance[0] = -1.0
             self._imus.append((publisher(Imu, imu_topic(link)), message))
 
-    def publish(self, sample: ElasticSample, stamp: Time) -> None:
+    def publish(self, sample: LinkSample, stamp: Time) -> None:
         """Publish a sample."""
         for (publisher, message), q, dq in (
-            (self._link, sample.link_q, sample.link_dq),
+            (self._link, sample.q, sample.dq),
             (self._reference, sample.asked_q, sample.asked_dq),
         ):
             message.header.stamp = stamp

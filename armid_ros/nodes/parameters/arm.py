@@ -11,7 +11,6 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import load_model
 from armid_ros.effects import parse_effect
-from armid_ros.elastic.plant.arm import ElasticArm
 from armid_ros.elastic.plant.setup import (
     elastic_joints,
     make_elastic_arm,
@@ -99,7 +98,7 @@ SENSOR_PARAMETERS = {
 }
 
 
-def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm | ElasticArm:
+def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
     """
     Make the simulated arm that parameters describe, elastic where its joints are.
 

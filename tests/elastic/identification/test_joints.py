@@ -13,7 +13,7 @@ from armid_ros.elastic.identification import write_runs
 from armid_ros.elastic.identification.files import read_sides
 from armid_ros.elastic.identification.joints import fit_springs
 from armid_ros.elastic.identification.output import springs_document
-from armid_ros.elastic.plant.arm import record
+from armid_ros.elastic.plant.record import record
 from armid_ros.elastic.plant.setup import make_elastic_arm
 from armid_ros.elastic.report.springs_page import springs_report
 from armid_ros.errors import ArmidError

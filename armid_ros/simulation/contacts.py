@@ -1,0 +1,139 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What can hold an arm at a standstill: dry friction, and the stops of its joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from armid_ros.effects import DryFriction
+from armid_ros.errors import ModelError
+from armid_ros.motion import FloatArray
+from armid_ros.simulation.box_complementarity import BoxLaw, Modes, SPEED_TOLERANCE
+import numpy as np
+import numpy.typing as npt
+
+
+class KnownModes(NamedTuple):
+    """
+    What is constant of a step as long as every element does what it does.
+
+    Attributes
+    ----------
+    taken : ndarray, shape (n,)
+        Joint torques that slipping elements take [N m].
+    free : ndarray, shape (n,), or None
+        1 for joints that move and 0 for those that stick; None if none does.
+    both, stuck : ndarray, shape (n, n)
+        1 where two joints move; the diagonal matrix with 1 for each that sticks.
+
+    """
+
+    taken: FloatArray
+    free: FloatArray | None
+    both: FloatArray
+    stuck: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """
+    Elements that can hold: dry friction, and joint stops.
+
+    Attributes
+    ----------
+    directions : ndarray, shape (m, n)
+        Velocity of each element as a combination of the joint velocities.
+    law : BoxLaw
+        What torques they take.
+    axes : tuple of int, length m
+        The joint that an element acts on alone; -1 if it acts on several.
+    own : bool
+        Whether each is friction of one joint whatever its load, so that a joint whose element
+        sticks stood still before.
+    friction : DryFriction
+        What they are without a load, where the load matters.
+
+    """
+
+    directions: FloatArray
+    law: BoxLaw
+    axes: tuple[int, ...]
+    own: bool
+    friction: DryFriction | None = None
+    _patterns: dict[Modes, KnownModes] = field(init=False, repr=False, default_factory=dict)
+
+    @classmethod
+    def of(cls, friction: DryFriction) -> Contacts:
+        """Return the contacts of friction elements."""
+        directions = friction.directions
+        axes = tuple(_axis(direction) for direction in directions)
+        law = BoxLaw(friction.lower, friction.upper)
+        loaded = None if friction.load_share is None else friction
+        unit = np.array_equal(directions[directions != 0.0], np.ones(len(axes)))
+        own = unit and -1 not in axes and loaded is None
+        return cls(directions, law, axes, own, loaded)
+
+    def pattern(self, modes: Modes) -> KnownModes | None:
+        """
+        Return what a step is made of in which all elements do what they do; None if not known.
+
+        What sticks can be taken out of the system where it is a joint. Patterns of modes come
+        back step after step, so they are kept.
+
+        """
+        found = self._patterns.get(modes)
+        if found is None and (self.own or 0 not in modes):
+            found = self._patterns[modes] = self._new_pattern(np.array(modes, dtype=int))
+        return found
+
+    def _new_pattern(self, modes: npt.NDArray[np.intp]) -> KnownModes:
+        bound = np.where(modes > 0, self.law.upper, np.where(modes < 0, self.law.lower, 0.0))
+        taken = np.asarray(bound @ self.directions)
+        free = 1.0 - np.any(self.directions[modes == 0], axis=0)
+        moving = None if free.all() else free
+        return KnownModes(taken, moving, np.outer(free, free), np.diag(1.0 - free))
+
+    def obeyed(self, dq: FloatArray, modes: Modes, taken: FloatArray | None) -> bool:
+        """Tell whether elements obey their laws at joint velocities and torques, (n,)."""
+        speeds = self.directions.dot(dq)
+        if taken is not None:
+            return not self.law.violations(speeds, self.directions.dot(taken), modes)
+        for speed, mode in zip(speeds.tolist(), modes, strict=True):
+            if speed * mode < -SPEED_TOLERANCE:
+                return False
+        return True
+
+    def under(self, load: FloatArray) -> Contacts:
+        """Return the contacts as they are under a torque of the rigid body, shape (n,) [N m]."""
+        if self.friction is None:
+            return self
+        more = self.friction.widening(load)
+        return replace(self, law=BoxLaw(self.friction.lower - more, self.friction.upper + more))
+
+
+def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFriction, FloatArray]:
+    """Part the elements that cannot stick, whose levels are one constant torque, from the rest."""
+    if friction is None:
+        return DryFriction(np.empty((0, n_joints)), np.empty(0), np.empty(0)), np.zeros(n_joints)
+    if np.any(friction.lower > friction.upper):
+        raise ModelError(
+            'dry friction that pushes: the torque of an element forwards is less than backwards '
+            f'({friction.upper} against {friction.lower}); friction torques have to be positive'
+        )
+    share = np.zeros(len(friction.lower)) if friction.load_share is None else friction.load_share
+    constant = (friction.lower == friction.upper) & (share == 0.0)
+    sticking = DryFriction(
+        np.ascontiguousarray(friction.directions[~constant]),
+        friction.lower[~constant],
+        friction.upper[~constant],
+        None if friction.load_share is None else share[~constant],
+    )
+    return sticking, np.asarray(friction.lower[constant] @ friction.directions[constant])
+
+
+def _axis(direction: FloatArray) -> int:
+    """Return the joint that an element acts on alone, -1 if it acts on several."""
+    joints = np.flatnonzero(direction)
+    return int(joints[0]) if len(joints) == 1 else -1

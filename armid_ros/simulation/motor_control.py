@@ -1,0 +1,158 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the drives of an arm with elastic joints do: velocity loops, alone or led by a model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+from armid_ros.errors import ModelError
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.simulation.controller import BANDWIDTH, Controller, Targets
+from armid_ros.simulation.plant import middle_position, Plant
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+#: Share of a motor's velocity that one sampled action of its loop may take away.
+_QUICKEST = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class VelocityLoop:
+    """
+    Proportional-integral control of the motors' velocities, sampled at every step of the plant.
+
+    tau_k = kp e_k + ki s_k, with e_k = reference - velocity and s_k = s_k-1 + dt e_k.
+
+    Attributes
+    ----------
+    proportional : ndarray, shape (n,)
+        kp [N m s/rad], at the joints.
+    integral : ndarray, shape (n,)
+        ki [N m/rad].
+
+    """
+
+    proportional: FloatArray
+    integral: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the gains."""
+        object.__setattr__(self, 'proportional', read_only(self.proportional))
+        object.__setattr__(self, 'integral', read_only(self.integral))
+
+    def torque(self, error: FloatArray, integral: FloatArray) -> FloatArray:
+        """Return the torque for errors of velocity [rad/s] and their integral [rad], (n,)."""
+        return np.asarray(self.proportional * error + self.integral * integral)
+
+    @classmethod
+    def of_drive(
+        cls,
+        proportional: npt.ArrayLike,
+        integral: npt.ArrayLike,
+        torque_per_volt: FloatArray,
+        gear: FloatArray,
+    ) -> VelocityLoop:
+        """Convert gains of drives, V s/rad and V/rad at the motors, to the joints."""
+        scale = torque_per_volt * gear
+        return cls(np.asarray(proportional) * scale, np.asarray(integral) * scale)
+
+
+@dataclass(eq=False)
+class MotorControl(Controller):
+    """
+    A velocity loop on every motor, which keeps the integral of its error from step to step.
+
+    Attributes
+    ----------
+    loop : VelocityLoop
+        The loops; the integral of the velocity's error is that of the position.
+    dt : float
+        Time between two actions of the loops, a step of the plant [s].
+    guide : Plant, or None
+        What they believe of the arm: its torque along the reference is added to theirs, and the
+        motors are led ahead of the links by the twist of their springs. None: loops alone.
+    integral : ndarray, shape (n,)
+        Of the error of the velocity [rad].
+
+    """
+
+    loop: VelocityLoop
+    dt: float
+    guide: Plant | None = None
+    integral: FloatArray = field(init=False, repr=False)
+    acts_once: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        """Begin with relaxed loops."""
+        self.integral = np.zeros(len(self.loop.proportional))
+
+    @classmethod
+    def of(cls, plant: Plant) -> MotorControl:
+        """
+        Return a control that suits an arm whose joints give way, and knows it.
+
+        The gain on the velocity is the least of what a rigid joint needs for 8 Hz, of what damps
+        the link on its spring best, sqrt(K M), and of what a sampled loop may do to a rotor. That
+        on the position damps the joint critically.
+
+        """
+        robot, springs = plant.robot, plant.springs
+        if springs is None:
+            raise ModelError(f'{robot.name}: its joints are rigid; use ComputedTorque')
+        joints, e = springs.joints, len(springs.joints)
+        link = np.diag(pin.crba(robot.model, robot.model.createData(), middle_position(robot)))
+        rotor = np.array(np.diag(springs.rotors)[e:])
+        rotor[joints] = np.diag(springs.rotors)[:e]
+        inertia = link + rotor
+        gain = 2.0 * BANDWIDTH * inertia
+        gain[joints] = np.minimum.reduce(
+            [
+                gain[joints],
+                np.sqrt(springs.transmission.stiffness * link[joints]),
+                _QUICKEST * rotor[joints] / plant.dt,
+            ]
+        )
+        return cls(VelocityLoop(gain, gain**2 / (4.0 * inertia)), plant.dt, plant)
+
+    def started(self) -> MotorControl:
+        """Return the same loops, relaxed."""
+        return replace(self)
+
+    def targets(self, desired: Motion, asked: FloatArray | None = None) -> Targets:
+        """
+        Return where the loops are to bring the motors, and the torque that is added to theirs.
+
+        Parameters
+        ----------
+        desired : Motion
+            Of the links; its torque, if it has one, is added too.
+        asked : ndarray, shape (n,), optional
+            Position that was the target of the first step, for which the loops have acted.
+
+        """
+        tau = np.zeros_like(desired.q) if desired.tau is None else np.array(desired.tau)
+        q = desired.q
+        if self.guide is not None and self.guide.springs is not None:
+            load = inverse_dynamics(self.guide.robot, desired)
+            q = self.guide.springs.at_motors(q, self.guide.springs.twist(load))
+            tau += load + self.guide.action.effort(desired, desired, load)
+        before = np.concatenate([q[:1] - self.dt * desired.dq[:1], q[:-1]])
+        if asked is not None:
+            before[1:2] = asked
+        return Targets(q, (q - before) / self.dt, np.zeros_like(q), tau)
+
+    def torque(
+        self,
+        q: FloatArray,
+        dq: FloatArray,
+        desired: tuple[FloatArray, FloatArray, FloatArray],
+        feedforward: FloatArray,
+    ) -> FloatArray:
+        """Act once, and return the torque, shape (n,)."""
+        error = desired[1] - dq
+        self.integral = self.integral + self.dt * error
+        return self.loop.torque(error, self.integral) + feedforward

@@ -1,0 +1,223 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What is between the motors and the links of a plant whose transmissions give way.
+
+Where one does, motor and link have velocities of their own. Motors carry rotor inertia, drive
+torque and all friction of the arm's effects; links carry the rigid body and what is attached to
+it. Rotors are taken to turn fast about their own axes, so that their inertia does not depend on
+the pose (Spong 1987).
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import Action, Transmission
+from armid_ros.errors import ModelError
+from armid_ros.motion import FloatArray, read_only
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+
+#: Natural frequency of a link against its stop, times the substep: soft enough to be integrated.
+_STOP = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Elasticity:
+    """
+    How joints that give way are simulated.
+
+    Attributes
+    ----------
+    substeps : int
+        Parts that a step is integrated in.
+    link_damping : float or ndarray, shape (n,)
+        Viscous friction of the links, which no effect of the catalogue has: friction there is at
+        the motors [N m s/rad].
+
+    """
+
+    substeps: int = 2
+    link_damping: npt.ArrayLike = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticJoints:
+    """
+    The e joints of an arm that give way; velocities are those of e motors, then of n links.
+
+    Attributes
+    ----------
+    joints : ndarray, shape (e,)
+        Which they are.
+    transmission : Transmission
+        Their stiffness, damping and free play, each of shape (e,).
+    substeps : int
+        Parts that a step is integrated in.
+    dt : float
+        One of them [s].
+    to_motors, to_twists : ndarray, shape (n, e + n), (e, e + n)
+        Velocities of the motors at all joints, and of the twists of the springs.
+    rotors, damping : ndarray, shape (e + n, e + n)
+        Inertia but for that of the rigid body [kg m^2], and viscous friction [N m s/rad].
+    friction : ndarray, shape (m, e + n)
+        Directions of the dry friction.
+    stops : tuple of ndarray, each of shape (n,)
+        Stiffness and damping of the stops [N m/rad], [N m s/rad].
+    sensing : Action
+        What effects make of the readings of motors, which their springs do not change.
+    pull : ndarray, shape (e + n, e + e + n)
+        What springs that mesh and friction do per twist and velocity.
+    loose : bool
+        Whether any has free play.
+
+    """
+
+    joints: npt.NDArray[np.intp]
+    transmission: Transmission
+    substeps: int
+    dt: float
+    to_motors: FloatArray
+    to_twists: FloatArray
+    rotors: FloatArray
+    damping: FloatArray
+    friction: FloatArray
+    stops: tuple[FloatArray, FloatArray]
+    sensing: Action
+    pull: FloatArray = field(init=False, repr=False)
+    loose: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Collect what springs that mesh do."""
+        springs = self.transmission
+        object.__setattr__(self, 'loose', bool(np.any(springs.gap)))
+        pull = self.pull_of(springs.stiffness, springs.damping)
+        object.__setattr__(self, 'pull', read_only(pull))
+
+    @classmethod
+    def of(
+        cls,
+        arm: ArmModel,
+        elasticity: Elasticity,
+        directions: FloatArray,
+        mass: FloatArray,
+        dt: float,
+    ) -> ElasticJoints:
+        """
+        Return the springs that the effects of an arm describe.
+
+        Parameters
+        ----------
+        arm : ArmModel
+            With joint_elasticity and rotor_inertia among its effects.
+        elasticity : Elasticity
+            How they are simulated.
+        directions : ndarray, shape (m, n)
+            Of the dry friction at the motors.
+        mass : ndarray, shape (n, n)
+            Inertia matrix of the links in the middle of their ranges [kg m^2].
+        dt : float
+            Step of the plant [s].
+
+        Raises
+        ------
+        ModelError
+            If no joint gives way, or the motor of one that does has no inertia; names the joint.
+
+        """
+        action = arm.action()
+        springs = _required(arm.robot, action)
+        joints = np.flatnonzero(np.isfinite(springs.stiffness))
+        n, e = len(mass), len(joints)
+        none = np.zeros((n, n))
+        to_links = np.hstack([np.zeros((n, e)), np.eye(n)])
+        to_motors = to_links.copy()
+        to_motors[joints] = np.eye(e, e + n)
+        rotors, damping = (
+            to_motors.T @ (none if x is None else x) @ to_motors
+            for x in (action.inertia, action.damping)
+        )
+        rub = np.diag(np.broadcast_to(np.asarray(elasticity.link_damping, dtype=float), (n,)))
+        return cls(
+            joints=joints,
+            transmission=Transmission(
+                springs.stiffness[joints], springs.damping[joints], springs.gap[joints]
+            ),
+            substeps=elasticity.substeps,
+            dt=dt / elasticity.substeps,
+            to_motors=to_motors,
+            to_twists=(to_motors - to_links)[joints],
+            rotors=rotors,
+            damping=damping + to_links.T @ rub @ to_links,
+            friction=np.ascontiguousarray(directions @ to_motors),
+            stops=_stops(mass, _STOP * elasticity.substeps / dt),
+            sensing=_sensing(arm),
+        )
+
+    def pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
+        """Return what springs and friction do per state, shape (e + n, e + e + n)."""
+        w = self.to_twists
+        return np.hstack([-w.T * stiffness, -self.damping - (w.T * damping) @ w])
+
+    def meshing(self, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what springs that mesh do, and their torque at zero twist, negative (e,)."""
+        springs = self.transmission
+        meshes = np.abs(twist) > springs.gap
+        stiffness = np.where(meshes, springs.stiffness, 0.0)
+        damping = np.where(meshes, springs.damping, 0.0)
+        return self.pull_of(stiffness, damping), stiffness * springs.gap * np.sign(twist)
+
+    def twist(self, load: FloatArray) -> FloatArray:
+        """Return by how much loads on the joints, (..., n) [N m], twist the springs, (..., e)."""
+        springs, push = self.transmission, load[..., self.joints]
+        return np.asarray(push / springs.stiffness + np.sign(push) * springs.gap)
+
+    def at_motors(self, links: FloatArray, twist: FloatArray) -> FloatArray:
+        """Return positions of the motors from those of the links and twists, (..., n)."""
+        q = links.copy()
+        q[..., self.joints] += twist
+        return q
+
+
+def _required(robot: Robot, action: Action) -> Transmission:
+    """Return the transmission of an arm whose motors can move on their own."""
+    springs = action.transmission
+    if springs is None or not np.any(np.isfinite(springs.stiffness)):
+        raise ModelError(
+            f'{robot.name}: no joint gives way; add joint_elasticity, or simulate it '
+            'as a rigid arm'
+        )
+    soft = np.isfinite(springs.stiffness)
+    rotor = np.zeros(len(soft)) if action.inertia is None else np.diag(action.inertia)
+    for joint in np.flatnonzero(soft & (rotor <= 0.0))[:1]:
+        raise ModelError(
+            f"{robot.name}: joint '{robot.joints[joint]}' gives way, but its motor has no "
+            'inertia; add rotor_inertia'
+        )
+    if np.any(springs.gap[~soft] > 0.0):
+        raise ModelError(
+            f'{robot.name}: free play of a rigid transmission cannot be integrated; add '
+            'joint_elasticity to the joints with backlash'
+        )
+    return springs
+
+
+def _stops(mass: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+    """Return stiffness and damping of stops with a natural frequency [rad/s], each (n,)."""
+    free = 1.0 / np.diag(np.linalg.inv(mass))
+    return read_only(free * rate**2), read_only(1.4 * free * rate)
+
+
+def _sensing(arm: ArmModel) -> Action:
+    """Return what effects make of the readings of motors, which their springs do not change."""
+    kept = [
+        (effect, values)
+        for effect, values in zip(arm.effects, arm.values, strict=True)
+        if effect.action(values, ArmModel(arm.robot)).transmission is None
+    ]
+    bare = ArmModel(arm.robot, tuple(e for e, _ in kept), tuple(v for _, v in kept))
+    return bare.action()
