@@ -178,6 +178,7 @@ class LiveDiagnosis:
         self.settings = settings or LiveSettings()
         self._given = arm, baseline, misfit
         self._seed = seed
+        self._under_way = self._outdated = False
         self.reset()
 
     def reset(self) -> None:
@@ -186,6 +187,7 @@ class LiveDiagnosis:
         self.belief = Belief(arm)
         self.latest: Answer | None = None
         self.asked = 0
+        self._outdate()
         self.use(self.settings)
         known = self._baseline or self._misfit is not None
         self._learned = bool(known) or not self.settings.learning
@@ -230,6 +232,7 @@ class LiveDiagnosis:
         """Return what to ask now."""
         self._asked_at = self.window.moved
         self.asked += 1
+        self._under_way, self._outdated = True, False
         longest = self.settings.learning if self.learning else self.settings.window
         return Question(
             self.belief.accepted,
@@ -245,7 +248,7 @@ class LiveDiagnosis:
 
     def take(self, answer: Answer) -> bool:
         """
-        Take an answer into account.
+        Take an answer into account, unless it is about an arm that is not believed in any more.
 
         Returns
         -------
@@ -253,6 +256,9 @@ class LiveDiagnosis:
             Whether another model is believed now.
 
         """
+        outdated, self._under_way, self._outdated = self._outdated, False, False
+        if outdated:
+            return False
         if answer.misfit is not None:
             self._misfit, self._learned = answer.misfit, True
             return False
@@ -282,6 +288,7 @@ class LiveDiagnosis:
 
         """
         self.belief = self.belief.accepting()
+        self._outdate()
         if self._baseline and self.latest is not None:
             self._baseline = (self.latest.window,)
         self._agreed = []
@@ -297,7 +304,12 @@ class LiveDiagnosis:
 
         """
         self.belief = self.belief.rejecting()
+        self._outdate()
         self._agreed = []
+
+    def _outdate(self) -> None:
+        """Have the answer that is under way dropped when it comes."""
+        self._outdated = self._under_way
 
     def _agree(self, named: Named) -> None:
         """Count the questions in a row that put a name first."""

@@ -89,6 +89,20 @@ def test_what_was_rejected_is_not_proposed_again(live, known_arm, patched):
     assert live.belief.model is patched
 
 
+@pytest.mark.parametrize('said_by_a_person', [LiveDiagnosis.accept, LiveDiagnosis.reject])
+def test_an_answer_about_the_arm_before_is_dropped(live, patched, said_by_a_person):
+    for _ in range(2):
+        live.take(said(patched, 'named', FRICTION))
+    stream(live, 9.0)
+    latest = live.latest
+    said_by_a_person(live)
+    live.take(said(patched, 'named', SPRING))
+    assert live.latest is latest
+    late = said(patched, 'named', SPRING)
+    live.take(late)
+    assert live.latest is late
+
+
 def test_with_nothing_proposed_there_is_nothing_to_accept_or_reject(live):
     for service in (live.accept, live.reject):
         with pytest.raises(IdentificationError, match='nothing is proposed'):
