@@ -17,6 +17,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.live.question import Answer, Question, WAITING
 from armid_ros.live.window import SampleWindow
 from armid_ros.recording import Recording
+import numpy as np
 import numpy.typing as npt
 
 Named = tuple[str, tuple[str, ...]]
@@ -197,7 +198,8 @@ class LiveDiagnosis:
         self.settings = settings
         joints, period = self.belief.accepted.robot.joints, 1.0 / settings.rate
         self.window = SampleWindow(joints, max(settings.window, settings.learning), period)
-        self._asked_at = 0.0
+        self._asked_at, self._next = 0.0, settings.every
+        self._begin = -np.inf
         self._agreed: list[Named] = []
 
     @property
@@ -216,7 +218,7 @@ class LiveDiagnosis:
         wanted = self.settings.learning if self.learning else self.settings.shortest
         if self.window.moved < wanted or self.window.end - self.window.begin < wanted:
             return False
-        return self.window.moved - self._asked_at >= self.settings.every
+        return self.window.moved - self._asked_at >= self._next
 
     def add(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
@@ -225,18 +227,21 @@ class LiveDiagnosis:
         held = len(self.window)
         kept = self.window.add(t, q, dq, tau)
         if kept and held and len(self.window) == 1:
-            self._asked_at, self.window.moved = 0.0, 0.0  # a gap: the stretch is another one
+            # a gap: the stretch is another one
+            self._asked_at, self.window.moved, self._begin = 0.0, 0.0, -np.inf
         return kept
 
     def question(self) -> Question:
         """Return what to ask now."""
-        self._asked_at = self.window.moved
+        self._asked_at, self._next = self.window.moved, self.settings.every
         self.asked += 1
         self._under_way, self._outdated = True, False
         longest = self.settings.learning if self.learning else self.settings.window
         return Question(
             self.belief.accepted,
-            self.window.recording(self.window.end - longest, f'window {self.asked}'),
+            self.window.recording(
+                max(self.window.end - longest, self._begin), f'window {self.asked}'
+            ),
             self._baseline,
             self._misfit,
             self.settings.shortest,
@@ -262,8 +267,10 @@ class LiveDiagnosis:
         if answer.misfit is not None:
             self._misfit, self._learned = answer.misfit, True
             return False
+        self._begin = answer.end - answer.window.duration  # what came before was another arm
         if answer.verdict == WAITING:
             self._agreed = []
+            self._next = self.settings.shortest - answer.window.duration
             return False
         self.latest = answer
         before = self.belief.model

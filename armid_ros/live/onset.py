@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.rows.signals import (
+    Conditioning,
     conditioning,
     decimate,
     decimated_samples,
@@ -47,7 +48,7 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
         nothing changed.
 
     """
-    power = block_powers(arm, recording)
+    power = block_powers(arm, recording, conditioning([recording], SignalSettings()))
     times, logs = power[:, 0], np.log(np.maximum(power[:, 1:], 1e-300))
     count = len(logs)
     splits = range(_FEWEST, count)
@@ -60,7 +61,7 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     return float(times[splits[best]]) + _BLOCK if ratios[best].max() > limit else None
 
 
-def block_powers(arm: ArmModel, recording: Recording) -> FloatArray:
+def block_powers(arm: ArmModel, recording: Recording, used: Conditioning) -> FloatArray:
     """
     Return the mean squares of the residual of short blocks; the last one ends with the motion.
 
@@ -70,7 +71,6 @@ def block_powers(arm: ArmModel, recording: Recording) -> FloatArray:
         Begin of each block [s], and the power of each joint [N^2 m^2].
 
     """
-    used = conditioning([recording], SignalSettings())
     rows = [np.empty((0, 1 + len(arm.robot.joints)))]
     for motion in segments(recording, used):
         assert motion.tau is not None

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.live import Answer, LiveDiagnosis, LiveSettings
@@ -20,8 +21,9 @@ class Named:
         self.name, self.joints = name, joints
 
 
-def said(arm, verdict, *findings):
-    return Answer(verdict, verdict, findings, (), arm, None, 0.0, 0.0)
+def said(arm, verdict, *findings, duration=8.0, end=0.0):
+    window = SimpleNamespace(duration=duration)
+    return Answer(verdict, verdict, findings, (), arm, window, end, 0.0)
 
 
 @pytest.fixture
@@ -124,6 +126,21 @@ def test_it_asks_after_every_so_many_seconds_of_motion(live):
     asked = stream(live, 30.0)
     assert asked[0] == pytest.approx(8.0, abs=0.5)
     np.testing.assert_allclose(np.diff(asked), 4.0, atol=0.5)
+
+
+def test_after_a_change_it_asks_as_soon_as_enough_motion_came(live, known_arm):
+    stream(live, 8.1)
+    live.take(said(known_arm, WAITING, duration=5.5))
+    assert stream(live, 4.0, begin=8.1)[0] == pytest.approx(8.1 + 2.5, abs=0.2)
+
+
+def test_what_came_before_a_change_is_not_looked_at_again(live, known_arm):
+    stream(live, 8.1)
+    live.take(said(known_arm, WAITING, duration=5.0, end=8.1))
+    stream(live, 6.0, begin=8.1)
+    assert live.question().window.duration == pytest.approx(11.0, abs=0.1)
+    stream(live, 10.0, begin=100.0)
+    assert live.question().window.duration == pytest.approx(10.0, abs=0.1)
 
 
 def test_an_arm_at_rest_is_not_asked_about(live):
