@@ -19,6 +19,7 @@ import struct
 import subprocess
 import sys
 import threading
+import traceback
 from typing import Any, IO, Protocol
 
 from armid_ros.api.diagnosis import DiagnosisResult
@@ -150,17 +151,8 @@ class Assistant:
     """
 
     def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, '-c', f'from {__name__} import main; main()'],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=os.environ | _ONE_THREAD,
-            start_new_session=True,  # Ctrl-C is for who started it
-        )
-        self._results: queue.SimpleQueue[Result] = queue.SimpleQueue()
         self.busy = False
-        assert self._process.stdout is not None
-        threading.Thread(target=self._listen, args=(self._process.stdout,), daemon=True).start()
+        self._start()
 
     @property
     def pid(self) -> int:
@@ -169,16 +161,21 @@ class Assistant:
 
     def ask(self, job: Job) -> None:
         """
-        Begin a job.
+        Begin a job, in another process where the one before has ended.
 
         Raises
         ------
         IdentificationError
-            If another one is under way, or the process has ended.
+            If another one is under way, or the process ends just now.
+        OSError
+            If another process cannot be started.
 
         """
         if self.busy:
             raise IdentificationError('a diagnosis is under way; ask again in some seconds')
+        if self._process.poll() is not None:
+            self.close()
+            self._start()
         assert self._process.stdin is not None
         try:
             _write(self._process.stdin, job)
@@ -206,11 +203,26 @@ class Assistant:
                 except OSError:  # what it was not read of any more
                     pass
 
-    def _listen(self, pipe: IO[bytes]) -> None:
-        while (result := _read(pipe)) is not None:
-            self._results.put(result)
-        code = self._process.wait()
-        self._results.put(Done(f'the process that diagnoses has ended with {code}', success=False))
+    def _start(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, '-c', f'from {__name__} import main; main()'],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=os.environ | _ONE_THREAD,
+            start_new_session=True,  # Ctrl-C is for who started it
+        )
+        self._results: queue.SimpleQueue[Result] = queue.SimpleQueue()
+        own = self._process, self._results
+        threading.Thread(target=_listen, args=own, daemon=True).start()
+
+
+def _listen(process: subprocess.Popen[bytes], results: queue.SimpleQueue[Result]) -> None:
+    """Pass on what a process answers, until it ends."""
+    assert process.stdout is not None
+    while (result := _read(process.stdout)) is not None:
+        results.put(result)
+    code = process.wait()
+    results.put(Done(f'the process that diagnoses has ended with {code}', success=False))
 
 
 def _write(pipe: IO[bytes], what: object) -> None:
@@ -225,8 +237,11 @@ def _read(pipe: IO[bytes]) -> Any:
         head = pipe.read(_LENGTH.size)
         if len(head) < _LENGTH.size:
             return None
-        data = pipe.read(_LENGTH.unpack(head)[0])
+        length = _LENGTH.unpack(head)[0]
+        data = pipe.read(length)
     except (OSError, ValueError):  # closed while it is read
+        return None
+    if len(data) < length:  # it ended while it wrote
         return None
     return pickle.loads(data)  # of a process of one's own
 
@@ -238,5 +253,11 @@ def main() -> None:
     os.dup2(2, 1)  # what a library prints must not get among the results
     helper = InProcess()
     while (job := _read(jobs)) is not None:
-        helper.ask(job)
-        _write(results, helper.poll())
+        try:
+            helper.ask(job)
+            result = helper.poll()
+        except Exception as error:  # a window that nobody foresaw; the next one is another
+            traceback.print_exc()
+            what = f'{type(job).__name__.lower()} failed: {type(error).__name__}: {error}'
+            result = Done(what, success=False)
+        _write(results, result)

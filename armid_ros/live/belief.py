@@ -17,6 +17,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.live.request import Answer, DiagnosisRequest, WAITING
 from armid_ros.live.window import SampleWindow
 from armid_ros.recording import Recording
+import numpy as np
 import numpy.typing as npt
 
 Named = tuple[str, tuple[str, ...]]
@@ -178,6 +179,7 @@ class LiveDiagnosis:
         self.settings = settings or LiveSettings()
         self._given = arm, baseline, misfit
         self._seed = seed
+        self._under_way = self._outdated = False
         self.reset()
 
     def reset(self) -> None:
@@ -186,6 +188,7 @@ class LiveDiagnosis:
         self.belief = Belief(arm)
         self.latest: Answer | None = None
         self.asked = 0
+        self._outdate()
         self.use(self.settings)
         known = self._baseline or self._misfit is not None
         self._learned = bool(known) or not self.settings.learning
@@ -195,7 +198,8 @@ class LiveDiagnosis:
         self.settings = settings
         joints, period = self.belief.accepted.robot.joints, 1.0 / settings.rate
         self.window = SampleWindow(joints, max(settings.window, settings.learning), period)
-        self._asked_at = 0.0
+        self._asked_at, self._next = 0.0, settings.every
+        self._begin = -np.inf
         self._agreed: list[Named] = []
 
     @property
@@ -214,7 +218,7 @@ class LiveDiagnosis:
         wanted = self.settings.learning if self.learning else self.settings.shortest
         if self.window.moved < wanted or self.window.end - self.window.begin < wanted:
             return False
-        return self.window.moved - self._asked_at >= self.settings.every
+        return self.window.moved - self._asked_at >= self._next
 
     def add(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
@@ -223,17 +227,21 @@ class LiveDiagnosis:
         held = len(self.window)
         kept = self.window.add(t, q, dq, tau)
         if kept and held and len(self.window) == 1:
-            self._asked_at, self.window.moved = 0.0, 0.0  # a gap: the stretch is another one
+            # a gap: the stretch is another one
+            self._asked_at, self.window.moved, self._begin = 0.0, 0.0, -np.inf
         return kept
 
     def request(self) -> DiagnosisRequest:
         """Return what to ask now."""
-        self._asked_at = self.window.moved
+        self._asked_at, self._next = self.window.moved, self.settings.every
         self.asked += 1
+        self._under_way, self._outdated = True, False
         longest = self.settings.learning if self.learning else self.settings.window
         return DiagnosisRequest(
             self.belief.accepted,
-            self.window.recording(self.window.end - longest, f'window {self.asked}'),
+            self.window.recording(
+                max(self.window.end - longest, self._begin), f'window {self.asked}'
+            ),
             self._baseline,
             self._misfit,
             self.settings.shortest,
@@ -245,7 +253,7 @@ class LiveDiagnosis:
 
     def take(self, answer: Answer) -> bool:
         """
-        Take an answer into account.
+        Take an answer into account, unless it is about an arm that is not believed in any more.
 
         Returns
         -------
@@ -253,11 +261,16 @@ class LiveDiagnosis:
             Whether another model is believed now.
 
         """
+        outdated, self._under_way, self._outdated = self._outdated, False, False
+        if outdated:
+            return False
         if answer.misfit is not None:
             self._misfit, self._learned = answer.misfit, True
             return False
+        self._begin = answer.end - answer.window.duration  # what came before was another arm
         if answer.verdict == WAITING:
             self._agreed = []
+            self._next = self.settings.shortest - answer.window.duration
             return False
         self.latest = answer
         before = self.belief.model
@@ -282,6 +295,7 @@ class LiveDiagnosis:
 
         """
         self.belief = self.belief.accepting()
+        self._outdate()
         if self._baseline and self.latest is not None:
             self._baseline = (self.latest.window,)
         self._agreed = []
@@ -297,7 +311,12 @@ class LiveDiagnosis:
 
         """
         self.belief = self.belief.rejecting()
+        self._outdate()
         self._agreed = []
+
+    def _outdate(self) -> None:
+        """Have the answer that is under way dropped when it comes."""
+        self._outdated = self._under_way
 
     def _agree(self, named: Named) -> None:
         """Count the questions in a row that put a name first."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.rows.signals import (
+    Conditioning,
     conditioning,
     decimate,
     decimated_samples,
@@ -19,7 +20,7 @@ import scipy.stats
 
 #: Stretches whose residual power is compared [s]: longer than what the residual remembers.
 _BLOCK = 0.5
-#: Blocks on either side of a change at least, for a mean to be one.
+#: Blocks before a change at least, for their spread to be one.
 _FEWEST = 4
 #: Probability of a change where nothing changes, over all times and joints that are tried.
 _ERROR_RATE = 0.01
@@ -43,25 +44,26 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     Returns
     -------
     float or None
-        Time since the begin of the recording [s]; None where nothing changed.
+        Time since the begin of the recording from which on all is of one arm [s]; None where
+        nothing changed.
 
     """
-    power = block_powers(arm, recording)
+    power = block_powers(arm, recording, conditioning([recording], SignalSettings()))
     times, logs = power[:, 0], np.log(np.maximum(power[:, 1:], 1e-300))
     count = len(logs)
-    splits = range(_FEWEST, count - _FEWEST + 1)
+    splits = range(_FEWEST, count)
     if not splits:
         return None
     ratios = np.array([_ratio(logs, split) for split in splits])
     tried = len(splits) * logs.shape[1]
     limit = scipy.stats.f.isf(_ERROR_RATE / tried, 1, count - 2)
     best = int(np.argmax(ratios.max(axis=1)))
-    return float(times[splits[best]]) if ratios[best].max() > limit else None
+    return float(times[splits[best]]) + _BLOCK if ratios[best].max() > limit else None
 
 
-def block_powers(arm: ArmModel, recording: Recording) -> FloatArray:
+def block_powers(arm: ArmModel, recording: Recording, used: Conditioning) -> FloatArray:
     """
-    Return the mean squares of the residual of short blocks.
+    Return the mean squares of the residual of short blocks; the last one ends with the motion.
 
     Returns
     -------
@@ -69,16 +71,15 @@ def block_powers(arm: ArmModel, recording: Recording) -> FloatArray:
         Begin of each block [s], and the power of each joint [N^2 m^2].
 
     """
-    used = conditioning([recording], SignalSettings())
     rows = [np.empty((0, 1 + len(arm.robot.joints)))]
     for motion in segments(recording, used):
         assert motion.tau is not None
         squares = decimate(motion.tau - arm.torque(motion), used) ** 2
         t = motion.t[decimated_samples(len(motion.t), used)]
-        block = ((t - t[0]) // _BLOCK).astype(int) if len(t) else np.empty(0, dtype=int)
-        for number in range(int(block.max(initial=-1))):  # the last one is not whole
-            own = squares[block == number]
-            rows.append(np.r_[t[0] + number * _BLOCK, own.mean(axis=0)][np.newaxis])
+        blocks = int((t[-1] - t[0]) / _BLOCK) if len(t) else 0
+        for begin in t[-1] - _BLOCK * np.arange(blocks, 0, -1) if blocks else ():
+            own = squares[(t > begin) & (t <= begin + _BLOCK)]
+            rows.append(np.r_[begin, own.mean(axis=0)][np.newaxis])
     return np.concatenate(rows)
 
 

@@ -10,6 +10,7 @@ import time
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings, Finding
+from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.live.onset import block_powers, onset
 from armid_ros.recording import Recording
@@ -155,7 +156,7 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
 
 def own_misfit(arm: ArmModel, healthy: Recording) -> Misfit:
     """
-    Measure what a model leaves of motion in which nothing is wrong.
+    Measure what a model leaves of motion in which nothing is wrong, in the band of a diagnosis.
 
     Raises
     ------
@@ -163,7 +164,8 @@ def own_misfit(arm: ArmModel, healthy: Recording) -> Misfit:
         If the motion is too short for the filters.
 
     """
-    power = block_powers(arm, healthy)[:, 1:]
+    filters = choose_filters(arm, [healthy], (), DiagnosisSettings(), np.random.default_rng(0))
+    power = block_powers(arm, healthy, filters)[:, 1:]
     if not len(power):
         raise IdentificationError(f'{healthy.duration:.1f} s are too short to measure a misfit')
     assert healthy.tau is not None

@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 #: A sample that is so much earlier than one is due counts as due, as a share of the period.
 _EARLY = 0.25
-#: Periods without a sample after which the stretch is broken: its spectrum would have a hole.
+#: Periods without a sample after which the stretch is broken, for its spectrum would have a hole;
+#: a step back in time that is as long is none of samples out of order.
 _LONGEST_GAP = 20.0
 
 
@@ -20,7 +21,8 @@ class SampleWindow:
     The latest samples of an arm, one of each period, without a gap among them.
 
     Samples in between are left out, so that a period of 5 ms makes 200 samples a second of a
-    stream of any rate. Where time jumps back or nothing comes for long the window begins anew.
+    stream of any rate. A sample that comes late or twice is left out too. Where time jumps back or
+    nothing comes for long the window begins anew.
 
     Parameters
     ----------
@@ -99,7 +101,7 @@ class SampleWindow:
 
         """
         since = t - self.end
-        if since <= 0.0 or (len(self) and since > _LONGEST_GAP * self._period):
+        if len(self) and abs(since) > _LONGEST_GAP * self._period:
             self._first = self._end = 0
         elif since < (1.0 - _EARLY) * self._period:
             return False

@@ -82,7 +82,7 @@ class LiveDiagnosisNode(ArmidNode):
         self.freshness = Freshness('joint states')
         self._description: str | None = None
         self._said: object = ()
-        self._waiting: Save | Plan | None = None
+        self._waiting: list[Save | Plan] = []
         self._helper = helper or Assistant()
         self._diagnoses = self.create_publisher(Diagnosis, '~/diagnosis', LATCHED)
         self._models = self.create_publisher(String, '~/model', LATCHED)
@@ -171,9 +171,8 @@ class LiveDiagnosisNode(ArmidNode):
             self._take(result)
         else:
             self._note(result)
-        if self._waiting is not None and not self._helper.busy:
-            job, self._waiting = self._waiting, None
-            self._helper.ask(job)
+        if self._waiting and not self._helper.busy:
+            self._helper.ask(self._waiting.pop(0))
         return True
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
@@ -262,7 +261,7 @@ class LiveDiagnosisNode(ArmidNode):
         if self._require().latest is None:
             raise IdentificationError('nothing has been diagnosed so far')
         if self._helper.busy:
-            self._waiting = job
+            self._waiting.append(job)
         else:
             self._helper.ask(job)
 

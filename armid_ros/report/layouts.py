@@ -133,7 +133,12 @@ def foxglove_layout(joints: Sequence[str], namespace: str = '', base: str = 'bas
 
 
 def _scene(at: str, base: str) -> dict[str, Any]:
-    """Return a view of the arm from the front and above, with what is drawn on its joints."""
+    """
+    Return a view of the arm from the front and above, with what is drawn on its joints.
+
+    The arm is a layer: of all topics, Foxglove takes only /robot_description for a robot.
+
+    """
     return {
         'followTf': base,
         'followMode': 'follow-pose',
@@ -151,11 +156,19 @@ def _scene(at: str, base: str) -> dict[str, Any]:
         },
         'scene': {},
         'transforms': {},
-        'topics': {
-            f'{at}robot_description': {'visible': True},
-            f'{at}{_MARKERS}': {'visible': True},
-        },
+        'topics': {f'{at}{_MARKERS}': {'visible': True}},
         'layers': {
+            'arm': {
+                'layerId': 'foxglove.Urdf',
+                'instanceId': 'arm',
+                'label': 'Arm',
+                'visible': True,
+                'frameLocked': True,
+                'sourceType': 'topic',
+                'topic': f'{at}robot_description',
+                'framePrefix': '',
+                'displayMode': 'auto',
+            },
             'grid': {
                 'layerId': 'foxglove.Grid',
                 'instanceId': 'grid',
@@ -168,7 +181,7 @@ def _scene(at: str, base: str) -> dict[str, Any]:
                 'color': '#a0a0a0ff',
                 'position': [0, 0, 0],
                 'rotation': [0, 0, 0],
-            }
+            },
         },
         'publish': {},
         'imageMode': {},

@@ -78,6 +78,23 @@ def test_a_process_that_died_is_said():
         assert 'has ended' in done.text
 
 
+def test_another_process_takes_the_place_of_one_that_died(tmp_path):
+    with working() as assistant:
+        before = assistant.pid
+        assistant._process.kill()
+        wait(assistant)
+        assistant.ask(Save(tmp_path))
+        assert assistant.pid != before
+        assert wait(assistant).text == 'nothing has been diagnosed so far'
+
+
+def test_a_job_that_fails_does_not_end_the_process():
+    with working() as assistant:
+        assistant.ask(Question(None, None))
+        assert 'failed: AttributeError' in wait(assistant).text
+        assert assistant._process.poll() is None
+
+
 @pytest.mark.slow
 def test_the_process_ends_when_nobody_can_ask_it_any_more():
     with working() as assistant:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.live import Answer, LiveDiagnosis, LiveSettings
@@ -20,8 +21,9 @@ class Named:
         self.name, self.joints = name, joints
 
 
-def said(arm, verdict, *findings):
-    return Answer(verdict, verdict, findings, (), arm, None, 0.0, 0.0)
+def said(arm, verdict, *findings, duration=8.0, end=0.0):
+    window = SimpleNamespace(duration=duration)
+    return Answer(verdict, verdict, findings, (), arm, window, end, 0.0)
 
 
 @pytest.fixture
@@ -89,6 +91,20 @@ def test_what_was_rejected_is_not_proposed_again(live, known_arm, patched):
     assert live.belief.model is patched
 
 
+@pytest.mark.parametrize('said_by_a_person', [LiveDiagnosis.accept, LiveDiagnosis.reject])
+def test_an_answer_about_the_arm_before_is_dropped(live, patched, said_by_a_person):
+    for _ in range(2):
+        live.take(said(patched, 'named', FRICTION))
+    stream(live, 9.0)
+    latest = live.latest
+    said_by_a_person(live)
+    live.take(said(patched, 'named', SPRING))
+    assert live.latest is latest
+    late = said(patched, 'named', SPRING)
+    live.take(late)
+    assert live.latest is late
+
+
 def test_with_nothing_proposed_there_is_nothing_to_accept_or_reject(live):
     for service in (live.accept, live.reject):
         with pytest.raises(IdentificationError, match='nothing is proposed'):
@@ -110,6 +126,21 @@ def test_it_asks_after_every_so_many_seconds_of_motion(live):
     asked = stream(live, 30.0)
     assert asked[0] == pytest.approx(8.0, abs=0.5)
     np.testing.assert_allclose(np.diff(asked), 4.0, atol=0.5)
+
+
+def test_after_a_change_it_asks_as_soon_as_enough_motion_came(live, known_arm):
+    stream(live, 8.1)
+    live.take(said(known_arm, WAITING, duration=5.5))
+    assert stream(live, 4.0, begin=8.1)[0] == pytest.approx(8.1 + 2.5, abs=0.2)
+
+
+def test_what_came_before_a_change_is_not_looked_at_again(live, known_arm):
+    stream(live, 8.1)
+    live.take(said(known_arm, WAITING, duration=5.0, end=8.1))
+    stream(live, 6.0, begin=8.1)
+    assert live.question().window.duration == pytest.approx(11.0, abs=0.1)
+    stream(live, 10.0, begin=100.0)
+    assert live.question().window.duration == pytest.approx(10.0, abs=0.1)
 
 
 def test_an_arm_at_rest_is_not_asked_about(live):

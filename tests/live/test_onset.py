@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from armid_ros.live.onset import onset
 
 
@@ -13,3 +15,16 @@ def test_the_time_of_a_change_is_found_within_a_second(known_arm, changed):
 
 def test_nothing_is_found_where_nothing_changes(known_arm, healthy):
     assert onset(known_arm, healthy) is None
+
+
+def test_what_came_before_a_change_is_left_out_and_the_change_itself(known_arm, changed):
+    """However long ago it was: a window is seldom cut where blocks begin."""
+    for end in (8.6, 9.3, 12.2, 17.9):
+        so_far = until(changed, end)
+        assert onset(known_arm, so_far) >= 8.0
+
+
+def until(recording, t):
+    kept = recording.t < t
+    parts = {name: getattr(recording, name)[kept] for name in ('t', 'q', 'dq', 'tau')}
+    return replace(recording, **parts)

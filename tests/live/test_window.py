@@ -45,6 +45,17 @@ def test_a_gap_and_a_jump_back_begin_a_window_anew():
         assert len(window) == 1
 
 
+def test_a_sample_that_comes_late_or_twice_is_left_out():
+    """As of two publishers of the same joint states."""
+    window, kept = SampleWindow(JOINTS, 2.0, 0.01), 0
+    for t in np.arange(0.0, 1.5, 0.01):
+        kept += window.add(t, np.zeros(2), np.zeros(2), np.zeros(2))
+        for again in (t, t - 0.015):
+            assert not window.add(again, np.ones(2), np.ones(2), np.ones(2))
+    assert len(window) == kept
+    assert not window.recording().q.any()
+
+
 def test_rest_is_no_motion():
     window = SampleWindow(JOINTS, 2.0, 0.01)
     for t in np.arange(0.0, 3.0, 0.01):

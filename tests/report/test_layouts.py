@@ -49,7 +49,10 @@ def test_the_arm_and_what_is_drawn_on_it_are_shown_in_the_frame_of_its_base():
     configured = json.loads(foxglove_layout(('a',), 'left', 'foot'))['configById']
     scene = configured['3D!arm']
     assert scene['followTf'] == 'foot'
-    assert set(scene['topics']) == {'/left/robot_description', '/left/residual_markers/markers'}
+    assert set(scene['topics']) == {'/left/residual_markers/markers'}
+    assert scene['layers']['arm']['layerId'] == 'foxglove.Urdf'
+    assert scene['layers']['arm']['sourceType'] == 'topic'
+    assert scene['layers']['arm']['topic'] == '/left/robot_description'
     assert configured['RawMessages!diagnosis']['topicPath'].startswith('/left/live_diagnosis/')
     manager = yaml.safe_load(rviz_config('foot', 'left'))['Visualization Manager']
     assert manager['Global Options']['Fixed Frame'] == 'foot'

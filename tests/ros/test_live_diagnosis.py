@@ -9,6 +9,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import model_text, read_model
 from armid_ros.effects import parse_effect
 from armid_ros.live import InProcess, LiveDiagnosis, LiveSettings
+from armid_ros.live.assistant import Done, Plan, Save
 from armid_ros.motion import Motion
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.qos import LATCHED
@@ -168,6 +169,18 @@ def test_questions_wait_until_the_one_before_is_answered(bench, idle):
         node.take_joint_states(message)
     assert len(helper.jobs) == 1
     assert node.received == 4000
+
+
+def test_all_that_is_asked_while_a_diagnosis_is_under_way_is_done_afterwards(bench, idle):
+    node, helper = idle
+    node.live.latest = 'a diagnosis'
+    helper.busy = True
+    assert bench.call('live_diagnosis/save').success
+    assert bench.call('live_diagnosis/next_run').success
+    for _ in range(3):
+        helper.results.append(Done('done'))
+        node.take_answer()
+    assert [type(job) for job in helper.jobs] == [Save, Plan]
 
 
 def test_before_a_diagnosis_nothing_can_be_saved_or_planned(bench, idle):
