@@ -34,7 +34,7 @@ from armid_ros.diagnosis.ties.explain_ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, findings, small_print
 from armid_ros.diagnosis.verdict.gap import Gap, measure_gap
-from armid_ros.diagnosis.verdict.headline import headline, shares_of
+from armid_ros.diagnosis.verdict.headline import headline, shares_of, smallest
 from armid_ros.diagnosis.verdict.pattern import find_pattern, Pattern
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left
@@ -202,22 +202,21 @@ def diagnose(
     known = None
     if baseline:
         known = Baseline.of(arm, trajectories(baseline, prepared.used, arm), rng)
-    chosen = None
+    context = (arm, gate, prepared, validate, settings, rng, tell)
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
-        chosen = diagnose_ties(arm, recordings, prepared, settings)
-    if chosen is None:
-        written = None if misfit is None else misfit.of(arm.robot)
-        chosen = explained(arm, prepared, known, settings, rng, tell, written)
-        unseen = _unseen(validate, chosen.explanation, prepared, chosen)
-        if chosen.explanation.steps and not _helps(chosen.rest or chosen.explanation, unseen):
-            chosen = _second_choice(chosen, (arm, prepared, known, settings, rng, tell, written))
-    notes += chosen.notes
-    explanation, remarks = as_bodies(chosen.explanation, arm)
-    return _said(
-        replace(chosen, explanation=explanation, notes=(*notes, *remarks)),
-        (arm, gate, prepared, validate, settings, rng, tell),
-    )
+        tied = diagnose_ties(arm, recordings, prepared, settings)
+        if tied is not None:
+            return _said(tied, notes, context)
+    written = None if misfit is None else misfit.of(arm.robot)
+    chosen = explained(arm, prepared, known, settings, rng, tell, written)
+    said = _said(chosen, notes, context)
+    if said.verdict != 'unknown' or not chosen.explanation.steps:
+        return said
+    gone = {own.effect.name for own in chosen.explanation.fitted.named}
+    fewer = replace(settings, library=tuple(name for name in settings.library if name not in gone))
+    again = _said(explained(arm, prepared, known, fewer, rng, tell, written), notes, context)
+    return again if again.findings else said
 
 
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
@@ -225,35 +224,6 @@ def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
     large = tuple(one for one in result.findings if one.share >= least)
     small = tuple(one for one in result.findings if one.share < least)
     return replace(result, findings=large, minor=(*small, *result.minor))
-
-
-def _helps(explanation: Explanation, unseen: Evidence | None) -> bool:
-    """Return whether names make data that they were not fitted to better, or do nothing there."""
-    if unseen is None:
-        return True
-    seen = attribute(explanation, unseen)
-    return not seen.made.any() or seen.share(range(len(explanation.steps))) > 0.0
-
-
-def _second_choice(chosen: Chosen, asked: _Asked) -> Chosen:
-    """Explain the gap without the names that make the model worse somewhere."""
-    arm, prepared, baseline, settings, rng, tell, written = asked
-    gone = {own.effect.name for own in chosen.explanation.fitted.named}
-    library = tuple(name for name in settings.library if name not in gone)
-    fewer = replace(settings, library=library)
-    again = explained(arm, prepared, baseline, fewer, rng, tell, written)
-    return again if again.explanation.steps else chosen
-
-
-_Asked = tuple[
-    ArmModel,
-    Prepared,
-    Baseline | None,
-    DiagnosisSettings,
-    np.random.Generator,
-    Progress,
-    FloatArray | None,
-]
 
 
 _Context = tuple[
@@ -267,20 +237,21 @@ _Context = tuple[
 ]
 
 
-def _said(chosen: Chosen, context: _Context) -> Diagnosis:
+def _said(chosen: Chosen, notes: Sequence[str], context: _Context) -> Diagnosis:
     """Measure what was found on held-out data, and say it."""
     arm, gate, prepared, validate, settings, rng, tell = context
     tell(0.85, 'held-out gap')
-    explanation, notes = chosen.explanation, list(chosen.notes)
+    explanation, remarks = as_bodies(chosen.explanation, arm)
+    notes = [*notes, *chosen.notes, *remarks]
     evidence = explanation.evidence
     unseen = _unseen(validate, explanation, prepared, chosen)
     measured = chosen.floor_in_words in (NOISE, ESTIMATED)
     least = 0.0 if measured else settings.thresholds.headline
-    rest, shares = headline(chosen.rest or explanation, unseen, least)
+    rest, shares = headline(chosen.rest or explanation, unseen, settings, least)
     explanation = rest
     if chosen.rest is not None and rest.steps:
-        explanation, shares, remarks = _as_stated(rest, shares, unseen, arm, least)
-        notes += remarks
+        explanation, shares, more = _as_stated(rest, shares, unseen, arm, settings)
+        notes += more
     found = findings(explanation, shares, arm, rng)
     worse = _harmed(chosen, explanation, unseen, settings)
     if worse:
@@ -298,8 +269,8 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
     left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings')]
     if unseen is not None:
-        sure, more = _sure(unseen, chosen), settings.thresholds.predicted
-        left.append(_left(rest, sure, settings, 'recordings that were not used', more))
+        sure, least_sure = _sure(unseen, chosen), settings.thresholds.predicted
+        left.append(_left(rest, sure, settings, 'recordings that were not used', least_sure))
     word = decide(
         found,
         floors if measured else (),
@@ -336,18 +307,22 @@ def _said(chosen: Chosen, context: _Context) -> Diagnosis:
 
 
 def _as_stated(
-    rest: Explanation, shares: Attribution, unseen: Evidence | None, arm: ArmModel, least: float
+    rest: Explanation,
+    shares: Attribution,
+    unseen: Evidence | None,
+    arm: ArmModel,
+    settings: DiagnosisSettings,
 ) -> tuple[Explanation, Attribution, list[str]]:
     """Return names in the model as given, or beside a body common to both days, and a note."""
     as_described = in_model_as_given(rest)
     told = shares_of(as_described, unseen)[0]
-    names = range(len(as_described.steps))
+    names, least = range(len(as_described.steps)), settings.thresholds.headline
     if told.share(names) >= least:
-        small = [k for k in names if told.share([k]) < least]
-        if small and len(small) < len(names):
-            fewer = rest.without(min(small, key=lambda k: told.share([k])))
-            return _as_stated(fewer, shares_of(fewer, unseen)[0], unseen, arm, least)
-        return as_described, told, []
+        small = smallest(as_described, told, settings, least) if len(names) > 1 else None
+        if small is None:
+            return as_described, told, []
+        fewer = rest.without(small)
+        return _as_stated(fewer, shares_of(fewer, unseen)[0], unseen, arm, settings)
     bodily, remarks = as_bodies(rest, arm)
     return bodily, shares, [_COMMON, *remarks]
 

@@ -16,7 +16,7 @@ import numpy as np
 
 #: How far from its joint a link's mass may be without a word in the description [m].
 _REACH = 0.1
-#: Deviations by which a mass is told from none.
+#: Deviations by which a mass may be more than its estimate.
 _SURELY = 3.0
 _UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
@@ -93,12 +93,11 @@ class Payload(_LinkBody):
         return robot.joints[-1:]
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether it surely weighs something, not farther away than the arm is long."""
+        """Return whether it may weigh something, not farther away than the arm is long."""
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
         length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH
-        return bool(
-            values[0] > _SURELY * std[0] and np.linalg.norm(values[1:4]) < length * values[0]
-        )
+        heaviest = float(values[0] + _SURELY * std[0])
+        return bool(heaviest > 0.0 and np.linalg.norm(values[1:4]) < length * heaviest)
 
     def spread(self, robot: Robot) -> FloatArray:
         """Return what an arm may carry at the most: as much as it weighs, a little off, (P,)."""

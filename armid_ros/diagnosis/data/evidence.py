@@ -152,6 +152,12 @@ class Evidence:
             squares += np.sum(part.reduce(part.motion.tau) ** 2, axis=0, where=part.informative)
         return np.sqrt(squares / np.maximum(self.count, 1.0))
 
+    @cached_property
+    def noise_share(self) -> FloatArray:
+        """Mean square of the noise of each joint over that of the unit, shape (n,)."""
+        sigma = np.mean([own**2 for own in self.sigma], axis=0)
+        return np.asarray(np.mean([one**2 for one in self.noise], axis=0) / sigma)
+
     def chi2_per_row(self, residual: Sequence[FloatArray]) -> FloatArray:
         """Return the mean square over the unit of each joint, shape (n,)."""
         squares = np.zeros_like(self.count)
@@ -179,8 +185,7 @@ class Evidence:
         free = np.maximum(count / self._lasting(residual), 4.0)
         each = 1.0 - (1.0 - thresholds.confidence) / len(count)
         noise = stats.f.ppf(each, free, free)
-        sigma = np.mean([own**2 for own in self.sigma], axis=0)
-        own = np.mean([one**2 for one in self.noise], axis=0) / sigma
+        own = self.noise_share
         misfit = np.where(own < 1.0 / thresholds.same_fit, self.as_good(settings), 1.0)
         return np.asarray(np.maximum(noise, misfit) + self.matters(settings))
 

@@ -118,8 +118,8 @@ def _changes(bare: ArmModel, data: Sequence[Trajectory]) -> Iterator[tuple[Float
 
 def _loaded(bare: ArmModel, load: Effect, values: FloatArray) -> ArmModel | None:
     """Return an arm with a load; None if it could not be one, or is more than an arm carries."""
-    possible = load.plausible(values, np.zeros_like(values), bare)
-    possible = possible and bool(values[0] < load.spread(bare.robot)[0])
+    possible = bool(0.0 < values[0] < load.spread(bare.robot)[0])
+    possible = possible and load.plausible(values, np.zeros_like(values), bare)
     return bare.with_effect(load, values) if possible else None
 
 

@@ -60,6 +60,8 @@ class Explanation:
         Causes of the last look that are there beyond chance and do not matter.
     told : Told or None
         What other data tell of what was free.
+    by_chance : float
+        Squares that a value of any cause takes of what the names leave.
 
     """
 
@@ -72,10 +74,15 @@ class Explanation:
     evidence: Evidence
     minor: tuple[Trial, ...] = ()
     told: Told | None = None
+    by_chance: float = 0.0
 
     def without(self, name: int) -> Explanation:
         """Return the explanation without one of its names, the others fitted anew."""
-        keep = [k for k in range(len(self.steps)) if k != name]
+        fewer = self.only([k for k in range(len(self.steps)) if k != name])
+        return replace(fewer, minor=(*self.minor, self.steps[name].trial))
+
+    def only(self, keep: Sequence[int]) -> Explanation:
+        """Return the explanation with some of its names, in this order, fitted anew."""
         fitted = fit(
             self.given,
             [self.fitted.named[k] for k in keep],
@@ -85,9 +92,8 @@ class Explanation:
             [self.fitted.values[k] for k in keep],
             self.told,
         )
-        minor = (*self.minor, self.steps[name].trial)
-        steps = tuple(self.steps[k] for k in keep)
-        return replace(self, fitted=fitted, steps=steps, minor=minor)
+        fitted = widened(fitted, self.evidence, self.told, self.by_chance)
+        return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
     @property
     def chi2_per_row(self) -> FloatArray:
@@ -126,7 +132,8 @@ def explain(
         question.arm, (), evidence.data, evidence.sigma, question.base, (), question.told
     )
     named, steps, fitted = _pruned(question, named, steps, values, evidence, settings)
-    fitted = widened(fitted, evidence, question.told, 0.0 if last is None else last.by_chance)
+    by_chance = 0.0 if last is None else last.by_chance
+    fitted = widened(fitted, evidence, question.told, by_chance)
     said = {own.effect.name for own in named}
     small = tuple(trial for trial in minor if trial.group.effect.name not in said)
     return Explanation(
@@ -139,6 +146,7 @@ def explain(
         evidence,
         small,
         question.told,
+        by_chance,
     )
 
 

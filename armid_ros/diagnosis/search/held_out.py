@@ -69,6 +69,13 @@ class Trial:
     held_alone: FloatArray
     piece: npt.NDArray[np.intp]
 
+    @cached_property
+    def deviation(self) -> FloatArray:
+        """Deviations of the values, those of noise of any colour by the jackknife, shape (p,)."""
+        parts = len(self.held_values)
+        change = self.held_values - self.held_values.mean(axis=0)
+        return np.asarray(np.sqrt(self.std**2 + (1.0 - 1.0 / parts) * np.sum(change**2, axis=0)))
+
     @property
     def gains(self) -> FloatArray:
         """Squares that go in every block, shape (B,)."""

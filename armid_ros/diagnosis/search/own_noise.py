@@ -18,13 +18,16 @@ _NOT_NOISE = 0.1
 _TAUTOLOGY = 0.8
 
 
-def made_of_noise(trial: Trial, problem: Problem, projection: Projection, work: Workspace) -> bool:
+def made_of_noise(
+    trial: Trial, problem: Problem, projection: Projection, work: Workspace, noise: FloatArray
+) -> bool:
     """
     Return whether a group explains noise with that noise.
 
     What positions have beyond the motion is in the accelerations that the model takes, and so in
     what is left, and in columns that are derived from them. And columns that are made of the
-    measured torque can leave less than its noise.
+    measured torque can leave less than its noise, whose squares over the unit of the gap are given
+    for every joint, (n,).
 
     """
     effect, kept = trial.group.effect, trial.group.kept
@@ -34,7 +37,7 @@ def made_of_noise(trial: Trial, problem: Problem, projection: Projection, work: 
     if _taken(smooth, projection, left) < _NOT_NOISE * _taken(rough, projection, left):
         return True
     after = problem.chi2_per_row(left - projection.rest(rough) @ trial.values)
-    before = np.minimum(problem.chi2_per_row(left), 1.0)
+    before = np.minimum(problem.chi2_per_row(left), noise)
     return bool(np.any(after < _TAUTOLOGY * before)) and work.reads_torque(effect, kept)
 
 

@@ -154,16 +154,19 @@ def acceptable(trial: Trial, here: Round, tried: int) -> bool:
 
 def possible(trial: Trial, here: Round) -> bool:
     """Return whether the values are what could be called by the name."""
-    group, arm = trial.group, here.work.arm
-    inside = bool(_inside(trial, here).all())
-    return inside and group.effect.plausible(trial.values, trial.std, arm)
+    effect, arm, kept = trial.group.effect, here.work.arm, list(trial.group.kept)
+    if not _inside(trial, here).all():
+        return False
+    values, std = np.zeros((2, len(effect.parameters(arm.robot))))
+    values[kept], std[kept] = trial.values, trial.deviation
+    return effect.plausible(values, std, arm)
 
 
 def _inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
     """Return which values are physically possible, or differ from that by noise, shape (p,)."""
     kept = list(trial.group.kept)
     lower, upper = (bound[kept] for bound in room(trial.group.effect, here.work.arm))
-    slack = 3.0 * trial.std
+    slack = 3.0 * trial.deviation
     return np.asarray((trial.values > lower - slack) & (trial.values < upper + slack))
 
 
@@ -373,6 +376,6 @@ def _passing(
         if id(trial) not in gains or (result and beaten(trial, result[0], here)):
             continue
         projection = projection or project(problem, beside.free, beside.hold)
-        if not made_of_noise(trial, problem, projection, here.work):
+        if not made_of_noise(trial, problem, projection, here.work, here.evidence.noise_share):
             result.append(trial)
     return result

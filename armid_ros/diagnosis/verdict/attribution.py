@@ -19,7 +19,6 @@ from armid_ros.diagnosis.data.rows import block_rows
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.explain import Explanation, View
 from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.patch import with_named
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -152,7 +151,7 @@ def _left_out(
 
 
 def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
-    """Predict other data, name after name, with values fitted to all of the data."""
+    """Predict other data with the first name, the first two, and so on, fitted to the data."""
     arms = [explanation.reference.arm, *_staircase(explanation, order)]
     blocks, _ = block_rows(unseen.data)
     left = [[part.residual(arm) for part in unseen.data] for arm in arms]
@@ -166,16 +165,9 @@ def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence)
 
 
 def _staircase(explanation: Explanation, order: Sequence[int]) -> list[ArmModel]:
-    """Return the fitted arm with the first name, with the first two, and so on."""
-    fitted = explanation.fitted
-    bare = fitted.bare
-    arms = []
-    for count in range(1, len(order)):
-        arm = bare
-        for k in sorted(order[:count]):
-            arm = with_named(arm, fitted.named[k].effect, fitted.values[k])
-        arms.append(arm)
-    return [*arms, fitted.arm] if order else []
+    """Return the arm with the first name, with the first two, and so on, each fitted."""
+    fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
+    return [*(one.fitted.arm for one in fewer), explanation.fitted.arm] if order else []
 
 
 def _squares(

@@ -12,5 +12,5 @@ from armid_ros.effects import CATALOGUE, Effect
 def separating(name: str, rival: str, joints: Sequence[str]) -> str:
     """Say which experiment separates two names."""
     where = f' of {", ".join(joints)}' if joints else ''
-    shown = [CATALOGUE.get(one, Effect).shown_by for one in (name, rival)]
-    return f'To separate {name} from {rival}{where}: {shown[0]}, and {shown[1]}.'
+    shown = dict.fromkeys(CATALOGUE.get(one, Effect).shown_by for one in (name, rival))
+    return f'To separate {name} from {rival}{where}: {", and ".join(shown)}.'

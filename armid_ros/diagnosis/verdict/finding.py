@@ -20,6 +20,9 @@ from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 import numpy as np
 
+#: Slope from which on a value of a translation goes along one that no data tell.
+_ALONG = 1e-6
+
 
 @dataclass(frozen=True)
 class Rival:
@@ -202,7 +205,9 @@ def _translated(
 ) -> list[_Said]:
     """Return an effect in other words, deviations by the slopes of the translation."""
     parts = []
-    step = 1e-4 * np.sqrt(np.maximum(np.diag(covariance), 1e-18))
+    told = np.isfinite(np.diag(covariance))
+    inside = np.where(np.outer(told, told), covariance, 0.0)
+    step = 1e-4 * np.sqrt(np.maximum(np.diag(inside), 1e-18))
     for position, (word, numbers) in enumerate(effect.named_as(values, arm)):
         slopes = np.column_stack(
             [
@@ -214,7 +219,8 @@ def _translated(
                 for change, size in zip(np.diag(step), step, strict=True)
             ]
         )
-        std = np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+        std = np.sqrt(np.diag(slopes @ inside @ slopes.T))
+        std[np.any(np.abs(slopes[:, ~told]) > _ALONG, axis=1)] = np.nan
         parts.append(_Said(word, word.parameters(arm.robot), numbers, std))
     return parts
 

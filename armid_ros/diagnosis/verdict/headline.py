@@ -5,29 +5,60 @@
 from __future__ import annotations
 
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.search.choice import in_model_as_given
 from armid_ros.diagnosis.search.explain import Explanation
+from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
+import numpy as np
 
+#: Standard deviations to either side of a 95 % interval.
+_NORMAL = 1.96
 #: Recordings hardly show what takes less than this share of the share it takes of others.
 _HARDLY = 0.1
 
 
 def headline(
-    explanation: Explanation, unseen: Evidence | None, least: float
+    explanation: Explanation, unseen: Evidence | None, settings: DiagnosisSettings, least: float
 ) -> tuple[Explanation, Attribution]:
     """
     Drop names that other data deny, leave small ones to the small print, share out the gap.
 
-    It is shared out on those data, or on the data left out one by one where those hardly show
+    The gap is shared out on those data, or on the data left out one by one where those hardly show
     what was named.
 
     """
     shares, denied = shares_of(explanation, unseen)
-    small = [k for k in range(len(explanation.steps)) if shares.share([k]) < least]
-    gone = denied or sorted(small, key=lambda k: shares.share([k]))
-    if gone:
-        return headline(explanation.without(gone[0]), unseen, least)
-    return explanation, shares
+    gone = denied[0] if denied else smallest(explanation, shares, settings, least)
+    if gone is None:
+        return explanation, shares
+    return headline(explanation.without(gone), unseen, settings, least)
+
+
+def smallest(
+    explanation: Explanation, shares: Attribution, settings: DiagnosisSettings, least: float
+) -> int | None:
+    """
+    Return the name that takes least, if it is small print; None if every name is a headline.
+
+    A name is small print whose values may all be zero, or that takes less than a share and leaves
+    no gap open where it is missing.
+
+    """
+    for k in sorted(range(len(explanation.steps)), key=lambda k: shares.share([k])):
+        if may_be_nothing(explanation, k):
+            return k
+        small = shares.share([k]) < least
+        if small and not _opens(explanation.without(k), explanation, settings):
+            return k
+    return None
+
+
+def _opens(fewer: Explanation, explanation: Explanation, settings: DiagnosisSettings) -> bool:
+    """Return whether a gap is open in a joint without a name, and closed with it."""
+    if explanation.told is not None:
+        fewer, explanation = in_model_as_given(fewer), in_model_as_given(explanation)
+    limits = explanation.evidence.limits(explanation.fitted.residual, settings)
+    return bool(np.any((fewer.chi2_per_row > limits) & (explanation.chi2_per_row <= limits)))
 
 
 def shares_of(explanation: Explanation, unseen: Evidence | None) -> tuple[Attribution, list[int]]:
@@ -40,3 +71,20 @@ def shares_of(explanation: Explanation, unseen: Evidence | None) -> tuple[Attrib
     denied = [k for k in reversed(seen.order) if seen.denied(k)]
     shown = seen.share(names) > _HARDLY * left_out.share(names)
     return (seen if shown else left_out), denied
+
+
+def may_be_nothing(explanation: Explanation, name: int) -> bool:
+    """
+    Return whether the 95 % interval of every value of a name holds zero.
+
+    Shapes are none of them: they say how it acts, and not whether.
+
+    """
+    fitted = explanation.fitted
+    ends = np.cumsum([len(own.kept) + len(own.effect.shape) for own in fitted.named])
+    first = int(ends[name]) - len(fitted.named[name].kept) - len(fitted.named[name].effect.shape)
+    span = np.zeros(len(fitted.estimate.values), dtype=bool)
+    span[first : first + len(fitted.named[name].kept)] = True
+    return bool(
+        np.all(np.abs(fitted.estimate.values) <= _NORMAL * fitted.estimate.std, where=span)
+    )

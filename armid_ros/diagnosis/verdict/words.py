@@ -131,8 +131,7 @@ def sentence(finding: Finding, robot: Robot) -> str:
         where = ', '.join(_tie(finding, tie.joint, tie.name) for tie in finding.ties)
         return f'{words.capitalize()} at {where} {explains}.'
     if finding.name == 'payload' and finding.values:
-        mass = _as_sure(finding.values[0], finding.std[0])
-        return f'A payload of {mass} kg on {finding.joints[0]} {explains}.'
+        return f'A payload {_weight(finding)} on {finding.joints[0]} {explains}.'
     if len(finding.joints) > _JOINTS_SAID:
         return f'{words.capitalize()} in {len(finding.joints)} joints {explains}.'
     where = f' in {", ".join(finding.joints)}' if finding.joints else ''
@@ -144,6 +143,14 @@ def sentence(finding: Finding, robot: Robot) -> str:
         shown = [*shown[:2], f'and {len(shown) - 2} more']
     numbers = f' ({", ".join(shown)})' if shown else ''
     return f'{article} {words}{where}{numbers} {explains}.'
+
+
+def _weight(finding: Finding) -> str:
+    """Return the mass of a payload, or that it is not determined."""
+    mass, std = finding.values[0], finding.std[0]
+    if mass < _NORMAL * std:
+        return 'whose mass these data do not determine'
+    return f'of {_as_sure(mass, std)} kg'
 
 
 def _with_degrees(value: float, std: float, unit: str) -> str:
