@@ -237,7 +237,7 @@ def _share(tick: Tick, number: int, count: int) -> Callable[[str | float, Design
 
 @dataclass(frozen=True)
 class _Task:
-    """What is designed at every speed: for which plan, beside what is known already."""
+    """What is designed at every speed: the plan, the rival, and the prior information."""
 
     plan: ExcitationPlan
     settings: DesignSettings
