@@ -13,9 +13,9 @@ LEFT = {
     # what acts on an arm that is shipped
     'elastic/plant/two_link.py': 4,
     # advice and examples for a person
-    'cli/springs.py': 1,
+    'cli/elastic/springs.py': 1,
     'inspection/inspect.py': 1,
-    'elastic/plant/plant.py': 3,
+    'simulation/springs.py': 3,
     'elastic/plant/setup.py': 3,
     # fields of springs.json that are called as an effect is
     'elastic/identification/output.py': 3,

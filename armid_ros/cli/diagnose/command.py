@@ -9,8 +9,8 @@ from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.cli import columns, options
-from armid_ros.cli import partner as partner_options
-from armid_ros.cli.diagnosis_files import DiagnosisCase, make_extras, write_results
+from armid_ros.cli.diagnose import partner as partner_options
+from armid_ros.cli.diagnose.files import DiagnosisCase, make_extras, write_results
 from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
