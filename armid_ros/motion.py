@@ -30,7 +30,7 @@ def read_only(values: npt.ArrayLike) -> FloatArray:
 @dataclass(frozen=True)
 class MovingPoints:
     """
-    Points of something else that moved beside an arm, such as of a person in an exoskeleton.
+    Points of another machine or a person that moved with an arm, as of an exoskeleton's wearer.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Motion:
         What positions that were measured have above this frequency is noise, as far as second
         derivatives of torques go; infinite for a reference.
     partner : MovingPoints or None
-        What moved beside the arm and was recorded with it.
+        Points of its partner that were recorded with the arm.
 
     Examples
     --------

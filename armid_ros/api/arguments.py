@@ -27,7 +27,7 @@ RecordingLike = Recording | str | Path
 #: A generator, or the seed of one.
 Rng = np.random.Generator | int
 
-#: What is fitted beside the rigid body where nothing is said.
+#: Effects that are fitted with the rigid body by default.
 USUAL = ','.join(USUAL_EFFECTS)
 
 

@@ -206,7 +206,7 @@ class ArmModel:
         return self._acting.robot
 
     def along(self, motion: Motion) -> ArmModel:
-        """Return the arm with effects that know what moved beside it along a motion."""
+        """Return the arm with effects that have the motion of its partner."""
         effects = tuple(effect.along(motion) for effect in self.effects)
         known = all(new is old for new, old in zip(effects, self.effects, strict=True))
         return self if known else replace(self, effects=effects)

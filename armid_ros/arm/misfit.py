@@ -75,7 +75,7 @@ class Misfit:
 
 def load_misfit(path: str | Path) -> Misfit | None:
     """
-    Read what a model left when it was identified; None if the file does not say.
+    Read the residual of a model from when it was identified; None if the file has none.
 
     Parameters
     ----------

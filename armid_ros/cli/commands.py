@@ -17,14 +17,14 @@ from click.shell_completion import CompletionItem
 
 #: Command and module, in the order of the work; a module is imported when its command is called.
 COMMANDS = {
-    'demo': 'demo',
+    'demo': 'demo.command',
     'convert': 'convert',
     'inspect': 'inspect',
-    'excite': 'excite',
+    'excite': 'excite.command',
     'simulate': 'record',
     'identify': 'identify',
-    'diagnose': 'diagnose',
-    'elastic': 'elastic',
+    'diagnose': 'diagnose.command',
+    'elastic': 'elastic.command',
     'exo': 'exo',
     'lunar': 'lunar',
     'compare': 'compare',

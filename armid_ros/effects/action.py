@@ -157,7 +157,7 @@ class Action:
 
     def effort(self, motors: Motion, links: Motion, load: FloatArray) -> FloatArray:
         """
-        Return what the actuators supply beside the rigid body's torque, shape (N, n) [N m].
+        Return what the actuators supply in addition to the rigid body's torque, (N, n) [N m].
 
         Parameters
         ----------

@@ -103,7 +103,7 @@ class Effect(ABC):
     mjcf_attribute: ClassVar[str] = ''
     #: Whether it comes from outside the arm: a person, another machine.
     external: ClassVar[bool] = False
-    #: Whether it is learned from what is left: nothing that a cause can be called by.
+    #: Whether it is learned from the residual, and so names no cause.
     learned: ClassVar[bool] = False
     #: Whether its torque changes smoothly with position and velocity.
     smooth: ClassVar[bool] = False
@@ -168,7 +168,7 @@ class Effect(ABC):
         return tuple((joint,) for joint in joints) or ((),)
 
     def particulars(self) -> dict[str, Any]:
-        """Return what model.yaml holds of it beside joints, parameters and shapes."""
+        """Return what model.yaml holds of it in addition to joints, parameters and shapes."""
         return {}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
@@ -298,7 +298,7 @@ class Effect(ABC):
         return ()
 
     def along(self, motion: Motion) -> Self:
-        """Return the effect with what it takes from beside the arm, along a motion."""
+        """Return the effect with the motion of the other machine that it acts through."""
         return self
 
     @abstractmethod

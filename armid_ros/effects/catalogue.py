@@ -73,7 +73,7 @@ _EFFECTS: tuple[type[Effect], ...] = (
 
 CATALOGUE = Catalogue(_EFFECTS)
 
-#: What is fitted beside the rigid body where nothing is said.
+#: Effects that are fitted with the rigid body by default.
 USUAL_EFFECTS = tuple(effect.name for effect in _EFFECTS if effect.usual)
 
 _Kind = TypeVar('_Kind', bound=type[Effect])

@@ -209,7 +209,7 @@ class StribeckFriction(Effect):
         return Action(dry_friction=dry, torque=torque)
 
     def _left(self, dq: FloatArray, arm: Arm) -> FloatArray:
-        """Return which share of the breakaway torque is left at a velocity."""
+        """Return the share of the breakaway torque that remains at a velocity."""
         velocity, exponent = self.shape_over_joints(arm.robot)
         return np.asarray(np.exp(-(np.abs(dq / velocity) ** exponent)))
 

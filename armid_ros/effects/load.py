@@ -16,7 +16,7 @@ import numpy as np
 
 #: How far from its joint a link's mass may be without a word in the description [m].
 _REACH = 0.1
-#: Deviations by which a mass may be more than its estimate.
+#: Standard deviations by which a mass may be more than its estimate.
 _SURELY = 3.0
 _UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
@@ -68,8 +68,8 @@ class Payload(_LinkBody):
     A body fixed to a link, the last one by default: mass, first moments and inertia.
 
     All ten are about the frame of the link's joint, so they add to the link's own and are linear.
-    The same as the last link's parameters, exactly: a payload can be told from them only against
-    a model that is known without it.
+    They are exactly collinear with the parameters of the last link: a payload is identifiable only
+    against a model that is known without it.
 
     """
 

@@ -32,7 +32,7 @@ _SLACKS = (0.001, 0.002, 0.004, 0.008)
 @dataclass(frozen=True)
 class Tied(Attached):
     """
-    Springs to points that moved beside the arm.
+    Springs to points of another machine that moved.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Tied(Attached):
         Raises
         ------
         ModelError
-            If nothing was recorded beside the motion, or other points.
+            If the points of the other machine were not recorded with the motion.
 
         """
         beside, names = motion.partner, self.points
@@ -157,7 +157,9 @@ class TiedKind:
         joints = [tie.joint for tie in self.ties]
         twice = [joint for joint in joints if joints.count(joint) > 1]
         if twice:
-            raise ModelError(f'{self.name}: two ties on {twice[0]}; one on each joint can be told')
+            raise ModelError(
+                f'{self.name}: two ties on {twice[0]}; only one on each joint is identifiable'
+            )
 
     @property
     def name(self) -> str:
@@ -229,7 +231,7 @@ def _point(values: Sequence[float]) -> tuple[float, float, float]:
 @dataclass(frozen=True)
 class Partner:
     """
-    A machine that moves beside an arm, and where the two may be tied.
+    A second machine, and where the arm may be tied to it.
 
     Attributes
     ----------

@@ -236,7 +236,7 @@ def _wanted(arm: ArmModel, focus: tuple[str, ...], selected: npt.NDArray[np.intp
     wanted = np.concatenate(marks)[selected]
     if not wanted.any():
         raise TrajectoryError(
-            f'focus: {", ".join(focus)} cannot be told from the rigid body by any motion; take '
+            f'focus: no motion tells {", ".join(focus)} from the rigid body; take '
             "target 'effects', where the rigid body counts as known"
         )
     return wanted

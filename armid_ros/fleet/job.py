@@ -108,7 +108,7 @@ class Job:
 
     @cached_property
     def settings(self) -> dict[str, Any]:
-        """What results depend on, beside the bag."""
+        """What results depend on, other than the bag."""
         robot = self.arm.robot
         return {
             'robot': robot.name,

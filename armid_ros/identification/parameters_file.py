@@ -18,7 +18,7 @@ from armid_ros.robots import load_robot
 import numpy as np
 import yaml
 
-#: A grouping is a combination of others if this share of it is left at most.
+#: A grouping is a combination of others if its remainder is at most this share of it.
 _SAME_GROUPING = 1e-6
 #: Relative; what is written has 16 digits.
 _ROUNDING = 1e-9

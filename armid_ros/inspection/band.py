@@ -24,8 +24,8 @@ LEAST, _SEGMENT = 512, 128
 _REST, _LOOK = 0.02, 0.1
 #: Bands that are tried, in octaves of a tenth.
 _TENTHS = 10
-#: Log-likelihood that a filter has to gain over white noise to be told: two quantities are
-#: fitted, of which thirty is far beyond what chance gives (p about 1e-13).
+#: Log-likelihood that a filter has to gain over white noise to be reported: two quantities are
+#: fitted, so thirty has a p-value of about 1e-13.
 _CLEAR = 30.0
 #: A filter whose band is more than this share of half the rate takes nothing away.
 _WIDEST = 0.6
@@ -48,7 +48,7 @@ def noise_band(noise: FloatArray, rate: float) -> FloatArray:
     Returns
     -------
     ndarray, shape (n,)
-        Frequency at which half the power is left [Hz]; NaN where the noise is white, or there are
+        Frequency at which half the power passes [Hz]; NaN where the noise is white, or there are
         fewer than `LEAST` samples, or nothing varies.
 
     """

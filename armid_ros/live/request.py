@@ -34,7 +34,7 @@ class DiagnosisRequest:
     baseline : tuple of Recording
         From when nothing was wrong.
     misfit : Misfit or None
-        What the model left when it was identified, where there is no baseline.
+        Residual of the model when it was identified, where there is no baseline.
     shortest : float
         A window shorter than this tells too little [s].
     material : float

@@ -26,7 +26,7 @@ from armid_ros.robots import Robot, robot_from_urdf
 import numpy as np
 import scipy.linalg
 
-#: The least share of a body's pseudo-inertia, in any direction, that its own link is left with.
+#: The least share of a body's pseudo-inertia, in any direction, that its own link keeps.
 LEAST_SHARE = 0.05
 #: Largest difference of what the file says when read again, as a share of the largest parameter.
 ROUNDING = 1e-11

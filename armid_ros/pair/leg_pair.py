@@ -50,7 +50,7 @@ class TiedPair:
     stiffness : ndarray, shape (S,)
         k [N/m].
     damping : ndarray, shape (S,)
-        Of dampers beside the springs [N s/m]; zero by default.
+        Of dampers parallel to the springs [N s/m]; zero by default.
     slack : ndarray, shape (S,)
         Way that a spring gives before it pulls [m]; zero by default.
 

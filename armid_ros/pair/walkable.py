@@ -27,7 +27,7 @@ HEEL_DOWN, TOE_DOWN = (0.0, 0.42), (0.12, 0.62)
 #: ground from where it stands [m]: one standard deviation of the least squares.
 _FREEDOM = np.radians([3.0, 3.0, 10.0])
 _PLACE = 0.3e-3
-#: How hard hips are pushed forward and up beside their weight [m/s^2]: people walk smoothly.
+#: Push on the hips forward and up, in addition to their weight [m/s^2]: people walk smoothly.
 _HURRY = np.array([1.0, 1.5])
 #: Height of the swing foot in the middle of its way [m], when, and how strictly.
 _CLEARANCE, _SWING, _CLEAR = 0.02, (0.68, 0.93), 3e-3

@@ -39,7 +39,7 @@ def read_pieces(
     path, joints, topic, settings
         As of ``read_recording``.
     samples : int
-        Messages that a piece takes at most, beside those that the piece before left it.
+        Messages that a piece reads at most, in addition to those carried over from the one before.
     keep : callable
         Asked of every piece but the last; what lies before the stamp that it returns is let go.
 

@@ -28,7 +28,7 @@ def recorded_together(
     recording: Recording, other: Recording, robot: Robot, ties: Sequence[Tie] = ()
 ) -> Recording:
     """
-    Put another machine beside a recording, at its stamps.
+    Add the motion of another machine to a recording, at its stamps.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.changes import Changes
 from armid_ros.report.sections.frame import Asked, Origin, VerdictSection
 
-#: Changes that are told in a sentence each; the table has all.
+#: Changes that get a sentence each; the table has all.
 _TOLD = 8
 #: Parameters that a line names.
 _NAMED = 6
@@ -137,7 +137,7 @@ def _sentence(change: ParameterChange) -> str:
 
 
 def _end(value: float, std: float) -> str:
-    return f'{value:.4g}' if excludes_zero(value, std) else 'what is not told from 0'
+    return f'{value:.4g}' if excludes_zero(value, std) else 'a value whose interval includes 0'
 
 
 def _least_visible(changes: Sequence[ParameterChange]) -> str:

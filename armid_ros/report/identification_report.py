@@ -40,7 +40,7 @@ TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
 @dataclass(frozen=True)
 class Assessment:
     """
-    What an identification was put to, beside predicting recordings.
+    How an identification was assessed, apart from predicting recordings.
 
     Attributes
     ----------

@@ -225,13 +225,13 @@ def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caut
 def _excitation_findings(result: Identification) -> list[Caution]:
     findings = []
     estimate = result.estimate
-    told = excludes_zero(estimate.values, estimate.std)
-    lost = [full_label(estimate.parameters[k]) for k in np.flatnonzero(~told)]
+    known = excludes_zero(estimate.values, estimate.std)
+    lost = [full_label(estimate.parameters[k]) for k in np.flatnonzero(~known)]
     if lost:
         findings.append(
             Caution(
-                f'{len(lost)} of {len(estimate.parameters)} parameters are not told '
-                f'from zero: {", ".join(lost[:_NAMED])}'
+                f'{len(lost)} of {len(estimate.parameters)} parameters have '
+                f'intervals that include zero: {", ".join(lost[:_NAMED])}'
                 + (f' and {len(lost) - _NAMED} more' if len(lost) > _NAMED else '')
                 + '. Use the model for torques, not these values one by one.'
             )

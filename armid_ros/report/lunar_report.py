@@ -37,7 +37,7 @@ def lunar_report(found: Reproduction, *, provenance: Provenance | None = None) -
         GravityParameters(found.composites, _load(found)),
         Origin(provenance or Provenance()),
     ]
-    subtitle = 'gravity and dynamics of a 6-DOF humanoid arm · the paper beside its repeat'
+    subtitle = 'gravity and dynamics of a 6-DOF humanoid arm · the paper compared with its repeat'
     return Page('The lunar paper', subtitle, sections).html()
 
 

@@ -32,8 +32,8 @@ _FOR_SCALES = 100
 _KNEES = (0.02, 1.0)
 #: Length scales that are looked at, over the span of an input; one at the end does not matter.
 _LENGTHS = (0.02, 10.0)
-#: Amplitudes that are looked at, over the root mean square of what is left: what was never seen is
-#: no larger than what was.
+#: Amplitudes that are tried, relative to the root mean square of the residual: where there are no
+#: data, the torque is taken to be no larger than where there are some.
 _AMPLITUDES = (0.1, 2.0)
 #: Variances of the noise of a cell that are looked at, over the same.
 _NOISES = (1e-6, 2.0)
@@ -65,7 +65,7 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
     Parameters
     ----------
     rows : JointRows
-        What is left of it.
+        Its residual.
     rng : numpy.random.Generator
         Draws the first cells.
 

@@ -152,7 +152,7 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     Parameters
     ----------
     rows : JointRows
-        What is left of a joint.
+        Residuals of a joint.
     prismatic : bool
         Whether the joint slides.
 
@@ -200,7 +200,7 @@ def _fit(x: FloatArray, left: FloatArray, count: int) -> FloatArray:
 
 
 def _losses(x: FloatArray, rows: JointRows, count: int) -> FloatArray:
-    """Return the squares that are left of each block by a law of the others, shape (BLOCKS,)."""
+    """Return the squared residual of each block under a law fitted to the others, (BLOCKS,)."""
     result = np.zeros(BLOCKS)
     for block in range(BLOCKS):
         others = rows.outside(block)

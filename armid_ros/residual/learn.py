@@ -43,7 +43,7 @@ class JointResidual:
     ranges : ndarray, shape (3, 2)
         Smallest and largest position, velocity and load in the data.
     before, after : float
-        Root mean square of what is left without and with the map [N m].
+        Root mean square of the residual without and with the map [N m].
     gain : float
         Share of the squares that the map predicts of data it was not learned from: blocks left
         out in turn, and held-out recordings where they come near the data.
@@ -153,10 +153,10 @@ def _law(law: Law) -> dict[str, Any]:
 
 def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual | None:
     """
-    Learn what a diagnosis leaves without a name.
+    Learn a map of the residual that a diagnosis does not explain.
 
-    The maps stand beside the patched model or, where nothing was named, beside the one in which
-    nothing was found: with its rigid body fitted anew, if it was.
+    The residual is that of the patched model or, where nothing was named, of the model that was
+    diagnosed, with its rigid body fitted anew if the diagnosis did so.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is left of recordings, beside the state in which it was left."""
+"""The residuals of recordings, with the state of the arm in which they arose."""
 
 from __future__ import annotations
 

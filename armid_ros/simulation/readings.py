@@ -10,7 +10,7 @@ from armid_ros.simulation.closed_loop import Trace
 from armid_ros.simulation.plant import Plant, State
 import numpy as np
 
-#: Samples beside those that a reading depends on, from which rates of change are taken.
+#: Extra samples around those that a reading depends on, for its rates of change.
 _NEIGHBOURS = 8
 
 

@@ -5,7 +5,7 @@
 import json
 
 from armid_ros.arm import load_misfit, load_model, Misfit, save_model
-from armid_ros.cli.diagnose import Percent
+from armid_ros.cli.diagnose.command import Percent
 from armid_ros.excitation import check_limits, Limits, load_excitation
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import write_recording
@@ -137,8 +137,8 @@ def test_an_extra_that_fails_costs_no_result(files, tmp_path, monkeypatch):
         }
         raise ZeroDivisionError('no motion at all')
 
-    monkeypatch.setattr('armid_ros.cli.diagnosis_files.next_run', broken)
-    monkeypatch.setattr('armid_ros.cli.diagnosis_files.simulate_held_out', broken)
+    monkeypatch.setattr('armid_ros.cli.diagnose.files.next_run', broken)
+    monkeypatch.setattr('armid_ros.cli.diagnose.files.simulate_held_out', broken)
     result = armid(
         'diagnose', *bags, '--robot', urdf, '--model', model, '--validate', bags[0], '--out', out
     )

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 
-from armid_ros.cli.elastic import elastic
+from armid_ros.cli.elastic.command import elastic
 from armid_ros.cli.record import simulate
 from armid_ros.elastic.identification import Accelerometers, read_runs
 from armid_ros.errors import RecordingError, RobotError

@@ -6,7 +6,7 @@ from importlib.metadata import files
 import json
 
 from armid_ros.arm import ArmModel
-import armid_ros.cli.excitation_files as excitation_files
+import armid_ros.cli.excite.files as excitation_files
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     check_limits,
@@ -153,7 +153,7 @@ def test_a_design_that_fails_does_not_cost_the_one_before_it(tmp_path, monkeypat
             raise TrajectoryError('nothing moves')
         return design_speeds(*arguments, **settings)
 
-    monkeypatch.setattr('armid_ros.cli.excite.design_speeds', design_once)
+    monkeypatch.setattr('armid_ros.cli.excite.command.design_speeds', design_once)
     arguments = ('--robot', ROBOT, *QUICK, '--speed', 'slow,fast', '--out', tmp_path / 'plan')
     armid('excite', *arguments, code=2)
     assert plan_of(ROBOT, tmp_path / 'plan' / 'slow').t[0] == 0.0

@@ -3,7 +3,7 @@
 """The story of the demo: what is hidden is drawn fairly, found, and revealed only in the end."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.cli.story import draw_hidden, show_story, ToldStory
+from armid_ros.cli.demo.story import draw_hidden, show_story, ToldStory
 from armid_ros.diagnosis import diagnose
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import ModelError

@@ -90,7 +90,7 @@ def test_another_process_takes_the_place_of_one_that_died(tmp_path):
 
 def test_a_job_that_fails_does_not_end_the_process():
     with working() as assistant:
-        assistant.ask(Question(None, None))
+        assistant.ask(DiagnosisRequest(None, None))
         assert 'failed: AttributeError' in wait(assistant).text
         assert assistant._process.poll() is None
 

@@ -13,7 +13,7 @@ LEFT = {
     # what acts on an arm that is shipped
     'elastic/plant/two_link.py': 4,
     # advice and examples for a person
-    'cli/springs.py': 1,
+    'cli/elastic/springs.py': 1,
     'inspection/inspect.py': 1,
     'simulation/springs.py': 3,
     'elastic/plant/setup.py': 3,

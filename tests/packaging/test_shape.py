@@ -7,7 +7,7 @@ from collections import defaultdict
 
 import pytest
 
-MOST_LINES, MOST_PARAMETERS, MOST_OF_FILE = 60, 8, 450
+MOST_LINES, MOST_PARAMETERS, MOST_OF_FILE, MOST_IN_ROOM = 60, 8, 450, 26
 #: What is longer or takes more, until it is mended; nothing may be added.
 LONG = {'diagnosis/diagnose.py:diagnose', 'diagnosis/diagnose.py:_said'}
 MANY = {
@@ -56,6 +56,13 @@ def test_no_file_is_longer_than_can_be_read_at_once(root):
     assert len(files) > 100
     lines = {str(path): path.read_text('utf-8').count('\n') for path in files}
     assert {name: count for name, count in lines.items() if count > MOST_OF_FILE} == {}
+
+
+def test_no_room_has_more_files_than_can_be_seen_at_once(root):
+    package = root / 'armid_ros'
+    rooms = {str(path): len(list(path.glob('*.py'))) for path in package.rglob('*/')}
+    assert len(rooms) > 20
+    assert {room: count for room, count in rooms.items() if count > MOST_IN_ROOM} == {}
 
 
 def test_no_function_is_longer_than_a_screen(trees):

@@ -5,7 +5,7 @@ Springs of any arm, joint by joint, from encoders on both sides of its transmiss
 
 What a spring carries is what the rigid body takes along the motion of the links, inertia, gravity
 and the interaction of all of them included; the twist over it is one part compliance, one part
-free play. What is left of the motor's torque is its own: rotor, viscous and Coulomb friction. Both
+free play. The rest of the motor's torque is its own: rotor, viscous and Coulomb friction. Both
 are linear, and slow: nothing is asked of the resonances, which follow from inertia and stiffness.
 
 """
@@ -171,7 +171,7 @@ def _inertia(robot: Robot, q: FloatArray) -> FloatArray:
 def _motor(
     motors: Sequence[Motion], loads: Sequence[FloatArray], joint: int, cutoff: float
 ) -> FloatArray | None:
-    """Fit rotor, friction and offset to what the motor gives beside the load."""
+    """Fit rotor inertia, friction and offset to the motor torque minus the load."""
     tables, torques = [], []
     for motor, load in zip(motors, loads, strict=True):
         if motor.tau is None:

@@ -76,7 +76,7 @@ def fit_rigid(runs: Sequence[ElasticRun], *, cutoff: float = CUTOFF) -> RigidFit
     Raises
     ------
     IdentificationError
-        If nothing is left of the experiments or they do not tell the parameters apart.
+        If no experiment is usable, or the parameters are not identifiable from them.
 
     """
     tables, torques = [], []

@@ -14,7 +14,7 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 
-#: Parameters that step responses tell well; friction and damping of the springs are told less.
+#: Parameters that step responses determine well; friction and spring damping are less certain.
 MAIN = ('alpha', 'beta', 'gamma', 'mm', 'kg')
 
 

@@ -50,7 +50,7 @@ class TwoEncoders:
     torque : ndarray, shape (N,)
         Of the motor, at the joint; or what the spring carries, where that is known [N m].
     carried : bool
-        Whether the torque is what the spring carries. Nothing has to be told from it then.
+        Whether the torque is what the spring carries, so that it needs no correction.
 
     """
 
@@ -81,7 +81,7 @@ class TransmissionFit:
     delay : tuple of float
         Twist per velocity: by how much the link's encoder is read later than the motor's [s].
     correlation : float
-        Of compliance and backlash, -1 to 1; near either end they cannot be told apart.
+        Of compliance and backlash, -1 to 1; near either end the two are collinear.
     reversals : int
         Times that the load changed flanks; without any, backlash is an offset.
     explained : float
@@ -103,7 +103,7 @@ class TransmissionFit:
 
     @property
     def backlash_seen(self) -> bool:
-        """Whether free play is more than its uncertainty, and can be told from the spring."""
+        """Whether free play exceeds its uncertainty and is identifiable apart from the spring."""
         return self.backlash[1] > 0.0 and abs(self.correlation) < 0.95
 
 

@@ -40,8 +40,8 @@ _LINK, _MOTOR = (7, 8), (9, 10)
 _COULOMB = (SIZE, SIZE + 1)
 #: How far the split of friction and the Coulomb torques are believed: logarithms, one deviation.
 _SPLIT, _BELIEVED = np.log(2.0), 0.1
-#: What an arm that stands may still do, one deviation: twist of the springs [rad], velocity of the
-#: links [rad/s]. Some tenths of a second after a step of 1 rad/s that is left.
+#: Motion of an arm that has come to rest, one standard deviation: twist of the springs [rad] and
+#: velocity of the links [rad/s], some tenths of a second after a step of 1 rad/s.
 _RINGING = np.array([1e-5, 1e-5, 1e-3, 1e-3])
 _ROUNDS = 3
 #: Residuals are looked at for this share of an experiment for whether they last (1 / share).
@@ -58,7 +58,7 @@ class Tuning:
     parameters : TwoLinkParameters
         The result.
     estimate : Estimate
-        The thirteen values and their covariance, Coulomb torques free beside them.
+        The thirteen values and their covariance, with the Coulomb torques as nuisance parameters.
     steps : Steps
         The experiments.
     measured, before, after : ndarray, shape (N, E, 4)

@@ -32,7 +32,7 @@ class Springs(Section):
 
     @property
     def springs(self) -> list[tuple[str, str, str, str, str, str]]:
-        """Joint, stiffness, interval, free play, how far the two are told apart, R^2."""
+        """Joint, stiffness, interval, free play, correlation of the two, R^2."""
         rows = []
         for one in self.found:
             fit = one.transmission
@@ -41,7 +41,7 @@ class Springs(Section):
             rows.append(
                 (
                     one.joint,
-                    f'{value:.4g}' if one.informative else 'not told',
+                    f'{value:.4g}' if one.informative else 'not identifiable',
                     f'{low:.4g} to {high:.4g}' if one.informative else '',
                     f'{play[1]:.2g} to {play[2]:.2g}'
                     if np.isfinite(play).all()

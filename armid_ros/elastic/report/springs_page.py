@@ -45,7 +45,7 @@ def _verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
             'load, or with finer encoders.'
         )
     if not told:
-        return VerdictSection('not told', 'bad', ['No joint shows a spring.'], beware)
+        return VerdictSection('not identifiable', 'bad', ['No joint shows a spring.'], beware)
     softest = min(told, key=lambda one: one.transmission.stiffness[0])
     value, low, high = softest.transmission.stiffness
     sentences = [

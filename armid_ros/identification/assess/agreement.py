@@ -21,7 +21,7 @@ _COVERED = 0.95
 @dataclass(frozen=True)
 class Agreement:
     """
-    An estimate beside the truth.
+    An estimate compared with the true values.
 
     The misses of correlated parameters come together, so that their number says little. The
     distance of all parameters together, in the metric of their covariance, has a distribution

@@ -38,7 +38,7 @@ INSTRUMENT_SHARE = 0.2
 #: Noise is what lies above this share of the sampling rate.
 _NOISE_ABOVE = 0.3
 #: A difference between the two fits of less than this share of a deviation does not matter, and
-#: counts little in the test: two fits of the same data can be told apart to a thousandth.
+#: counts little in the test: two fits of the same data are distinguishable to a thousandth.
 NEGLIGIBLE = 0.1
 #: Deviations of bias that matter: a quarter takes 95 % intervals to 94 %.
 BIAS_LIMIT = 0.25

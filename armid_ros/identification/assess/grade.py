@@ -147,7 +147,7 @@ def _halves(result: Identification) -> _Reason:
     if undetermined:
         time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
         text += (
-            f', but {training:.2g} % is left of what is fitted: {time:.2g} s of this motion do '
+            f', but the training error is {training:.2g} %: {time:.2g} s of this motion do '
             f'not determine {result.base.rank} parameters; record longer, or move more'
         )
     return _Reason(word, _sentence(text))

@@ -245,7 +245,7 @@ class InDegrees(Hypothesis):
 
 @dataclass(frozen=True)
 class OtherGravity(Hypothesis):
-    """Gravity is another vector than was told; torque is linear in it, so the data give it."""
+    """Gravity is not the vector of the description; torque is linear in it, so data give it."""
 
     values: ClassVar[int] = 3
 
@@ -261,7 +261,7 @@ class OtherGravity(Hypothesis):
         return OtherGravity((float(values[0]), float(values[1]), float(values[2])))
 
     def material(self, robot: Robot, limits: GradeLimits) -> bool:
-        """Whether it is too far from what was told for masses to be what is wrong."""
+        """Whether it is too far from the description to be explained by wrong masses."""
         told, found = robot.gravity, np.array(self.vector)
         size = max(float(np.linalg.norm(told)), 1.0)
         return bool(np.linalg.norm(found - told) > limits.gravity_change * size)
@@ -365,7 +365,7 @@ def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str
     vector : ndarray, shape (3,)
         As it was found [m/s^2].
     told : ndarray, shape (3,)
-        As it was told; its size is kept where the found one is near.
+        As described; its magnitude is kept where the estimated one is close.
 
     Returns
     -------

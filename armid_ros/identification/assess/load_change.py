@@ -27,7 +27,7 @@ _SYMBOLS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
 _REFUSED = 0.01
 #: Below this share of the largest a direction of a load is not seen at all.
 _UNSEEN = 1e-9
-#: A mass is told from zero by this many standard deviations.
+#: A mass differs from zero if it is this many standard deviations away.
 _TOLD = 1.96
 
 
@@ -43,7 +43,7 @@ class LoadChange:
     mass, mass_std : float
         Mass that was added, negative if taken away, and its standard deviation [kg].
     center : ndarray, shape (3,), or None
-        Its centre of mass in the joint frame of the link [m]; None where that is not told.
+        Its centre of mass in the joint frame of the link [m]; None where it is not determined.
     p_value : float
         Probability of what it leaves unexplained, by chance.
     rivals : tuple of int
@@ -89,7 +89,7 @@ def find_load(
     -------
     LoadChange or None
         That of the outermost link that will do, for that is where arms hold things; None if no
-        load of any link explains all, or none has a mass that is told from zero.
+        load of any link explains all, or none has a mass that differs from zero.
 
     """
     std = np.sqrt(np.diag(covariance))

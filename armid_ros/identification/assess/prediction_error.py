@@ -28,7 +28,7 @@ _OWN = 4
 @dataclass(frozen=True)
 class PredictionError:
     """
-    What is left of the torque in blocks that were not fitted.
+    Prediction error of the torque in blocks that were not fitted.
 
     Attributes
     ----------

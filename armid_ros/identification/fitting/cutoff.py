@@ -104,7 +104,7 @@ def _losses(problem: Sequence[Regression]) -> FloatArray:
     Returns
     -------
     ndarray, shape (S,)
-        Root mean square of what is left over that of the torque, mean of the joints, of each
+        Root mean square of the residual relative to the torque, mean of the joints, of each
         stretch.
 
     """
@@ -125,7 +125,7 @@ def _losses(problem: Sequence[Regression]) -> FloatArray:
 
 
 def _rms(values: FloatArray, told: npt.NDArray[np.bool_]) -> FloatArray:
-    """Return the root mean square of what is told, shape (n,)."""
+    """Return the root mean square over the informative rows, shape (n,)."""
     count = np.maximum(told.sum(axis=0), 1)
     return np.asarray(np.sqrt(np.sum(values**2, axis=0, where=told) / count))
 

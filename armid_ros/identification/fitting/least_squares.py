@@ -214,7 +214,7 @@ def _noise_spectrum(
     residual: FloatArray, told: npt.NDArray[np.bool_], leverage: FloatArray
 ) -> FloatArray:
     """
-    Estimate the power spectrum of the noise that left a residual.
+    Estimate the power spectrum of the noise from a residual.
 
     Its autocovariance is that of the samples that tell something, lag by lag over as many pairs
     as there are (Parzen 1963). The residual is whitened by an autoregression, its spectrum

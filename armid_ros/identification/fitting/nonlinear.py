@@ -36,7 +36,7 @@ AGREED = 1e-4
 _EXACT = 1e-8
 #: Linearisations; fits that settle take three to eight.
 MOST_PASSES = 20
-#: Torque that is left below this share is none.
+#: A residual torque below this share counts as zero.
 _FINE = 1e-6
 #: A gain in squares of residuals that is less than one standard deviation of one parameter.
 _NOTHING = 1.0
@@ -173,7 +173,7 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
     arm : ArmModel
         Where to begin.
     base : BaseParameters
-        What is told apart.
+        The base parameters that are identifiable.
     values : ndarray, shape (r,)
         Base parameters that the arm is to have.
     free : ndarray, shape (10 n, k)
@@ -314,7 +314,7 @@ class _State:
         self._weights = self._used / np.maximum(rms, _EXACT * max(rms.max(), 1e-100))
 
     def gain(self, predicted: Torques) -> float:
-        """Return the squares of residuals that torques take away; none where nothing is left."""
+        """Return the squared residuals that torques explain; zero where there is no residual."""
         if np.linalg.norm(self._used * self._left) <= _FINE * np.linalg.norm(
             self._used * self._tau
         ):
@@ -336,7 +336,7 @@ class _State:
         return np.clip(self.values + step / np.where(size > 0.0, size, np.inf), *limits)
 
     def cost(self, predicted: Torques | None = None) -> float:
-        """Return the sum of squares that torques leave, in what is left now of each joint."""
+        """Return the sum of squares that remains of the present residual of each joint."""
         if predicted is None:
             return float(np.sum((self._weights * self._left) ** 2))
         left = self._weights * (self._tau - np.concatenate(predicted))

@@ -8,13 +8,13 @@ from armid_ros.motion import FloatArray
 import numpy as np
 
 #: Directions of columns scaled to one length with less than this share of the largest eigenvalue
-#: are not told: products of columns hold no more digits.
+#: are not identifiable: products of columns hold no more digits.
 UNINFORMATIVE = 1e-10
 
 
 def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) -> FloatArray:
     """
-    Return directions that data tell.
+    Return the identifiable directions.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) ->
 
 def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     """
-    Solve normal equations; what data do not tell stays where it is.
+    Solve normal equations; directions that are not identifiable get no change.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
 #: Of a body that an arm picks up, what is reported: its mass and where it is. The torque of its
-#: inertia about its own centre is small beside theirs.
+#: inertia about its own centre is small compared with theirs.
 _REPORTED = 4
 #: A direction of which others leave less than this share is not one of its own.
 _INDEPENDENT = 1e-6

@@ -34,8 +34,8 @@ _EARLIEST = 4
 _LATEST = 6
 #: Logarithm of the likelihood ratio by which the best explanation is clear.
 _CLEAR = 5.0
-#: Of two begins of a change that differ by less the later one is taken: soon after a change any
-#: begin before it will do, and all that can be told apart by then is not much.
+#: If the log-likelihoods of two onsets differ by less, the later one is taken: soon after a change
+#: there are too few data to distinguish onsets, and every onset before the change fits.
 _ALIKE = 4.0
 #: For so long after a change its size is still being learned [s]; what is less likely than this
 #: share of it corrects the size.

@@ -115,7 +115,7 @@ class ChangeWatch:
         self.reset()
 
     def reset(self) -> None:
-        """Forget what noise usually does, and all changes; nothing may be left to be done."""
+        """Forget the noise level and all changes; no background work may be pending."""
         self.changes: list[Change] = []
         self._wider.reset()
         self._search.reset()

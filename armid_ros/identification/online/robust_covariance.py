@@ -26,7 +26,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import linalg, stats
 
-#: Rows over frequencies that are looked at: beyond, the low-pass has left nothing.
+#: Rows over frequencies that are used: beyond, the low-pass filter passes nothing.
 _ROWS_OF_BIN = 8
 #: Columns that are transformed in one piece of work.
 _COLUMNS = 24
@@ -253,7 +253,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
     """
     Return a root of R_M^-T J R_M^-1, R_M that of M, and what widens deviations by it.
 
-    The noise is what residuals have in a band over what the fit has left of it there; the
+    The noise power in a band is that of the residuals, corrected for what the fit absorbed; the
     covariance of every value is a sum over bands, and as certain as that (Satterthwaite 1946).
 
     """

@@ -55,7 +55,7 @@ UNKNOWN_RADIUS = 0.05
 @dataclass(frozen=True)
 class PhysicalSettings:
     """
-    What is known beside the recordings.
+    Prior knowledge, in addition to the recordings.
 
     Attributes
     ----------

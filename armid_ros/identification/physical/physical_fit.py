@@ -95,7 +95,7 @@ def _about(
     method: Method,
     rng: np.random.Generator,
 ) -> FittedValues:
-    """Linearise about a fit, in the parameters that can be told apart there, and solve that."""
+    """Linearise about a fit in the parameters that are identifiable there, and solve."""
     arm = fit.arm
     theory = arm.base_parameters(rng)
     columns = regressions(arm, theory.independent, recordings, used)

@@ -62,7 +62,7 @@ def check_motion(
 
 
 def check_length(recordings: Sequence[Recording], problem: Sequence[Regression]) -> None:
-    """Refuse recordings of which nothing is left behind the filters."""
+    """Refuse recordings that are too short for the filters."""
     left = {part.source for part in problem}
     for recording in recordings:
         if recording.source not in left:

@@ -263,7 +263,7 @@ def _even(
 def _differentiated(
     recording: Recording, t: FloatArray, q: FloatArray, tau: FloatArray, used: Conditioning
 ) -> Motion:
-    """Filter and differentiate positions of the arm, and of what moved beside it after them."""
+    """Filter and differentiate positions of the arm, and after them those of its partner."""
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     smooth = signal.sosfiltfilt(sections, q, axis=0)
     dq = _central_difference(smooth, t[1] - t[0])

@@ -203,7 +203,7 @@ class SpikeGate:
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
-        Return whether an arm may have made what left its line and came back.
+        Return whether the arm itself may have caused an excursion of a signal.
 
         A position cannot jump and come back. A torque can, and where free play is crossed it goes
         beyond what it reaches otherwise, from `lowest` to `highest`, but by no more than that

@@ -37,7 +37,7 @@ import numpy.typing as npt
 from scipy import signal
 import scipy.linalg
 
-#: A column of which others leave less than this share is not told apart from them.
+#: A column is taken as a combination of the others if its remainder is below this share.
 _RANK_TOLERANCE = 1e-6
 #: Step of the central differences of rigid columns [rad or m].
 _STEP = 1e-5
@@ -282,9 +282,9 @@ def _free_body(
     count: int,
     names: Sequence[str],
 ) -> _Body:
-    """Return the columns of inertias that are told apart beside the springs, and the prior."""
+    """Return the inertial columns that are identifiable with the springs, and the prior."""
     body = regressor(robot, motion)
-    base = _told_apart(robot, body, springs, names)
+    base = _identifiable(robot, body, springs, names)
     spread = base.grouping * described_spread(robot).ravel()
     return _Body(
         np.zeros_like(motion.q),
@@ -299,10 +299,10 @@ def _free_body(
 
 def _passed(used: Conditioning) -> FloatArray:
     """
-    Return what is left of white noise in position, velocity and acceleration, (1 + lags, 3, 3).
+    Return the filtered covariance of white noise in position, velocity, acceleration.
 
-    Covariances of a row with itself and with later ones. Columns are slow beside the filter of the
-    decimation, so that noise in them goes through it as if it were by itself.
+    Of a row with itself and with later ones, shape (1 + lags, 3, 3). Columns change slowly
+    compared with the filter of the decimation, so noise passes it as if it were alone.
 
     """
     w = np.linspace(0.0, np.pi, 8001)
@@ -323,10 +323,10 @@ def _torque_passed(used: Conditioning) -> FloatArray:
     return np.array([taps[:end] @ taps[-end:] if end > 0 else 0.0 for end in ends])
 
 
-def _told_apart(
+def _identifiable(
     robot: Robot, body: FloatArray, springs: FloatArray, names: Sequence[str]
 ) -> BaseParameters:
-    """Return the rigid columns that the motion tells apart beside the springs."""
+    """Return the base parameters that are identifiable together with the springs."""
     every = rigid_parameter_names(robot)
     base = group_columns(body.reshape(-1, body.shape[2]), every, _RANK_TOLERANCE)
     w = np.concatenate([body[:, :, base.independent], springs], axis=2)
@@ -336,8 +336,8 @@ def _told_apart(
     left = np.abs(np.diag(np.linalg.qr(scaled, mode='r')))[base.rank :]
     if len(left) and left.min() < _RANK_TOLERANCE:
         raise IdentificationError(
-            f'{names[int(np.argmin(left))]}: this motion does not tell its stiffness from weight '
-            'and inertia; keep the inertias known, or move more'
+            f'{names[int(np.argmin(left))]}: its stiffness cannot be distinguished from weight '
+            'and inertia along this motion; keep the inertias known, or move more'
         )
     return base
 

@@ -99,14 +99,14 @@ def together_interaction_problem(
     rest: Callable[[Motion], FloatArray] | None = None,
 ) -> InteractionProblem:
     """
-    Set up the regression on a recording with the other machine beside it.
+    Set up the regression on a recording that has the motion of the other machine.
 
     Parameters
     ----------
     robot : Robot
         The machine whose torques were measured.
     recording : Recording
-        Of it, with torques, and with the other one and their ties beside it.
+        Of the arm, with torques, and with the motion of the other machine and the ties.
     used : Conditioning
         Filters.
     inertias, separate, slack
@@ -168,7 +168,7 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
 
 def _one_machine(recording: Recording) -> Recording:
-    """Return a recording and what is beside it as of one machine, without torques of the other."""
+    """Return a recording and its partner as one machine, without torques of the partner."""
     assert recording.partner is not None and recording.tau is not None
     far = recording.partner.q
     return replace(

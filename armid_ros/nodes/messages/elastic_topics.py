@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an arm with elastic joints publishes beside its joint states."""
+"""What an arm with elastic joints publishes in addition to its joint states."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ class TrajectorySenders:
 
     @property
     def error(self) -> float:
-        """Largest error of a joint that the controller told of [rad or m]; NaN: none."""
+        """Largest joint error that the controller reported [rad or m]; NaN: none."""
         return float(self.action.error) if self.under_way else float('nan')
 
     def look(self) -> None:

@@ -65,7 +65,7 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
 
 def side_by_side(tables: Sequence[Table]) -> Table:
     """
-    Put tables of the same samples beside each other.
+    Join tables of the same samples, column by column.
 
     Names that several have are preceded by the file's: 'currents:Joint_1'.
 

@@ -23,7 +23,7 @@ _OTHERS: tuple[QuantityName, ...] = ('velocity', 'effort')
 _FACTORS = {'deg': np.pi / 180, 'deg/s': np.pi / 180, 'mN m': 1e-3, 'N mm': 1e-3, 'mA': 1e-3}
 _FACTORS |= {'mrad': 1e-3, 'kN m': 1e3, 'rpm': 2 * np.pi / 60, 'mm': 1e-3, 'mm/s': 1e-3}
 _TURNS = ('deg', 'deg/s', 'rpm', 'mrad')
-#: Steps between samples that are told from the numbers alone [s].
+#: Sampling periods that are recognised from the numbers alone [s].
 _STEP = (2e-5, 0.5)
 
 

@@ -18,7 +18,7 @@ from armid_ros.report.page import Section
 import numpy as np
 
 _MOST = 15
-#: Deviations by which a value is told from zero, and from what is possible.
+#: Standard deviations by which a value has to differ from zero, and from what is possible.
 _TOLD = 3.0
 
 
@@ -93,6 +93,6 @@ class CandidateTable(Section):
         if not inside.all():
             return 'not possible'
         if not np.any(np.abs(trial.values) > _TOLD * trial.std):
-            return 'not told from 0'
+            return 'interval includes 0'
         name = effect.parameters(arm.robot)[kept[0]]
         return with_interval(float(trial.values[0]), float(trial.std[0]), name.unit)

@@ -60,9 +60,9 @@ class ChangeRow:
 
 
 def _value(value: float, std: float) -> str:
-    """Return a value with its 95 % interval; one that is not told from zero is no number."""
+    """Return a value with its 95 % interval, and no value where that includes zero."""
     number, reach = measured(value, HALF_WIDTH * std)
-    return f'{number} ± {reach}' if excludes_zero(value, std) else f'not told from 0, ± {reach}'
+    return f'{number} ± {reach}' if excludes_zero(value, std) else f'includes 0, ± {reach}'
 
 
 @dataclass(frozen=True)

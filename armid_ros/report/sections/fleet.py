@@ -171,7 +171,7 @@ def spark(values: FloatArray, std: FloatArray, cut: int = 0, title: str = '') ->
     cut : int
         First value after a step; 0 for none.
     title : str
-        What a pointer over it is told.
+        Text of the tooltip.
 
     """
     width, height = _SMALL

@@ -21,7 +21,7 @@ import numpy as np
 @dataclass(frozen=True)
 class GapBars(Section):
     """
-    Errors before and after, beside the floor.
+    Errors before and after, compared with the noise floor.
 
     Attributes
     ----------

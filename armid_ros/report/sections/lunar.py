@@ -21,7 +21,7 @@ Row = tuple[str, list[str]]
 @dataclass(frozen=True)
 class PaperTables(Section):
     """
-    The paper's tables beside the same of the repeat, joint by joint.
+    The paper's tables next to those of the repeat, joint by joint.
 
     Attributes
     ----------

@@ -52,12 +52,12 @@ class ParameterRow:
         """
         Estimate and half width, to the digit that the half width leaves; described value.
 
-        An estimate that is not told from zero is no number.
+        The value of an estimate whose interval includes zero is not shown.
 
         """
         described = f'{self.described:.3g}' if self.known else 'none'
         if not self.told:
-            return 'not told from 0', f'{self.reach:.2g}', described
+            return 'interval includes 0', f'{self.reach:.2g}', described
         return (*measured(self.value, self.reach), described)
 
     @property

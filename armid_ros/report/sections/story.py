@@ -157,7 +157,7 @@ def _cause(finding: Finding) -> str:
     low, high = finding.share_interval
     share = f'{percent(finding.share)} of the gap ({percent(low)} to {percent(high)})'
     rivals = ', '.join(name.replace('_', ' ') for name in finding.ambiguous_with)
-    doubt = f'; not told from {rivals}' if rivals else ''
+    doubt = f'; the data do not distinguish it from {rivals}' if rivals else ''
     return f'{finding.name.replace("_", " ")}{where}{numbers}; explains {share}{doubt}'
 
 

@@ -150,7 +150,7 @@ def test_payload_is_visible_when_the_arm_is_known(humanoid, with_effects):
     arm = with_effects(humanoid, 'payload')
     rng = np.random.default_rng(0)
     assert DesignProblem.of(arm, DesignSettings(target='effects'), rng).base.rank == 10
-    with pytest.raises(TrajectoryError, match=r"payload cannot be told.*target 'effects'"):
+    with pytest.raises(TrajectoryError, match=r"no motion tells payload.*target 'effects'"):
         DesignProblem.of(arm, DesignSettings(focus=('payload',)), rng)
 
 

@@ -10,7 +10,7 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.arm import ArmModel, save_model
 from armid_ros.cli import options
-from armid_ros.cli.story import show_story, tell_story
+from armid_ros.cli.demo.story import show_story, tell_story
 from armid_ros.cli.terminal import ConvergenceTable, progress, say
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.arm import ArmModel
-from armid_ros.cli.diagnose import show
-from armid_ros.cli.diagnosis_files import DiagnosisCase, write_results
+from armid_ros.cli.diagnose.command import show
+from armid_ros.cli.diagnose.files import DiagnosisCase, write_results
 from armid_ros.cli.terminal import progress, say
 from armid_ros.diagnosis import diagnose, Diagnosis
 from armid_ros.effects import CATALOGUE, Effect, make_effect, parse_effect

@@ -7,8 +7,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from armid_ros.cli import options
-from armid_ros.cli.excitation_files import BAG, CollisionScene, require_free, SCHEMA
-from armid_ros.cli.excite_options import MotionOptions
+from armid_ros.cli.excite.files import BAG, CollisionScene, require_free, SCHEMA
+from armid_ros.cli.excite.options import MotionOptions
 from armid_ros.cli.terminal import say
 from armid_ros.elastic.plant.courses import multisine_course, step_course
 from armid_ros.excitation import Limits, not_checked

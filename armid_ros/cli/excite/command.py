@@ -10,7 +10,7 @@ from pathlib import Path
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli import options
-from armid_ros.cli.excitation_files import (
+from armid_ros.cli.excite.files import (
     CollisionScene,
     ExcitationPlan,
     require_free,
@@ -18,7 +18,7 @@ from armid_ros.cli.excitation_files import (
     write_plan,
     Written,
 )
-from armid_ros.cli.excite_options import (
+from armid_ros.cli.excite.options import (
     design_settings,
     LimitOptions,
     ModelOptions,
@@ -26,7 +26,7 @@ from armid_ros.cli.excite_options import (
     SearchOptions,
     Speeds,
 )
-from armid_ros.cli.excite_springs import COURSES, refuse_other_options, write_course
+from armid_ros.cli.excite.springs import COURSES, refuse_other_options, write_course
 from armid_ros.cli.groups import gathered, RobotChoice
 from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.errors import TrajectoryError
@@ -237,7 +237,7 @@ def _share(tick: Tick, number: int, count: int) -> Callable[[str | float, Design
 
 @dataclass(frozen=True)
 class _Task:
-    """What is designed at every speed: for which plan, beside what is known already."""
+    """What is designed at every speed: the plan, the rival, and the prior information."""
 
     plan: ExcitationPlan
     settings: DesignSettings

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.cli import columns, options
-from armid_ros.cli import partner as partner_options
-from armid_ros.cli.diagnosis_files import DiagnosisCase, make_extras, write_results
+from armid_ros.cli.diagnose import partner as partner_options
+from armid_ros.cli.diagnose.files import DiagnosisCase, make_extras, write_results
 from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
@@ -71,7 +71,7 @@ class DiagnosisData:
     def read(
         self, robot: Robot, partner: Partner | None, partner_topic: str | None
     ) -> tuple[list[Recording], list[Recording], list[Recording]]:
-        """Return the three kinds of recordings, the first two with the partner beside."""
+        """Return the three kinds of recordings, the first two with the motion of the partner."""
         recordings, held_out, before = (
             options.read(paths, robot, self.topic)
             for paths in (self.bags, self.validate, self.baseline)
@@ -252,7 +252,7 @@ def show(result: Diagnosis) -> None:
 
 
 def _rows(finding: Finding) -> list[dict[str, str]]:
-    """Return a row for every value that is told from zero."""
+    """Return a row for every value whose interval excludes zero."""
     every = list(zip(finding.parameters, finding.values, finding.std, strict=True))
     values = [row for row in every if excludes_zero(row[1], row[2])] or every
     return [

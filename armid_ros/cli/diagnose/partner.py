@@ -43,7 +43,7 @@ _OPTIONS = (
 @dataclass(frozen=True)
 class PartnerOptions:
     """
-    A machine or a person that was recorded beside the arm.
+    A machine or a person that was recorded together with the arm.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ def read_together(
     topic: str | None,
     settings: ReadSettings,
 ) -> list[Recording]:
-    """Put the partner, as the same bags have it, beside recordings of the arm."""
+    """Add the motion of the partner, from the same bags, to recordings of the arm."""
     joints = partner.robot.joints
     others = [read_recording(bag, joints=joints, topic=topic, settings=settings) for bag in bags]
     tell_damage(*others)

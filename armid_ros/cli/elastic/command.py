@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.cli import options
+from armid_ros.cli.elastic.springs import identify_springs
 from armid_ros.cli.groups import gathered
-from armid_ros.cli.springs import identify_springs
 from armid_ros.cli.terminal import print_parameters, progress, say, Tick
 from armid_ros.elastic.identification import (
     Accelerometers,

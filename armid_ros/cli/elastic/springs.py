@@ -64,7 +64,7 @@ def identify_springs(
 def _line(found: SpringEstimate) -> str:
     """Return what was found of a joint in words."""
     if not found.informative:
-        return f'{found.joint}: the twist does not follow the load; no stiffness is told'
+        return f'{found.joint}: the twist does not follow the load, so no stiffness is estimated'
     fit = found.transmission
     stiffness, low, high = fit.stiffness
     parts = [f'{stiffness:.4g} N m/rad ({low:.4g} to {high:.4g}, 95 %)']

@@ -110,7 +110,7 @@ def make_extras(result: Diagnosis, case: DiagnosisCase, seed: int, tick: Tick) -
     """Simulate the held-out recordings and plan a next run, as far as that can be done."""
     extras = Extras()
     if case.learns:
-        tick(1.0, 'learning what is left')
+        tick(1.0, 'learning the residual')
         extras = _learned(result, seed)
     arm = result.arm if extras.residual is None else extras.residual.arm
     if case.data.held_out and result.gap is not None:
@@ -131,7 +131,9 @@ def _learned(result: Diagnosis, seed: int) -> Extras:
     if why:
         return Extras(notes=why)
     if found is None:
-        return Extras(notes=('nothing was learned: what is left goes with no state of a joint',))
+        return Extras(
+            notes=('nothing was learned: the residual does not depend on the state of any joint',)
+        )
     return Extras(residual=found)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import options
-from armid_ros.cli.excitation_files import CollisionScene, WAYPOINT_RATE
+from armid_ros.cli.excite.files import CollisionScene, WAYPOINT_RATE
 from armid_ros.effects import parse_effect
 from armid_ros.excitation import (
     DesignSettings,
