@@ -102,13 +102,14 @@ def _end_velocity(
     dt, pattern = plant.spans[0], contacts.pattern(modes)
     if pattern is not None:
         right, system = force - pattern.taken, inertia
-        if pattern.free is not None:
-            right *= pattern.free
-            system = inertia * pattern.both
-            system += pattern.stuck
+        if pattern.held is not None:
+            moving, both, stuck = pattern.held
+            right *= moving
+            system = inertia * both
+            system += stuck
         ddq = _solve(plant, system, right)
         dq_next = dq + dt * ddq
-        taken = None if pattern.free is None else force - inertia.dot(ddq)
+        taken = None if pattern.held is None else force - inertia.dot(ddq)
         if contacts.obeyed(dq_next, modes, taken):
             return dq_next, ddq, modes
     directions = contacts.directions
