@@ -38,7 +38,7 @@ class Trace(NamedTuple):
 
 def command(plant: Plant, controller: Controller, state: State, target: Target) -> FloatArray:
     """Return the torque for a target, within the limits of the drives, shape (n,) [N m]."""
-    q, dq, _ = plant.motors(state)
+    q, dq = (state.q, state.dq) if state.rotors is None else plant.motors(state)[:2]
     lowest, highest = plant.torque_range
     return np.minimum(np.maximum(controller.torque(q, dq, *target), lowest), highest)
 
