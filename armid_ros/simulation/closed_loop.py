@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.controller import Controller, Target, Targets
@@ -13,8 +13,7 @@ from armid_ros.simulation.plant import Plant, State
 import numpy as np
 
 
-@dataclass(frozen=True, eq=False)
-class Trace:
+class Trace(NamedTuple):
     """
     What happened during N steps.
 
@@ -39,7 +38,7 @@ class Trace:
 
 def command(plant: Plant, controller: Controller, state: State, target: Target) -> FloatArray:
     """Return the torque for a target, within the limits of the drives, shape (n,) [N m]."""
-    q, dq, _ = plant.motors(state)
+    q, dq = (state.q, state.dq) if state.rotors is None else plant.motors(state)[:2]
     lowest, highest = plant.torque_range
     return np.minimum(np.maximum(controller.torque(q, dq, *target), lowest), highest)
 
@@ -64,17 +63,18 @@ def run(
         What to do at the end of each step.
 
     """
-    count, drive = len(targets), plant.action.drive
-    tau = np.empty((count + 1, len(torque)))
+    drive, last = plant.action.drive, len(targets)
+    tau = np.empty((last + 1, len(torque)))
     links = np.empty((3, *tau.shape))
     motors = links if plant.springs is None else np.empty_like(links)
     q, dq, ddq = links
-    steps = iter(targets)
-    for k in range(count + 1):
+    for k, target in enumerate(targets):
         q[k], dq[k], ddq[k], tau[k] = state.q, state.dq, state.ddq, torque
         if motors is not links:
             motors[:, k] = plant.motors(state)
-        if k < count:
-            state = step(plant, state, torque if drive is None else drive(torque))
-            torque = command(plant, controller, state, next(steps))
+        state = step(plant, state, torque if drive is None else drive(torque))
+        torque = command(plant, controller, state, target)
+    q[last], dq[last], ddq[last], tau[last] = state.q, state.dq, state.ddq, torque
+    if motors is not links:
+        motors[:, last] = plant.motors(state)
     return Trace(motors, links, tau, state)

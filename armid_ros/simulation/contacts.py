@@ -23,17 +23,14 @@ class KnownModes(NamedTuple):
     ----------
     taken : ndarray, shape (n,)
         Joint torques that slipping elements take [N m].
-    free : ndarray, shape (n,), or None
-        1 for joints that move and 0 for those that stick; None if none does.
-    both, stuck : ndarray, shape (n, n)
-        1 where two joints move; the diagonal matrix with 1 for each that sticks.
+    held : tuple of ndarray, of shapes (n,), (n, n) and (n, n), or None
+        What takes joints that stick out of the system: 1 for joints that move, 1 where two of
+        them meet, and a diagonal matrix with 1 for those that stick. None if none does.
 
     """
 
     taken: FloatArray
-    free: FloatArray | None
-    both: FloatArray
-    stuck: FloatArray
+    held: tuple[FloatArray, FloatArray, FloatArray] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +47,8 @@ class Contacts:
     axes : tuple of int, length m
         The joint that an element acts on alone; -1 if it acts on several.
     own : bool
-        Whether each is friction of one joint whatever its load, so that a joint whose element
-        sticks stood still before.
+        Whether they are friction of one joint after the other, whatever its load, so that a joint
+        whose element sticks stood still before.
     friction : DryFriction
         What they are without a load, where the load matters.
 
@@ -71,8 +68,7 @@ class Contacts:
         axes = tuple(_axis(direction) for direction in directions)
         law = BoxLaw(friction.lower, friction.upper)
         loaded = None if friction.load_share is None else friction
-        unit = np.array_equal(directions[directions != 0.0], np.ones(len(axes)))
-        own = unit and -1 not in axes and loaded is None
+        own = loaded is None and np.array_equal(directions, np.eye(directions.shape[1]))
         return cls(directions, law, axes, own, loaded)
 
     def pattern(self, modes: Modes) -> KnownModes | None:
@@ -91,15 +87,16 @@ class Contacts:
     def _new_pattern(self, modes: npt.NDArray[np.intp]) -> KnownModes:
         bound = np.where(modes > 0, self.law.upper, np.where(modes < 0, self.law.lower, 0.0))
         taken = np.asarray(bound @ self.directions)
-        free = 1.0 - np.any(self.directions[modes == 0], axis=0)
-        moving = None if free.all() else free
-        return KnownModes(taken, moving, np.outer(free, free), np.diag(1.0 - free))
+        if modes.all():
+            return KnownModes(taken, None)
+        free = np.where(modes == 0, 0.0, 1.0)
+        return KnownModes(taken, (free, np.outer(free, free), np.diag(1.0 - free)))
 
     def obeyed(self, dq: FloatArray, modes: Modes, taken: FloatArray | None) -> bool:
-        """Tell whether elements obey their laws at joint velocities and torques, (n,)."""
-        speeds = self.directions.dot(dq)
+        """Tell whether elements obey their laws at joint velocities, (n,), torques where held."""
         if taken is not None:
-            return not self.law.violations(speeds, self.directions.dot(taken), modes)
+            return not self.law.violations(dq, taken, modes)
+        speeds = dq if self.own else self.directions.dot(dq)
         for speed, mode in zip(speeds.tolist(), modes, strict=True):
             if speed * mode < -SPEED_TOLERANCE:
                 return False
@@ -124,11 +121,13 @@ def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFric
         )
     share = np.zeros(len(friction.lower)) if friction.load_share is None else friction.load_share
     constant = (friction.lower == friction.upper) & (share == 0.0)
+    first = np.argsort(np.argmax(friction.directions != 0.0, axis=1), kind='stable')
+    able = first[~constant[first]]  # in the order of the joints, so that most are one a joint
     sticking = DryFriction(
-        np.ascontiguousarray(friction.directions[~constant]),
-        friction.lower[~constant],
-        friction.upper[~constant],
-        None if friction.load_share is None else share[~constant],
+        np.ascontiguousarray(friction.directions[able]),
+        friction.lower[able],
+        friction.upper[able],
+        None if friction.load_share is None else share[able],
     )
     return sticking, np.asarray(friction.lower[constant] @ friction.directions[constant])
 

@@ -82,15 +82,10 @@ class Controller(ABC):
 
     def targets(self, desired: Motion, asked: FloatArray | None = None) -> Targets:
         """
-        Return what to do at successive steps.
+        Return what to do to follow a reference that has one row per step.
 
-        Parameters
-        ----------
-        desired : Motion
-            The reference, one row per step.
-        asked : ndarray, shape (n,), optional
-            Position that was the target of the first of these steps, for which the controller
-            has acted already.
+        A controller that has acted for the first of them already is told what it asked for then,
+        positions of shape (n,).
 
         """
         return Targets(desired.q, desired.dq, desired.ddq, self.feedforward(desired))
@@ -182,11 +177,11 @@ class ComputedTorque(Controller):
         ddq = stiffness * (q_desired - q)
         ddq += damping * (dq_desired - dq)
         ddq += ddq_desired
-        tau = pin.rnea(self._robot.model, self._data, q, dq, ddq)
+        tau: FloatArray = pin.rnea(self._robot.model, self._data, q, dq, ddq)
         if self._inertia is not None:
             tau += self._inertia.dot(ddq)
         tau += feedforward
-        return np.asarray(tau)
+        return tau
 
 
 @dataclass(frozen=True, eq=False)

@@ -102,13 +102,14 @@ def _end_velocity(
     dt, pattern = plant.spans[0], contacts.pattern(modes)
     if pattern is not None:
         right, system = force - pattern.taken, inertia
-        if pattern.free is not None:
-            right *= pattern.free
-            system = inertia * pattern.both
-            system += pattern.stuck
+        if pattern.held is not None:
+            moving, both, stuck = pattern.held
+            right *= moving
+            system = inertia * both
+            system += stuck
         ddq = _solve(plant, system, right)
         dq_next = dq + dt * ddq
-        taken = None if pattern.free is None else force - inertia.dot(ddq)
+        taken = None if pattern.held is None else force - inertia.dot(ddq)
         if contacts.obeyed(dq_next, modes, taken):
             return dq_next, ddq, modes
     directions = contacts.directions
@@ -127,19 +128,18 @@ def _end_velocity(
 
 def _solve(plant: Plant, inertia: FloatArray, right: FloatArray) -> FloatArray:
     """Return the inverse inertia times columns, which are written over."""
+    solution: FloatArray
     _, solution, failed = dposv(inertia, right, 0, 0, 1)
     if failed:
         raise ModelError(no_body(plant.robot))
-    return np.asarray(solution)
+    return solution
 
 
 def _clear_stuck(dq: FloatArray, contacts: Contacts, modes: Modes) -> None:
     """Make the velocity of what sticks exactly zero, where the solution has rounding errors."""
-    fixed = [axis for axis, mode in zip(contacts.axes, modes, strict=True) if mode == 0]
-    if -1 not in fixed:
-        dq[fixed] = 0.0
-        return
-    fixed = [axis for axis in fixed if axis >= 0]
+    fixed = [
+        axis for axis, mode in zip(contacts.axes, modes, strict=True) if mode == 0 and axis >= 0
+    ]
     dq[fixed] = 0.0
     for direction, axis, mode in zip(contacts.directions, contacts.axes, modes, strict=True):
         if mode == 0 and axis < 0:

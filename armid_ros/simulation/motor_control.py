@@ -124,14 +124,9 @@ class MotorControl(Controller):
 
     def targets(self, desired: Motion, asked: FloatArray | None = None) -> Targets:
         """
-        Return where the loops are to bring the motors, and the torque that is added to theirs.
+        Return where the loops are to bring the motors for a motion of the links.
 
-        Parameters
-        ----------
-        desired : Motion
-            Of the links; its torque, if it has one, is added too.
-        asked : ndarray, shape (n,), optional
-            Position that was the target of the first step, for which the loops have acted.
+        The torque of the reference, if it has one, is added to that of the loops.
 
         """
         tau = np.zeros_like(desired.q) if desired.tau is None else np.array(desired.tau)

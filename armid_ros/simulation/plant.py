@@ -235,21 +235,7 @@ class Plant:
     def resist(
         self, force: FloatArray, t: float, q: FloatArray, dq: FloatArray, memory: FloatArray
     ) -> None:
-        """
-        Subtract from forces on the motors, (n,) [N m], what smooth effects take.
-
-        Parameters
-        ----------
-        force : ndarray, shape (n,)
-            Is changed [N m].
-        t : float
-            Time [s].
-        q, dq : ndarray, shape (n,)
-            Positions and velocities of the motors.
-        memory : ndarray, shape (h,)
-            States of the friction that has some.
-
-        """
+        """Subtract from forces on the motors, (n,) [N m], what smooth effects take of them."""
         if self.constant is not None:
             force -= self.constant
         if self.torque is not None:

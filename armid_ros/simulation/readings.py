@@ -69,7 +69,7 @@ class RecentPast:
         self._length = memory + delay + _NEIGHBOURS
         given = torque if plant.action.drive is None else plant.action.drive(torque)
         q, dq, _ = plant.motors(state)
-        self._rows = np.stack([q, dq, np.zeros_like(q), given, torque])[np.newaxis]
+        self._rows = np.stack([q, dq, np.zeros_like(q), given, torque])[:, np.newaxis]
         self._steps = state.steps
 
     def extend(self, trace: Trace) -> None:
@@ -81,20 +81,22 @@ class RecentPast:
         own, it is what is given from now on.
 
         """
-        plant, asked = self._plant, trace.tau
-        drive = plant.action.drive
-        given = asked if drive is None else drive(asked)
-        rows = np.empty((len(asked) - 1, 5, asked.shape[1]))
-        rows[:, :3] = trace.motors[:, 1:].transpose(1, 0, 2)
-        for column, tau in ((3, given), (4, asked)):
-            rows[:, column] = (tau[1:] + tau[:-1]) / 2 if plant.springs is None else tau[1:]
-        self._rows = np.concatenate([self._rows, rows])[-self._length :]
+        rows = np.empty((5, len(trace.tau) - 1, trace.tau.shape[1]))
+        rows[:3], rows[3:] = trace.motors[:, 1:], self._read(trace.tau)
+        drive = self._plant.action.drive
+        if drive is not None:
+            rows[3] = self._read(drive(trace.tau))
+        self._rows = np.concatenate([self._rows, rows], axis=1)[:, -self._length :]
         self._steps = trace.state.steps
+
+    def _read(self, tau: FloatArray) -> FloatArray:
+        """Return torques at the ends of steps from those of the steps."""
+        return (tau[1:] + tau[:-1]) / 2 if self._plant.springs is None else tau[1:]
 
     def latest(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return position, velocity and torque as read now, each of shape (n,)."""
-        count, sensing = len(self._rows), self._plant.sensing
-        q, dq, ddq, given, asked = self._rows.transpose(1, 0, 2)
+        count, sensing = self._rows.shape[1], self._plant.sensing
+        q, dq, ddq, given, asked = self._rows
         late = max(-1 - self._delay, -count)
         if count == 1 or (sensing.reading is None and sensing.displacement is None):
             return q[-1], dq[-1], asked[late]

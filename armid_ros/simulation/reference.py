@@ -130,11 +130,12 @@ class Reference:
         span = (self.t[segment + 1] - self.t[segment])[:, np.newaxis]
         outside = ((t < self.t[0]) | (t > self.t[-1]))[:, np.newaxis]
         u = np.clip((t - self.t[segment])[:, np.newaxis] / span, 0.0, 1.0)
-        q, dq, ddq = (np.zeros((len(t), len(self.joints))) for _ in range(3))
+        u = np.repeat(u, len(self.joints), axis=1)  # twice as fast as a column
+        q, dq, ddq = np.zeros((3, *u.shape))
         for c in self._coefficients[::-1]:
             ddq = ddq * u + 2.0 * dq
             dq = dq * u + q
-            q = q * u + c[segment]
+            q = q * u + c.take(segment, axis=0)
         q = np.where((t > self.t[-1])[:, np.newaxis], self.q[-1], q)
         dq, ddq = (np.where(outside, 0.0, x) for x in (dq / span, ddq / span**2))
         return Motion(self.joints, t, q, dq, ddq, tau)
@@ -232,10 +233,9 @@ class Reference:
                 (motion.q > robot.upper + slack, motion.q, 'upper', ''),
                 (np.abs(motion.dq) > fastest, motion.dq, 'velocity', '/s'),
             ):
-                hits = np.argwhere(beyond)
-                if not len(hits):
+                if not beyond.any():
                     continue
-                sample, joint = hits[0]
+                sample, joint = np.argwhere(beyond)[0]
                 limit = {
                     'lower': robot.lower,
                     'upper': robot.upper,

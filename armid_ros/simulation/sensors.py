@@ -45,7 +45,7 @@ class Sensors:
     torque_delay: int = 0
     acceleration_noise: float = 0.0
     _noisy: bool = field(init=False, repr=False)
-    _counted: npt.NDArray[np.bool_] = field(init=False, repr=False)
+    _counted: npt.NDArray[np.bool_] | None = field(init=False, repr=False)
     _size: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -64,7 +64,7 @@ class Sensors:
         object.__setattr__(
             self, '_noisy', any(np.any(np.asarray(getattr(self, name))) for name in noises[:3])
         )
-        object.__setattr__(self, '_counted', resolution > 0.0)
+        object.__setattr__(self, '_counted', resolution > 0.0 if resolution.any() else None)
         object.__setattr__(self, '_size', np.where(resolution > 0.0, resolution, 1.0))
 
     def measure(
@@ -111,6 +111,6 @@ class Sensors:
         return position, dq, tau
 
     def _quantise(self, q: FloatArray) -> FloatArray:
-        if not self._counted.any():
+        if self._counted is None:
             return q
         return np.where(self._counted, np.rint(q / self._size) * self._size, q)

@@ -108,20 +108,10 @@ class ElasticJoints:
         dt: float,
     ) -> ElasticJoints:
         """
-        Return the springs that the effects of an arm describe.
+        Return the joints of an arm that give way.
 
-        Parameters
-        ----------
-        arm : ArmModel
-            With joint_elasticity and rotor_inertia among its effects.
-        elasticity : Elasticity
-            How they are simulated.
-        directions : ndarray, shape (m, n)
-            Of the dry friction at the motors.
-        mass : ndarray, shape (n, n)
-            Inertia matrix of the links in the middle of their ranges [kg m^2].
-        dt : float
-            Step of the plant [s].
+        Beside its effects it takes the directions of the dry friction, (m, n), the inertia matrix
+        of the links in the middle of their ranges, (n, n) [kg m^2], and the step of the plant [s].
 
         Raises
         ------

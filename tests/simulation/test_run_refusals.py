@@ -3,10 +3,11 @@
 """What cannot be simulated is refused with its name, and arms of one joint are arms."""
 
 from armid_ros.arm import ArmModel
+from armid_ros.effects import parse_effect
 from armid_ros.errors import ModelError
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot, robot_from_urdf
-from armid_ros.simulation import simulate
+from armid_ros.simulation import Elasticity, MotorControl, Plant, simulate, SimulatedArm
 from armid_ros.simulation.bodies import require_masses
 from armid_ros.simulation.controller import Controller
 import numpy as np
@@ -87,3 +88,19 @@ def test_an_arm_that_flies_away_does_not_follow_and_warns_of_nothing():
             rng=np.random.default_rng(0),
             controller=Pushing(),
         )
+
+
+def test_what_needs_springs_or_has_none_is_told_so():
+    robot = load_robot('two_link_elastic')
+    springs, rotors = (
+        parse_effect(text, robot)
+        for text in ('joint_elasticity:compliance=0.001', 'rotor_inertia:rotor_inertia=0.1')
+    )
+    arm = ArmModel(robot).with_effect(*springs).with_effect(*rotors)
+    plant = Plant(arm, elasticity=Elasticity())
+    with pytest.raises(ModelError, match=r'give way are read on both sides.* use SimulatedArm'):
+        simulate(plant, sine(robot.joints), rng=np.random.default_rng(0))
+    with pytest.raises(ModelError, match='keeps its effects; start it with others'):
+        SimulatedArm(plant, rng=np.random.default_rng(0)).become(ArmModel(robot))
+    with pytest.raises(ModelError, match='its joints are rigid; use ComputedTorque'):
+        MotorControl.of(Plant(arm))

@@ -12,12 +12,12 @@ from armid_ros.elastic.plant.record import record
 from armid_ros.elastic.plant.run import run_elastic
 from armid_ros.elastic.plant.setup import elastic_joints, make_elastic_arm, shipped_arm
 from armid_ros.elastic.plant.signals import step_experiments
-from armid_ros.elastic.plant.two_link import two_link_loop, two_link_plant
-from armid_ros.errors import TrajectoryError
+from armid_ros.elastic.plant.two_link import modes, two_link_loop, two_link_plant
+from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation import Reference, Sensors
+from armid_ros.simulation import Plant, Reference, Sensors, SimulatedArm
 from armid_ros.simulation.accelerometers import LinkAccelerometers
 import numpy as np
 import pytest
@@ -184,3 +184,11 @@ def test_no_more_torque_is_read_than_the_drives_have():
     limit = HUMANOID.torque_limit
     assert np.any(np.abs(tau) == limit)
     assert np.all(np.abs(tau) <= limit)
+
+
+def test_an_arm_without_springs_is_not_recorded_on_both_sides():
+    still = Reference(HUMANOID.joints, np.zeros(1), HUMANOID.lower[np.newaxis] + 0.5)
+    with pytest.raises(ModelError, match='its joints are rigid; use simulate'):
+        record(SimulatedArm(ArmModel(HUMANOID), rng=np.random.default_rng(0)), still)
+    with pytest.raises(ModelError, match='its joints are rigid and do not oscillate'):
+        modes(Plant(ArmModel(HUMANOID)), still.q[0])
