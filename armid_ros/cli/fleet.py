@@ -177,7 +177,7 @@ def fleet() -> None:
 )
 @click.option('--cutoff', type=float, help='Of the position filter [Hz]; from a few bags, once.')
 @click.option('--decimation', type=int, help='Keep one sample of this many.')
-@click.option('--topic', help='JointState topic, where a bag has several.')
+@options.topic
 @options.gravity
 @options.joints
 @options.seed

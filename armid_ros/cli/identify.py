@@ -143,16 +143,10 @@ class BodyOptions:
 
 
 @click.command(epilog='Example: armid identify run.mcap --robot ur10.urdf --out result')
-@click.argument('bags', nargs=-1, required=True, type=click.Path(path_type=Path))
+@options.bags
 @options.robot
 @options.folder
-@click.option(
-    '--validate',
-    multiple=True,
-    type=click.Path(path_type=Path),
-    metavar='BAG',
-    help='A bag to predict and not to fit; may be given several times.',
-)
+@options.validate
 @options.effects
 @click.option(
     '--method',
@@ -201,7 +195,7 @@ class BodyOptions:
 )
 @click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
 @columns.options
-@click.option('--topic', help='JointState topic, where a bag has several.')
+@options.topic
 @options.gravity
 @options.joints
 @options.seed

@@ -44,7 +44,7 @@ _SIGNS = {'bad': 'x', 'doubt': '!', 'note': '-'}
     help='Folder to put the page with all curves into.',
 )
 @columns.options
-@click.option('--topic', help='JointState topic, where a bag has several.')
+@options.topic
 @options.gravity
 @options.joints
 @options.seed

@@ -82,6 +82,15 @@ _memory = click.option(
 bag = click.option(
     '--out', required=True, type=click.Path(path_type=Path), help='Bag to write; must not exist.'
 )
+bags = click.argument('bags', nargs=-1, required=True, type=click.Path(path_type=Path))
+validate = click.option(
+    '--validate',
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar='BAG',
+    help='A bag to predict and not to fit; may be given several times.',
+)
+topic = click.option('--topic', help='JointState topic, where a bag has several.')
 seed = click.option('--seed', default=0, show_default=True, help='Of every random number.')
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
 

@@ -59,7 +59,7 @@ class OptionalRobot:
 @click.option('--live', is_flag=True, help='Show joint_states as they come; no BAG.')
 @click.option('--namespace', default='', help='With --live: of the nodes, such as left_arm.')
 @columns.options
-@click.option('--topic', help='JointState topic, where a bag has several.')
+@options.topic
 @options.gravity
 @options.joints
 @options.reading

@@ -114,16 +114,10 @@ class AskedOptions:
 
 
 @click.command(epilog='Example: armid diagnose slow.mcap fast.mcap --robot ur10.urdf --out found')
-@click.argument('bags', nargs=-1, required=True, type=click.Path(path_type=Path))
+@options.bags
 @options.robot
 @options.folder
-@click.option(
-    '--validate',
-    multiple=True,
-    type=click.Path(path_type=Path),
-    metavar='BAG',
-    help='A bag that is only predicted; may be given several times.',
-)
+@options.validate
 @click.option(
     '--model',
     type=click.Path(path_type=Path),
@@ -163,7 +157,7 @@ class AskedOptions:
 @click.option('--cutoff', type=float, help='Of the position filter [Hz]; from the data if none.')
 @click.option('--decimation', type=int, help='Keep one sample of this many.')
 @columns.options
-@click.option('--topic', help='JointState topic, where a bag has several.')
+@options.topic
 @partner_options.options
 @options.gravity
 @options.joints
