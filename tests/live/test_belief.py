@@ -138,9 +138,9 @@ def test_what_came_before_a_change_is_not_looked_at_again(live, known_arm):
     stream(live, 8.1)
     live.take(said(known_arm, WAITING, duration=5.0, end=8.1))
     stream(live, 6.0, begin=8.1)
-    assert live.question().window.duration == pytest.approx(11.0, abs=0.1)
+    assert live.request().window.duration == pytest.approx(11.0, abs=0.1)
     stream(live, 10.0, begin=100.0)
-    assert live.question().window.duration == pytest.approx(10.0, abs=0.1)
+    assert live.request().window.duration == pytest.approx(10.0, abs=0.1)
 
 
 def test_an_arm_at_rest_is_not_asked_about(live):

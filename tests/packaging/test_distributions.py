@@ -15,7 +15,9 @@ import armid_ros
 import pytest
 
 BUILD = 'import sys; from setuptools import build_meta; print(build_meta.{}(sys.argv[1]))'
-LEFT_OUT = ('.*', 'build', 'dist', 'demo', '*.egg-info', '__pycache__', 'node_modules', 'site')
+LEFT_OUT = ('.*', 'build', 'dist', '*.egg-info', '__pycache__', 'node_modules', 'site')
+#: What `armid demo` fills where it is run, and not the room of that name in the package.
+DEMO = 'demo'
 
 
 def built(step, source, out):
@@ -31,7 +33,12 @@ def built(step, source, out):
 def sdist(root, tmp_path_factory):
     """Return the source distribution, of the tree as it is."""
     folder = tmp_path_factory.mktemp('sdist')
-    shutil.copytree(root, folder / 'tree', ignore=shutil.ignore_patterns(*LEFT_OUT))
+    by_name = shutil.ignore_patterns(*LEFT_OUT)
+
+    def ignored(place, names):
+        return by_name(place, names) | ({DEMO} if place == str(root) else set())
+
+    shutil.copytree(root, folder / 'tree', ignore=ignored)
     (folder / 'out').mkdir()
     return built('build_sdist', folder / 'tree', folder / 'out')
 
