@@ -169,7 +169,7 @@ def print_parameters(rows: Sequence[dict[str, Any]]) -> None:
         {
             'parameter': row['name'],
             'joint': row['joint'],
-            'value': f'{row["value"]:.5g}' if _told(row) else 'interval includes 0',
+            'value': f'{row["value"]:.5g}' if _told(row) else 'includes 0',
             'std': '' if row['std'] is None else f'{row["std"]:.2g}',
             'unit': row['unit'],
         }

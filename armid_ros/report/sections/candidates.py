@@ -93,6 +93,6 @@ class CandidateTable(Section):
         if not inside.all():
             return 'not possible'
         if not np.any(np.abs(trial.values) > _TOLD * trial.std):
-            return 'interval includes 0'
+            return 'includes 0'
         name = effect.parameters(arm.robot)[kept[0]]
         return with_interval(float(trial.values[0]), float(trial.std[0]), name.unit)

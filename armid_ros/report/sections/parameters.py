@@ -57,7 +57,7 @@ class ParameterRow:
         """
         described = f'{self.described:.3g}' if self.known else 'none'
         if not self.told:
-            return 'interval includes 0', f'{self.reach:.2g}', described
+            return 'includes 0', f'{self.reach:.2g}', described
         return (*measured(self.value, self.reach), described)
 
     @property
