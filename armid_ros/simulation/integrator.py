@@ -58,12 +58,13 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
     memory, slipping = state.memory, plant.action.hysteresis
     middle = memory if slipping is None else slipping.advance(memory, half * dq)
     plant.resist(force, state.t + 0.5 * plant.dt, q_middle, dq_middle, middle)
-    mass = pin.crba(model, data, q_middle)
     contacts, load = plant.contacts, None
     if contacts.friction is not None:
-        load = weight + mass.dot(state.ddq)
+        load = pin.rnea(model, data, q_middle, dq_middle, state.ddq)
         contacts = contacts.under(load)
-    inertia = mass + plant.inertia
+    inertia = pin.crba(plant.model, data, q_middle)
+    if plant.coupling is not None:
+        inertia = inertia + plant.coupling
 
     dq_next, ddq, modes = _end_velocity(plant, contacts, inertia, force, dq, state.modes)
     q_next = q_middle + half * dq_next

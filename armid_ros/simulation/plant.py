@@ -104,9 +104,11 @@ class Plant:
         Friction elements that can stick, m of them.
     damping : ndarray, shape (n, n)
         Viscous matrix [N m s/rad].
-    inertia : ndarray, shape (n, n)
-        What is added to the inertia matrix of the rigid body: rotors, and the implicit part of
-        the damping [kg m^2].
+    model : pinocchio.Model
+        The rigid body, and on every joint what is added to its inertia: rotors, and the implicit
+        part of the damping [kg m^2].
+    coupling : ndarray, shape (n, n), or None
+        What is added to that between joints [kg m^2].
     constant : ndarray, shape (n,), or None
         Constant torque that the actuators have to supply [N m].
     torque : callable (t, q, dq) -> ndarray (n,), or None
@@ -139,7 +141,8 @@ class Plant:
     data: pin.Data = field(init=False, repr=False)
     damping: FloatArray = field(init=False, repr=False)
     constant: FloatArray | None = field(init=False, repr=False)
-    inertia: FloatArray = field(init=False, repr=False)
+    model: pin.Model = field(init=False, repr=False)
+    coupling: FloatArray | None = field(init=False, repr=False)
     spans: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
     torque_range: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
     stops: list[tuple[float, float]] = field(init=False, repr=False)
@@ -159,15 +162,17 @@ class Plant:
         inertia = zero if action.inertia is None else action.inertia
         friction, constant = split_constant(action.dry_friction, n)
         data = robot.model.createData()
-        pin.crba(robot.model, data, middle_position(robot))
-        _require_inertia(robot, np.diag(np.array(data.M) + inertia))
-        weight = _damping_weight(robot, np.array(data.M) + inertia, damping, self.dt)
+        mass = np.array(pin.crba(robot.model, data, middle_position(robot)))
+        _require_inertia(robot, np.diag(mass + inertia))
+        weight = _damping_weight(robot, mass + inertia, damping, self.dt)
+        added = inertia + weight * self.dt * damping
+        coupling = added - np.diag(np.diag(added))
+        model = pin.Model(robot.model)
+        model.armature = np.diag(added).copy()
         springs, torque = None, _both(action.torque, action.link_torque)
         if self.elasticity is not None:
             directions, torque = friction.directions, action.torque
-            springs = ElasticJoints.of(
-                self.arm, self.elasticity, directions, np.array(data.M), self.dt
-            )
+            springs = ElasticJoints.of(self.arm, self.elasticity, directions, mass, self.dt)
         values = {
             'robot': robot,
             'contacts': Contacts.of(friction),
@@ -180,7 +185,8 @@ class Plant:
             'springs': springs,
             'damping': damping,
             'constant': constant if constant.any() else None,
-            'inertia': inertia + weight * self.dt * damping,
+            'model': model,
+            'coupling': coupling if coupling.any() else None,
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
