@@ -23,8 +23,9 @@ import pinocchio as pin
 BANDWIDTH = 50.0
 
 
-#: Position, velocity and acceleration to have, and torque of the feedforward, each of shape (n,).
-Target = tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]
+#: Position, velocity and acceleration to have; and with the torque of the feedforward; each (n,).
+Desired = tuple[FloatArray, FloatArray, FloatArray]
+Target = tuple[Desired, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,11 +97,7 @@ class Controller(ABC):
 
     @abstractmethod
     def torque(
-        self,
-        q: FloatArray,
-        dq: FloatArray,
-        desired: tuple[FloatArray, FloatArray, FloatArray],
-        feedforward: FloatArray,
+        self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
         """
         Return the torque to apply now.
@@ -165,11 +162,7 @@ class ComputedTorque(Controller):
         return effort if self._inertia is None else effort - desired.ddq @ self._inertia.T
 
     def torque(
-        self,
-        q: FloatArray,
-        dq: FloatArray,
-        desired: tuple[FloatArray, FloatArray, FloatArray],
-        feedforward: FloatArray,
+        self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
         """Return the computed torque, shape (n,)."""
         q_desired, dq_desired, ddq_desired = desired
@@ -229,11 +222,7 @@ class GravityPD(Controller):
         object.__setattr__(self, '_gains', (stiffness, damping))
 
     def torque(
-        self,
-        q: FloatArray,
-        dq: FloatArray,
-        desired: tuple[FloatArray, FloatArray, FloatArray],
-        feedforward: FloatArray,
+        self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
         """Return spring, damper and gravity, shape (n,)."""
         stiffness, damping = self._gains

@@ -10,7 +10,7 @@ from typing import ClassVar
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.simulation.controller import BANDWIDTH, Controller, Targets
+from armid_ros.simulation.controller import BANDWIDTH, Controller, Desired, Targets
 from armid_ros.simulation.plant import middle_position, Plant
 import numpy as np
 import numpy.typing as npt
@@ -141,11 +141,7 @@ class MotorControl(Controller):
         return Targets(q, (q - before) / self.dt, np.zeros_like(q), tau)
 
     def torque(
-        self,
-        q: FloatArray,
-        dq: FloatArray,
-        desired: tuple[FloatArray, FloatArray, FloatArray],
-        feedforward: FloatArray,
+        self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
         """Act once, and return the torque, shape (n,)."""
         error = desired[1] - dq

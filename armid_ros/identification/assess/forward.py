@@ -23,6 +23,7 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 from armid_ros.simulation import Controller, Plant, simulate, SimulatedRun
+from armid_ros.simulation.controller import Desired
 import numpy as np
 import pinocchio as pin
 
@@ -110,11 +111,7 @@ class RecordedTorque(Controller):
         return np.column_stack([np.interp(desired.t, t, column) for column in self.motion.tau.T])
 
     def torque(
-        self,
-        q: FloatArray,
-        dq: FloatArray,
-        desired: tuple[FloatArray, FloatArray, FloatArray],
-        feedforward: FloatArray,
+        self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
         """Return the recorded torque and the feedback, shape (n,)."""
         omega = self.bandwidth
