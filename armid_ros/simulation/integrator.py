@@ -82,7 +82,7 @@ def _on_springs(plant: Plant, springs: ElasticJoints, state: State, torque: Floa
     for _ in range(springs.substeps):
         assert state.rotors is not None
         state = spring_substep(plant, springs, state.rotors, state, torque)
-    return state._replace(steps=steps, t=steps * plant.dt)
+    return State(steps, steps * plant.dt, *state[2:])
 
 
 def _end_velocity(

@@ -232,11 +232,10 @@ class Plant:
         _, _, q, dq, ddq, _, _, rotors = state
         if rotors is None or self.springs is None:
             return q, dq, ddq
-        joints = self.springs.joints
-        q, dq, ddq = q.copy(), dq.copy(), ddq.copy()
-        q[joints] += rotors.twist
-        dq[joints], ddq[joints] = rotors.dq, rotors.ddq
-        return q, dq, ddq
+        to_motors = self.springs.to_motors
+        dq = to_motors.dot(np.concatenate([rotors.dq, state.dq]))
+        ddq = to_motors.dot(np.concatenate([rotors.ddq, state.ddq]))
+        return self.springs.at_motors(state.q, rotors.twist), dq, ddq
 
     def resist(
         self, force: FloatArray, t: float, q: FloatArray, dq: FloatArray, memory: FloatArray

@@ -79,8 +79,8 @@ def _rates(plant: Plant, springs: ElasticJoints, middle: _Middle, force: FloatAr
     if springs.loose:
         pull, offset = springs.meshing(middle.twist)
         force = force + springs.to_twists.T.dot(offset)
-    right = np.concatenate([pull, force[:, np.newaxis], springs.friction.T], axis=1)
-    return np.asarray(dgesv(inertia, right)[2])
+    right = np.concatenate([pull.T, force[np.newaxis], springs.friction]).T
+    return np.asarray(dgesv(inertia, right, 0, 1)[2])
 
 
 def _propagated(springs: ElasticJoints, rates: FloatArray, x: FloatArray) -> FloatArray:

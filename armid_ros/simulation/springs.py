@@ -168,9 +168,7 @@ class ElasticJoints:
 
     def at_motors(self, links: FloatArray, twist: FloatArray) -> FloatArray:
         """Return positions of the motors from those of the links and twists, (..., n)."""
-        q = links.copy()
-        q[..., self.joints] += twist
-        return q
+        return np.asarray(links + twist.dot(self.to_motors[:, : len(self.joints)].T))
 
 
 def _required(robot: Robot, action: Action) -> Transmission:
