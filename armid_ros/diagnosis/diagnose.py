@@ -254,12 +254,6 @@ def _said(chosen: Chosen, notes: Sequence[str], context: _Context) -> Diagnosis:
         notes += more
     found = findings(explanation, shares, arm, rng)
     worse = _harmed(chosen, explanation, unseen, settings)
-    if worse:
-        names = ', '.join(one.name.replace('_', ' ') for one in found)
-        notes.append(
-            f'{names} would make the model worse in {", ".join(worse)}, where it is off as well: '
-            'not patched'
-        )
     pattern = None
     if not explanation.steps and explanation.base is not None:
         pattern = find_pattern(explanation, arm, evidence.data, evidence.sigma)
@@ -287,7 +281,7 @@ def _said(chosen: Chosen, notes: Sequence[str], context: _Context) -> Diagnosis:
     tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
-        summary=word.summary,
+        summary=' '.join([word.summary, *_unpatched(found, worse)]),
         findings=found,
         minor=small_print(explanation.minor, max(total, 1e-300), tried, arm),
         where=_where(explanation, limits, bool(found)),
@@ -304,6 +298,14 @@ def _said(chosen: Chosen, notes: Sequence[str], context: _Context) -> Diagnosis:
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
     )
+
+
+def _unpatched(found: Sequence[Finding], worse: Sequence[str]) -> list[str]:
+    """Say why a model is not patched, if it is not."""
+    if not worse:
+        return []
+    names = ' and '.join(one.name.replace('_', ' ') for one in found)
+    return [f'The model is not patched: {names} would make it worse in {", ".join(worse)}.']
 
 
 def _as_stated(

@@ -238,7 +238,7 @@ def show(result: Diagnosis) -> None:
         rows = [row for finding in result.findings for row in _rows(finding)]
         print_rows(rows, as_json=False, right=('value, 95 %',))
     if result.minor:
-        say('small print: there beyond chance, and smaller than what matters')
+        say('small print: there beyond chance, but too small or not borne out by other data')
         rows = [_minor(finding) for finding in result.minor]
         print_rows(rows, as_json=False, right=('share of the gap', 'p'))
     for note in result.notes:

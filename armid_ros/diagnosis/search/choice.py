@@ -20,9 +20,11 @@ from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.search.explain import explain, Explanation
 from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.question import as_given, fitted_anew
 from armid_ros.diagnosis.search.round import cost
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.effects import CATALOGUE
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -70,7 +72,10 @@ def explained(
     written: FloatArray | None = None,
 ) -> Chosen:
     """
-    Explain the gap of an arm.
+    Explain the gap of an arm, by causes of its own where they close the gap with less freedom.
+
+    A person or a strap may act anywhere and in any way, and takes a little more of what a wrong
+    model gets wrong of any cause.
 
     Parameters
     ----------
@@ -90,6 +95,41 @@ def explained(
         Misfit that the model is known to have, where there are no recordings of it [N m].
 
     """
+    everything = arm, prepared, baseline, rng, tell, written
+    found = _explained(settings, everything)
+    outside = [step for step in found.explanation.steps if step.trial.group.effect.external]
+    if not outside:
+        return found
+    own = tuple(name for name in settings.library if not CATALOGUE[name].external)
+    inside = _explained(replace(settings, library=own), everything)
+    simpler = _freedom(inside.explanation, settings) <= _freedom(found.explanation, settings)
+    if not (inside.explanation.steps and simpler and _at_floor(inside.explanation, settings)):
+        return found
+    rivals = tuple(step.trial for step in outside)
+    rest = None if inside.rest is None else _with_rivals(inside.rest, rivals)
+    return replace(inside, explanation=_with_rivals(inside.explanation, rivals), rest=rest)
+
+
+def _with_rivals(explanation: Explanation, rivals: tuple[Trial, ...]) -> Explanation:
+    """Return an explanation whose first name may be something else as well."""
+    first, *others = explanation.steps
+    first = replace(first, rivals=(*first.rivals, *rivals))
+    return replace(explanation, steps=(first, *others))
+
+
+_Everything = tuple[
+    ArmModel,
+    Prepared,
+    Baseline | None,
+    np.random.Generator,
+    Progress,
+    FloatArray | None,
+]
+
+
+def _explained(settings: DiagnosisSettings, everything: _Everything) -> Chosen:
+    """Explain the gap by any cause of the library."""
+    arm, prepared, baseline, rng, tell, written = everything
     if baseline is not None:
         return _since(arm, prepared, baseline, settings, rng, tell)
     if written is not None:

@@ -83,7 +83,15 @@ def rarity(trial: Trial) -> int:
 
 
 def contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
-    """Return whether a cause says the same, or is freer and can make what another one makes."""
+    """
+    Return whether a cause says the same, or is freer and can make what another one makes.
+
+    A cause of the whole arm that looks like one of a joint is another cause: a base that leans,
+    and the zero of the first encoder of an arm that moves in a plane.
+
+    """
+    if not big.group.effect.joints and small.group.effect.joints:
+        return False
     projection = project(problem, beside.free, beside.hold)
     columns = projection.rest(problem.x[:, :, big.group.columns])
     target = projection.rest(problem.x[:, :, small.group.columns]) @ small.values

@@ -99,7 +99,7 @@ def decide(
     if strange and (not findings or open_gap):
         return Verdict('not_repeatable', _strange(strange, findings))
     rest = (
-        f'the error of {joint} is {np.sqrt(worst.excess.max()):.1f} times as large as '
+        f'the error of {joint} is {_factor(np.sqrt(worst.excess.max()))} times as large as '
         f'{floor_in_words} can be {worst.where}'
     )
     if not findings:
@@ -119,6 +119,11 @@ def decide(
         text = f'{said} These data cannot tell it from {others}. {first.experiment}'
         return Verdict('ambiguous', text)
     return Verdict('named', f'{said} The rest is {floor_in_words}.')
+
+
+def _factor(ratio: float) -> str:
+    """Return a ratio with as many digits as tell it from one."""
+    return f'{ratio:.1f}' if ratio >= 1.05 else f'{ratio:.2f}'
 
 
 def sentence(finding: Finding, robot: Robot) -> str:

@@ -145,7 +145,7 @@ class SmallPrint(Section):
     Attributes
     ----------
     minor : sequence of Finding
-        What is there beyond chance and smaller than what matters.
+        What is there beyond chance, and too small or not borne out by other data.
     patched : bool
         Whether it was added to the model all the same.
 
