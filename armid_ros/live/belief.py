@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.errors import IdentificationError
-from armid_ros.live.request import Answer, DiagnosisRequest, WAITING
+from armid_ros.live.request import Answer, DiagnosisRequest, Healthy, WAITING
 from armid_ros.live.window import SampleWindow
 from armid_ros.recording import Recording
 import numpy as np
@@ -190,8 +190,9 @@ class LiveDiagnosis:
         self.asked = 0
         self._outdate()
         self.use(self.settings)
-        known = self._baseline or self._misfit is not None
-        self._learned = bool(known) or not self.settings.learning
+        self._healthy: Healthy | None = None
+        known = bool(self._baseline) or self._misfit is not None
+        self._learned = known or not self.settings.learning
 
     def use(self, settings: LiveSettings) -> None:
         """Ask as other settings have it; the window begins anew."""
@@ -199,7 +200,7 @@ class LiveDiagnosis:
         joints, period = self.belief.accepted.robot.joints, 1.0 / settings.rate
         self.window = SampleWindow(joints, max(settings.window, settings.learning), period)
         self._asked_at, self._next = 0.0, settings.every
-        self._begin = -np.inf
+        self._begin, self._changed = -np.inf, False
         self._agreed: list[Named] = []
 
     @property
@@ -215,8 +216,7 @@ class LiveDiagnosis:
     @property
     def due(self) -> bool:
         """Whether enough motion came since the last request."""
-        wanted = self.settings.learning if self.learning else self.settings.shortest
-        if self.window.moved < wanted or self.window.end - self.window.begin < wanted:
+        if self.learning or not self._holds(self.settings.shortest):
             return False
         return self.window.moved - self._asked_at >= self._next
 
@@ -228,27 +228,40 @@ class LiveDiagnosis:
         kept = self.window.add(t, q, dq, tau)
         if kept and held and len(self.window) == 1:
             # a gap: the stretch is another one
-            self._asked_at, self.window.moved, self._begin = 0.0, 0.0, -np.inf
+            self._asked_at, self.window.moved = 0.0, 0.0
+            self._begin, self._changed = -np.inf, False
+        if self.learning and self._holds(self.settings.learning):
+            self._learn()
         return kept
+
+    def _holds(self, seconds: float) -> bool:
+        """Return whether the window has motion of so many seconds."""
+        return self.window.moved >= seconds <= self.window.end - self.window.begin
+
+    def _learn(self) -> None:
+        """Keep the motion so far, which tells the misfit of the model."""
+        began = self.window.end - self.settings.learning
+        motion = self.window.recording(began, 'the motion in which nothing was wrong')
+        self._healthy, self._learned = Healthy(self.belief.accepted, motion), True
+        self._asked_at = self.window.moved
 
     def request(self) -> DiagnosisRequest:
         """Return what to ask now."""
         self._asked_at, self._next = self.window.moved, self.settings.every
         self.asked += 1
         self._under_way, self._outdated = True, False
-        longest = self.settings.learning if self.learning else self.settings.window
+        begin = max(self.window.end - self.settings.window, self._begin)
         return DiagnosisRequest(
             self.belief.accepted,
-            self.window.recording(
-                max(self.window.end - longest, self._begin), f'window {self.asked}'
-            ),
+            self.window.recording(begin, f'window {self.asked}'),
             self._baseline,
             self._misfit,
             self.settings.shortest,
             self.settings.material,
             self._seed,
             self.window.end,
-            self.learning,
+            self._healthy,
+            self._changed,
         )
 
     def take(self, answer: Answer) -> bool:
@@ -264,10 +277,10 @@ class LiveDiagnosis:
         outdated, self._under_way, self._outdated = self._outdated, False, False
         if outdated:
             return False
-        if answer.misfit is not None:
-            self._misfit, self._learned = answer.misfit, True
-            return False
-        self._begin = answer.end - answer.window.duration  # what came before was another arm
+        if answer.changed:
+            self._begin, self._changed = answer.end - answer.window.duration, True
+        if answer.verdict == 'consistent':  # what changes now shows in the residual again
+            self._changed = False
         if answer.verdict == WAITING:
             self._agreed = []
             self._next = self.settings.shortest - answer.window.duration

@@ -58,7 +58,10 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     tried = len(splits) * logs.shape[1]
     limit = scipy.stats.f.isf(_ERROR_RATE / tried, 1, count - 2)
     best = int(np.argmax(ratios.max(axis=1)))
-    return float(times[splits[best]]) + _BLOCK if ratios[best].max() > limit else None
+    if ratios[best].max() <= limit:
+        return None
+    edge = recording.duration - (times[-1] + _BLOCK)  # what the filter needs of the end
+    return float(times[splits[best]] + _BLOCK + edge)
 
 
 def block_powers(arm: ArmModel, recording: Recording, used: Conditioning) -> FloatArray:

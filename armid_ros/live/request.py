@@ -5,19 +5,58 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import time
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings, Finding
 from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.live.onset import block_powers, onset
 from armid_ros.recording import Recording
 import numpy as np
 
 #: The verdict where too little came since the arm changed.
 WAITING = 'waiting'
+
+
+@dataclass(frozen=True)
+class Healthy:
+    """
+    Motion in which nothing was wrong, and the model of the arm as it was then.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        The model.
+    recording : Recording
+        The motion.
+
+    """
+
+    arm: ArmModel
+    recording: Recording
+
+    def misfit(self, filters: Conditioning) -> Misfit:
+        """
+        Measure what the model leaves of the motion: the narrower the band, the less noise.
+
+        Raises
+        ------
+        IdentificationError
+            If the motion is too short for the filters.
+
+        """
+        power = block_powers(self.arm, self.recording, filters)[:, 1:]
+        if not len(power):
+            seconds = self.recording.duration
+            raise IdentificationError(f'{seconds:.1f} s are too short to measure a misfit')
+        assert self.recording.tau is not None
+        torque = float(np.sum(self.recording.tau**2) / len(self.recording))
+        mean = power.mean(axis=0)
+        rms = dict(zip(self.arm.robot.joints, np.sqrt(mean).tolist(), strict=True))
+        return Misfit('held-out', rms, 100.0 * float(np.sqrt(mean.sum() / torque)))
 
 
 @dataclass(frozen=True)
@@ -43,8 +82,11 @@ class DiagnosisRequest:
         Of the diagnosis.
     end : float
         When the last sample of the window was, in the time of who asks [s].
-    learn : bool
-        Whether nothing is wrong yet, and only the misfit of the model is asked for.
+    healthy : Healthy or None
+        Motion that tells the misfit, where neither of them is known.
+    of_one_arm : bool
+        Whether all of the window is since the arm changed last. What a wrong model leaves comes
+        and goes with the motion, so that no further change can be told by it.
 
     """
 
@@ -56,7 +98,8 @@ class DiagnosisRequest:
     material: float = 0.01
     seed: int = 0
     end: float = 0.0
-    learn: bool = False
+    healthy: Healthy | None = None
+    of_one_arm: bool = False
 
 
 @dataclass(frozen=True)
@@ -93,8 +136,8 @@ class Answer:
         When its last sample was, in the time of who asked [s].
     seconds : float
         Processor time that it took [s].
-    misfit : Misfit or None
-        What the model leaves, where only that was asked for.
+    changed : bool
+        Whether the arm changed in the window that was asked about.
 
     """
 
@@ -106,7 +149,7 @@ class Answer:
     window: Recording
     end: float
     seconds: float
-    misfit: Misfit | None = None
+    changed: bool = False
 
     @property
     def named(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
@@ -128,14 +171,15 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
     ) -> Answer:
         spent = time.process_time() - begun
         more = () if found is None else _gap(found)
-        return Answer(verdict, summary, tuple(findings), more, patched, window, request.end, spent)
+        cut = window is not request.window
+        return Answer(
+            verdict, summary, tuple(findings), more, patched, window, request.end, spent, cut
+        )
 
     found: Diagnosis | None = None
+    settings = DiagnosisSettings(material=request.material)
     try:
-        if request.learn:
-            text = 'the misfit of the model was measured'
-            return replace(said('consistent', text), misfit=own_misfit(arm, window)), None
-        changed = onset(arm, window)
+        changed = None if request.of_one_arm else onset(arm, window)
         if changed is not None:
             window = since(window, changed)
         if window.duration < request.shortest:
@@ -145,33 +189,13 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
             arm,
             [window],
             baseline=request.baseline,
-            misfit=None if request.baseline else request.misfit,
-            settings=DiagnosisSettings(material=request.material),
+            misfit=_misfit(request, window, settings),
+            settings=settings,
             rng=np.random.default_rng(request.seed),
         )
     except ArmidError as error:
         return said('bad_data', str(error)), None
     return said(found.verdict, found.summary, found.findings, found.arm), found
-
-
-def own_misfit(arm: ArmModel, healthy: Recording) -> Misfit:
-    """
-    Measure what a model leaves of motion in which nothing is wrong, in the band of a diagnosis.
-
-    Raises
-    ------
-    IdentificationError
-        If the motion is too short for the filters.
-
-    """
-    filters = choose_filters(arm, [healthy], (), DiagnosisSettings(), np.random.default_rng(0))
-    power = block_powers(arm, healthy, filters)[:, 1:]
-    if not len(power):
-        raise IdentificationError(f'{healthy.duration:.1f} s are too short to measure a misfit')
-    assert healthy.tau is not None
-    torque = float(np.sum(healthy.tau**2) / len(healthy))
-    rms = dict(zip(arm.robot.joints, np.sqrt(power.mean(axis=0)).tolist(), strict=True))
-    return Misfit('held-out', rms, 100.0 * float(np.sqrt(power.mean(axis=0).sum() / torque)))
 
 
 def since(recording: Recording, t: float) -> Recording:
@@ -186,6 +210,16 @@ def since(recording: Recording, t: float) -> Recording:
         tau=None if recording.tau is None else recording.tau[kept],
         source=recording.source,
     )
+
+
+def _misfit(
+    request: DiagnosisRequest, window: Recording, settings: DiagnosisSettings
+) -> Misfit | None:
+    """Return what the model left before, in the band in which the window is looked at."""
+    if request.baseline or request.healthy is None:
+        return None if request.baseline else request.misfit
+    rng = np.random.default_rng(request.seed)
+    return request.healthy.misfit(choose_filters(request.arm, [window], (), settings, rng))
 
 
 def _gap(diagnosis: Diagnosis) -> tuple[GapOfJoint, ...]:

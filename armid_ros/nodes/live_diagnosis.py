@@ -157,8 +157,11 @@ class LiveDiagnosisNode(ArmidNode):
         self.last_stamp_ns = stamp.sec * 10**9 + stamp.nanosec
         if self.live is None:
             return
+        learning = self.live.learning
         for sample in self._reader.read(message):
             self.live.add(*sample)
+        if learning and not self.live.learning:
+            self._tell('the misfit of the model is learned; from now on it is diagnosed')
         if self.live.due and not self._helper.busy:
             self._helper.ask(self.live.request())
 
@@ -232,10 +235,8 @@ class LiveDiagnosisNode(ArmidNode):
     def _take(self, answer: Answer) -> None:
         """Publish a diagnosis, and the model if it is another one."""
         live = self._require()
-        asked, latest = live.learning, live.latest
+        latest = live.latest
         changed = live.take(answer)
-        if asked and not live.learning:
-            self._tell('the misfit of the model is measured; from now on it is diagnosed')
         if changed:
             self._publish_model()
         if live.latest is latest:

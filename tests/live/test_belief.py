@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.errors import IdentificationError
@@ -21,9 +20,9 @@ class Named:
         self.name, self.joints = name, joints
 
 
-def said(arm, verdict, *findings, duration=8.0, end=0.0):
+def said(arm, verdict, *findings, duration=8.0, end=0.0, changed=False):
     window = SimpleNamespace(duration=duration)
-    return Answer(verdict, verdict, findings, (), arm, window, end, 0.0)
+    return Answer(verdict, verdict, findings, (), arm, window, end, 0.0, changed)
 
 
 @pytest.fixture
@@ -136,11 +135,21 @@ def test_after_a_change_it_asks_as_soon_as_enough_motion_came(live, known_arm):
 
 def test_what_came_before_a_change_is_not_looked_at_again(live, known_arm):
     stream(live, 8.1)
-    live.take(said(known_arm, WAITING, duration=5.0, end=8.1))
+    live.take(said(known_arm, WAITING, duration=5.0, end=8.1, changed=True))
     stream(live, 6.0, begin=8.1)
     assert live.request().window.duration == pytest.approx(11.0, abs=0.1)
     stream(live, 10.0, begin=100.0)
     assert live.request().window.duration == pytest.approx(10.0, abs=0.1)
+
+
+def test_another_change_is_looked_for_once_the_model_is_right(live, known_arm, patched):
+    stream(live, 8.1)
+    assert not live.request().of_one_arm
+    live.take(said(known_arm, WAITING, duration=5.0, end=8.1, changed=True))
+    live.take(said(patched, 'unknown'))
+    assert live.request().of_one_arm
+    live.take(said(patched, 'consistent'))
+    assert not live.request().of_one_arm
 
 
 def test_an_arm_at_rest_is_not_asked_about(live):
@@ -160,13 +169,23 @@ def test_after_a_gap_the_motion_counts_anew(live):
 
 def test_the_misfit_is_learned_first(known_arm):
     live = LiveDiagnosis(known_arm, LiveSettings(learning=10.0))
-    asked = stream(live, 10.5)
-    assert len(asked) == 1
     assert live.learning
-    measured = replace(said(known_arm, 'consistent'), misfit=object())
-    assert not live.take(measured)
+    asked = stream(live, 30.0)
     assert not live.learning
-    assert live.request().misfit is measured.misfit
+    assert asked[0] == pytest.approx(14.0, abs=0.5)
+    healthy = live.request().healthy
+    assert healthy.arm is known_arm
+    assert healthy.recording.duration == pytest.approx(10.0, abs=0.1)
+
+
+def test_what_was_learned_is_of_the_arm_as_it_was_then(known_arm, patched):
+    live = LiveDiagnosis(known_arm, LiveSettings(learning=10.0))
+    stream(live, 12.0)
+    for _ in range(2):
+        live.take(said(patched, 'named', FRICTION))
+    live.accept()
+    assert live.request().arm is patched
+    assert live.request().healthy.arm is known_arm
 
 
 def test_settings_that_never_ask_are_refused():

@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.live import DiagnosisRequest
-from armid_ros.live.request import answer, own_misfit, since, WAITING
+from armid_ros.live.request import answer, Healthy, since, WAITING
 import numpy as np
 
 
@@ -24,6 +25,14 @@ def test_a_healthy_arm_is_consistent(known_arm, healthy):
     said, _ = answer(DiagnosisRequest(known_arm, healthy))
     assert (said.verdict, said.named) == ('consistent', ())
     assert said.arm is known_arm
+
+
+def test_a_gap_is_told_from_the_misfit_that_was_learned(known_arm, healthy, changed):
+    learned = Healthy(known_arm, healthy)
+    said, found = answer(DiagnosisRequest(known_arm, changed, healthy=learned))
+    assert said.named[0] == ('viscous_friction', ('elbow_pitch',))
+    assert 'misfit' in found.baseline
+    assert answer(DiagnosisRequest(known_arm, healthy, healthy=learned))[0].verdict == 'consistent'
 
 
 def test_too_little_motion_since_a_change_waits_for_more(known_arm, changed):
@@ -47,7 +56,10 @@ def test_a_window_that_cannot_be_diagnosed_is_bad_data(known_arm, healthy):
     assert said.summary
 
 
-def test_the_misfit_of_a_right_model_is_the_noise_of_the_torque(known_arm, healthy):
-    misfit = own_misfit(known_arm, healthy)
-    assert set(misfit.rms) == set(healthy.joints)
-    assert all(0.005 < rms < 0.1 for rms in misfit.rms.values())
+def test_the_misfit_of_a_right_model_is_the_noise_of_the_torque_in_a_band(known_arm, healthy):
+    """White noise of 0.05 N m at 200 Hz; each decimation passes 0.4 of the new rate."""
+    for decimation in (4, 8, 16):
+        misfit = Healthy(known_arm, healthy).misfit(Conditioning(200.0, 12.0, decimation))
+        noise = 0.05 * np.sqrt(2.0 * 0.4 / decimation)
+        assert set(misfit.rms) == set(healthy.joints)
+        np.testing.assert_allclose(list(misfit.rms.values()), noise, rtol=0.35)
