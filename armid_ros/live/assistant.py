@@ -108,8 +108,11 @@ class InProcess:
         """Do a job."""
         try:
             self._result = self._done(job)
-        except (ArmidError, OSError) as error:
+        except ArmidError as error:
             self._result = Done(str(error), success=False)
+        except OSError as error:
+            text = f'{error.filename}: cannot be written: {error.strerror}'
+            self._result = Done(text, success=False)
 
     def poll(self) -> Result | None:
         """Return the result, once."""

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 import json
 from pathlib import Path
 import subprocess
@@ -13,19 +12,23 @@ import sys
 import time
 from typing import Any
 
-from armid_ros.errors import ArmidError, RecordingError, TrajectoryError
+from armid_ros.arm import ArmModel
+from armid_ros.errors import ArmidError, OutputError, RecordingError, TrajectoryError
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.client import Client
 from rclpy.clock import Clock, ClockType
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 #: How often it is looked what has happened [s].
 _LOOK_PERIOD = 0.05
 #: How long a program may take to end that is told to [s].
 _FAREWELL = 5.0
+#: How long to wait for a node to say that it has stopped [s]; under a launch it may be gone.
+_PARTING = 1.0
 #: What is said of a program that ended well, by command: the document it wrote, and its keys.
 _SAID = {
     'identify': ('identification.json', ('grade',)),
@@ -50,7 +53,8 @@ class IdentificationRunNode(ArmidNode):
     It asks `recorder` and `excitation_publisher` for each run, and when all are recorded has
     `armid identify` and `armid diagnose` make of them what they can. The last run is held out when
     there are several. Whatever fails is said, and ends the node with code 2; what was recorded and
-    identified until then stays.
+    identified until then stays. What of that can be known beforehand is said before the arm moves.
+    When the node is ended, it stops the run and the recording that it has begun.
 
     """
 
@@ -85,9 +89,20 @@ class IdentificationRunNode(ArmidNode):
     )
 
     def __init__(self, start: Callable[[Program], Any] = start_program, **kwargs: Any) -> None:
-        """Take what starts a program; by default it is a process of its own."""
+        """
+        Take what starts a program; by default it is a process of its own.
+
+        Raises
+        ------
+        ArmidError
+            If robot, effects or folder cannot be used.
+
+        """
         super().__init__('identification_run', **kwargs)
+        self._require_input()
         self._start = start
+        self._begun: list[str] = []
+        self._farewells: list[Future] = []
         self._program: Any = None
         self._done, self._failure, self._step = False, '', 'begins'
         self._results: list[str] = []
@@ -126,21 +141,43 @@ class IdentificationRunNode(ArmidNode):
             self.get_logger().info('; '.join(self._results))
         except ArmidError as error:
             self._done, self._failure = True, str(error)
-            with suppress(ArmidError):
-                self._call('recorder', 'stop')
+            self._stop_all()
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say what is under way, and what has come of it."""
         return self._failure, {'step': self._step, 'results': '; '.join(self._results)}
 
     def close(self) -> None:
-        """End the program that is under way."""
+        """End the run, the recording and the program that are under way."""
+        self._stop_all()
+        for future in self._farewells:
+            if self.executor is not None:
+                self.executor.spin_until_future_complete(future, timeout_sec=_PARTING)
         if self._program is not None and self._program.poll() is None:
             self._program.terminate()
             try:
                 self._program.wait(_FAREWELL)
             except subprocess.TimeoutExpired:
                 self._program.kill()
+
+    def _require_input(self) -> None:
+        """Refuse what armid would refuse after the arm has moved."""
+        joints, effects = names(self, 'joints') or None, ','.join(names(self, 'effects'))
+        ArmModel.of(
+            self.value('robot'), effects=effects, gravity=self.value('gravity'), joints=joints
+        )
+        folder = Path(self.value('save_to')).expanduser()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f'save_to: {folder}: cannot be made: {error.strerror}') from error
+
+    def _stop_all(self) -> None:
+        """Stop what this node has begun: the arm first."""
+        for node in sorted(self._begun):
+            if self._client(node, 'stop').service_is_ready():
+                self._farewells.append(self._call(node, 'stop'))
+        self._begun = []
 
     def _steps(self) -> Iterator[Wait]:
         """Go through all that is to be done."""
@@ -150,9 +187,11 @@ class IdentificationRunNode(ArmidNode):
         bags = []
         for number in range(self.value('runs')):
             said = yield from self._asked('recorder', 'start')
+            self._begun.append('recorder')
             bags.append(said.removeprefix('recording into '))
             yield from self._excited('start', f'run {number + 1} of {self.value("runs")}')
             yield from self._asked('recorder', 'stop')
+            self._begun.remove('recorder')
         folder = Path(self.value('save_to')).expanduser()
         yield from self._ended('identify', folder / 'identification', bags)
         if self.value('diagnose'):
@@ -163,7 +202,9 @@ class IdentificationRunNode(ArmidNode):
         """Have the arm run, and wait until it has come to the end."""
         before = int(self._state.get('runs', 0))
         yield from self._started(service, what)
+        self._begun.append('publisher')
         yield f'{what} is under way', lambda: self._over(before, service == 'rehearse')
+        self._begun.remove('publisher')
         if self._state['run'] != 'complete':
             raise TrajectoryError(f'{what}: {self._state["message"]}')
         if service == 'rehearse':

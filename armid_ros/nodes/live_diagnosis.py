@@ -11,7 +11,7 @@ from typing import Any
 from armid_msgs.msg import Diagnosis
 from armid_ros.api.arguments import source_of
 from armid_ros.arm.model_file import model_text
-from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.errors import ArmidError, IdentificationError, OutputError
 from armid_ros.live import Answer, Assistant, LiveDiagnosis
 from armid_ros.live.assistant import Done, Helper, Plan, Save
 from armid_ros.nodes.base import ArmidNode
@@ -135,12 +135,18 @@ class LiveDiagnosisNode(ArmidNode):
 
     def save(self) -> str:
         """Have the last diagnosis written; the log says when it is."""
+        self._require_diagnosis()
         folder = Path(self.value('save_to')).expanduser()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f'save_to: {folder}: cannot be made: {error.strerror}') from error
         self._begin(Save(folder))
         return f'writing diagnosis.json, model.yaml and report.html to {folder}'
 
     def next_run(self) -> str:
         """Have the motion planned that separates the names; it goes out on ~/experiment."""
+        self._require_diagnosis()
         self._begin(Plan(self.value('seed')))
         return f'planning; the motion goes out on {self._runs.topic_name}'
 
@@ -258,9 +264,11 @@ class LiveDiagnosisNode(ArmidNode):
         if done.excitation:
             self._runs.publish(String(data=done.excitation))
 
-    def _begin(self, job: Save | Plan) -> None:
+    def _require_diagnosis(self) -> None:
         if self._require().latest is None:
             raise IdentificationError('nothing has been diagnosed so far')
+
+    def _begin(self, job: Save | Plan) -> None:
         if self._helper.busy:
             self._waiting.append(job)
         else:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from armid_ros.errors import ArmidError
 from armid_ros.nodes.identification_run import IdentificationRunNode
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.recording import read_recording
@@ -151,3 +152,38 @@ def test_nodes_that_do_not_come_up_are_named(bench, tmp_path):
     run = bench.add(IdentificationRunNode, Programs(), save_to=str(tmp_path), patience=1.0)
     bench.spin_until(lambda: run.finished, 'the end')
     assert run.failure == '/excitation_publisher and /recorder did not come up'
+
+
+def test_a_node_that_is_ended_stops_the_arm_and_the_recording(bench, arm, excitation, tmp_path):
+    node, run = everything(bench, arm, excitation, tmp_path, Programs())
+
+    def end():
+        run.close()
+        run._done = True
+
+    carry_on(bench, arm, node, run, fault=end)
+    arm.run(arm.now + 1.0, step=0.2)
+    bench.settle()
+    node.publish_diagnostics()
+    assert arm.ends == ['abort', 'succeed']  # a goal that brings it to rest took the place
+    assert len(read_recording(tmp_path / 'run', joints=ROBOT.joints)) > 10
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'said'),
+    [
+        ({'robot': 'no.urdf'}, 'no.urdf'),
+        ({'joints': ['knee']}, 'knee'),
+        ({'effects': ['glue']}, "no effect 'glue'"),
+        ({'gravity': 'mars'}, 'mars'),
+        ({'save_to': 'FILE/results'}, 'cannot be made: Not a directory'),
+    ],
+)
+def test_what_armid_would_refuse_is_refused_before_the_arm_moves(
+    bench, tmp_path, parameters, said
+):
+    (tmp_path / 'file').write_text('')
+    given = {'save_to': str(tmp_path), **parameters}
+    given['save_to'] = given['save_to'].replace('FILE', str(tmp_path / 'file'))
+    with pytest.raises(ArmidError, match=said):
+        bench.add(IdentificationRunNode, Programs(), **given)

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import re
+
 from armid_msgs.msg import Diagnosis
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import model_text, read_model
@@ -171,9 +173,12 @@ def test_questions_wait_until_the_one_before_is_answered(bench, idle):
     assert node.received == 4000
 
 
-def test_all_that_is_asked_while_a_diagnosis_is_under_way_is_done_afterwards(bench, idle):
+def test_all_that_is_asked_while_a_diagnosis_is_under_way_is_done_afterwards(
+    bench, idle, tmp_path
+):
     node, helper = idle
     node.live.latest = 'a diagnosis'
+    assert node.set_parameters([Parameter('save_to', value=str(tmp_path / 'deep' / 'saved'))])
     helper.busy = True
     assert bench.call('live_diagnosis/save').success
     assert bench.call('live_diagnosis/next_run').success
@@ -181,6 +186,17 @@ def test_all_that_is_asked_while_a_diagnosis_is_under_way_is_done_afterwards(ben
         helper.results.append(Done('done'))
         node.take_answer()
     assert [type(job) for job in helper.jobs] == [Save, Plan]
+
+
+def test_a_folder_that_cannot_be_made_is_said_at_once(bench, idle, tmp_path):
+    node, helper = idle
+    node.live.latest = 'a diagnosis'
+    (tmp_path / 'file').write_text('')
+    node.set_parameters([Parameter('save_to', value=str(tmp_path / 'file' / 'saved'))])
+    answer = bench.call('live_diagnosis/save')
+    assert not answer.success
+    assert answer.message == f'save_to: {tmp_path}/file/saved: cannot be made: Not a directory'
+    assert not helper.jobs
 
 
 def test_before_a_diagnosis_nothing_can_be_saved_or_planned(bench, idle):
@@ -200,6 +216,15 @@ def test_settings_can_be_changed_and_those_that_do_not_fit_are_refused(bench, id
     assert not result.successful
     assert 'never as long' in result.reason
     assert node.live.settings.shortest == 8.0
+
+
+def test_a_description_without_inertia_is_refused(bench):
+    bare = re.sub(r'<inertial>.*?</inertial>', '', ROBOT.urdf, flags=re.DOTALL)
+    node = bench.add(LiveDiagnosisNode, None, Silent())
+    bench.matched_publisher(String, 'robot_description', LATCHED).publish(String(data=bare))
+    bench.spin_until(lambda: node.complaints.latest, 'a complaint')
+    assert 'no link that moves has an <inertial>' in node.complaints.latest
+    assert node.live is None
 
 
 def test_a_robot_is_taken_from_robot_description(bench):

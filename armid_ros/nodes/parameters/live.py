@@ -12,6 +12,7 @@ from typing import Any
 from armid_ros.api.arguments import read_recording
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.effects import parse_effect
+from armid_ros.errors import ModelError
 from armid_ros.live import LiveDiagnosis, LiveSettings
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
@@ -149,6 +150,11 @@ def make_diagnosis(value: Values, description: str | None = None) -> LiveDiagnos
 
     """
     arm = _arm(value, description)
+    if not arm.robot.rigid_parameters.any():
+        raise ModelError(
+            f'{arm.robot.name}: no link that moves has an <inertial>, so that the model predicts '
+            'no torque to compare with; complete the description, or give a model'
+        )
     bags = [read_recording(bag, arm) for bag in filter(None, value('baseline'))]
     misfit = load_misfit(value('model')) if value('model') and not bags else None
     return LiveDiagnosis(
