@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.rows.signals import (
-    Conditioning,
     conditioning,
     decimate,
     decimated_samples,
@@ -48,7 +47,7 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
         nothing changed.
 
     """
-    power = block_powers(arm, recording, conditioning([recording], SignalSettings()))
+    power = _block_powers(arm, recording)
     times, logs = power[:, 0], np.log(np.maximum(power[:, 1:], 1e-300))
     count = len(logs)
     splits = range(_FEWEST, count)
@@ -64,7 +63,7 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     return float(times[splits[best]] + _BLOCK + edge)
 
 
-def block_powers(arm: ArmModel, recording: Recording, used: Conditioning) -> FloatArray:
+def _block_powers(arm: ArmModel, recording: Recording) -> FloatArray:
     """
     Return the mean squares of the residual of short blocks; the last one ends with the motion.
 
@@ -74,6 +73,7 @@ def block_powers(arm: ArmModel, recording: Recording, used: Conditioning) -> Flo
         Begin of each block [s], and the power of each joint [N^2 m^2].
 
     """
+    used = conditioning([recording], SignalSettings())
     rows = [np.empty((0, 1 + len(arm.robot.joints)))]
     for motion in segments(recording, used):
         assert motion.tau is not None

@@ -10,10 +10,11 @@ import time
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings, Finding
+from armid_ros.diagnosis.data.evidence import trajectories
 from armid_ros.diagnosis.data.prepare import choose_filters
-from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.errors import ArmidError
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.live.onset import block_powers, onset
+from armid_ros.live.onset import onset
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -42,19 +43,21 @@ class Healthy:
         """
         Measure what the model leaves of the motion: the narrower the band, the less noise.
 
+        Rows count as in a diagnosis, which learns nothing from the friction of a joint at rest.
+
         Raises
         ------
         IdentificationError
             If the motion is too short for the filters.
 
         """
-        power = block_powers(self.arm, self.recording, filters)[:, 1:]
-        if not len(power):
-            seconds = self.recording.duration
-            raise IdentificationError(f'{seconds:.1f} s are too short to measure a misfit')
+        data = trajectories([self.recording], filters, self.arm)
         assert self.recording.tau is not None
+        left = np.concatenate([part.residual(self.arm) for part in data])
+        informative = np.concatenate([part.informative for part in data])
+        informative[:, ~informative.any(axis=0)] = True  # of a joint that never moved, all of it
+        mean = np.mean(left**2, axis=0, where=informative)
         torque = float(np.sum(self.recording.tau**2) / len(self.recording))
-        mean = power.mean(axis=0)
         rms = dict(zip(self.arm.robot.joints, np.sqrt(mean).tolist(), strict=True))
         return Misfit('held-out', rms, 100.0 * float(np.sqrt(mean.sum() / torque)))
 

@@ -4,9 +4,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.live import DiagnosisRequest
 from armid_ros.live.request import answer, Healthy, since, WAITING
+from armid_ros.motion import Motion
 import numpy as np
 
 
@@ -63,3 +66,21 @@ def test_the_misfit_of_a_right_model_is_the_noise_of_the_torque_in_a_band(known_
         noise = 0.05 * np.sqrt(2.0 * 0.4 / decimation)
         assert set(misfit.rms) == set(healthy.joints)
         np.testing.assert_allclose(list(misfit.rms.values()), noise, rtol=0.35)
+
+
+def test_what_friction_holds_at_rest_is_no_misfit(known_arm, healthy):
+    count = 1200
+    still = np.repeat(healthy.q[:1], count, axis=0)
+    held = known_arm.torque(
+        Motion(healthy.joints, np.arange(count) / 200.0, still, 0 * still, 0 * still)
+    )
+    rested = replace(
+        healthy,
+        t=np.r_[np.arange(count) / 200.0, count / 200.0 + healthy.t],
+        q=np.vstack([still, healthy.q]),
+        dq=np.vstack([0.0 * still, healthy.dq]),
+        tau=np.vstack([held + 0.15, healthy.tau]),
+    )
+    filters = Conditioning(200.0, 12.0, 8)
+    moving, both = (Healthy(known_arm, part).misfit(filters).rms for part in (healthy, rested))
+    np.testing.assert_allclose(list(both.values()), list(moving.values()), rtol=0.3)
