@@ -238,7 +238,8 @@ class ArmidNode(Node):
 
     def _note_refusal(self, name: str, result: SetParametersResult) -> None:
         if not result.successful:
-            self.complaints.say('parameter', f"parameter '{name}' refused: {result.reason}")
+            reason = result.reason.removeprefix(f"parameter '{name}': ")
+            self.complaints.say('parameter', f"parameter '{name}' refused: {reason}")
 
 
 def _text(value: object) -> str:

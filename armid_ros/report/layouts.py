@@ -91,14 +91,8 @@ def foxglove_layout(joints: Sequence[str], namespace: str = '', base: str = 'bas
             'Plot!residual': _plot('Residual [N m]', _paths(f'{at}{_RESIDUAL}.effort', joints)),
             'Plot!condition': _plot('Condition number', [condition]),
             '3D!arm': _scene(at, base),
-            'RawMessages!diagnosis': {
-                'topicPath': f'{at}{_DIAGNOSIS}.summary',
-                'diffMode': 'off',
-            },
-            'RawMessages!estimate': {
-                'topicPath': f'{at}{_IDENTIFIER}/estimate',
-                'diffMode': 'off',
-            },
+            'RawMessages!diagnosis': _messages(f'{at}{_DIAGNOSIS}.summary'),
+            'RawMessages!estimate': _messages(f'{at}{_IDENTIFIER}/estimate'),
             'DiagnosticSummary!nodes': {
                 'minLevel': 0,
                 'pinnedIds': [],
@@ -222,15 +216,27 @@ def _paths(field: str, joints: Sequence[str], suffix: str = '') -> list[dict[str
 
 def _plot(title: str, paths: list[dict[str, Any]]) -> dict[str, Any]:
     return {
-        'title': title,
+        'foxglovePanelTitle': title,
         'paths': paths,
         'showXAxisLabels': True,
         'showYAxisLabels': True,
         'showLegend': True,
         'legendDisplay': 'floating',
         'isSynced': True,
+        'showPlotValuesInLegend': False,
         'xAxisVal': 'timestamp',
         'sidebarDimension': 240,
+    }
+
+
+def _messages(path: str) -> dict[str, Any]:
+    """Return a view of messages as they are, without a comparison."""
+    return {
+        'topicPath': path,
+        'diffEnabled': False,
+        'diffMethod': 'custom',
+        'diffTopicPath': '',
+        'showFullMessageForDiff': False,
     }
 
 

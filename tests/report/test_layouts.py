@@ -4,6 +4,7 @@
 
 import json
 from pathlib import Path
+import re
 from xml.etree import ElementTree
 
 from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout
@@ -37,6 +38,22 @@ def test_a_namespace_is_before_every_topic_of_the_nodes():
     values = [path['value'] for path in layout['Plot!torque']['paths']]
     assert values[0] == '/left/joint_states.effort[0]'
     assert values[-1] == '/left/online_identifier/predicted_joint_states.effort[1]'
+
+
+def test_panels_of_foxglove_have_the_settings_that_foxglove_reads():
+    """As its sources declare them; what they do not is ignored without a word."""
+    known = {
+        'Plot': 'foxglovePanelTitle paths isSynced xAxisVal sidebarDimension showXAxisLabels '
+        'showYAxisLabels showLegend legendDisplay showPlotValuesInLegend',
+        '3D': 'followTf followMode cameraState scene transforms topics layers publish imageMode',
+        'RawMessages': 'topicPath diffEnabled diffMethod diffTopicPath showFullMessageForDiff',
+        'DiagnosticSummary': 'minLevel pinnedIds hardwareIdFilter topicToRender sortByLevel',
+    }
+    layout = json.loads(foxglove_layout(('a',)))
+    shown = set(re.findall(r'[\w]+![\w]+', json.dumps(layout['layout'])))
+    assert shown == set(layout['configById'])
+    for panel, settings in layout['configById'].items():
+        assert set(settings) == set(known[panel.partition('!')[0]].split())
 
 
 def test_names_that_xml_does_not_like_are_escaped():
