@@ -230,6 +230,7 @@ class LiveDiagnosis:
             # a gap: the stretch is another one
             self._asked_at, self.window.moved = 0.0, 0.0
             self._begin, self._changed = -np.inf, False
+            self._outdate()
         if self.learning and self._holds(self.settings.learning):
             self._learn()
         return kept
@@ -266,7 +267,7 @@ class LiveDiagnosis:
 
     def take(self, answer: Answer) -> bool:
         """
-        Take an answer into account, unless it is about an arm that is not believed in any more.
+        Take an answer into account, unless the arm or the time is another one by now.
 
         Returns
         -------

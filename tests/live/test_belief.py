@@ -142,6 +142,15 @@ def test_what_came_before_a_change_is_not_looked_at_again(live, known_arm):
     assert live.request().window.duration == pytest.approx(10.0, abs=0.1)
 
 
+def test_an_answer_from_before_time_jumped_back_is_dropped(live, known_arm):
+    """As where a bag is played again and again."""
+    stream(live, 9.0, begin=90.0)
+    stream(live, 1.0)
+    live.take(said(known_arm, WAITING, duration=2.0, end=98.2, changed=True))
+    assert stream(live, 9.0, begin=1.0)
+    assert live.question().window.duration == pytest.approx(10.0, abs=0.1)
+
+
 def test_another_change_is_looked_for_once_the_model_is_right(live, known_arm, patched):
     stream(live, 8.1)
     assert not live.request().of_one_arm
