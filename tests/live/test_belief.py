@@ -148,7 +148,7 @@ def test_an_answer_from_before_time_jumped_back_is_dropped(live, known_arm):
     stream(live, 1.0)
     live.take(said(known_arm, WAITING, duration=2.0, end=98.2, changed=True))
     assert stream(live, 9.0, begin=1.0)
-    assert live.question().window.duration == pytest.approx(10.0, abs=0.1)
+    assert live.request().window.duration == pytest.approx(10.0, abs=0.1)
 
 
 def test_another_change_is_looked_for_once_the_model_is_right(live, known_arm, patched):
