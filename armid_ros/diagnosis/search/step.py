@@ -32,6 +32,9 @@ _LOOKED_AT, _REFINED, _PROMISING = 30, 6, 0.4
 _COMPARED = 8
 #: Rivals that are told of a name: the likeliest; more than two help nobody.
 _RIVALS = 2
+#: A cause that takes this share of a joint in which a gap is open matters there, however little
+#: that is of the gap of the arm.
+_MOST = 0.5
 #: Causes in the small print.
 _SMALL_PRINT = 5
 
@@ -264,6 +267,7 @@ def _examined(
     assert here.total is not None
     least = 0.0 if here.before is None else here.settings.thresholds.headline * here.total
     free = beside.rows(problem)
+    open_squares = _open_squares(problem, beside, here)
     there: list[Trial] = []
     large: list[tuple[Trial, FloatArray]] = []
     for trial in ranking[:_LOOKED_AT]:
@@ -275,7 +279,8 @@ def _examined(
         there.append(change)
         own = problem.x[:, :, trial.group.columns]
         takes = trial.joint_gains(problem, own, free)
-        if change.gain >= least and material(_size(change, takes, own, here), here):
+        matters = change.gain >= least or bool(np.any(takes > _MOST * open_squares))
+        if matters and material(_size(change, takes, own, here), here):
             large.append((trial, takes))
     best = large[:_COMPARED]
     seen = {id(trial) for trial, _ in best}
@@ -288,6 +293,14 @@ def _examined(
     result.sort(key=lambda t: -worth(t, here))
     there.sort(key=lambda t: -worth(t, here))
     return result, there, gains
+
+
+def _open_squares(problem: Problem, beside: Beside, here: Round) -> FloatArray:
+    """Return the squares of every joint in which a gap is open; infinite where none is, (n,)."""
+    left = project(problem, beside.free, beside.hold).rest(problem.y)
+    limits = here.evidence.limits(here.evidence.split(left, problem.weight), here.settings)
+    open_gap = problem.chi2_per_row(left) > limits
+    return np.where(open_gap, np.sum(left**2, axis=0), np.inf)
 
 
 def _compared(
