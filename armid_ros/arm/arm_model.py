@@ -383,7 +383,7 @@ class ArmModel:
             return 0
         return int(np.ceil(action.reading_memory / period)) + _STENCIL
 
-    @property
+    @cached_property
     def _readings(self) -> list[tuple[TorqueReading, FloatArray]]:
         pairs = zip(self.effects, self.values, strict=True)
         return [(e, values) for e, values in pairs if isinstance(e, TorqueReading)]

@@ -31,12 +31,13 @@ class StreamChecks:
         self._lowest, self._highest = np.full((2, n), np.inf), np.full((2, n), -np.inf)
         self._moved: float | None = None
         self._moving = 0.0
+        self._judged: tuple[bytes, str] | None = None
 
     def take(self, t: float, q: FloatArray, tau: FloatArray) -> None:
         """Take in a sample that is not damaged: stamp, positions, torques, shape (n,)."""
-        signals = np.stack([q, tau])
-        np.minimum(self._lowest, signals, out=self._lowest)
-        np.maximum(self._highest, signals, out=self._highest)
+        for place, signal in enumerate((q, tau)):
+            np.minimum(self._lowest[place], signal, out=self._lowest[place])
+            np.maximum(self._highest[place], signal, out=self._highest[place])
         if self._moved is None and np.any(self._highest[0] - self._lowest[0] > REST_RANGE):
             self._moved = t
         self._moving = 0.0 if self._moved is None else t - self._moved
@@ -44,11 +45,19 @@ class StreamChecks:
     @property
     def silent(self) -> bool:
         """Whether no torque has ever changed, so that nothing can be learned from it."""
-        return bool(np.all(self._highest[1] <= self._lowest[1]))
+        return bool((self._highest[1] <= self._lowest[1]).all())
 
     @property
     def error(self) -> str:
         """What has to be mended before anything can be identified; empty when all is well."""
         if self.silent and abs(self._moving) > SHORTEST:
             return SILENT
-        return position_problem(self._robot, self._lowest[0], self._highest[0])
+        return self._position_problem()
+
+    def _position_problem(self) -> str:
+        """Return what is wrong with the range; it is asked for each row, and seldom grows."""
+        ranged = self._lowest[0].tobytes() + self._highest[0].tobytes()
+        if self._judged is None or self._judged[0] != ranged:
+            problem = position_problem(self._robot, self._lowest[0], self._highest[0])
+            self._judged = ranged, problem
+        return self._judged[1]
