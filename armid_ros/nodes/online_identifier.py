@@ -36,6 +36,7 @@ from armid_ros.nodes.parameters.identifier import (
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, STREAM
 from armid_ros.nodes.running.process import run
+from armid_ros.recording.header import header_stamp
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.clock import Clock, ClockType
@@ -128,7 +129,7 @@ class OnlineIdentifierNode(ArmidNode):
         self._predictions = self.create_publisher(JointState, '~/predicted_joint_states', STREAM)
         self._residuals = self.create_publisher(JointState, '~/residual', STREAM)
         self.joint_states = MatchedSubscription(
-            self, JointState, 'joint_states', self._on_joint_states
+            self, JointState, 'joint_states', self._on_joint_states, raw=True
         )
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
@@ -299,14 +300,13 @@ class OnlineIdentifierNode(ArmidNode):
             rng = np.random.default_rng(0)
             self._adopt(OnlineIdentifier(arm, before.settings, rng=rng))
 
-    def _on_joint_states(self, message: JointState) -> None:
+    def _on_joint_states(self, data: bytes) -> None:
         self.received += 1
         self.freshness.heard()
-        stamp = message.header.stamp
-        self.last_stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+        self.last_stamp_ns = header_stamp(data)
         if self.identifier is None:
             return
-        for sample in self._reader.read(message):
+        for sample in self._reader.read_serialized(data):
             self._take(sample)
 
     def _take(self, sample: JointSample) -> None:

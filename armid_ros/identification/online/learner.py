@@ -174,8 +174,7 @@ class Learner:
 
     @property
     def changes(self) -> Sequence[Change]:
-        """What has changed, oldest first."""
-        self.settle()
+        """What has changed, oldest first; it is found in the background, not when learning."""
         return () if self._watch is None else self._watch.changes
 
     @property
