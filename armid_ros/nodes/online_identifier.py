@@ -62,6 +62,8 @@ _DISTURBANCES = {
     'jump_back': 'joint states jump back in time: the filters begin anew',
     'position_step': 'positions step, as when a clock is set or an encoder is zeroed: the filters '
     'begin anew',
+    'missing': 'joint states are missing between those that came: a history of the publisher of '
+    'less than a second at their rate, or a computer that has too much to do, loses some',
     'dropout': 'joint states are missing for longer than max_gap: the filters begin anew',
 }
 
@@ -195,6 +197,7 @@ class OnlineIdentifierNode(ArmidNode):
             return 'waiting for robot_description', {'received': self.received}
         values: dict[str, object] = {
             'received': self.received,
+            'missing': identifier.missing,
             'samples': identifier.samples,
             'condition_number': identifier.condition_number,
         }
@@ -259,6 +262,7 @@ class OnlineIdentifierNode(ArmidNode):
 
     def _say_what_was_left_out(self, identifier: OnlineIdentifier) -> None:
         counted = Counter(identifier.rejected) + Counter(identifier.restarts)
+        counted['missing'] = identifier.missing
         for reason in (counted - self._disturbed).keys() & _DISTURBANCES.keys():
             self.complaints.say(reason, _DISTURBANCES[reason])
         if counted['spike'] > self._disturbed['spike']:

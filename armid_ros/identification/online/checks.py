@@ -9,6 +9,9 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
+#: Who is silent for longer has stopped, and nothing is lost [s].
+_SILENCE = 10.0
+
 
 class StreamChecks:
     """
@@ -61,3 +64,42 @@ class StreamChecks:
             problem = position_problem(self._robot, self._lowest[0], self._highest[0])
             self._judged = ranged, problem
         return self._judged[1]
+
+
+class MissingSamples:
+    """
+    Count the samples that should have come between others, by their stamps.
+
+    Where a sample is late and those after it are early, nothing is missing.
+
+    Attributes
+    ----------
+    count : int
+        Samples that never came; those of a longer silence are not counted.
+
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Set the count to zero."""
+        self.count = 0
+        self._last: float | None = None
+        self._doubtful = 0
+
+    def take(self, t: float, period: float | None) -> None:
+        """Take in a stamp [s], with the sampling period if it is known."""
+        last, self._last = self._last, t
+        if last is None or period is None or not 0.0 < t - last < _SILENCE:
+            self._doubtful = 0
+            return
+        steps = (t - last) / period
+        if steps >= 1.5:
+            self._doubtful = round(steps) - 1
+            self.count += self._doubtful
+        elif steps <= 0.5 and self._doubtful:  # it was only late
+            self._doubtful -= 1
+            self.count -= 1
+        else:
+            self._doubtful = 0

@@ -15,7 +15,7 @@ from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import Background
 from armid_ros.identification.online.change import Change
 from armid_ros.identification.online.change_watch import ChangeSettings
-from armid_ros.identification.online.checks import StreamChecks
+from armid_ros.identification.online.checks import MissingSamples, StreamChecks
 from armid_ros.identification.online.learner import Learner
 from armid_ros.identification.online.nuisance_rows import Seed
 from armid_ros.identification.online.recursive import check_forgetting, WeightedSample
@@ -109,6 +109,7 @@ class OnlineIdentifier:
         )
         self._gate = _gate(arm, settings)
         self._checks = StreamChecks(robot)
+        self._missing = MissingSamples()
         self.latest: tuple[OnlineSample, ...] = ()
         self._row_filter = TripleLag(settings.cutoff)
         self._row_period = 1.0 / settings.rows_per_second()
@@ -130,6 +131,7 @@ class OnlineIdentifier:
         self._learner.reset()
         self._filter.reset()
         self._checks.reset()
+        self._missing.reset()
         self.latest = ()
         if self._gate is not None:
             self._gate.reset()
@@ -157,6 +159,8 @@ class OnlineIdentifier:
         """
         learned = self._learner.settle()
         signal = self._filter.signal(t, q, dq, tau)
+        if signal is not None:
+            self._missing.take(t, self._filter.period)
         if signal is None:
             self.latest = ()
         elif self._gate is None:
@@ -274,6 +278,11 @@ class OnlineIdentifier:
     def samples(self) -> int:
         """Samples that the estimate rests on."""
         return self._learner.samples
+
+    @property
+    def missing(self) -> int:
+        """Joint states that never came, by the stamps of those that did."""
+        return self._missing.count
 
     @property
     def rejected(self) -> Mapping[str, int]:
