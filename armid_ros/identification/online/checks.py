@@ -11,6 +11,8 @@ import numpy as np
 
 #: Who is silent for longer has stopped, and nothing is lost [s].
 _SILENCE = 10.0
+#: A stamp that is further back is of a time that begins anew [s].
+_BEHIND = 1.0
 
 
 class StreamChecks:
@@ -90,7 +92,11 @@ class MissingSamples:
 
     def take(self, t: float, period: float | None) -> None:
         """Take in a stamp [s], with the sampling period if it is known."""
-        last, self._last = self._last, t
+        last = self._last
+        if last is not None and last - _BEHIND < t <= last:
+            self._came_late()
+            return
+        self._last = t
         if last is None or period is None or not 0.0 < t - last < _SILENCE:
             self._doubtful = 0
             return
@@ -98,8 +104,13 @@ class MissingSamples:
         if steps >= 1.5:
             self._doubtful = round(steps) - 1
             self.count += self._doubtful
-        elif steps <= 0.5 and self._doubtful:  # it was only late
-            self._doubtful -= 1
-            self.count -= 1
+        elif steps <= 0.5:
+            self._came_late()
         else:
             self._doubtful = 0
+
+    def _came_late(self) -> None:
+        """Take back one of those that were counted last."""
+        if self._doubtful:
+            self._doubtful -= 1
+            self.count -= 1

@@ -33,3 +33,9 @@ def test_a_sender_that_pauses_and_catches_up_has_lost_nothing(late):
 
 def test_a_pause_and_a_clock_that_is_set_are_no_loss():
     assert missing([0.0, 0.001, 3600.0, 3600.001, 1.0, 1.001]) == 0
+
+
+def test_what_comes_out_of_order_does_not_count_twice():
+    stamps = list(PERIOD * np.arange(20.0))
+    assert missing([*stamps[:10], stamps[6], *stamps[10:]]) == 0
+    assert missing([*stamps[:6], stamps[7], stamps[6], *stamps[8:]]) == 0
