@@ -105,7 +105,7 @@ class MatchedSubscription:
 
     @property
     def publishers(self) -> int:
-        """Number of publishers that it hears."""
+        """Return the number of publishers that it hears."""
         return int(self.subscription.get_publisher_count()) if self.subscription else 0
 
     def match(self) -> None:

@@ -129,7 +129,7 @@ class RecorderNode(ArmidNode):
 
     @property
     def message_count(self) -> int:
-        """Number of messages in the bag, or in the last one when none is open."""
+        """Return the number of messages in the bag, or in the last one when none is open."""
         return self._count
 
     @property

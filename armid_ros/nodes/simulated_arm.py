@@ -168,7 +168,7 @@ class SimulatedArmNode(ArmidNode):
 
     @property
     def joint_state(self) -> JointState:
-        """The joint state that was published last."""
+        """Return the joint state that was published last."""
         return self._message
 
     @property
@@ -178,7 +178,7 @@ class SimulatedArmNode(ArmidNode):
 
     @property
     def readers(self) -> int:
-        """Number of subscriptions to joint_states."""
+        """Return the number of subscriptions to joint_states."""
         return int(self._states.get_subscription_count())
 
     @property

@@ -99,12 +99,12 @@ class FoundChange:
 
     @property
     def before(self) -> int:
-        """The last block that is not of the change."""
+        """Return the last block that is not of the change."""
         return max(self.first - 1, 0)
 
     @property
     def after(self) -> int:
-        """The first block that is wholly of the arm as it is now."""
+        """Return the first block that is wholly of the arm as it is now."""
         return min(self.first + 1, len(self.blocks) - 1)
 
 

@@ -54,7 +54,7 @@ class StreamChecks:
 
     @property
     def error(self) -> str:
-        """What has to be mended before anything can be identified; empty when all is well."""
+        """Return what to mend before anything can be identified; empty when all is well."""
         if self.silent and abs(self._moving) > SHORTEST:
             return SILENT
         return self._position_problem()

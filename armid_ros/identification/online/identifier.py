@@ -266,7 +266,7 @@ class OnlineIdentifier:
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """What has changed about the arm since the last reset, oldest first."""
+        """Return what has changed about the arm since the last reset, oldest first."""
         return tuple(self._learner.changes)
 
     @property
@@ -276,7 +276,7 @@ class OnlineIdentifier:
 
     @property
     def samples(self) -> int:
-        """Samples that the estimate rests on."""
+        """Return the samples that the estimate rests on."""
         return self._learner.samples
 
     @property
@@ -357,7 +357,7 @@ class OnlineIdentifier:
 
     @property
     def _without_consequence(self) -> FloatArray:
-        """What a single sample may be off by before a row shows it, positions not so judged."""
+        """Return what one sample may be off by before a row shows it, positions not so judged."""
         n = self.arm.robot.n_joints
         floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
         if self._filter.pole is not None:

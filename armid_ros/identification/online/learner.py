@@ -154,7 +154,7 @@ class Learner:
 
     @property
     def residual_deviation(self) -> FloatArray:
-        """What the estimate leaves of the torques, as noise of single samples, (n,) [N m]."""
+        """Return what the estimate leaves of torques, as noise of single samples, (n,) [N m]."""
         self.settle()
         return self._residual_deviation.size
 
@@ -174,7 +174,10 @@ class Learner:
 
     @property
     def changes(self) -> Sequence[Change]:
-        """What has changed, oldest first; it is found in the background, not when learning."""
+        """
+        Return what has changed, oldest first; it is found in the background, not when learning.
+
+        """
         return () if self._watch is None else self._watch.changes
 
     @property
@@ -185,6 +188,6 @@ class Learner:
 
     @property
     def samples(self) -> int:
-        """Samples that the estimate rests on."""
+        """Return the samples that the estimate rests on."""
         self.settle()
         return self._estimator.samples

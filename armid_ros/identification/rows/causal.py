@@ -255,7 +255,7 @@ class CausalFilter:
 
     @property
     def rejected(self) -> Mapping[str, int]:
-        """Samples left out: wrong_length, not_finite, impossible, out_of_order, no_velocity."""
+        """Return counts of samples that were left out, by reason."""
         return MappingProxyType(self._rejected)
 
     @property
@@ -265,7 +265,7 @@ class CausalFilter:
 
     @property
     def period(self) -> float | None:
-        """Sampling period [s], None until it is known."""
+        """Return the sampling period [s], None until it is known."""
         return self._period
 
     @property

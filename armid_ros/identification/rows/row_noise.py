@@ -53,12 +53,15 @@ class RowNoise:
 
     @property
     def gain(self) -> float:
-        """Standard deviation of the noise of a row over that of a sample."""
+        """Return the standard deviation of the noise of a row over that of a sample."""
         return float(np.sqrt(self.period * self.bandwidth))
 
     @property
     def single(self) -> float:
-        """What one sample is off by that moves a row by what noise of 1 in all samples does."""
+        """
+        Return what one sample is off by that moves a row by what noise of 1 in all samples does.
+
+        """
         return self.gain / (self.period * self.peak)
 
     def independent(self, step: float) -> float:

@@ -119,7 +119,7 @@ class NoiseLevel:
     @property
     def _resolution(self) -> FloatArray:
         """
-        The smallest step of every signal, 0 where it is not known.
+        Return the smallest step of every signal, 0 where it is not known.
 
         A signal that moves fast makes no small steps; but by its resolution it leaves any line.
 

@@ -239,7 +239,7 @@ class SpikeGate:
 
     @property
     def _tail(self) -> StreamSample | None:
-        """The newest sample that is not damaged for sure."""
+        """Return the newest sample that is not damaged for sure."""
         latest = self._held or self._first or self._known
         return latest[-1] if latest else None
 

@@ -109,7 +109,7 @@ class Usual:
 
     @cached_property
     def _shares(self) -> tuple[FloatArray, FloatArray]:
-        """Standard deviations of what is noise, and most of what is not, over `size`, (m,)."""
+        """Return standard deviations of what is noise, most of what is not, over `size`, (m,)."""
         return np.sqrt(self.noisy), np.sqrt(1.0 - self.noisy) * _HARDER
 
     def limits(self, quantile: float, noise: Factor, bend: Factor) -> FloatArray:

@@ -38,7 +38,7 @@ class PoseReader:
 
     @property
     def pose(self) -> MeasuredPose:
-        """The pose by all that came."""
+        """Return the pose by all that came."""
         for message, came in self._waiting.values():
             stamp = message.sec * 10**9 + message.nanosec
             self._pose = self._pose.updated(message.names, message.position, stamp, came)
