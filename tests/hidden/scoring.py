@@ -127,10 +127,7 @@ class Judged:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """
-        Return what was named; bodies that are off where the nominal bodies are off are no finding.
-
-        """
+        """Return what was named; a body that is off where the nominal one is off is no finding."""
         honest = () if self.truth.exact else ('link_inertia',)
         return tuple(f for f in self.outcome.findings if f.name not in honest)
 

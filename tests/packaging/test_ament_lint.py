@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The linters that `colcon test` runs on a ROS 2 machine pass on this tree, where there are any."""
+"""The linters that `colcon test` runs on a ROS 2 machine pass on this tree."""
 
 import pytest
 

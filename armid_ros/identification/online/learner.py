@@ -174,10 +174,7 @@ class Learner:
 
     @property
     def changes(self) -> Sequence[Change]:
-        """
-        Return what has changed, oldest first; it is found in the background, not when learning.
-
-        """
+        """Return what has changed, oldest first; it is found in the background."""
         return () if self._watch is None else self._watch.changes
 
     @property

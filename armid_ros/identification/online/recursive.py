@@ -299,10 +299,7 @@ class RecursiveLeastSquares:
 
     @property
     def covariance_factor(self) -> float:
-        """
-        Return what the covariance is multiplied by: the variance factor, or 1 for known noise.
-
-        """
+        """Return the factor of the covariance: the variance factor, or 1 for known noise."""
         return self.variance_factor if self._scale else 1.0
 
     @property

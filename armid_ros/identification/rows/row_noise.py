@@ -58,10 +58,7 @@ class RowNoise:
 
     @property
     def single(self) -> float:
-        """
-        Return what one sample is off by that moves a row by what noise of 1 in all samples does.
-
-        """
+        """Return what one sample is off by that moves a row as noise of 1 in all samples does."""
         return self.gain / (self.period * self.peak)
 
     def independent(self, step: float) -> float:
