@@ -91,11 +91,12 @@ class _Fields:
 
     def read(self, data: bytes) -> JointStateValues:
         """Return the values of a message of this layout."""
-        values = [
+        position, velocity, effort = (
             np.frombuffer(data, self._type, count, place) if count else _NOTHING
             for count, place in self._places
-        ]
-        return JointStateValues(*self._stamp(data, 4), self.names, *values)
+        )
+        sec, nanosec = self._stamp(data, 4)
+        return JointStateValues(sec, nanosec, self.names, position, velocity, effort)
 
 
 _NOTHING = np.empty(0)
