@@ -93,7 +93,7 @@ class Estimate:
 
     @property
     def std(self) -> FloatArray:
-        """Standard deviations, shape (P,)."""
+        """Return the standard deviations, shape (P,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     def interval(self, confidence: float = 0.95) -> FloatArray:

@@ -121,7 +121,7 @@ class Motion:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints n."""
+        """Return the number of joints n."""
         return len(self.joints)
 
     def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Motion:

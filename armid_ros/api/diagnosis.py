@@ -83,7 +83,7 @@ class DiagnosisResult(Shown):
 
     @property
     def summary_text(self) -> str:
-        """The verdict in a sentence or two."""
+        """Return the verdict in a sentence or two."""
         return self.core.summary
 
     @property
@@ -93,7 +93,7 @@ class DiagnosisResult(Shown):
 
     @property
     def arm(self) -> ArmModel:
-        """The model with what was found added, and with what was learned."""
+        """Return the model with what was found added, and with what was learned."""
         return self.core.arm if self.residual is None else self.residual.arm
 
     def urdf(self, path: str | Path | None = None) -> str:

@@ -84,17 +84,17 @@ class IdentificationResult(Shown):
 
     @property
     def arm(self) -> ArmModel:
-        """The identified model."""
+        """Return the identified model."""
         return self.core.arm
 
     @property
     def estimate(self) -> Estimate:
-        """Base and effect parameters with covariance."""
+        """Return the base and effect parameters with covariance."""
         return self.core.estimate
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a person should know."""
+        """Return what a person should know."""
         return self.core.notes
 
     @property

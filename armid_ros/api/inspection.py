@@ -53,12 +53,12 @@ class InspectionResult(Shown):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a person should know, the worst first."""
+        """Return what a person should know, the worst first."""
         return tuple(remark.text for remark in self.core.remarks)
 
     @property
     def recording(self) -> Recording:
-        """What was read."""
+        """Return what was read."""
         return self.core.recording
 
     def to_dataframe(self) -> pandas.DataFrame:

@@ -65,7 +65,7 @@ class ExcitationResult(Shown):
 
     @property
     def trajectory(self) -> Excitation:
-        """What is to be run, from rest to rest."""
+        """Return what is to be run, from rest to rest."""
         return self.core.excitation
 
     @property

@@ -154,7 +154,7 @@ class ArmModel:
 
     @property
     def parameters(self) -> tuple[ParameterName, ...]:
-        """Standard parameters: 10 n rigid ones, then those of the effects, P in all."""
+        """Return the standard parameters: 10 n rigid ones, then those of the effects, P in all."""
         names = list(rigid_parameter_names(self.robot))
         for effect in self.effects:
             names.extend(effect.parameters(self.robot))
@@ -201,7 +201,7 @@ class ArmModel:
 
     @property
     def body(self) -> Robot:
-        """The rigid body as the effects make it: with payload, under the gravity that is there."""
+        """Return the rigid body that effects make: with payload, under the gravity there is."""
         assert self._acting.robot is not None
         return self._acting.robot
 
@@ -383,7 +383,7 @@ class ArmModel:
             return 0
         return int(np.ceil(action.reading_memory / period)) + _STENCIL
 
-    @property
+    @cached_property
     def _readings(self) -> list[tuple[TorqueReading, FloatArray]]:
         pairs = zip(self.effects, self.values, strict=True)
         return [(e, values) for e, values in pairs if isinstance(e, TorqueReading)]

@@ -250,7 +250,7 @@ class Effect(ABC):
 
     @property
     def said_as(self) -> str:
-        """What it is called in the catalogue."""
+        """Return what it is called in the catalogue."""
         return self.name
 
     @property
@@ -378,7 +378,7 @@ class Kind(Protocol):
 
     @property
     def name(self) -> str:
-        """What its effects are called."""
+        """Return what its effects are called."""
 
     @property
     def changes_body(self) -> bool:
@@ -400,7 +400,7 @@ class Arm(Protocol):
 
     @property
     def body(self) -> Robot:
-        """The rigid body as the effects make it: with payload, under the gravity that is there."""
+        """Return the rigid body that effects make: with payload, under the gravity there is."""
 
     @property
     def middle_frames(self) -> LinkFrames:

@@ -4,11 +4,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import NamedTuple
+
 from armid_ros.effects.base import Effect
 from armid_ros.effects.smooth import Gradient, SmoothColumns, SmoothFactor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
+import numpy.typing as npt
 
 
 def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> FloatArray:
@@ -30,11 +34,30 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
         Zero where a parameter belongs to another joint.
 
     """
-    joints, count = effect.indices(motion.joints), len(quantities)
-    columns = np.zeros((len(motion), motion.n_joints, count * len(joints)))
-    for offset, values in enumerate(quantities):
-        columns[:, joints, range(offset, count * len(joints), count)] = values[:, joints]
-    return columns
+    places = _places(tuple(effect.indices(motion.joints)), motion.n_joints, len(quantities))
+    size = len(quantities) * len(places.joints)
+    columns = np.zeros((len(motion), motion.n_joints * size))
+    for place, values in zip(places.of_quantity, quantities, strict=True):
+        columns[:, place] = values[:, places.joints]
+    return columns.reshape(len(motion), motion.n_joints, size)
+
+
+class _Places(NamedTuple):
+    """Joints of an effect, and where its values are among the flattened columns of a sample."""
+
+    joints: npt.NDArray[np.intp]
+    of_quantity: tuple[npt.NDArray[np.intp], ...]
+
+
+@lru_cache(maxsize=1024)
+def _places(joints: tuple[int, ...], n_joints: int, count: int) -> _Places:
+    """Return where values go; a stream asks the same for every sample."""
+    own = np.array(joints, dtype=np.intp)
+    size = count * len(own)
+    return _Places(
+        own,
+        tuple(own * size + np.arange(offset, size, count) for offset in range(count)),
+    )
 
 
 def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:

@@ -250,10 +250,10 @@ class Partner:
 
     @property
     def interaction(self) -> TiedKind:
-        """What makes springs and dampers."""
+        """Return what makes springs and dampers."""
         return TiedKind(TiedInteraction, self.ties, self.source or self.robot.name)
 
     @property
     def slack(self) -> TiedKind:
-        """What makes straps with slack."""
+        """Return what makes straps with slack."""
         return TiedKind(TiedSlack, self.ties, self.source or self.robot.name)

@@ -47,7 +47,7 @@ class Fitness:
 
     @property
     def word(self) -> str:
-        """The verdict in a few words: `FIT` only when everything was checked and is clear."""
+        """Return the verdict in a few words: `FIT` only when all was checked and is clear."""
         if self.nearest is not None and self.nearest.distance < 0.0:
             return UNFIT
         if self.floor.height is not None and self.lowest.height < self.floor.height:

@@ -77,17 +77,17 @@ class FourierTrajectory:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints n."""
+        """Return the number of joints n."""
         return len(self.joints)
 
     @property
     def harmonics(self) -> int:
-        """Number of harmonics H."""
+        """Return the number of harmonics H."""
         return int(self.a.shape[1])
 
     @property
     def angular_frequency(self) -> float:
-        """Base frequency w [rad/s]."""
+        """Return the base frequency w [rad/s]."""
         return 2.0 * np.pi / self.period
 
     def motion(self, t: npt.ArrayLike) -> Motion:
@@ -115,7 +115,7 @@ class FourierTrajectory:
         return self.motion(np.arange(n_samples) * (self.period / n_samples))
 
     def shifted(self, time: float) -> FourierTrajectory:
-        """Return the same orbit entered later: shifted(s).motion(t) is motion(t + s)."""
+        """Return the same orbit entered later, by a time [s]: its beginning is the motion then."""
         angle = self.angular_frequency * time * np.arange(1, self.harmonics + 1)
         cosine, sine = np.cos(angle), np.sin(angle)
         a = self.a * cosine + self.b * sine

@@ -48,7 +48,7 @@ class RehearsalReport:
 
     @property
     def surprises(self) -> tuple[str, ...]:
-        """What was not as foreseen, a sentence a joint."""
+        """Return what was not as foreseen, a sentence a joint."""
         if not self.samples:
             return ('no joint state came during the rehearsal',)
         said = []

@@ -108,7 +108,7 @@ class Job:
 
     @cached_property
     def settings(self) -> dict[str, Any]:
-        """What results depend on, other than the bag."""
+        """Return what results depend on, other than the bag."""
         robot = self.arm.robot
         return {
             'robot': robot.name,
@@ -123,13 +123,13 @@ class Job:
 
     @cached_property
     def digest(self) -> str:
-        """A name for the settings."""
+        """Return a name for the settings."""
         text = json.dumps(self.settings, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     @property
     def samples(self) -> int:
-        """Samples of a bag that are in memory at once."""
+        """Return the samples of a bag that are in memory at once."""
         joints = self.arm.robot.n_joints
         rows = _MOST_NUMBERS // (joints * self.theory.rank)
         return min(rows * self.filters.decimation, _MOST_SAMPLES // joints)

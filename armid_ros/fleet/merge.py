@@ -229,7 +229,7 @@ class Packed:
 
     @property
     def matrix(self) -> FloatArray:
-        """The whole matrix, shape (r, r)."""
+        """Return the whole matrix, shape (r, r)."""
         size = int((np.sqrt(8.0 * len(self.numbers) + 1.0) - 1.0) / 2.0)
         upper = np.zeros((size, size))
         upper[np.triu_indices(size)] = self.numbers

@@ -137,12 +137,12 @@ class Splits:
 
     @property
     def scores(self) -> FloatArray:
-        """Steps in standard deviations, shape (K - 1,)."""
+        """Return the steps in standard deviations, shape (K - 1,)."""
         return np.asarray(np.abs(self.high - self.low) / self.std)
 
     @property
     def trend(self) -> float:
-        """The trend in standard deviations."""
+        """Return the trend in standard deviations."""
         return abs(self.slope) / self.slope_std if self.slope_std < np.inf else 0.0
 
 

@@ -92,7 +92,7 @@ class Store:
 
     @property
     def local(self) -> Path | None:
-        """The folder, where it is one of this machine."""
+        """Return the folder, where it is one of this machine."""
         filesystem, path = self._place
         return Path(path) if isinstance(filesystem, LocalFileSystem) else None
 

@@ -63,7 +63,7 @@ class IdentificationSettings:
 
     @property
     def least_squares(self) -> Method:
-        """The least squares that the method is, or starts from."""
+        """Return the least squares that the method is, or starts from."""
         return least_squares_of(self.method)
 
 
@@ -198,7 +198,7 @@ class Identification:
 
     @property
     def unidentified(self) -> tuple[Unidentified, ...]:
-        """What the data do not tell, and why."""
+        """Return what the data do not tell, and why."""
         return unidentified(self.theory, self.base, self.estimate)
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:

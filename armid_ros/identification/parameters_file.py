@@ -62,7 +62,7 @@ class ParameterFile:
 
     @property
     def std(self) -> FloatArray:
-        """Standard deviations of the values, shape (P,)."""
+        """Return the standard deviations of the values, shape (P,)."""
         return np.array([std for _, std in self.values.values()])
 
     def covariance_of(self, names: Sequence[ParameterName]) -> FloatArray:

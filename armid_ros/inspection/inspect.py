@@ -98,7 +98,7 @@ class Inspection:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Unit of each position."""
+        """Return the unit of each position."""
         if self.robot is None:
             return ('rad',) * self.recording.n_joints
         return self.robot.position_units

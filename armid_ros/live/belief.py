@@ -93,7 +93,7 @@ class Belief:
 
     @property
     def model(self) -> ArmModel:
-        """The best model there is."""
+        """Return the best model there is."""
         return self.accepted if self.proposed is None else self.proposed
 
     def proposing(self, answer: Answer) -> Belief:

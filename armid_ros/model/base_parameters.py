@@ -60,7 +60,7 @@ class BaseParameters:
 
     @property
     def rank(self) -> int:
-        """Number of base parameters r."""
+        """Return the number of base parameters r."""
         return len(self.parameters)
 
     @property

@@ -26,8 +26,9 @@ from armid_ros.excitation import (
 )
 from armid_ros.excitation.files import load_excitation, read_excitation
 from armid_ros.excitation.supervision import HANDOVER, Speedometer
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import Motion
 from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.messages.measured_pose import efforts, PoseReader
 from armid_ros.nodes.parameters.excitation import (
     checked,
     EXCITATION_PARAMETERS,
@@ -41,9 +42,7 @@ from armid_ros.nodes.running.process import run
 from armid_ros.nodes.trajectory.action import Tolerances
 from armid_ros.nodes.trajectory.messages import write_trajectory
 from armid_ros.nodes.trajectory.senders import TrajectorySenders
-import numpy as np
 from rclpy.clock import Clock, ClockType
-from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
@@ -52,6 +51,8 @@ from trajectory_msgs.msg import JointTrajectory
 _LOOK_PERIOD = 0.05
 #: How often it is looked whether the arm follows [s].
 _TRACKING_PERIOD = 0.02
+#: How often it is looked at at all, whatever the rate of joint_states [s].
+_POSE_PERIOD = 0.005
 #: How long the last message may take to arrive when the node ends [s].
 _FAREWELL = 1.0
 
@@ -104,11 +105,12 @@ class ExcitationPublisherNode(ArmidNode):
             raise TrajectoryError('a planner needs an excitation to plan the way to')
         self._planner = planner
         self._excitation = excitation.for_joints(planner.arm.robot.joints)
-        self._pose = MeasuredPose.unknown(self._excitation.joints)
+        self._measured = PoseReader(self._excitation.joints)
         self._speed = Speedometer.unknown(len(self._excitation.joints))
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._run: Run | None = None
-        self._begun_ns, self._sent_at, self._tracked = 0, -math.inf, -math.inf
+        self._begun_ns, self._sent_at = 0, -math.inf
+        self._looked_at = self._tracked = -math.inf
         self._trouble = self._rehearsed = ''
         self._runs, self._outcome = 0, 'none'
         self._rehearsal: Rehearsal | None = None
@@ -117,7 +119,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
         self._controller = TrajectorySenders(self, self._on_goal_ended)
         self._states = self.create_subscription(
-            JointState, 'joint_states', self._on_joint_states, 10
+            JointState, 'joint_states', self._on_joint_states, 10, raw=True
         )
         self._experiments = self.create_subscription(
             String, 'experiment', self._on_experiment, LATCHED
@@ -149,6 +151,10 @@ class ExcitationPublisherNode(ArmidNode):
     def readers(self) -> int:
         """Return the number of subscriptions to joint_trajectory."""
         return self._controller.readers
+
+    @property
+    def _pose(self) -> MeasuredPose:
+        return self._measured.pose
 
     @property
     def last_stamp_ns(self) -> int:
@@ -292,10 +298,13 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.close()
         super().destroy_node()
 
-    def _on_joint_states(self, message: JointState) -> None:
-        stamp = Time.from_msg(message.header.stamp).nanoseconds
-        self._pose = self._pose.updated(message.name, message.position, stamp, self._now())
+    def _on_joint_states(self, data: bytes) -> None:
         now = self._now()
+        message = self._measured.take(data, now)
+        if 0.0 <= now - self._looked_at < _POSE_PERIOD:
+            return
+        self._looked_at = now
+        stamp = message.sec * 10**9 + message.nanosec
         self._speed = self._speed.looked(now, self._pose.q)
         elapsed = self.elapsed
         if self._halt is not None:
@@ -308,7 +317,7 @@ class ExcitationPublisherNode(ArmidNode):
         if not stamp or (strange and not self._simulated):
             phase = elapsed  # the stamp is of another clock; a simulation may just be slow
         if self._rehearsal is not None:
-            self._rehearsal.add(phase, self._pose.q, self._efforts(message))
+            self._rehearsal.add(phase, self._pose.q, efforts(message, self._pose.joints))
         fault = tracking_fault(
             self._pose.joints,
             self._planner.arm.robot.position_units,
@@ -395,11 +404,6 @@ class ExcitationPublisherNode(ArmidNode):
         else:
             self._rehearsed = self._tell(f'rehearsed: {report}; {advice}')
 
-    def _efforts(self, message: JointState) -> FloatArray:
-        """Return the torques of a message in the order of the joints, NaN where there is none."""
-        known = dict(zip(message.name, message.effort, strict=False))
-        return np.array([known.get(joint, math.nan) for joint in self._pose.joints])
-
     def _on_experiment(self, message: String) -> None:
         """Take an excitation that somebody planned; ~/start runs it, and nothing else does."""
         if self.elapsed is not None:
@@ -417,7 +421,9 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _now(self) -> float:
         """Return the time that ages are measured in: simulated, or steady [s]."""
-        clock = self.get_clock() if self.value('use_sim_time') else self._steady
+        clock = self.get_clock()
+        if not clock.ros_time_is_active:
+            clock = self._steady
         return float(clock.now().nanoseconds * 1e-9)
 
     def _stamped(self, motion: Motion, lead: float) -> JointTrajectory:

@@ -18,7 +18,7 @@ from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.classes import message_class
 from armid_ros.nodes.messages.efforts import effort_reader, Reader
 from armid_ros.nodes.parameters.table import names, NodeParameter, ParameterError
-from armid_ros.nodes.qos import LATCHED, MatchedSubscription, STREAM
+from armid_ros.nodes.qos import LATCHED, MatchedSubscription, SAMPLES
 from armid_ros.nodes.running.process import run
 from armid_ros.robots import robot_from_urdf
 import numpy as np
@@ -89,7 +89,7 @@ class JointStateMergerNode(ArmidNode):
         self._reader: Reader | None = None
         self._efforts: MatchedSubscription | None = None
         self._kept: deque[tuple[float, FloatArray, FloatArray]] = deque(maxlen=_KEPT)
-        self._states = self.create_publisher(JointState, '~/joint_states', STREAM)
+        self._states = self.create_publisher(JointState, '~/joint_states', SAMPLES)
         self._topics = names(self, 'position_topics')
         if not self._topics:
             raise ParameterError("parameter 'position_topics' names no topic")

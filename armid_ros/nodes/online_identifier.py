@@ -36,6 +36,7 @@ from armid_ros.nodes.parameters.identifier import (
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, STREAM
 from armid_ros.nodes.running.process import run
+from armid_ros.recording.header import header_stamp
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.clock import Clock, ClockType
@@ -61,6 +62,8 @@ _DISTURBANCES = {
     'jump_back': 'joint states jump back in time: the filters begin anew',
     'position_step': 'positions step, as when a clock is set or an encoder is zeroed: the filters '
     'begin anew',
+    'missing': 'joint states are missing between those that came: a history of the publisher of '
+    'less than a second at their rate, or a computer that has too much to do, loses some',
     'dropout': 'joint states are missing for longer than max_gap: the filters begin anew',
 }
 
@@ -128,7 +131,7 @@ class OnlineIdentifierNode(ArmidNode):
         self._predictions = self.create_publisher(JointState, '~/predicted_joint_states', STREAM)
         self._residuals = self.create_publisher(JointState, '~/residual', STREAM)
         self.joint_states = MatchedSubscription(
-            self, JointState, 'joint_states', self._on_joint_states
+            self, JointState, 'joint_states', self._on_joint_states, raw=True
         )
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
@@ -194,6 +197,7 @@ class OnlineIdentifierNode(ArmidNode):
             return 'waiting for robot_description', {'received': self.received}
         values: dict[str, object] = {
             'received': self.received,
+            'missing': identifier.missing,
             'samples': identifier.samples,
             'condition_number': identifier.condition_number,
         }
@@ -258,6 +262,7 @@ class OnlineIdentifierNode(ArmidNode):
 
     def _say_what_was_left_out(self, identifier: OnlineIdentifier) -> None:
         counted = Counter(identifier.rejected) + Counter(identifier.restarts)
+        counted['missing'] = identifier.missing
         for reason in (counted - self._disturbed).keys() & _DISTURBANCES.keys():
             self.complaints.say(reason, _DISTURBANCES[reason])
         if counted['spike'] > self._disturbed['spike']:
@@ -299,14 +304,13 @@ class OnlineIdentifierNode(ArmidNode):
             rng = np.random.default_rng(0)
             self._adopt(OnlineIdentifier(arm, before.settings, rng=rng))
 
-    def _on_joint_states(self, message: JointState) -> None:
+    def _on_joint_states(self, data: bytes) -> None:
         self.received += 1
         self.freshness.heard()
-        stamp = message.header.stamp
-        self.last_stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+        self.last_stamp_ns = header_stamp(data)
         if self.identifier is None:
             return
-        for sample in self._reader.read(message):
+        for sample in self._reader.read_serialized(data):
             self._take(sample)
 
     def _take(self, sample: JointSample) -> None:

@@ -13,12 +13,16 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-#: Joint states, commands and diagnostics.
+#: Commands, /clock and diagnostics.
 STREAM = QoSProfile(depth=10)
 #: The latest value, also for those who come late: descriptions, trajectories, estimates.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 #: Messages a subscription holds while its node is busy: 1 s at 1 kHz.
 DEPTH = 1000
+#: Joint states, of which none may be lost. A process that gets no processor leaves what is sent to
+#: it in shared memory, which holds 512 messages, half a second at 1 kHz; what came after that is
+#: sent again from the history of the publisher, as far as that goes back.
+SAMPLES = QoSProfile(depth=DEPTH)
 
 
 def matching(publishers: Sequence[TopicEndpointInfo], depth: int = DEPTH) -> QoSProfile:
@@ -101,7 +105,7 @@ class MatchedSubscription:
 
     @property
     def publishers(self) -> int:
-        """Number of publishers that it hears."""
+        """Return the number of publishers that it hears."""
         return int(self.subscription.get_publisher_count()) if self.subscription else 0
 
     def match(self) -> None:

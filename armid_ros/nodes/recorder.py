@@ -11,7 +11,6 @@ from functools import partial
 import os
 from pathlib import Path
 import shutil
-import struct
 import time
 from typing import Any, NoReturn
 
@@ -23,6 +22,7 @@ from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import MatchedSubscription, recorded
 from armid_ros.nodes.running.process import run
 from armid_ros.recording import BagWriter
+from armid_ros.recording.header import header_stamp
 from rclpy.clock import Clock, ClockType
 
 OpenBag = Callable[[Path], BagWriter]
@@ -129,7 +129,7 @@ class RecorderNode(ArmidNode):
 
     @property
     def message_count(self) -> int:
-        """Number of messages in the bag, or in the last one when none is open."""
+        """Return the number of messages in the bag, or in the last one when none is open."""
         return self._count
 
     @property
@@ -339,12 +339,6 @@ class RecorderNode(ArmidNode):
         return BagWriter(
             path, chunk_age=self.value('chunk_age'), compression=self.value('compression')
         )
-
-
-def header_stamp(data: bytes) -> int:
-    """Return the stamp of a serialised message that begins with a header [ns]; 0 if unset."""
-    seconds, nanoseconds = struct.unpack_from('<iI' if data[1] & 1 else '>iI', data, 4)
-    return int(seconds) * 10**9 + int(nanoseconds)
 
 
 def main(args: Sequence[str] | None = None) -> None:

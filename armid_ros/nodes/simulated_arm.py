@@ -23,7 +23,7 @@ from armid_ros.nodes.parameters.arm import (
     with_effects,
 )
 from armid_ros.nodes.parameters.table import NodeParameter
-from armid_ros.nodes.qos import LATCHED, STREAM
+from armid_ros.nodes.qos import LATCHED, SAMPLES, STREAM
 from armid_ros.nodes.running.process import run
 from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.simulation import Reference, SimulatedArm
@@ -123,7 +123,7 @@ class SimulatedArmNode(ArmidNode):
         self._states = self.create_publisher(
             JointState,
             'joint_states',
-            STREAM,
+            SAMPLES,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
         )
         self._message = JointState(name=list(self._arm.joints))
@@ -168,7 +168,7 @@ class SimulatedArmNode(ArmidNode):
 
     @property
     def joint_state(self) -> JointState:
-        """The joint state that was published last."""
+        """Return the joint state that was published last."""
         return self._message
 
     @property
@@ -178,7 +178,7 @@ class SimulatedArmNode(ArmidNode):
 
     @property
     def readers(self) -> int:
-        """Number of subscriptions to joint_states."""
+        """Return the number of subscriptions to joint_states."""
         return int(self._states.get_subscription_count())
 
     @property

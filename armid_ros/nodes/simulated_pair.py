@@ -12,7 +12,7 @@ from typing import Any
 
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import names, NodeParameter
-from armid_ros.nodes.qos import STREAM
+from armid_ros.nodes.qos import SAMPLES
 from armid_ros.nodes.running.process import run
 from armid_ros.pair.gait import read_gait
 from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
@@ -82,8 +82,8 @@ class SimulatedPairNode(ArmidNode):
         super().__init__('simulated_pair', **kwargs)
         self.pair = pair or self._make_pair()
         self._origin_ns = self.get_clock().now().nanoseconds if start_ns is None else start_ns
-        self._exo = self.create_publisher(JointState, 'exo/joint_states', STREAM)
-        self._human = self.create_publisher(JointState, 'human/joint_states', STREAM)
+        self._exo = self.create_publisher(JointState, 'exo/joint_states', SAMPLES)
+        self._human = self.create_publisher(JointState, 'human/joint_states', SAMPLES)
         self._anchor = (time.monotonic(), 0.0)
         self.offer('~/reset', self.reset)
         factor = self.value('real_time_factor')

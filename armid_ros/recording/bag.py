@@ -113,7 +113,7 @@ class Bag:
 
     @property
     def damage(self) -> str:
-        """What is wrong with the files, as far as they were read; empty for a whole bag."""
+        """Return what is wrong with the files, as far as they were read; empty for a whole bag."""
         said = (*(source.damage for source in self._sources), str(self._damage))
         return '; '.join(dict.fromkeys(filter(None, said)))
 

@@ -215,7 +215,7 @@ class Recording:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints n."""
+        """Return the number of joints n."""
         return len(self.joints)
 
     @property

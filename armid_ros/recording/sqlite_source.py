@@ -78,7 +78,7 @@ class SqliteSource:
 
     @property
     def damage(self) -> str:
-        """What is wrong with the file, as far as it was read; empty for a whole one."""
+        """Return what is wrong with the file, as far as it was read; empty for a whole one."""
         return str(self._damage)
 
     def close(self) -> None:

@@ -155,7 +155,7 @@ class BagWriter:
 
     @property
     def topics(self) -> tuple[Topic, ...]:
-        """The topics, with the number of messages written out."""
+        """Return the topics, with the number of messages written out."""
         counts = self._mcap.counts
         return tuple(
             replace(topic, count=counts[self._channels[name]])
@@ -164,7 +164,7 @@ class BagWriter:
 
     @property
     def size(self) -> int:
-        """Number of bytes written out."""
+        """Return the number of bytes written out."""
         return self._mcap.size
 
     @property

@@ -35,7 +35,7 @@ class Bar:
 
     @property
     def text(self) -> str:
-        """What is written beside the bar."""
+        """Return what is written beside the bar."""
         return self.label or digits(self.value)
 
 

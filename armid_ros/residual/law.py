@@ -69,7 +69,7 @@ class Law:
 
     @property
     def text(self) -> str:
-        """The law in a line, such as '0.31 dq^3 - 0.02 q'."""
+        """Return the law in a line, such as '0.31 dq^3 - 0.02 q'."""
         said = ''
         for number, term in enumerate(self.terms):
             sign = '-' if term.coefficient < 0.0 else ('' if number == 0 else '+')

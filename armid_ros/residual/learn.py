@@ -90,7 +90,7 @@ class Residual:
 
     @property
     def effect(self) -> Effect:
-        """The maps as an effect."""
+        """Return the maps as an effect."""
         return self.arm.effects[-1]
 
     def sentences(self) -> tuple[str, ...]:

@@ -118,7 +118,7 @@ class Robot:
 
     @property
     def n_joints(self) -> int:
-        """Number of driven joints n."""
+        """Return the number of driven joints n."""
         return len(self.joints)
 
     @property
@@ -149,12 +149,12 @@ class Robot:
 
     @property
     def position_units(self) -> tuple[str, ...]:
-        """Unit of each joint position: 'rad' or 'm'."""
+        """Return the unit of each joint position: 'rad' or 'm'."""
         return tuple('m' if slides else 'rad' for slides in self.prismatic)
 
     @property
     def torque_units(self) -> tuple[str, ...]:
-        """Unit of each joint torque or force: 'N m' or 'N'."""
+        """Return the unit of each joint torque or force: 'N m' or 'N'."""
         return tuple('N' if slides else 'N m' for slides in self.prismatic)
 
     def index(self, joint: str) -> int:

@@ -250,7 +250,7 @@ class Plant:
 
     @property
     def sensing(self) -> Action:
-        """What effects make of the readings of motors."""
+        """Return what effects make of the readings of motors."""
         return self.action if self.springs is None else self.springs.sensing
 
     def _within_stops(self, q: FloatArray) -> FloatArray:

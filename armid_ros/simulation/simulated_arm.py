@@ -140,7 +140,7 @@ class SimulatedArm:
 
     @property
     def state(self) -> State:
-        """The true state of the arm."""
+        """Return the true state of the arm."""
         return self._state
 
     @property

@@ -150,7 +150,7 @@ def learned(damage: dict[int, tuple], velocity: bool = False) -> OnlineIdentifie
     for state in stream(damage):
         for sample in reader.read(state):
             online.update(*sample)
-            assert np.all(np.isfinite(online._estimator.values))
+            assert np.all(np.isfinite(online._learner.values))
     return online
 
 

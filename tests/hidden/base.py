@@ -157,7 +157,7 @@ class HiddenEffect(ABC):
     @property
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
-        """The true parameters."""
+        """Return the true parameters."""
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:  # noqa: B027
         """Change the description of the arm."""

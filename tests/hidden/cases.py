@@ -83,7 +83,7 @@ class Bag:
 
     @property
     def evidence(self) -> Evidence:
-        """The bag as the oracle has it."""
+        """Return the bag as the oracle has it."""
         stamps, truth = self.clean.t, self.signals
         rates = (
             np.column_stack([np.interp(stamps, truth.t, column) for column in values.T])

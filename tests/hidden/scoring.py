@@ -127,7 +127,7 @@ class Judged:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What was named; bodies that are off where the nominal bodies are off are no finding."""
+        """Return what was named; a body that is off where the nominal one is off is no finding."""
         honest = () if self.truth.exact else ('link_inertia',)
         return tuple(f for f in self.outcome.findings if f.name not in honest)
 
@@ -144,7 +144,7 @@ class Judged:
 
     @property
     def found(self) -> Finding | None:
-        """The finding that has the (first) truth among its names."""
+        """Return the finding that has the (first) truth among its names."""
         return next((f for f in self.findings if self.truth.names[0] in f.names), None)
 
     @property

@@ -75,7 +75,7 @@ class CaseSpec:
 
     @property
     def sized_as(self) -> str:
-        """The key under which the sizes of its effects are kept."""
+        """Return the key under which the sizes of its effects are kept."""
         return self.key.removesuffix('/removed')
 
 

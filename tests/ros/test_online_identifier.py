@@ -404,6 +404,16 @@ def test_a_spike_is_said_with_the_joint_and_costs_nothing(bench, arm, samples, e
     )
 
 
+def test_joint_states_that_never_came_are_counted_and_said(bench, arm, samples):
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    batch = messages(arm, samples)
+    publish(bench, node, publisher, batch[:300] + batch[301:500] + batch[503:])
+    state = statuses(bench, node)['state']
+    assert {v.key: v.value for v in state.values}['missing'] == '4'
+    assert 'joint states are missing between those that came' in node.complaints.latest
+
+
 def test_without_a_robot_the_services_say_so(bench):
     bench.add(OnlineIdentifierNode)
     for service in ('reset', 'save'):

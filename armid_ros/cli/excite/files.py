@@ -66,7 +66,7 @@ class CollisionScene:
 
     @property
     def bodies(self) -> CollisionModel:
-        """The bodies of the robot together with what stands around it."""
+        """Return the bodies of the robot together with what stands around it."""
         return with_obstacles(self.collision, self.obstacles)
 
 

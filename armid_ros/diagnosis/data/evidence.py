@@ -83,17 +83,17 @@ class Trajectory:
 
     @cached_property
     def smooth(self) -> Trajectory:
-        """The same with positions that have nothing beyond the band of the motion."""
+        """Return the same with positions that have nothing beyond the band of the motion."""
         return replace(self, motion=smoothed(self.motion))
 
     @cached_property
     def at_rows(self) -> Motion:
-        """The motion at the samples that the rows sit on."""
+        """Return the motion at the samples that the rows sit on."""
         return self.motion.select(self.rows)
 
     @cached_property
     def period(self) -> tuple[int, slice] | None:
-        """The repeated period of the motion; see `find_period`."""
+        """Return the repeated period of the motion; see `find_period`."""
         return find_period(self.motion)
 
     def residual(self, arm: ArmModel) -> FloatArray:

@@ -146,7 +146,7 @@ class Projection:
         return np.asarray((flat - self.basis @ (self.basis.T @ flat)).reshape(values.shape))
 
     def products(self, columns: FloatArray) -> FloatArray:
-        """Return the products (p, p) of what is left of weighted columns (R n, p)."""
+        """Return products, shape (p, p), of what is left of weighted columns (R n, p)."""
         made = self.basis.T @ columns
         return np.asarray(columns.T @ columns - made.T @ made)
 

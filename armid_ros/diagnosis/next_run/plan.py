@@ -71,12 +71,12 @@ class NextRun:
 
     @property
     def expected_z(self) -> float:
-        """Standard deviations between the two names that are nearest to each other."""
+        """Return the standard deviations between the two names that are nearest to each other."""
         return min(pair.z for pair in self.separations)
 
     @property
     def sentence(self) -> str:
-        """What to do and what it would show, the least sure first, for a person."""
+        """Return what to do and what it would show, the least sure first, for a person."""
         told = sorted((s for s in self.separations if s.z >= _NOTHING), key=lambda one: one.z)
         alike = [one for one in self.separations if one.z < _NOTHING]
         parts = [

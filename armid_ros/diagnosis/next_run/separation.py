@@ -62,7 +62,7 @@ class Doubt:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The joints that either acts on; none if one of them acts on the whole arm."""
+        """Return the joints that either acts on; none if one of them acts on the whole arm."""
         if not self.named.effect.joints or not self.rival.joints:
             return ()
         return tuple(dict.fromkeys((*self.named.effect.joints, *self.rival.joints)))
@@ -97,7 +97,7 @@ class Separation:
 
     @property
     def z(self) -> float:
-        """Standard deviations between the two."""
+        """Return the standard deviations between the two."""
         return float(np.sqrt(self.power))
 
     @staticmethod

@@ -65,7 +65,7 @@ class Group:
 
     @property
     def size(self) -> int:
-        """Number of its columns."""
+        """Return the number of its columns."""
         return int(self.columns.stop) - int(self.columns.start)
 
 

@@ -98,12 +98,12 @@ class Told:
 
     @cached_property
     def columns(self) -> FloatArray:
-        """A row for every joint and sample, shape (S, r)."""
+        """Return a row for every joint and sample, shape (S, r)."""
         return np.concatenate([rows.reshape(-1, rows.shape[2]) for rows in self.rows])
 
     @cached_property
     def left(self) -> FloatArray:
-        """What is left in these rows, shape (S,)."""
+        """Return what is left in these rows, shape (S,)."""
         return np.concatenate([rest.ravel() for rest in self.rest])
 
     @cached_property

@@ -93,7 +93,7 @@ class Trial:
 
     @cached_property
     def z(self) -> float:
-        """The slope over its deviation."""
+        """Return the slope over its deviation."""
         scatter = self.cross - self.slope * self.square
         count = len(scatter)
         deviation = np.sqrt(np.sum(scatter**2) * count / (count - 1))

@@ -64,7 +64,7 @@ class Patch:
 
     @property
     def model(self) -> ArmModel:
-        """The arm with what was named."""
+        """Return the arm with what was named."""
         model = self.arm
         for own, values in zip(self.named, self.values, strict=True):
             model = with_named(model, own.effect, values)

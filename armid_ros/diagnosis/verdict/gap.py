@@ -75,7 +75,7 @@ class Gap:
 
     @property
     def data(self) -> str:
-        """What it was measured on, for a reader."""
+        """Return what it was measured on, for a reader."""
         return 'held-out' if self.predicted else 'the data it was found in'
 
 

@@ -88,7 +88,7 @@ class OnlineTwoInertia:
 
     @property
     def estimate(self) -> Estimate:
-        """What is known now."""
+        """Return what is known now."""
         return self._recursion.estimate
 
     def interrupt(self) -> None:

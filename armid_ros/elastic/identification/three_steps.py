@@ -87,7 +87,7 @@ class TwoInertiaIdentification:
 
     @property
     def parameters(self) -> TwoLinkParameters:
-        """The parameters after the last step."""
+        """Return the parameters after the last step."""
         return self.untuned if self.tuning is None else self.tuning.parameters
 
 

@@ -215,6 +215,6 @@ class StepResponses(Section):
 
     @property
     def rms(self) -> tuple[str, str]:
-        """What is not explained before and after, noise included [rad/s]."""
+        """Return what is not explained before and after, noise included [rad/s]."""
         before, after = self.tuning.rms
         return digits(before, 3), digits(after, 3)

@@ -74,7 +74,7 @@ class Chain:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints n."""
+        """Return the number of joints n."""
         return len(self.parents)
 
     def pose(self, q: FloatArray) -> Pose:

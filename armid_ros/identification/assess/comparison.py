@@ -62,12 +62,12 @@ class ParameterChange:
 
     @property
     def difference(self) -> float:
-        """What it grew by."""
+        """Return what it grew by."""
         return self.after - self.before
 
     @property
     def std(self) -> float:
-        """Standard deviation of the difference."""
+        """Return the standard deviation of the difference."""
         return float(np.hypot(self.before_std, self.after_std))
 
     @property
@@ -137,13 +137,13 @@ class Comparison:
 
     @property
     def changed_together(self) -> tuple[GroupChange, ...]:
-        """Groups that changed though none of their parameters did beyond doubt."""
+        """Return the groups that changed though none of their parameters did beyond doubt."""
         sure = {change.parameter for change in self.changed}
         return tuple(g for g in self.groups if g.changed and not sure.intersection(g.parameters))
 
     @property
     def changed(self) -> tuple[ParameterChange, ...]:
-        """What changed, the surest first."""
+        """Return what changed, the surest first."""
         found = [change for change in self.changes if change.changed]
         return tuple(sorted(found, key=lambda change: -abs(change.deviations)))
 

@@ -69,7 +69,7 @@ class ForwardScore:
 
     @property
     def worst(self) -> str:
-        """The largest position error and its joint, as it is read."""
+        """Return the largest position error and its joint, as it is read."""
         joint = int(np.argmax(self.position_error))
         return (
             f'{1e3 * self.position_error[joint]:.3g} m{self.units[joint]} ({self.joints[joint]})'

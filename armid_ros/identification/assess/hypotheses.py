@@ -53,7 +53,7 @@ class Hypothesis(ABC):
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """What is wrong and where, without by how much."""
+        """Return what is wrong and where, without by how much."""
         parts = (getattr(self, part.name) for part in fields(self) if part.compare)  # type: ignore
         return (type(self).__name__, *(v for v in parts if not isinstance(v, float | tuple)))
 

@@ -75,7 +75,7 @@ class Mistake:
 
     @property
     def joint(self) -> int:
-        """The joint with most of the torque explained."""
+        """Return the joint with most of the torque explained."""
         return int(np.argmax(self.before.joints.clip(max=1.0) - self.after.joints))
 
     def sentence(self, robot: Robot) -> str:

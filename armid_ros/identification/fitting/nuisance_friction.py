@@ -80,8 +80,8 @@ def _lacking(arm: ArmModel) -> list[Effect]:
 
 
 def by_joint(torques: FloatArray) -> FloatArray:
-    """Return torques that act on their own joint, (n, K), as rows of a regressor, (n, K n)."""
-    n, count = torques.shape
-    rows = np.zeros((n, count, n))
-    rows[np.arange(n), :, np.arange(n)] = torques
-    return rows.reshape(n, count * n)
+    """Return torques that act on their own joint, (..., n, K), as rows, (..., n, K n)."""
+    *samples, n, count = torques.shape
+    rows = np.zeros((*samples, n, count, n))
+    np.einsum('...jkj->...jk', rows)[...] = torques
+    return rows.reshape(*samples, n, count * n)

@@ -103,12 +103,12 @@ class Triangle:
 
     @property
     def rank(self) -> int:
-        """Number of columns r."""
+        """Return the number of columns r."""
         return int(self.factors.shape[2]) - 1
 
     @property
     def stacked(self) -> FloatArray:
-        """The columns of all joints as rows with the same products, shape (n (r + 1), r)."""
+        """Return the columns of all joints as rows of the same products, shape (n (r + 1), r)."""
         return self.factors[:, :, :-1].reshape(-1, self.rank)
 
     @cached_property

@@ -61,7 +61,7 @@ class PaperTable:
 
     @property
     def ratio(self) -> FloatArray:
-        """The error as the paper has it: of the peak, in Table 6 of the noise, shape (6,)."""
+        """Return the error as in the paper: of the peak, in Table 6 of the noise, shape (6,)."""
         return self.error / (self.noise if self.uniform else self.peak)
 
 

@@ -57,7 +57,7 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        """What changed where, such as 'payload at hand'."""
+        """Return what changed where, such as 'payload at hand'."""
         text = self.name.replace('_', ' ')
         return f'{text} at {self.joint}' if self.joint else text
 

@@ -29,7 +29,7 @@ from armid_ros.identification.online.recursive import Learned, WeightedSample
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg
+from scipy.linalg import lapack
 
 #: Eigenvalues of an information below this share of the largest are nothing [-].
 _NOTHING = 1e-9
@@ -72,6 +72,36 @@ class Block:
 
 
 @dataclass(frozen=True, eq=False)
+class Projected:
+    """
+    A block along the changes that are looked for; it is part of several windows.
+
+    Attributes
+    ----------
+    block : Block
+        Rows, and what was known before them.
+    moved : ndarray, shape (P, Q)
+        M D.
+    known : ndarray, shape (P, Q)
+        A D.
+
+    """
+
+    block: Block
+    moved: FloatArray
+    known: FloatArray
+
+
+def projecting(block: Block, directions: FloatArray) -> Pieces[Projected]:
+    """Project a block on what the changes do to the parameters, shape (P, Q)."""
+    moved = block.information @ directions
+    yield
+    known = block.known
+    yield
+    return Projected(block, moved, known @ directions)
+
+
+@dataclass(frozen=True, eq=False)
 class ScoreStatistics:
     """
     What a window says of Q possible changes.
@@ -98,8 +128,11 @@ class ScoreStatistics:
     def ratios(self, sets: npt.NDArray[np.intp]) -> FloatArray:
         """Return the same for G sets of p changes, of indices of shape (G, p), shape (G,)."""
         information = self.information[sets[:, :, np.newaxis], sets[:, np.newaxis, :]]
-        size, vectors = np.linalg.eigh(information)
-        squares = np.einsum('gpk,gp->gk', vectors, self.score[sets]) ** 2
+        if sets.shape[1] == 1:  # a number is its own eigenvalue, and most changes are numbers
+            size, squares = information[:, :, 0], self.score[sets] ** 2
+        else:
+            size, vectors = np.linalg.eigh(information)
+            squares = np.einsum('gpk,gp->gk', vectors, self.score[sets]) ** 2
         kept = size > _NOTHING * np.maximum(size[:, -1:], 0.0)
         return np.asarray(
             np.sum(np.divide(squares, size, where=kept, out=np.zeros_like(size)), axis=1)
@@ -115,20 +148,25 @@ def score_statistics(
     blocks: Sequence[Block], before: Block, directions: FloatArray, residual_scale: float = 1.0
 ) -> ScoreStatistics:
     """Weigh possible changes by a window of rows; see `weighing`."""
-    return at_once(weighing(blocks, before, directions, residual_scale))
+    window = [at_once(projecting(block, directions)) for block in blocks]
+    known = at_once(projecting(before, directions))
+    return at_once(weighing(window, known, directions, residual_scale))
 
 
 def weighing(
-    blocks: Sequence[Block], before: Block, directions: FloatArray, residual_scale: float = 1.0
+    window: Sequence[Projected],
+    before: Projected,
+    directions: FloatArray,
+    residual_scale: float = 1.0,
 ) -> Pieces[ScoreStatistics]:
     """
     Weigh possible changes by a window of rows, piece by piece.
 
     Parameters
     ----------
-    blocks : sequence of Block
-        The window.
-    before : Block
+    window : sequence of Projected
+        Its blocks.
+    before : Projected
         What was known when this one began is compared with the window.
     directions : ndarray, shape (P, Q)
         What the changes do to the parameters.
@@ -136,20 +174,24 @@ def weighing(
         Noise of what was learned before, in the unit of the window's.
 
     """
-    information, right = blocks[0].information, blocks[0].right
-    for block in blocks[1:]:
-        information, right = information + block.information, right + block.right
+    first = window[0]
+    information, right, moved = first.block.information, first.block.right, first.moved
+    for one in window[1:]:
+        information = information + one.block.information
+        right, moved = right + one.block.right, moved + one.moved
     yield
-    known = before.known / residual_scale**2
-    both = known + information
+    both = before.block.known / residual_scale**2 + information
     scale = 1.0 / np.sqrt(np.diag(both))
     both *= scale * scale[:, np.newaxis]
     np.fill_diagonal(both, 1.0 + _NOTHING)
     yield
-    factor = linalg.cho_factor(both, check_finite=False)
-    moved = np.column_stack([information @ directions, right - information @ before.before.values])
+    factor, _ = lapack.dpotrf(both, lower=1, clean=0)
+    score = right - information @ before.block.before.values
+    scaled = np.asfortranarray(np.column_stack([moved, score]) * scale[:, np.newaxis])
     yield
-    solved = linalg.cho_solve(factor, scale[:, np.newaxis] * moved, check_finite=False)
-    shared = (known @ directions).T @ (scale[:, np.newaxis] * solved)
-    strength = np.sum(directions * moved[:, :-1], axis=0)
+    solved, _ = lapack.dpotrs(factor, scaled, lower=1, overwrite_b=1)
+    yield
+    along = scale[:, np.newaxis] * before.known / residual_scale**2
+    shared = along.T @ solved
+    strength = np.einsum('pq,pq->q', directions, moved)
     return ScoreStatistics((shared[:, :-1] + shared[:, :-1].T) / 2.0, shared[:, -1], strength)

@@ -18,7 +18,13 @@ from dataclasses import dataclass
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.online.background import Background, Pieces
 from armid_ros.identification.online.change import Candidate
-from armid_ros.identification.online.change_score import Block, ScoreStatistics, weighing
+from armid_ros.identification.online.change_score import (
+    Block,
+    Projected,
+    projecting,
+    ScoreStatistics,
+    weighing,
+)
 from armid_ros.identification.online.null_calibration import NullCalibration, Weighed
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -93,12 +99,12 @@ class FoundChange:
 
     @property
     def before(self) -> int:
-        """The last block that is not of the change."""
+        """Return the last block that is not of the change."""
         return max(self.first - 1, 0)
 
     @property
     def after(self) -> int:
-        """The first block that is wholly of the arm as it is now."""
+        """Return the first block that is wholly of the arm as it is now."""
         return min(self.first + 1, len(self.blocks) - 1)
 
 
@@ -132,7 +138,12 @@ class ChangeSearch:
         sizes = [len(c.parameters) for c in self._candidates]
         self._sizes, ends = np.array(sizes), np.cumsum(sizes)
         self._slices = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
-        self._of_size = {size: np.flatnonzero(self._sizes == size) for size in set(sizes)}
+        firsts = ends - self._sizes
+        self._of_size = [
+            (some, firsts[some, np.newaxis] + np.arange(size))
+            for size in sorted(set(sizes))
+            for some in [np.flatnonzero(self._sizes == size)]
+        ]
         self.believe(chance)
         self.reset()
 
@@ -149,7 +160,7 @@ class ChangeSearch:
 
     def interrupt(self) -> None:
         """Begin a new stretch of blocks, which does not continue the one before."""
-        self._blocks: deque[Block] = deque(maxlen=_KEPT)
+        self._blocks: deque[Projected] = deque(maxlen=_KEPT)
         self._waiting: deque[dict[int, Weighed]] = deque()
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
@@ -164,7 +175,9 @@ class ChangeSearch:
             That noise over the one of what was learned before.
 
         """
-        self._blocks.append(block)
+        projected = yield from projecting(block, self._directions)
+        yield
+        self._blocks.append(projected)
         lengths = [m for m in _LENGTHS if m <= len(self._blocks)]
         weighed, positive = {}, False
         for m in lengths:
@@ -191,10 +204,11 @@ class ChangeSearch:
         self, found: FoundChange, residual_scale: float
     ) -> Pieces[tuple[FloatArray, FloatArray]]:
         """Return by how much a candidate has changed, and the covariance of that."""
-        blocks = found.blocks
-        window = yield from weighing(
-            blocks[found.after :], blocks[found.before], self._directions, residual_scale
-        )
+        blocks = []
+        for block in (found.blocks[found.before], *found.blocks[found.after :]):
+            blocks.append((yield from projecting(block, self._directions)))
+            yield
+        window = yield from weighing(blocks[1:], blocks[0], self._directions, residual_scale)
         yield
         number = self._candidates.index(found.best)
         values, covariance = window.size(self._slices[number])
@@ -208,9 +222,8 @@ class ChangeSearch:
 
     def _ratios(self, window: ScoreStatistics) -> FloatArray:
         ratios = np.empty(len(self._candidates))
-        for size, some in self._of_size.items():
-            first = np.array([self._slices[k].start for k in some])
-            ratios[some] = window.ratios(first[:, np.newaxis] + np.arange(size))
+        for some, sets in self._of_size:
+            ratios[some] = window.ratios(sets)
         return ratios
 
     def _judge(self, residual_scale: float) -> Pieces[FoundChange | None]:
@@ -233,12 +246,13 @@ class ChangeSearch:
         rivals = tuple(c for c in alike if not (c.includes(named) or named.includes(c)))
         if rivals and seen < _LATEST:
             return None
-        return FoundChange(tuple(self._blocks), first, named, rivals, float(at[best]))
+        blocks = tuple(projected.block for projected in self._blocks)
+        return FoundChange(blocks, first, named, rivals, float(at[best]))
 
     def _least_likelihood(self) -> float:
         """Return what counts as a change: soon after one, no mere correction of its size."""
         t, likelihood = self._fresh
-        soon = self._blocks[-1].end - t < _LEARNING
+        soon = self._blocks[-1].block.end - t < _LEARNING
         return max(_CLEAR, _CORRECTION * likelihood) if soon else _CLEAR
 
     @staticmethod
@@ -250,5 +264,5 @@ class ChangeSearch:
         """Return logarithms of likelihoods, each free parameter being charged for."""
         factors = np.concatenate([u.factors for u in self._usual.values()])
         usual = float(np.nanmedian(factors))
-        observations = sum(len(block.samples) for block in self._blocks)
+        observations = sum(len(one.block.samples) for one in self._blocks)
         return np.asarray(ratios / (2.0 * usual) - 0.5 * self._sizes * np.log(observations))

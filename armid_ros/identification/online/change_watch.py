@@ -51,7 +51,7 @@ _REMEMBERED = 240
 #: than come in the meantime, so that what came late is caught up with.
 _TOGETHER, _ONE_BY_ONE = 10, 4
 #: Samples whose nuisance rows are made in one piece of work.
-_WIDENED = 5
+_WIDENED = 3
 
 
 #: A sample, and what its nuisance rows are made from; None begins a new stretch.
@@ -243,9 +243,11 @@ class ChangeWatch:
         seeds = [seed for _, seed in samples if seed is not None]
         if self._nuisance is None or not seeds:
             return [sample for sample, _ in samples]
+        narrow = np.stack([sample.rows for sample, _ in samples])
+        rows = np.concatenate([narrow, self._nuisance.rows(seeds)], axis=2)
         return [
-            sample._replace(rows=np.hstack([sample.rows, more]))
-            for (sample, _), more in zip(samples, self._nuisance.rows(seeds), strict=True)
+            WeightedSample(wide, sample.tau, sample.weights)
+            for wide, (sample, _) in zip(rows, samples, strict=True)
         ]
 
     def _summed(

@@ -9,6 +9,11 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
+#: Who is silent for longer has stopped, and nothing is lost [s].
+_SILENCE = 10.0
+#: A stamp that is further back is of a time that begins anew [s].
+_BEHIND = 1.0
+
 
 class StreamChecks:
     """
@@ -31,12 +36,13 @@ class StreamChecks:
         self._lowest, self._highest = np.full((2, n), np.inf), np.full((2, n), -np.inf)
         self._moved: float | None = None
         self._moving = 0.0
+        self._judged: tuple[bytes, str] | None = None
 
     def take(self, t: float, q: FloatArray, tau: FloatArray) -> None:
         """Take in a sample that is not damaged: stamp, positions, torques, shape (n,)."""
-        signals = np.stack([q, tau])
-        np.minimum(self._lowest, signals, out=self._lowest)
-        np.maximum(self._highest, signals, out=self._highest)
+        for place, signal in enumerate((q, tau)):
+            np.minimum(self._lowest[place], signal, out=self._lowest[place])
+            np.maximum(self._highest[place], signal, out=self._highest[place])
         if self._moved is None and np.any(self._highest[0] - self._lowest[0] > REST_RANGE):
             self._moved = t
         self._moving = 0.0 if self._moved is None else t - self._moved
@@ -44,11 +50,67 @@ class StreamChecks:
     @property
     def silent(self) -> bool:
         """Whether no torque has ever changed, so that nothing can be learned from it."""
-        return bool(np.all(self._highest[1] <= self._lowest[1]))
+        return bool((self._highest[1] <= self._lowest[1]).all())
 
     @property
     def error(self) -> str:
-        """What has to be mended before anything can be identified; empty when all is well."""
+        """Return what to mend before anything can be identified; empty when all is well."""
         if self.silent and abs(self._moving) > SHORTEST:
             return SILENT
-        return position_problem(self._robot, self._lowest[0], self._highest[0])
+        return self._position_problem()
+
+    def _position_problem(self) -> str:
+        """Return what is wrong with the range; it is asked for each row, and seldom grows."""
+        ranged = self._lowest[0].tobytes() + self._highest[0].tobytes()
+        if self._judged is None or self._judged[0] != ranged:
+            problem = position_problem(self._robot, self._lowest[0], self._highest[0])
+            self._judged = ranged, problem
+        return self._judged[1]
+
+
+class MissingSamples:
+    """
+    Count the samples that should have come between others, by their stamps.
+
+    Where a sample is late and those after it are early, nothing is missing.
+
+    Attributes
+    ----------
+    count : int
+        Samples that never came; those of a longer silence are not counted.
+
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Set the count to zero."""
+        self.count = 0
+        self._last: float | None = None
+        self._doubtful = 0
+
+    def take(self, t: float, period: float | None) -> None:
+        """Take in a stamp [s], with the sampling period if it is known."""
+        last = self._last
+        if last is not None and last - _BEHIND < t <= last:
+            self._came_late()
+            return
+        self._last = t
+        if last is None or period is None or not 0.0 < t - last < _SILENCE:
+            self._doubtful = 0
+            return
+        steps = (t - last) / period
+        if steps >= 1.5:
+            self._doubtful = round(steps) - 1
+            self.count += self._doubtful
+        elif steps <= 0.5:
+            self._came_late()
+        else:
+            self._doubtful = 0
+
+    def _came_late(self) -> None:
+        """Take back one of those that were counted last."""
+        if self._doubtful:
+            self._doubtful -= 1
+            self.count -= 1

@@ -43,5 +43,5 @@ class History:
 
     @property
     def values(self) -> FloatArray:
-        """The rows, oldest first; they stay as they are when others come."""
+        """Return the rows, oldest first; they stay as they are when others come."""
         return self._rows[self._end - len(self) : self._end]

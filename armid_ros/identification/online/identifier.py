@@ -6,27 +6,23 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any, ClassVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import Background
-from armid_ros.identification.online.change import Change, change_candidates
-from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
-from armid_ros.identification.online.checks import StreamChecks
-from armid_ros.identification.online.nuisance_rows import NuisanceRows, Seed
-from armid_ros.identification.online.recursive import (
-    check_forgetting,
-    RecursiveLeastSquares,
-    WeightedSample,
-)
-from armid_ros.identification.online.robust_covariance import RobustCovariance
+from armid_ros.identification.online.change import Change
+from armid_ros.identification.online.change_watch import ChangeSettings
+from armid_ros.identification.online.checks import MissingSamples, StreamChecks
+from armid_ros.identification.online.learner import Learner
+from armid_ros.identification.online.nuisance_rows import Seed
+from armid_ros.identification.online.recursive import check_forgetting, WeightedSample
 from armid_ros.identification.online.sample import OnlineSample
 from armid_ros.identification.online.settings import OnlineSettings
 from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
-from armid_ros.identification.rows.row_noise import ResidualDeviation, RowNoise, sensor_noise
+from armid_ros.identification.rows.row_noise import RowNoise
 from armid_ros.identification.samples.joint_gate import joint_gate
 from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.identification.samples.straight_line import StreamSample
@@ -40,10 +36,11 @@ __all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
 
 #: Time constants of the row filter until its start, or a joint's rest, is forgotten, to 3e-3.
 _FORGOTTEN = 10.0
-#: Windows of which the colour of the noise is learned [s]: longer than what it lasts.
-_WINDOW = 4.0
 #: Pieces of work in the background per second, at the least; one for a sample at 1 kHz.
 _PIECES = 400.0
+#: Samples between two rows of which one is for learning from the row alone; where there are fewer,
+#: pieces of work have to be done with it.
+_SPARE = 4.0
 
 
 class OnlineIdentifier:
@@ -112,31 +109,13 @@ class OnlineIdentifier:
         )
         self._gate = _gate(arm, settings)
         self._checks = StreamChecks(robot)
+        self._missing = MissingSamples()
         self.latest: tuple[OnlineSample, ...] = ()
         self._row_filter = TripleLag(settings.cutoff)
         self._row_period = 1.0 / settings.rows_per_second()
-        self._estimator = RecursiveLeastSquares(
-            self.base.parameters,
-            sensor_noise(robot, settings.torque_noise),
-            forgetting=settings.forgetting,
-            prior=settings.prior,
-            start=self.base.values(arm.theta),
-            scale_covariance=settings.torque_noise is None,
-        )
-        window = max(1, round(_WINDOW / self._row_period))
         self._work = Background()
         self._crowded = False
-        self._reopened = 0
-        self._scores = RobustCovariance(window, settings.forgetting, self._work)
-        self._watch = None
-        if settings.changes is not None:
-            self._watch = ChangeWatch(
-                self._estimator,
-                NuisanceRows(arm, settings.cutoff),
-                change_candidates(arm, self.base),
-                settings.changes,
-                self._work,
-            )
+        self._learner = Learner(arm, self.base, settings, self._work)
         self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
         self._held = np.array([joint in held for joint in robot.joints])
@@ -145,22 +124,17 @@ class OnlineIdentifier:
         self._last_moving = np.full(robot.n_joints, -np.inf)
         self._last_useless: FloatArray | None = None
         self._noise: RowNoise | None = None
-        self._residual_deviation = ResidualDeviation(robot.n_joints, settings.forgetting)
 
     def reset(self) -> None:
         """Forget everything that was learned, and set the counters to zero."""
         self._work.clear()
-        self._reopened = 0
+        self._learner.reset()
         self._filter.reset()
-        self._residual_deviation.reset()
         self._checks.reset()
+        self._missing.reset()
         self.latest = ()
         if self._gate is not None:
             self._gate.reset()
-        self._estimator.reset()
-        self._scores.reset()
-        if self._watch is not None:
-            self._watch.reset()
 
     def update(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
@@ -183,7 +157,10 @@ class OnlineIdentifier:
             None between rows, while the filters settle, and for a sample that is left out.
 
         """
+        learned = self._learner.settle()
         signal = self._filter.signal(t, q, dq, tau)
+        if signal is not None:
+            self._missing.take(t, self._filter.period)
         if signal is None:
             self.latest = ()
         elif self._gate is None:
@@ -191,17 +168,24 @@ class OnlineIdentifier:
         else:
             good = self._gate.take(t, signal, self._without_consequence)
             self.latest = tuple(one for sample in good for one in self._take_good(sample))
-        self._go_on()
+        self._go_on(learned)
         return self.latest[-1] if self.latest else None
 
-    def _go_on(self) -> None:
-        """Do some of what takes long, with a sample that brings no row if there are such."""
-        if not self.latest or self._crowded:
-            self._work.advance(max(1, round(_PIECES * (self._filter.period or 0.0))))
+    def _go_on(self, learned: bool) -> None:
+        """Do some of what takes long, with a sample that does nothing else if there are such."""
+        period = self._filter.period or 0.0
+        if self.latest:
+            busy = not self._crowded
+        else:
+            busy = learned and _SPARE * period <= self._row_period
+        if not busy:
+            self._learner.settle()
+            self._work.advance(max(1, round(_PIECES * period)))
         self._crowded = bool(self.latest)
 
     def __getstate__(self) -> dict[str, Any]:
         """Finish what is under way, for a job can be in one place only."""
+        self._learner.settle()
         self._work.finish()
         return self.__dict__
 
@@ -231,13 +215,11 @@ class OnlineIdentifier:
 
     def estimate(self) -> Estimate:
         """Return values and covariance of the base parameters, errors that last included."""
-        estimate = self._estimator.estimate
-        covariance = self._scores.covariance(self._estimator.learned().root)
-        return estimate if covariance is None else replace(estimate, covariance=covariance)
+        return self._learner.estimate
 
     def model(self) -> ArmModel:
         """Return the arm with the estimate, otherwise as near as possible to what it was."""
-        return self.arm.with_theta(self.base.lift(self._estimator.values, self.arm.theta))
+        return self.arm.with_theta(self.base.lift(self._learner.values, self.arm.theta))
 
     def check(self, settings: OnlineSettings) -> None:
         """
@@ -255,7 +237,7 @@ class OnlineIdentifier:
                 raise IdentificationError(
                     f'{part.name} cannot change while samples are learned from: begin anew'
                 )
-        if self._watch is None and settings.changes is not None:
+        if not self._learner.watches and settings.changes is not None:
             raise IdentificationError(
                 'changes of the arm were not looked for from the beginning: begin anew'
             )
@@ -280,25 +262,27 @@ class OnlineIdentifier:
         self.check(settings)
         self.settings = settings
         self._filter.max_gap = settings.max_gap
-        for part in (self._estimator, self._scores, self._residual_deviation):
-            part.forgetting = settings.forgetting
-        if self._watch is not None:
-            self._watch.use(settings.changes, settings.forgetting)
+        self._learner.use(settings)
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """What has changed about the arm since the last reset, oldest first."""
-        return () if self._watch is None else tuple(self._watch.changes)
+        """Return what has changed about the arm since the last reset, oldest first."""
+        return tuple(self._learner.changes)
 
     @property
     def condition_number(self) -> float:
         """Condition number of the weighted regressor so far; takes a millisecond."""
-        return self._estimator.condition_number
+        return self._learner.condition_number
 
     @property
     def samples(self) -> int:
-        """Samples that the estimate rests on."""
-        return self._estimator.samples
+        """Return the samples that the estimate rests on."""
+        return self._learner.samples
+
+    @property
+    def missing(self) -> int:
+        """Joint states that never came, by the stamps of those that did."""
+        return self._missing.count
 
     @property
     def rejected(self) -> Mapping[str, int]:
@@ -340,9 +324,7 @@ class OnlineIdentifier:
     def _begin(self) -> None:
         """Start the row filter anew, together with the motion filter."""
         self._row_filter.reset()
-        self._scores.interrupt()
-        if self._watch is not None:
-            self._watch.interrupt()
+        self._learner.interrupt()
         self._generation = self._filter.generation
         self._last_row = None
         self._last_moving[:] = -np.inf
@@ -370,27 +352,16 @@ class OnlineIdentifier:
         stamp = motion.t - (self.delay or 0.0)
         weights = np.asarray(used * independent)
         sample = WeightedSample(rows / gain, measured / gain, weights)
-        if self._watch is None:
-            innovation = self._estimator.update(*sample)
-        else:
-            innovation = self._watch.update(stamp, sample, Seed(motion, step, gain))
-            for change in self._watch.changes[self._reopened :]:
-                self._scores.reopen(change.reopened, self._estimator.values)
-                self._reopened += 1
-        self._residual_deviation.learn(
-            innovation, sample.tau - sample.rows @ self._estimator.values, weights
-        )
-        scale = self._estimator.scale(weights) / gain
-        self._scores.add(rows * scale[:, np.newaxis], measured * scale, self._estimator.values)
+        innovation = self._learner.predict(stamp, sample, Seed(motion, step, gain))
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
 
     @property
     def _without_consequence(self) -> FloatArray:
-        """What a single sample may be off by before a row shows it, positions not so judged."""
+        """Return what one sample may be off by before a row shows it, positions not so judged."""
         n = self.arm.robot.n_joints
         floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
-        if self._filter.pole is not None and self._filter.period is not None:
-            floor[-n:] = self._residual_deviation.size * self._row_noise().single
+        if self._filter.pole is not None:
+            np.multiply(self._learner.residual_deviation, self._row_noise().single, out=floor[-n:])
         return floor
 
     def _rows(self, motion: Motion) -> FloatArray:

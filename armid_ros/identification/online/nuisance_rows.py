@@ -62,13 +62,14 @@ class NuisanceRows:
         """Begin a new stretch."""
         self._filter.reset()
 
-    def rows(self, seeds: Sequence[Seed]) -> list[FloatArray]:
-        """Return the rows of successive samples, each of shape (n, K n)."""
+    def rows(self, seeds: Sequence[Seed]) -> FloatArray:
+        """Return the rows of N successive samples, shape (N, n, K n)."""
         moved = [(s.motion.q, s.motion.dq, s.motion.ddq) for s in seeds]
         q, dq, ddq = (np.stack(part) for part in zip(*moved, strict=True))
         motion = Motion(self._joints, np.array([s.motion.t for s in seeds]), q, dq, ddq)
-        rows = []
-        for seed, torques in zip(seeds, self._friction.torques(motion), strict=True):
-            filtered = self._filter.update(seed.step, torques.reshape(-1))[2]
-            rows.append(by_joint(filtered.reshape(torques.shape)) / seed.gain)
-        return rows
+        torques = self._friction.torques(motion)
+        filtered = np.empty_like(torques)
+        for seed, raw, place in zip(seeds, torques, filtered, strict=True):
+            smooth = self._filter.update(seed.step, raw.reshape(-1))[2]
+            np.divide(smooth.reshape(raw.shape), seed.gain, out=place)
+        return by_joint(filtered)

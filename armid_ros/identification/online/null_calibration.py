@@ -108,6 +108,7 @@ class NullCalibration:
         self._variance = (square + _TAIL * self._most**2 - self._mean**2) / below**2
         self.factors = np.full(len(sizes), np.nan)
         self._freedom = np.zeros(len(sizes))
+        self._limits: tuple[FloatArray, float, FloatArray] | None = None
 
     def learn(self, window: Weighed) -> None:
         """Take in a window in which nothing changed."""
@@ -202,11 +203,22 @@ class NullCalibration:
             window.strength / self._strength.clip(_SMALLEST), self._first
         ).clip(1.0)
         usual = 1.0 + (_MARGIN * self._tail * self.factors[judged] - 1.0) * stronger[judged]
+        result[judged] = window.ratios[judged] / (usual * self._limits_at(chance)[judged])
+        return result
+
+    def _limits_at(self, chance: float) -> FloatArray:
+        """Return what ratios over their usual size exceed with a small chance; inf: not known."""
+        known = self._limits
+        if known is not None and known[0] is self._freedom and known[1] == chance:
+            return known[2]
+        judged = self._freedom > 0.0
         sizes, freedom = self._sizes[judged], self._freedom[judged]
         # Fisher's distribution as that of a share, for scipy.stats takes ten times as long
         share = special.betaincinv(0.5 * freedom, 0.5 * sizes, chance)
-        result[judged] = window.ratios[judged] / (usual * freedom * (1.0 - share) / share)
-        return result
+        limits = np.full(len(self._sizes), np.inf)
+        limits[judged] = freedom * (1.0 - share) / share
+        self._limits = self._freedom, chance, limits
+        return limits
 
 
 def _in_pieces(values: FloatArray) -> Iterator[slice]:

@@ -299,7 +299,7 @@ class RecursiveLeastSquares:
 
     @property
     def covariance_factor(self) -> float:
-        """What the covariance is multiplied by: the variance factor, or 1 for known noise."""
+        """Return the factor of the covariance: the variance factor, or 1 for known noise."""
         return self.variance_factor if self._scale else 1.0
 
     @property

@@ -38,7 +38,7 @@ class ResidualScale:
 
     @property
     def value(self) -> FloatArray:
-        """The factor of every joint, shape (m,); 1 in the beginning."""
+        """Return the factor of every joint, shape (m,); 1 in the beginning."""
         return np.ones(1) if self._value is None else self._value
 
     def learn(self, residual: FloatArray, weights: FloatArray) -> None:

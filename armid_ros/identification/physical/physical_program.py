@@ -76,7 +76,7 @@ class PhysicalProgram:
 
     @property
     def n_links(self) -> int:
-        """Number of links n."""
+        """Return the number of links n."""
         return (len(self.prior) - len(self.lower)) // PER_LINK
 
     @property

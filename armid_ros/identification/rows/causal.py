@@ -17,9 +17,9 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Mapping
-from dataclasses import dataclass
 import math
 from types import MappingProxyType
+from typing import NamedTuple
 
 from armid_ros.errors import IdentificationError
 from armid_ros.motion import FloatArray
@@ -43,8 +43,6 @@ _GAP = 1.5
 LARGEST = 1e6
 #: Intervals whose median is taken as the sampling period.
 _PERIOD_INTERVALS = 20
-
-_STAGES = np.arange(1.0, 4.0)
 
 
 def check_gap(samples: int) -> None:
@@ -71,9 +69,9 @@ class TripleLag:
     def __init__(self, cutoff: float) -> None:
         self.pole = pole_of(cutoff)
         self._dt = 0.0
-        self._transition = np.eye(3)
-        self._stages: FloatArray | None = None
-        self._input: FloatArray | None = None
+        self._step = np.zeros((3, 5))
+        #: Three stages, the signal of the sample before, and how far it has moved since.
+        self._state: FloatArray | None = None
 
     @property
     def delay(self) -> float:
@@ -82,7 +80,7 @@ class TripleLag:
 
     def reset(self) -> None:
         """Forget everything; the next sample starts at rest."""
-        self._stages = None
+        self._state = None
 
     def update(self, dt: float, signal: FloatArray) -> FloatArray:
         """
@@ -101,25 +99,35 @@ class TripleLag:
             Output of the three stages; the last one is the output of the filter.
 
         """
-        if self._stages is None or self._input is None:
-            self._stages = np.repeat(signal[np.newaxis], 3, axis=0)
-        else:
-            if dt != self._dt:
-                self._set_step(dt)
-            # a ramp u is followed by stage i at u - i * slope / pole; the rest decays
-            lag = (signal - self._input) / (self.pole * dt)
-            offset = np.multiply.outer(_STAGES, lag)
-            free = self._stages - self._input + offset
-            self._stages = self._transition @ free + signal - offset
-        self._input = signal
-        return self._stages
+        if self._state is None:
+            self._state = np.repeat(signal[np.newaxis], 5, axis=0)
+            return self._state[:3].copy()
+        if dt != self._dt:
+            self._set_step(dt)
+        state = self._state
+        np.subtract(signal, state[3], out=state[4])
+        stages: FloatArray = np.dot(self._step, state)
+        state[:3], state[3] = stages, signal
+        return stages
 
     def _set_step(self, dt: float) -> None:
-        x = self.pole * dt
+        """
+        Learn what the stages become of themselves, of the signal before and of its move.
+
+        A ramp u is followed by stage i at u - i * slope / pole; the rest decays.
+
+        """
+        x, step = self.pole * dt, self._step
         self._dt = dt
-        self._transition = np.exp(-x) * np.array(
-            [[1.0, 0.0, 0.0], [x, 1.0, 0.0], [x * x / 2.0, x, 1.0]]
-        )
+        step[0, 0] = step[1, 1] = step[2, 2] = decay = math.exp(-x)
+        step[1, 0] = step[2, 1] = x * decay
+        step[2, 0] = 0.5 * x * x * decay
+        kept = ending = 0.0
+        for stage, share in enumerate((decay, x * decay, 0.5 * x * x * decay)):
+            kept += share  # of what a stage is off the signal, all stages being off alike
+            ending += kept
+            step[stage, 3] = 1.0 - kept
+            step[stage, 4] = 1.0 - (stage + 1.0 - ending) / x
 
 
 def pole_of(cutoff: float) -> float:
@@ -144,8 +152,7 @@ def _gain_of_curvature(pole: float) -> float:
     return 0.5 * pole**3 * decay * (1.0 + decay) / (1.0 - decay) ** 3
 
 
-@dataclass(frozen=True)
-class CausalMotion:
+class CausalMotion(NamedTuple):
     """
     One sample of joint motion behind the motion filter.
 
@@ -227,7 +234,7 @@ class CausalFilter:
         self._restarts: Counter[str] = Counter()
         self._revolute = np.ones(n_joints) if prismatic is None else 1.0 - np.asarray(prismatic)
         self._lag: TripleLag | None = None
-        self._gain = 1.0
+        self._outputs = np.zeros((3, 3))
         self._intervals: list[float] = []
         self._start: float | None = None
         self._last: float | None = None
@@ -248,7 +255,7 @@ class CausalFilter:
 
     @property
     def rejected(self) -> Mapping[str, int]:
-        """Samples left out: wrong_length, not_finite, impossible, out_of_order, no_velocity."""
+        """Return counts of samples that were left out, by reason."""
         return MappingProxyType(self._rejected)
 
     @property
@@ -258,7 +265,7 @@ class CausalFilter:
 
     @property
     def period(self) -> float | None:
-        """Sampling period [s], None until it is known."""
+        """Return the sampling period [s], None until it is known."""
         return self._period
 
     @property
@@ -296,11 +303,13 @@ class CausalFilter:
         if self._measured_velocity and dq is None:
             self._rejected['no_velocity'] += 1
             return None
-        if any(np.shape(part) != (self._n_joints,) for part in parts):
-            self._rejected['wrong_length'] += 1
-            return None
-        signal = np.concatenate(parts, dtype=np.float64)
-        largest = float(np.max(np.abs(signal)))
+        arrays = [np.asarray(part, dtype=np.float64) for part in parts]
+        for array in arrays:
+            if array.shape != (self._n_joints,):
+                self._rejected['wrong_length'] += 1
+                return None
+        signal = np.concatenate(arrays)
+        largest = float(np.abs(signal).max())
         if not (largest <= LARGEST and math.isfinite(t)):
             finite = math.isfinite(largest) and math.isfinite(t)
             self._rejected['impossible' if finite else 'not_finite'] += 1
@@ -367,7 +376,7 @@ class CausalFilter:
         position = signal[: self._n_joints]
         if self._position is not None:
             step = position - self._position
-            if float(np.abs(step).max()) > np.pi:
+            if float(np.abs(step).max()) > math.pi:
                 position -= 2.0 * np.pi * np.rint(step / (2.0 * np.pi)) * self._revolute
         self._position = position
         return signal
@@ -394,17 +403,18 @@ class CausalFilter:
     def _make_filter(self, period: float) -> None:
         fastest = _FASTEST_POLE / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
         self._lag = TripleLag(min(MOTION_FILTER_RATIO * self._cutoff, fastest))
-        self._gain = _gain_of_curvature(self._lag.pole * period)
+        pole = self._lag.pole
+        curvature = pole * pole / _gain_of_curvature(pole * period)
+        slope = (0.0, pole, -pole)
+        bend = slope if self._measured_velocity else (curvature, -2.0 * curvature, curvature)
+        self._outputs = np.array([(0.0, 0.0, 1.0), slope, bend])
 
     def _motion(self, t: float, stages: FloatArray) -> CausalMotion:
         n = self._n_joints
-        assert self._lag is not None
-        pole = self._lag.pole
-        one, two, three = stages
-        slope = pole * (two - three)
+        outputs = np.dot(self._outputs, stages)
+        outputs.setflags(write=False)
+        value, slope, bend = outputs
         if self._measured_velocity:
-            q, dq, ddq = three[:n], three[n : 2 * n], slope[n : 2 * n]
-        else:
-            curvature = pole * pole * (one[:n] - 2.0 * two[:n] + three[:n]) / self._gain
-            q, dq, ddq = three[:n], slope[:n], curvature
-        return CausalMotion(t, q, dq, ddq, three[-n:])
+            velocity = slice(n, 2 * n)
+            return CausalMotion(t, value[:n], value[velocity], bend[velocity], value[-n:])
+        return CausalMotion(t, value[:n], slope[:n], bend[:n], value[-n:])

@@ -61,13 +61,13 @@ class Regression:
 
     @property
     def tau(self) -> FloatArray:
-        """Filtered measured torque, shape (M, n)."""
+        """Return the filtered measured torque, shape (M, n)."""
         assert self.motion.tau is not None
         return self.motion.tau
 
     @property
     def target(self) -> FloatArray:
-        """What columns times values have to be, shape (M, n)."""
+        """Return what columns times values have to be, shape (M, n)."""
         return self.tau if self.constant is None else self.tau - self.constant
 
     def torque(self, values: FloatArray) -> FloatArray:

@@ -17,6 +17,8 @@ from scipy import signal
 _NOISE_OF_LIMIT = 0.01
 #: The same relative to how much a torque varies, before anything has been fitted to it.
 NOISE_OF_TORQUE = 0.01
+#: What is divided by is at least this.
+_LEAST_COUNT = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -51,12 +53,12 @@ class RowNoise:
 
     @property
     def gain(self) -> float:
-        """Standard deviation of the noise of a row over that of a sample."""
+        """Return the standard deviation of the noise of a row over that of a sample."""
         return float(np.sqrt(self.period * self.bandwidth))
 
     @property
     def single(self) -> float:
-        """What one sample is off by that moves a row by what noise of 1 in all samples does."""
+        """Return what one sample is off by that moves a row as noise of 1 in all samples does."""
         return self.gain / (self.period * self.peak)
 
     def independent(self, step: float) -> float:
@@ -96,7 +98,7 @@ class ResidualDeviation:
         """Take in the residual of a sample before and after it was learned, shape (n,)."""
         self._squares = self.forgetting * self._squares + weights * before * after
         self._counts = self.forgetting * self._counts + weights
-        known = np.maximum(self._counts, np.finfo(float).tiny)
+        known = np.maximum(self._counts, _LEAST_COUNT)
         self.size = np.sqrt(np.maximum(self._squares, 0.0) / known)
 
 

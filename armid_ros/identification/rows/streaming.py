@@ -57,7 +57,7 @@ class Cuts:
 
     @property
     def overlap(self) -> int:
-        """Samples that two pieces share, at most."""
+        """Return the samples that two pieces share, at most."""
         return 2 * self._margin + self.used.decimation
 
     def keep(self, piece: Recording) -> int:

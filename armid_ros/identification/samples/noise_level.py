@@ -1,10 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What predictions of a stream usually miss by: its noise, and the resolution of its signals."""
+"""
+What predictions of a stream usually miss by: its noise, and the resolution of its signals.
+
+A window of errors costs the same whether it is the second or the thousandth of a stream, for one
+sample in a hundred completes one and must not take longer than a stream can wait.
+
+"""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 
 from armid_ros.identification.samples.straight_line import (
@@ -15,6 +20,7 @@ from armid_ros.identification.samples.straight_line import (
 )
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 
 #: Predictions whose usual error is measured together.
 WINDOW = 100
@@ -36,6 +42,8 @@ class NoiseLevel:
     ----------
     count : int
         Signals m.
+    together : int, optional
+        Most samples that are learned from before `settle`.
 
     Attributes
     ----------
@@ -44,17 +52,17 @@ class NoiseLevel:
 
     """
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, together: int = 1) -> None:
         self.usual = Usual(np.inf, np.zeros(count), np.zeros(count))
         self._steps, self._most = np.full((SEEN, count), np.inf), np.zeros(count)
-        self._windows: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=_REMEMBERED)
-        self._errors: list[FloatArray] = []
-        self._moves: list[FloatArray] = []
+        self._windows = Loudest(count, _REMEMBERED)
+        self._errors, self._moves = np.empty((2, WINDOW + together, count))
+        self._waiting = 0
 
     def set(self, usual: Usual) -> None:
         """Take it as known what is usual."""
         self._windows.clear()
-        self._windows.append((usual.size, usual.noisy))
+        self._windows.append(usual.size, usual.noisy)
         self.usual = usual
 
     def forget(self) -> None:
@@ -84,23 +92,23 @@ class NoiseLevel:
 
     def learn(self, missed: Missed, move: FloatArray) -> None:
         """Take in the prediction error of a good sample and its move, shape (m,)."""
-        self._errors.append(missed.error / self.usual.growth(missed.noise, missed.bend))
-        self._moves.append(move)
+        growth = self.usual.growth(missed.noise, missed.bend)
+        np.divide(missed.error, growth, out=self._errors[self._waiting])
+        self._moves[self._waiting] = move
+        self._waiting += 1
 
     def settle(self, period: float) -> None:
         """Measure what is usual anew if a whole window of errors came."""
-        if len(self._errors) < WINDOW:
+        if self._waiting < WINDOW:
             return
-        errors = np.array(self._errors)
+        errors, moves = self._errors[: self._waiting], self._moves[: self._waiting]
+        self._waiting = 0
         self._most = np.maximum(self._most, np.abs(errors).max(axis=0))
         size = robust_scale(errors, SHARE)
-        self._windows.append((size, share_of_noise(errors, size)))
-        self.see_steps(np.array(self._moves))
-        self._errors, self._moves = [], []
-        sizes, shares = (np.array(part) for part in zip(*self._windows, strict=True))
-        loudest = np.argmax(sizes, axis=0)[np.newaxis]
-        size = np.maximum(np.take_along_axis(sizes, loudest, 0)[0], self._resolution)
-        self.usual = Usual(period, size, np.take_along_axis(shares, loudest, 0)[0])
+        self._windows.append(size, share_of_noise(errors, size))
+        self.see_steps(moves)
+        loudest = np.maximum(self._windows.size, self._resolution)
+        self.usual = Usual(period, loudest, self._windows.noisy.copy())
 
     def see_steps(self, moves: FloatArray) -> None:
         """Learn the resolution from moves of shape (k, m)."""
@@ -111,9 +119,64 @@ class NoiseLevel:
     @property
     def _resolution(self) -> FloatArray:
         """
-        The smallest step of every signal, 0 where it is not known.
+        Return the smallest step of every signal, 0 where it is not known.
 
         A signal that moves fast makes no small steps; but by its resolution it leaves any line.
 
         """
         return np.minimum(self._most, np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0))
+
+
+class Loudest:
+    """
+    How large errors were in the loudest of the last windows, and what they were like there.
+
+    A window is compared with the loudest one before it, not with all that are remembered; these
+    are looked through only when the loudest is forgotten.
+
+    Parameters
+    ----------
+    count : int
+        Signals m.
+    most : int
+        Windows that are remembered.
+
+    Attributes
+    ----------
+    size, noisy : ndarray, shape (m,)
+        Size of the errors, and share of noise in them, in the window where each is largest.
+
+    """
+
+    def __init__(self, count: int, most: int) -> None:
+        self._most = most
+        self._sizes, self._shares = np.empty((2, most, count))
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._seen = 0
+        self._when = np.zeros(self._sizes.shape[1], dtype=np.intp)
+        self.size, self.noisy = np.full((2, self._sizes.shape[1]), -np.inf)
+
+    def __len__(self) -> int:
+        """Return how many windows are remembered."""
+        return min(self._seen, self._most)
+
+    def append(self, size: FloatArray, noisy: FloatArray) -> None:
+        """Take in a window, arrays of shape (m,)."""
+        forgotten = np.flatnonzero(self._when == self._seen - self._most)
+        place = self._seen % self._most
+        self._sizes[place], self._shares[place] = size, noisy
+        self._take(np.flatnonzero(size > self.size), place, self._seen)
+        self._seen += 1
+        for signal in forgotten:
+            oldest_first = np.roll(self._sizes[:, signal], -(place + 1))
+            age = int(np.argmax(oldest_first))
+            self._take(signal, (place + 1 + age) % self._most, self._seen - self._most + age)
+
+    def _take(self, signals: np.intp | npt.NDArray[np.intp], place: int, when: int) -> None:
+        """Let a window be the loudest of some signals."""
+        self.size[signals] = self._sizes[place, signals]
+        self.noisy[signals] = self._shares[place, signals]
+        self._when[signals] = when

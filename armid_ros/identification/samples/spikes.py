@@ -119,7 +119,8 @@ class SpikeGate:
         self._early: StreamSample | None = None
         count = len(self._turn)
         self._lowest, self._highest = np.full(count, np.inf), np.full(count, -np.inf)
-        self._level = NoiseLevel(count)
+        self._level = NoiseLevel(count, together=self._max_gap + 1)
+        self._least: tuple[Usual, float, FloatArray] | None = None
         self._restart([])
 
     def take(self, t: float, x: FloatArray, floor: FloatArray | float = 0.0) -> list[StreamSample]:
@@ -238,7 +239,7 @@ class SpikeGate:
 
     @property
     def _tail(self) -> StreamSample | None:
-        """The newest sample that is not damaged for sure."""
+        """Return the newest sample that is not damaged for sure."""
         latest = self._held or self._first or self._known
         return latest[-1] if latest else None
 
@@ -295,7 +296,10 @@ class SpikeGate:
         missed = missed_by(self._known, sample, self._period)
         # a smooth signal goes on bending as it does
         bent = self._level.usual.smoothness * self._bent * missed.bend
-        off = self._off_by(missed._replace(error=missed.error - bent), floor)
+        judged = missed._replace(error=missed.error - bent)
+        if not self._held and self._surely_in_line(judged, floor):
+            return self._accept([sample], missed)
+        off = self._off_by(judged, floor)
         if not self._held:
             if float(np.max(off)) <= 1.0:
                 return self._accept([sample], missed)
@@ -375,6 +379,21 @@ class SpikeGate:
         """Return how far off its prediction a sample is, over the limit, shape (m,)."""
         limit = np.maximum(self._limits(missed, floor), _TINY)
         return np.asarray(np.abs(missed.error) / limit)
+
+    def _surely_in_line(self, missed: Missed, floor: FloatArray | float) -> bool:
+        """
+        Return whether a sample is within less than its limits, which takes a third of the time.
+
+        Limits grow with both times over which the prediction is made, and as fast as they do where
+        both grow alike; so they are at least those over a period times the smaller of the two.
+
+        """
+        least, usual = self._least, self._level.usual
+        if least is None or least[0] is not usual or least[1] != self._quantile:
+            over_a_period = usual.limits(self._quantile, 1.0, 1.0)
+            self._least = least = usual, self._quantile, over_a_period
+        limits = np.maximum(min(missed.noise, missed.bend) * least[2], floor)
+        return bool((np.abs(missed.error) <= limits).all())
 
     def _accept(
         self, samples: list[StreamSample], missed: Missed | None = None

@@ -109,7 +109,7 @@ class Usual:
 
     @cached_property
     def _shares(self) -> tuple[FloatArray, FloatArray]:
-        """Standard deviations of what is noise, and most of what is not, over `size`, (m,)."""
+        """Return standard deviations of what is noise, most of what is not, over `size`, (m,)."""
         return np.sqrt(self.noisy), np.sqrt(1.0 - self.noisy) * _HARDER
 
     def limits(self, quantile: float, noise: Factor, bend: Factor) -> FloatArray:
@@ -173,17 +173,22 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
 
 def robust_scale(missed: FloatArray, share: float) -> FloatArray:
     """Return the standard deviation of which a normal variable exceeds so few of the errors."""
-    size = np.quantile(np.abs(missed), share, axis=0)
-    return np.asarray(size / _normal_quantile(share))
+    ordered = np.sort(np.abs(missed), axis=0)  # numpy's quantile takes ten times as long
+    place = share * (len(ordered) - 1)
+    first = int(place)
+    low, high = ordered[first], ordered[min(first + 1, len(ordered) - 1)]
+    return np.asarray((low + (place - first) * (high - low)) / _normal_quantile(share))
 
 
 def share_of_noise(missed: FloatArray, size: FloatArray) -> FloatArray:
     """Return the share of white noise in the squares of successive errors of shape (k, m)."""
-    errors = np.clip(missed, -_CLIPPED * size, _CLIPPED * size)
-    squares = np.sum(errors**2, axis=0)
-    products = np.sum(errors[1:] * errors[:-1], axis=0)
+    most = _CLIPPED * size
+    errors = np.minimum(np.maximum(missed, -most), most)
+    squares = np.einsum('k...,k...->...', errors, errors)
+    products = np.einsum('k...,k...->...', errors[1:], errors[:-1])
     correlation = np.divide(products, squares, where=squares > 0.0, out=np.ones_like(squares))
-    return np.asarray(np.clip((1.0 - correlation) / (1.0 - _NOISE_CORRELATION), 0.0, 1.0))
+    share = (1.0 - correlation) / (1.0 - _NOISE_CORRELATION)
+    return np.asarray(np.minimum(np.maximum(share, 0.0), 1.0))
 
 
 @cache

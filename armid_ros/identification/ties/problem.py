@@ -119,7 +119,7 @@ class InteractionProblem:
 
     @property
     def position_noise(self) -> FloatArray:
-        """Standard deviation of the angles of both machines, shape (J,) [rad]."""
+        """Return the standard deviation of the angles of both machines, shape (J,) [rad]."""
         variance = np.diag(self.motion_noise)
         return np.asarray(np.sqrt(variance[: len(variance) // 3]))
 

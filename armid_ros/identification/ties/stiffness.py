@@ -87,7 +87,7 @@ class Interaction:
 
     @property
     def bias(self) -> FloatArray:
-        """What noisy angles would have done to them, shape (S,) [N/m]."""
+        """Return what noisy angles would have done to them, shape (S,) [N/m]."""
         return np.asarray(self.uncorrected[: len(self.segments)] - self.stiffness)
 
     def interval(self, confidence: float = 0.95) -> FloatArray:

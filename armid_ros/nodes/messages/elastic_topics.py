@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.nodes.qos import STREAM
+from armid_ros.nodes.qos import SAMPLES
 from armid_ros.recording.elastic_topics import imu_topic, LINK, REFERENCE
 from armid_ros.simulation.simulated_arm import LinkSample, SimulatedArm
 from builtin_interfaces.msg import Time
@@ -31,7 +31,7 @@ class ElasticTopics:
             return node.create_publisher(
                 kind,
                 topic.lstrip('/'),
-                STREAM,
+                SAMPLES,
                 qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             )
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 from typing import NamedTuple
 
@@ -12,6 +13,11 @@ from armid_ros.identification.samples.joint_merge import JointMerger
 from armid_ros.identification.samples.joint_order import JointOrder
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.complaints import Complaints
+from armid_ros.recording.joint_state.message import (
+    JointStateMessages,
+    JointStateValues,
+    MalformedMessage,
+)
 import numpy as np
 import numpy.typing as npt
 from rclpy.clock import Clock
@@ -62,7 +68,8 @@ class JointStateReader:
         self._joints = JointOrder(joints)
         self._complaints = complaints
         self._clock = clock
-        self._names: list[str] | None = None
+        self._messages = JointStateMessages()
+        self._names: Sequence[str] | None = None
         self._some: tuple[int, ...] = ()
         self._whole = False
         self._merger: JointMerger | None = None
@@ -78,13 +85,30 @@ class JointStateReader:
         together with those of other senders.
 
         """
+        stamp, fields = message.header.stamp, (message.position, message.velocity, message.effort)
+        values = (np.array(field, dtype=np.float64) for field in fields)
+        return self._read(JointStateValues(stamp.sec, stamp.nanosec, tuple(message.name), *values))
+
+    def read_serialized(self, data: bytes) -> list[JointSample]:
+        """Return the same of a message as it came, which takes a third of the time."""
         try:
-            if message.name != self._names:
-                self._match(message.name)
-            stamp = self._time(message)
-            q = self._values(message, 'position')
-            dq = self._values(message, 'velocity') if message.velocity else None
-            tau = self._values(message, 'effort')
+            values = self._messages.read(data)
+        except MalformedMessage as error:
+            self._complaints.say('joint_states', str(error))
+            return []
+        return self._read(values)
+
+    def _read(self, message: JointStateValues) -> list[JointSample]:
+        try:
+            if message.names is not self._names and message.names != self._names:
+                self._match(message.names)
+            self._names = message.names
+            stamp = self._time(message.sec, message.nanosec)
+            q = self._values(message.names, message.position, 'position')
+            dq = None
+            if len(message.velocity):
+                dq = self._values(message.names, message.velocity, 'velocity')
+            tau = self._values(message.names, message.effort, 'effort')
         except RecordingError as error:
             self._complaints.say('joint_states', str(error))
             return []
@@ -92,7 +116,7 @@ class JointStateReader:
             return [JointSample(stamp, q, dq, tau)]
         return self._merged(stamp, q, dq, tau)
 
-    def _match(self, names: list[str]) -> None:
+    def _match(self, names: Sequence[str]) -> None:
         """Learn where the joints are in messages with these names."""
         self._names = None
         some = tuple(k for k, joint in enumerate(self._joints.joints) if joint in names)
@@ -104,7 +128,6 @@ class JointStateReader:
             wanted = JointOrder(tuple(self._joints.joints[k] for k in some))
             self._order, self._some = wanted.map(names), some
             self._merger = self._merger or JointMerger(len(self._joints.joints))
-        self._names = list(names)
 
     def _merged(
         self, stamp: float, q: FloatArray, dq: FloatArray | None, tau: FloatArray
@@ -131,18 +154,17 @@ class JointStateReader:
         """Return the stamp of a time of this reader."""
         return Time(nanoseconds=(self._epoch or 0) * 10**9 + round(t * 1e9))
 
-    def _time(self, message: JointState) -> float:
-        stamp = message.header.stamp
-        if stamp.sec == 0 and stamp.nanosec == 0:
+    def _time(self, sec: int, nanosec: int) -> float:
+        if sec == 0 and nanosec == 0:
             self._complaints.say(
                 'stamp', 'joint states without a stamp: the time of reception is used'
             )
-            stamp = self._clock.now().to_msg()
-        if stamp.sec < 0 or stamp.nanosec >= 10**9:
+            sec, nanosec = divmod(self._clock.now().nanoseconds, 10**9)
+        if sec < 0 or nanosec >= 10**9:
             raise RecordingError('joint states with a stamp that is no time are left out')
         if self._epoch is None:
-            self._epoch = stamp.sec
-        return float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec
+            self._epoch = sec
+        return float(sec - self._epoch) + 1e-9 * nanosec
 
     @property
     def _wanted(self) -> tuple[str, ...]:
@@ -150,16 +172,15 @@ class JointStateReader:
         joints = self._joints.joints
         return joints if self._merger is None else tuple(joints[k] for k in self._some)
 
-    def _values(self, message: JointState, name: str) -> FloatArray:
-        field = getattr(message, name)
-        if len(field) != len(message.name):
+    def _values(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
+        if len(field) != len(names):
             hint = '; identification needs measured torque' if name == 'effort' else ''
             raise RecordingError(
-                f'joint states with {len(message.name)} names but {len(field)} of {name}{hint}'
+                f'joint states with {len(names)} names but {len(field)} of {name}{hint}'
             )
-        values = np.frombuffer(field)[self._order]
-        # a plain sum of a few numbers is quicker than numpy; joints left out may well be NaN
-        if not math.isfinite(sum(field)) and not np.all(np.isfinite(values)):
+        values = field[self._order]
+        # one sum instead of isfinite; joints left out may well be NaN
+        if not math.isfinite(np.add.reduce(values)) and not np.all(np.isfinite(values)):
             joint = self._wanted[int(np.argmin(np.isfinite(values)))]
             raise RecordingError(f"joint states where the {name} of '{joint}' is not a number")
         return values

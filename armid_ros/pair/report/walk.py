@@ -82,7 +82,7 @@ class Walk(Section):
 
     @property
     def choices(self) -> list[str]:
-        """What can be shown."""
+        """Return what can be shown."""
         figure = {'hip': ' (figure 3)', 'knee': ' (figure 4)'}
         return [
             'as prescribed',
@@ -95,7 +95,7 @@ class Walk(Section):
 
     @property
     def held(self) -> tuple[str, str]:
-        """The largest moments that keep trunks at their lean, machine and wearer [N m]."""
+        """Return the largest moments that keep trunks at their lean, machine and wearer [N m]."""
         own, other = (
             f'{np.abs(self.cycle.trunk_moment(other=other)).max():.0f}' for other in (False, True)
         )

@@ -167,7 +167,7 @@ class JointStateLayout:
 
     @cached_property
     def names_pattern(self) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32]]:
-        """The words of the names, and which of their bits are not padding."""
+        """Return the words of the names, and which of their bits are not padding."""
         words = _align(self.names_end, 4) - self.names_offset
         text, mask = bytearray(words), bytearray(words)
         struct.pack_into(self.order + 'I', text, 0, len(self.names))

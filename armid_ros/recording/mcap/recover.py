@@ -44,7 +44,7 @@ class RecoveryReport:
 
     @property
     def messages(self) -> int:
-        """Number of messages saved."""
+        """Return the number of messages saved."""
         return sum(topic.count for topic in self.topics)
 
     def describe(self) -> str:

@@ -73,7 +73,7 @@ class McapSource:
 
     @property
     def damage(self) -> str:
-        """What is wrong with the file, as far as it was read; empty for a whole one."""
+        """Return what is wrong with the file, as far as it was read; empty for a whole one."""
         return str(self._found.damage)
 
     def close(self) -> None:

@@ -108,7 +108,7 @@ class McapWriter:
 
     @property
     def size(self) -> int:
-        """Number of bytes in the file for good."""
+        """Return the number of bytes in the file for good."""
         return self._done.position
 
     @property
@@ -122,12 +122,12 @@ class McapWriter:
 
     @property
     def chunk_count(self) -> int:
-        """Number of chunks in the file."""
+        """Return the number of chunks in the file."""
         return self._done.chunks
 
     @property
     def counts(self) -> Counter[int]:
-        """Number of messages of each channel in the file."""
+        """Return the number of messages of each channel in the file."""
         return Counter(self._done.counts)
 
     @property

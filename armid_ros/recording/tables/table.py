@@ -65,7 +65,7 @@ class TableColumn:
 
     @property
     def bare_name(self) -> str:
-        """The name without a unit in brackets behind it."""
+        """Return the name without a unit in brackets behind it."""
         return self.name if self.array else _UNIT.sub('', self.name)
 
 

@@ -202,5 +202,5 @@ class Methods(Section):
 
     @property
     def notes(self) -> list[tuple[str, str]]:
-        """Method and note of those that have one."""
+        """Return the method and note of those that have one."""
         return [(score.method, score.note) for score in self.scores if score.note]

@@ -59,7 +59,7 @@ class CandidateTable(Section):
 
     @property
     def rows(self) -> Sequence[CandidateRow]:
-        """The best candidates."""
+        """Return the best candidates."""
         explanation = self.diagnosis.explanation
         survey = None if explanation is None else explanation.survey
         if survey is None:

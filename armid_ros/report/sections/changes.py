@@ -31,7 +31,7 @@ class ChangeRow:
 
     @property
     def label(self) -> str:
-        """The parameter, or its joint where the heading says the kind."""
+        """Return the parameter, or its joint where the heading says the kind."""
         name = self.change.parameter
         return name.name if name.rigid else name.joint or name.name
 

@@ -59,7 +59,7 @@ class Correlations(Section):
 
     @property
     def picture(self) -> str:
-        """The matrix as an image of one pixel an entry, transparent where it is zero."""
+        """Return the matrix as an image of one pixel an entry, transparent where it is zero."""
         rho = self._sorted()
         pixels = np.zeros((*rho.shape, 4))
         pixels[rho >= 0.0, :3] = _POSITIVE

@@ -99,7 +99,7 @@ class DataQuality(Section):
 
     @property
     def repeating(self) -> list[tuple[str, float, list[tuple[str, str, str, float]]]]:
-        """Recording, period, and each joint: what varies, the residual, what repeats of it."""
+        """Return recording, period, per joint what varies, the residual, what repeats of it."""
         if self.robot is None:
             return []
         return [

@@ -55,7 +55,7 @@ class Shares(Section):
 
     @property
     def data(self) -> str:
-        """What the shares were measured on."""
+        """Return what the shares were measured on."""
         gap = self.diagnosis.gap
         if gap is not None and gap.predicted:
             return 'on recordings that were not used'
@@ -115,7 +115,7 @@ class EvidenceSection(Section):
 
     @property
     def shown(self) -> Sequence[Where]:
-        """The worst joints."""
+        """Return the worst joints."""
         return self.places[:_MOST]
 
     def charts(self, place: Where) -> list[tuple[str, Chart]]:
@@ -234,7 +234,7 @@ class PatchSection(Section):
 
     @property
     def yaml(self) -> str:
-        """The effects of the patched model."""
+        """Return the effects of the patched model."""
         start = max(self.text.find('effects:'), 0)
         end = self.text.find('\nmisfit:')
         return self.text[start:end] if end > start else self.text[start:]

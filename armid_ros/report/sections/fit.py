@@ -130,7 +130,7 @@ class FitSection(Section):
 
     @property
     def errors(self) -> list[tuple[str, str, float]]:
-        """Recording, role and relative error [%], worst first within each role."""
+        """Return the recording, role and relative error [%], worst first within each role."""
         rows = []
         for role, group in (('held-out', self.validation), ('training', self.training)):
             scored = [
@@ -147,7 +147,7 @@ class FitSection(Section):
 
     @property
     def shown(self) -> list[ShownRecording]:
-        """The worst held-out recording, and the worst of the training data."""
+        """Return the worst held-out recording, and the worst of the training data."""
         chosen = []
         for role, group in (('held-out', self.validation), ('training', self.training)):
             if group:

@@ -42,7 +42,7 @@ class Forward(Section):
 
     @property
     def drawn(self) -> list[tuple[ForwardValidation, BarChart, Chart]]:
-        """Recording, errors of its joints, and the error of the worst over time."""
+        """Return the recording, errors of its joints, and the error of the worst over time."""
         return [(pair, self._bars(pair), self._chart(pair)) for pair in self.pairs]
 
     def _bars(self, pair: ForwardValidation) -> BarChart:

@@ -67,7 +67,7 @@ class GapBars(Section):
 
     @property
     def where(self) -> str:
-        """What it was measured on."""
+        """Return what it was measured on."""
         return 'recordings that were not used' if self.gap.predicted else self.gap.data
 
     @property
@@ -109,7 +109,7 @@ class GapOverlay(Section):
 
     @property
     def joint(self) -> int:
-        """The joint with the largest gap."""
+        """Return the joint with the largest gap."""
         return int(np.argmax(self.gap.chi2_before))
 
     @property
@@ -119,12 +119,12 @@ class GapOverlay(Section):
 
     @property
     def source(self) -> str:
-        """What the recording is called that is shown."""
+        """Return what the recording is called that is shown."""
         return self.names.get(self.overlay.source, self.overlay.source)
 
     @property
     def overlay(self) -> Overlay:
-        """The recording in which it is largest."""
+        """Return the recording in which it is largest."""
         j = self.joint
 
         def size(overlay: Overlay) -> float:

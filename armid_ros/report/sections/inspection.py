@@ -30,7 +30,7 @@ class ContentsSection(Section):
 
     @property
     def facts(self) -> list[tuple[str, str]]:
-        """What is to be said of its time."""
+        """Return what is to be said of its time."""
         sampling, recording = self.found.sampling, self.found.recording
         facts = [
             ('Duration', f'{sampling.duration:.2f} s, {len(recording)} samples'),

@@ -139,10 +139,10 @@ class ParameterSection(Section):
 
     @property
     def changed(self) -> int:
-        """Number of parameters whose interval leaves out the description's value."""
+        """Return the number of parameters whose interval leaves out the description's value."""
         return sum(row.changed for _, _, rows in self.families for row in rows)
 
     @property
     def described_count(self) -> int:
-        """Number of parameters of which the description has a value."""
+        """Return the number of parameters of which the description has a value."""
         return sum(row.known for _, _, rows in self.families for row in rows)

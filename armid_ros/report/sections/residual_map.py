@@ -90,7 +90,7 @@ class ResidualMap(Section):
 
     @property
     def pictures(self) -> list[Picture]:
-        """A map a joint."""
+        """Return a map a joint."""
         return [self._picture(one) for one in self.residual.joints]
 
     def _unit(self, one: JointResidual) -> str:

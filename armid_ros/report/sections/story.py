@@ -57,7 +57,7 @@ class Story(Section):
 
     @property
     def picture(self) -> Markup:
-        """The arm, in a pose that it was in."""
+        """Return the arm, in a pose that it was in."""
         data = self.diagnosis.data
         q = np.concatenate([part.at_rows.q for part in data]) if data else None
         robot = self.diagnosis.arm.robot
@@ -66,7 +66,7 @@ class Story(Section):
 
     @property
     def caption(self) -> str:
-        """What the drawing shows."""
+        """Return what the drawing shows."""
         names = ', '.join(one.name.replace('_', ' ') for one in self.diagnosis.findings)
         if self.whole_arm:
             return f'coloured: the whole arm ({names})'

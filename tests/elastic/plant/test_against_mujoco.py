@@ -15,7 +15,7 @@ from benchmarks.elastic import MANY, mujoco_arm, run_mujoco, steps
 
 @pytest.mark.parametrize('number', range(4))
 def test_steps_move_both_alike(number) -> None:
-    """MuJoCo's own error at 5 us is about 1e-4 rad/s, falling with the first power."""
+    """The error of MuJoCo itself at 5 us is about 1e-4 rad/s, falling with the first power."""
     shipped = two_link_set('after')
     experiment = steps()[number]
     loop = two_link_loop(shipped)

@@ -86,7 +86,7 @@ class Chain:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints n."""
+        """Return the number of joints n."""
         return len(self.joints)
 
     def with_gravity(self, gravity: FloatArray) -> Chain:

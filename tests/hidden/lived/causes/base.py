@@ -77,7 +77,7 @@ class Cause(ABC):
     @property
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
-        """The true parameters, as the catalogue names them."""
+        """Return the true parameters, as the catalogue names them."""
 
     def bodies(self, chain: Chain) -> Chain:
         """Change the rigid arm or its gravity."""

@@ -1,0 +1,190 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What an online identifier learns from one row after the other, in two steps.
+
+A row has to say at once what the estimate before it predicts. That it is learned from may wait for
+the next sample, which as a rule brings no row: so no sample has to do both. Whoever asks for what
+is learned does not notice, for it is learned then at the latest.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from armid_ros.arm import ArmModel
+from armid_ros.estimate import Estimate
+from armid_ros.identification.online.background import Background
+from armid_ros.identification.online.change import Change, change_candidates
+from armid_ros.identification.online.change_watch import ChangeWatch
+from armid_ros.identification.online.nuisance_rows import NuisanceRows, Seed
+from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
+from armid_ros.identification.online.robust_covariance import RobustCovariance
+from armid_ros.identification.online.settings import OnlineSettings
+from armid_ros.identification.rows.row_noise import ResidualDeviation, sensor_noise
+from armid_ros.model import BaseParameters
+from armid_ros.motion import FloatArray
+
+#: Windows of which the colour of the noise is learned [s]: longer than what it lasts.
+_WINDOW = 4.0
+
+
+class _Row(NamedTuple):
+    """A row that was predicted and is to be learned from."""
+
+    t: float
+    sample: WeightedSample
+    seed: Seed
+    innovation: FloatArray
+
+
+class Learner:
+    """
+    Learns the base parameters of an arm, how certain they are, and when they have changed.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Structure.
+    base : BaseParameters
+        What is estimated.
+    settings : OnlineSettings
+        Weights and forgetting.
+    work : Background
+        Does what takes long.
+
+    """
+
+    def __init__(
+        self, arm: ArmModel, base: BaseParameters, settings: OnlineSettings, work: Background
+    ) -> None:
+        self._estimator = RecursiveLeastSquares(
+            base.parameters,
+            sensor_noise(arm.robot, settings.torque_noise),
+            forgetting=settings.forgetting,
+            prior=settings.prior,
+            start=base.values(arm.theta),
+            scale_covariance=settings.torque_noise is None,
+        )
+        window = max(1, round(_WINDOW * settings.rows_per_second()))
+        self._scores = RobustCovariance(window, settings.forgetting, work)
+        self._watch = None
+        if settings.changes is not None:
+            self._watch = ChangeWatch(
+                self._estimator,
+                NuisanceRows(arm, settings.cutoff),
+                change_candidates(arm, base),
+                settings.changes,
+                work,
+            )
+        self._residual_deviation = ResidualDeviation(arm.robot.n_joints, settings.forgetting)
+        self._reopened = 0
+        self._waiting: _Row | None = None
+
+    def reset(self) -> None:
+        """Forget everything; nothing may be left to be done in the background."""
+        self._waiting = None
+        self._reopened = 0
+        self._residual_deviation.reset()
+        self._estimator.reset()
+        self._scores.reset()
+        if self._watch is not None:
+            self._watch.reset()
+
+    def use(self, settings: OnlineSettings) -> None:
+        """Go on with another forgetting, and another belief in changes."""
+        self.settle()
+        for part in (self._estimator, self._scores, self._residual_deviation):
+            part.forgetting = settings.forgetting
+        if self._watch is not None:
+            self._watch.use(settings.changes, settings.forgetting)
+
+    def interrupt(self) -> None:
+        """Begin a new stretch of rows, which does not continue the one before."""
+        self.settle()
+        self._scores.interrupt()
+        if self._watch is not None:
+            self._watch.interrupt()
+
+    def predict(self, t: float, sample: WeightedSample, seed: Seed) -> FloatArray:
+        """
+        Take in a row, and return what the estimate before it misses the torque by.
+
+        Parameters
+        ----------
+        t : float
+            Time of the row [s].
+        sample : WeightedSample
+            The row.
+        seed : Seed
+            What it was made from.
+
+        """
+        self.settle()
+        innovation = sample.tau - sample.rows @ self._estimator.values
+        self._waiting = _Row(t, sample, seed, innovation)
+        return innovation
+
+    def settle(self) -> bool:
+        """Learn from the row that waits; return whether there was one."""
+        row, self._waiting = self._waiting, None
+        if row is None:
+            return False
+        sample, estimator = row.sample, self._estimator
+        if self._watch is None:
+            estimator.update(*sample)
+        else:
+            self._watch.update(row.t, sample, row.seed)
+            for change in self._watch.changes[self._reopened :]:
+                self._scores.reopen(change.reopened, estimator.values)
+                self._reopened += 1
+        left = sample.tau - sample.rows @ estimator.values
+        self._residual_deviation.learn(row.innovation, left, sample.weights)
+        scale = estimator.scale(sample.weights)
+        self._scores.add(sample.rows * scale[:, None], sample.tau * scale, estimator.values)
+        return True
+
+    @property
+    def watches(self) -> bool:
+        """Whether changes are looked for."""
+        return self._watch is not None
+
+    @property
+    def residual_deviation(self) -> FloatArray:
+        """Return what the estimate leaves of torques, as noise of single samples, (n,) [N m]."""
+        self.settle()
+        return self._residual_deviation.size
+
+    @property
+    def values(self) -> FloatArray:
+        """Estimated parameters, shape (P,)."""
+        self.settle()
+        return self._estimator.values
+
+    @property
+    def estimate(self) -> Estimate:
+        """Values and covariance, errors that last included."""
+        self.settle()
+        estimate = self._estimator.estimate
+        covariance = self._scores.covariance(self._estimator.learned().root)
+        return estimate if covariance is None else replace(estimate, covariance=covariance)
+
+    @property
+    def changes(self) -> Sequence[Change]:
+        """Return what has changed, oldest first; it is found in the background."""
+        return () if self._watch is None else self._watch.changes
+
+    @property
+    def condition_number(self) -> float:
+        """Condition number of the weighted regressor so far; takes a millisecond."""
+        self.settle()
+        return self._estimator.condition_number
+
+    @property
+    def samples(self) -> int:
+        """Return the samples that the estimate rests on."""
+        self.settle()
+        return self._estimator.samples

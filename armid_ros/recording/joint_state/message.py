@@ -1,0 +1,104 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Serialised JointState messages as they come, one at a time and without a Python object each."""
+
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple
+
+from armid_ros.motion import FloatArray
+from armid_ros.recording.joint_state.layout import JointStateLayout, MalformedMessage
+import numpy as np
+
+#: Layouts that are remembered: as many as senders that share a topic as a rule.
+_REMEMBERED = 8
+
+
+class JointStateValues(NamedTuple):
+    """
+    What one message says.
+
+    Attributes
+    ----------
+    sec, nanosec : int
+        Stamp.
+    names : tuple of str
+        Joints; the same object for all messages of one sender.
+    position, velocity, effort : ndarray
+        Values, as many as the message has: as a rule one per name, or none.
+
+    """
+
+    sec: int
+    nanosec: int
+    names: tuple[str, ...]
+    position: FloatArray
+    velocity: FloatArray
+    effort: FloatArray
+
+
+class JointStateMessages:
+    """Reads serialised messages, remembering where the fields of those before were."""
+
+    def __init__(self) -> None:
+        self._known: list[_Fields] = []
+
+    def read(self, data: bytes) -> JointStateValues:
+        """
+        Return the values of a message.
+
+        Raises
+        ------
+        MalformedMessage
+            The bytes are no JointState.
+
+        """
+        for fields in self._known:
+            if fields.fit(data):
+                return fields.read(data)
+        fields = _Fields(JointStateLayout.of(data))
+        self._known = [fields, *self._known[: _REMEMBERED - 1]]
+        return fields.read(data)
+
+
+class _Fields:
+    """The fields of messages of one layout, and the bytes by which they are known."""
+
+    def __init__(self, layout: JointStateLayout) -> None:
+        order = layout.order
+        self.names = layout.names
+        expected, mask = layout.names_pattern
+        self._named = slice(layout.names_offset, layout.names_offset + expected.nbytes)
+        self._text = int.from_bytes(expected.tobytes(), 'little')
+        self._mask = int.from_bytes(mask.tobytes(), 'little')
+        self._code = b'\x00\x01' if order == '<' else b'\x00\x00'
+        self._count = struct.Struct(order + 'I').unpack_from
+        self._stamp = struct.Struct(order + 'iI').unpack_from
+        counts = [(layout.count_offset(k), (count,)) for k, count in enumerate(layout.counts)]
+        self._counts = [(12, (layout.frame_length,)), *counts]
+        self._end = layout.end
+        self._type = np.dtype(order + 'f8')
+        self._places = list(zip(layout.counts, layout.offsets, strict=True))
+
+    def fit(self, data: bytes) -> bool:
+        """Return whether a message is of this layout; bytes of padding may be anything."""
+        if data[:2] != self._code or not self._end <= len(data) <= self._end + 7:
+            return False
+        if int.from_bytes(data[self._named], 'little') & self._mask != self._text:
+            return False
+        return all(self._count(data, place) == count for place, count in self._counts)
+
+    def read(self, data: bytes) -> JointStateValues:
+        """Return the values of a message of this layout."""
+        position, velocity, effort = (
+            np.frombuffer(data, self._type, count, place) if count else _NOTHING
+            for count, place in self._places
+        )
+        sec, nanosec = self._stamp(data, 4)
+        return JointStateValues(sec, nanosec, self.names, position, velocity, effort)
+
+
+_NOTHING = np.empty(0)
+
+__all__ = ['JointStateMessages', 'JointStateValues', 'MalformedMessage']

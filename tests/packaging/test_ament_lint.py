@@ -1,0 +1,34 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The linters that `colcon test` runs on a ROS 2 machine pass on this tree."""
+
+import pytest
+
+FOLDERS = ('armid_ros', 'benchmarks', 'docsite', 'examples', 'launch', 'scripts', 'tests')
+
+
+@pytest.fixture
+def folders(root):
+    return [str(root / name) for name in FOLDERS]
+
+
+def test_flake8(root, folders):
+    main = pytest.importorskip('ament_flake8.main').main
+    assert main(argv=['--config', str(root / 'ament_flake8.ini'), *folders]) == 0
+
+
+def test_pep257(folders):
+    """With the settings of the tool itself."""
+    main = pytest.importorskip('ament_pep257.main').main
+    assert main(argv=folders) == 0
+
+
+def test_copyright(folders):
+    main = pytest.importorskip('ament_copyright.main').main
+    assert main(argv=folders) == 0
+
+
+def test_xmllint(root):
+    """It asks the schema from the network, so it is left out without."""
+    main = pytest.importorskip('ament_xmllint.main').main
+    assert main(argv=[str(root / 'package.xml'), str(root / 'msg_schemas' / 'package.xml')]) == 0
