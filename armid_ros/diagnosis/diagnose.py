@@ -47,6 +47,11 @@ import numpy as np
 #: Told the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
+#: Said where no two equal periods measure the noise.
+_ASSUMED = (
+    'nothing repeats in some recordings: their noise is assumed from what rows differ by from '
+    'their neighbours; two equal periods would measure it'
+)
 #: Said where only a body that is common to both days shows what a cause does.
 _COMMON = (
     'the baseline did not determine the model for these motions: a rigid body and friction common '
@@ -195,13 +200,9 @@ def diagnose(
     tell(0.1, 'noise floor')
     prepared = prepare(arm, recordings, used, data, settings, rng)
     if any(floor.period is None for floor in prepared.floors):
-        notes.append(
-            'nothing repeats in some recordings: their noise is assumed from what rows differ by '
-            'from their neighbours; two equal periods would measure it'
-        )
-    known = None
-    if baseline:
-        known = Baseline.of(arm, trajectories(baseline, prepared.used, arm), rng)
+        notes.append(_ASSUMED)
+    before = trajectories(baseline, prepared.used, arm)
+    known = Baseline.of(arm, before, rng) if baseline else None
     context = (arm, gate, prepared, validate, settings, rng, tell)
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
