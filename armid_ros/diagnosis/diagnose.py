@@ -35,11 +35,13 @@ from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, findings, small_print
 from armid_ros.diagnosis.verdict.gap import Gap, measure_gap
 from armid_ros.diagnosis.verdict.headline import headline, shares_of, smallest
+from armid_ros.diagnosis.verdict.own_causes import own_causes_first
 from armid_ros.diagnosis.verdict.pattern import find_pattern, Pattern
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.checks import check_motion
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -47,6 +49,11 @@ import numpy as np
 #: Told the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
+#: Said where no two equal periods measure the noise.
+_ASSUMED = (
+    'nothing repeats in some recordings: their noise is assumed from what rows differ by from '
+    'their neighbours; two equal periods would measure it'
+)
 #: Said where only a body that is common to both days shows what a cause does.
 _COMMON = (
     'the baseline did not determine the model for these motions: a rigid body and friction common '
@@ -185,23 +192,16 @@ def diagnose(
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
     gate = check_data(arm, recordings, data)
-    faults, notes = list(gate.faults), [*gate.notes]
-    try:
-        notes += check_motion(arm.robot, recordings, used)
-    except IdentificationError as error:
-        faults.append(str(error))
-    if faults:
-        return _bad(arm, gate, data, tuple(faults))
+    faults, notes = _faults(arm, recordings, used)
+    if gate.faults or faults:
+        return _bad(arm, gate, data, (*gate.faults, *faults))
+    notes = [*gate.notes, *notes]
     tell(0.1, 'noise floor')
     prepared = prepare(arm, recordings, used, data, settings, rng)
     if any(floor.period is None for floor in prepared.floors):
-        notes.append(
-            'nothing repeats in some recordings: their noise is assumed from what rows differ by '
-            'from their neighbours; two equal periods would measure it'
-        )
-    known = None
-    if baseline:
-        known = Baseline.of(arm, trajectories(baseline, prepared.used, arm), rng)
+        notes.append(_ASSUMED)
+    before = trajectories(baseline, prepared.used, arm)
+    known = Baseline.of(arm, before, rng) if baseline else None
     context = (arm, gate, prepared, validate, settings, rng, tell)
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
@@ -209,14 +209,28 @@ def diagnose(
         if tied is not None:
             return _said(tied, notes, context)
     written = None if misfit is None else misfit.of(arm.robot)
-    chosen = explained(arm, prepared, known, settings, rng, tell, written)
+
+    def explain(asked: DiagnosisSettings) -> Chosen:
+        return explained(arm, prepared, known, asked, rng, tell, written)
+
+    chosen = own_causes_first(explain, settings)
     said = _said(chosen, notes, context)
     if said.verdict != 'unknown' or not chosen.explanation.steps:
         return said
     gone = {own.effect.name for own in chosen.explanation.fitted.named}
     fewer = replace(settings, library=tuple(name for name in settings.library if name not in gone))
-    again = _said(explained(arm, prepared, known, fewer, rng, tell, written), notes, context)
+    again = _said(own_causes_first(explain, fewer), notes, context)
     return again if again.findings else said
+
+
+def _faults(
+    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
+) -> tuple[list[str], list[str]]:
+    """Return what is wrong with a motion, and what a reader should know of it."""
+    try:
+        return [], list(check_motion(arm.robot, recordings, used))
+    except IdentificationError as error:
+        return [str(error)], []
 
 
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:

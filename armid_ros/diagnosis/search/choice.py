@@ -20,11 +20,9 @@ from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.search.explain import explain, Explanation
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.question import as_given, fitted_anew
 from armid_ros.diagnosis.search.round import cost
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.effects import CATALOGUE
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -72,10 +70,7 @@ def explained(
     written: FloatArray | None = None,
 ) -> Chosen:
     """
-    Explain the gap of an arm, by causes of its own where they close the gap with less freedom.
-
-    A person or a strap may act anywhere and in any way, and takes a little more of what a wrong
-    model gets wrong of any cause.
+    Explain the gap of an arm.
 
     Parameters
     ----------
@@ -95,41 +90,6 @@ def explained(
         Misfit that the model is known to have, where there are no recordings of it [N m].
 
     """
-    everything = arm, prepared, baseline, rng, tell, written
-    found = _explained(settings, everything)
-    outside = [step for step in found.explanation.steps if step.trial.group.effect.external]
-    if not outside:
-        return found
-    own = tuple(name for name in settings.library if not CATALOGUE[name].external)
-    inside = _explained(replace(settings, library=own), everything)
-    simpler = _freedom(inside.explanation, settings) <= _freedom(found.explanation, settings)
-    if not (inside.explanation.steps and simpler and _at_floor(inside.explanation, settings)):
-        return found
-    rivals = tuple(step.trial for step in outside)
-    rest = None if inside.rest is None else _with_rivals(inside.rest, rivals)
-    return replace(inside, explanation=_with_rivals(inside.explanation, rivals), rest=rest)
-
-
-def _with_rivals(explanation: Explanation, rivals: tuple[Trial, ...]) -> Explanation:
-    """Return an explanation whose first name may be something else as well."""
-    first, *others = explanation.steps
-    first = replace(first, rivals=(*first.rivals, *rivals))
-    return replace(explanation, steps=(first, *others))
-
-
-_Everything = tuple[
-    ArmModel,
-    Prepared,
-    Baseline | None,
-    np.random.Generator,
-    Progress,
-    FloatArray | None,
-]
-
-
-def _explained(settings: DiagnosisSettings, everything: _Everything) -> Chosen:
-    """Explain the gap by any cause of the library."""
-    arm, prepared, baseline, rng, tell, written = everything
     if baseline is not None:
         return _since(arm, prepared, baseline, settings, rng, tell)
     if written is not None:
@@ -140,13 +100,13 @@ def _explained(settings: DiagnosisSettings, everything: _Everything) -> Chosen:
     tell(0.2, 'the model as given')
     first = explain(given, told, settings)
     nothing = np.zeros(arm.robot.n_joints)
-    if _at_floor(first, settings):
+    if at_floor(first, settings):
         return Chosen(first, nothing, NOISE)
     tell(0.4, 'the model fitted anew')
     noise = Evidence(prepared.data, tuple(prepared.sigma), tuple(prepared.sigma))
     anew = explain(fitted_anew(arm, prepared.data, many, settings.library, rng), noise, settings)
     misfit = _left_by(anew)
-    if _at_floor(anew, settings):
+    if at_floor(anew, settings):
         misfit, words = nothing, NOISE
     else:
         tell(0.7, 'the model as given')
@@ -178,7 +138,7 @@ def _beside(
     evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
     given = as_given(arm, prepared.data, 2 * settings.thresholds.few_causes, settings.library)
     found = explain(given, evidence, settings)
-    if _at_floor(found, settings):
+    if at_floor(found, settings):
         return Chosen(found, misfit, WRITTEN_MISFIT)
     tell(0.6, 'the model fitted anew')
     sigma = tuple(np.maximum(one, misfit) for one in prepared.sigma)
@@ -247,7 +207,8 @@ def in_model_as_given(found: Explanation) -> Explanation:
     return replace(found, base=None, told=None, fitted=alone, reference=reference)
 
 
-def _at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
+def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
+    """Return whether what an explanation leaves is no gap in any joint."""
     evidence = explanation.evidence
     limits = evidence.limits(explanation.fitted.residual, settings)
     return bool(np.all(explanation.chi2_per_row <= limits))
@@ -276,14 +237,14 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     same = settings.thresholds.same_fit * least
     if np.all(after <= np.maximum(evidence.limits(left, settings), same)):
         return True
-    if _at_floor(anew, settings):
+    if at_floor(anew, settings):
         return False
     gap = max(float(evidence.count @ evidence.chi2_per_row(first.reference.residual)), 1e-300)
-    price = settings.thresholds.price * (_freedom(anew, settings) - _freedom(first, settings))
+    price = settings.thresholds.price * (freedom(anew, settings) - freedom(first, settings))
     return float(evidence.count @ (after - least)) <= price * gap
 
 
-def _freedom(explanation: Explanation, settings: DiagnosisSettings) -> float:
+def freedom(explanation: Explanation, settings: DiagnosisSettings) -> float:
     """Return how many values were chosen, those of the rigid body included."""
     body = 0 if explanation.base is None else explanation.base.rank
     return body + sum(cost(step.trial, settings) for step in explanation.steps)
