@@ -90,14 +90,18 @@ def may_be_nothing(explanation: Explanation, name: int) -> bool:
     """
     Return whether the 95 % interval of every value of a name holds zero.
 
-    Shapes are none of them: they say how it acts, and not whether.
+    Shapes are none of them: they say how it acts, and not whether. Values are asked at the shapes
+    that were found, as a drift may be slow and large or fast and small and still be there.
 
     """
     fitted = explanation.fitted
-    ends = np.cumsum([len(own.kept) + len(own.effect.shape) for own in fitted.named])
-    first = int(ends[name]) - len(fitted.named[name].kept) - len(fitted.named[name].effect.shape)
-    span = np.zeros(len(fitted.estimate.values), dtype=bool)
-    span[first : first + len(fitted.named[name].kept)] = True
-    return bool(
-        np.all(np.abs(fitted.estimate.values) <= _NORMAL * fitted.estimate.std, where=span)
-    )
+    own, sizes = fitted.named[name], [len(o.kept) + len(o.effect.shape) for o in fitted.named]
+    first = sum(sizes[:name])
+    span = np.arange(first, first + sizes[name])
+    variance = np.diag(fitted.estimate.covariance)
+    known = span[np.isfinite(variance[span])]
+    precision = np.linalg.pinv(fitted.estimate.covariance[np.ix_(known, known)], hermitian=True)
+    asked = known < first + len(own.kept)
+    at_shapes = np.linalg.pinv(precision[np.ix_(asked, asked)], hermitian=True)
+    deviation = np.sqrt(np.diag(at_shapes))
+    return bool(np.all(np.abs(fitted.estimate.values[known[asked]]) <= _NORMAL * deviation))
