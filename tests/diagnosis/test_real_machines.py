@@ -36,12 +36,10 @@ def names(found):
     return [finding.name for finding in found.findings]
 
 
-@pytest.mark.xfail(
-    strict=True, reason='what takes less than a tenth is dropped even where that opens the gap'
-)
-def test_friction_of_a_positioning_system_in_the_order_of_the_gap(real_data, tmp_path):
+@pytest.mark.xfail(strict=True, reason='an inertia is named beside friction')
+def test_friction_of_a_positioning_system(real_data, tmp_path):
     found = look(emps(real_data, tmp_path))
-    assert names(found)[:2] == ['viscous_friction', 'coulomb_friction']
+    assert set(names(found)[:2]) == {'viscous_friction', 'coulomb_friction'}
     assert 'asymmetric_friction' in names(found)
     assert set(names(found)) <= {
         'viscous_friction',
