@@ -138,7 +138,7 @@ class Separation:
             visible = np.linalg.norm(left, axis=0) > 1e-6 * np.maximum(scale, 1e-300)
             own = _basis(left[:, visible])
             powers.append(float(np.sum((rest - own @ (own.T @ rest)) ** 2)))
-        return Separation(named.name, doubt.rival.name, min(powers))
+        return Separation(named.said_as, doubt.rival.said_as, min(powers))
 
 
 @dataclass(frozen=True)
