@@ -53,8 +53,6 @@ class Fitted:
         What is left, per trajectory [N m].
     columns : tuple of ndarray, each (M, n, f)
         Columns of all that was free.
-    bare : ArmModel
-        The arm without the named effects, as it was fitted with them.
     values : tuple of ndarray
         All values of each named effect.
     hold : ndarray, shape (f, f)
@@ -69,7 +67,6 @@ class Fitted:
     estimate: Estimate
     residual: tuple[FloatArray, ...]
     columns: tuple[FloatArray, ...]
-    bare: ArmModel
     values: tuple[FloatArray, ...]
     hold: FloatArray
     pull: FloatArray
@@ -215,7 +212,6 @@ def fit(
         estimate,
         tuple(residual),
         tuple(columns),
-        state.arm,
         state.values,
         hold,
         held_to,

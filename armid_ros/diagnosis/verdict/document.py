@@ -12,6 +12,7 @@ from armid_ros.diagnosis.diagnose import Diagnosis
 from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.verdict.detectable import detectable, smallest_size
 from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -19,8 +20,6 @@ SCHEMA = 'armid/diagnosis/1'
 
 #: Candidates that are listed.
 _MOST_CANDIDATES = 20
-#: Standard deviations to either side of a 95 % interval.
-_NORMAL = 1.96
 
 
 def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[str, Any]:
@@ -89,7 +88,7 @@ def _ties(finding: Finding) -> dict[str, Any]:
                 'partner_joint': tie.other_joint,
                 'partner_point': list(tie.other_point),
                 'stiffness': value,
-                'interval': [value - _NORMAL * std, value + _NORMAL * std],
+                'interval': [value - HALF_WIDTH * std, value + HALF_WIDTH * std],
             }
         )
     return {'ties': rows}

@@ -9,10 +9,9 @@ from armid_ros.diagnosis.search.choice import in_model_as_given
 from armid_ros.diagnosis.search.explain import Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
+from armid_ros.identification.fitting.identifiability import excludes_zero
 import numpy as np
 
-#: Standard deviations to either side of a 95 % interval.
-_NORMAL = 1.96
 #: Recordings hardly show what takes less than this share of the share it takes of others.
 _HARDLY = 0.1
 
@@ -104,4 +103,4 @@ def may_be_nothing(explanation: Explanation, name: int) -> bool:
     asked = known < first + len(own.kept)
     at_shapes = np.linalg.pinv(precision[np.ix_(asked, asked)], hermitian=True)
     deviation = np.sqrt(np.diag(at_shapes))
-    return bool(np.all(np.abs(fitted.estimate.values[known[asked]]) <= _NORMAL * deviation))
+    return not np.any(excludes_zero(fitted.estimate.values[known[asked]], deviation))

@@ -11,6 +11,7 @@ from typing import Literal
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -24,8 +25,6 @@ Word = Literal[
 _SEVERAL, _ON_AVERAGE = 3, 3.5
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
-#: Standard deviations to either side of a 95 % interval.
-_NORMAL = 1.96
 
 
 @dataclass(frozen=True)
@@ -153,7 +152,7 @@ def sentence(finding: Finding, robot: Robot) -> str:
 def _weight(finding: Finding) -> str:
     """Return the mass of a payload, or that it is not determined."""
     mass, std = finding.values[0], finding.std[0]
-    if mass < _NORMAL * std:
+    if mass < HALF_WIDTH * std:
         return 'whose mass these data do not determine'
     return f'of {_as_sure(mass, std)} kg'
 
@@ -204,7 +203,7 @@ def _elsewhere(rival: Rival, joints: Sequence[str]) -> str:
 
 def _as_sure(value: float, std: float) -> str:
     """Return a value to the second digit of its 95 % interval, and that."""
-    wide = _NORMAL * std
+    wide = HALF_WIDTH * std
     if not 0.0 < wide < np.inf:
         return f'{value:.4g}'
     decimals = max(0, 1 - int(np.floor(np.log10(wide))))
