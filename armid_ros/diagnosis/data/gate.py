@@ -18,6 +18,7 @@ from itertools import product
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -69,6 +70,7 @@ def check_data(arm: ArmModel, recordings: Sequence[Recording], data: Sequence[Tr
     """Look for faults of the data."""
     slopes, correlation = _compare(_as_it_may_be(arm, data), data)
     faults = [*_time_base(recordings, _band(data)), *_torques(arm, slopes, correlation)]
+    faults += _laws(arm, data)
     return Gate(tuple(faults), tuple(_clipped(recordings)), slopes, correlation)
 
 
@@ -181,6 +183,14 @@ def _torques(arm: ArmModel, slopes: FloatArray, correlation: FloatArray) -> list
                         f'takes, {unit}: convert it'
                     )
     return faults
+
+
+def _laws(arm: ArmModel, data: Sequence[Trajectory]) -> Iterator[str]:
+    for part in data:
+        assert part.motion.tau is not None
+        rows = part.at_rows.with_torque(part.reduce(part.motion.tau))
+        for law in laws_of_controllers(arm.body, rows, part.informative):
+            yield f'{part.source or "recording"}: {law}'
 
 
 def _unlike(slopes: FloatArray, correlation: FloatArray) -> FloatArray:

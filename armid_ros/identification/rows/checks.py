@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.identification.rows.signals import Conditioning, segments
 from armid_ros.model import inverse_dynamics
@@ -97,7 +98,7 @@ def check_torque(
     arm: ArmModel, recordings: Sequence[Recording], problem: Sequence[Regression]
 ) -> tuple[str, ...]:
     """
-    Refuse torques that are absent, of the wrong sign or in another unit than N m.
+    Refuse torques that are absent, of the wrong sign, in another unit than N m, or a mere command.
 
     The sign shows in the power: over a recording an arm takes in energy and dissipates it. The
     unit shows against the rigid body of the description, if all the joints that follow it agree
@@ -136,6 +137,9 @@ def check_torque(
             f'{source}: the arm gives out energy throughout, so the torques have the wrong sign; '
             'effort has to be positive along the URDF joint axis: negate it'
         )
+    for part in problem:
+        for law in laws_of_controllers(robot, part.motion, part.informative):
+            raise IdentificationError(f'{part.source or "recording"}: {law}')
     if silent:
         return (f'torque constant throughout: {", ".join(silent)}',)
     return ()
