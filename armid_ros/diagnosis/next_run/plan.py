@@ -38,6 +38,8 @@ EXPERIMENT_FILE = 'experiment.yaml'
 _SURE = 5.0
 #: ... and not at all below this many.
 _NOTHING = 1.0
+#: Deviations beyond which more of them say nothing more: noise is not known so well.
+_CERTAIN = 30.0
 #: Pairs of names that a sentence has.
 _SAID = 3
 #: Rivals of a provisional name that has none: the next best of its ranking.
@@ -80,7 +82,7 @@ class NextRun:
         told = sorted((s for s in self.separations if s.z >= _NOTHING), key=lambda one: one.z)
         alike = [one for one in self.separations if one.z < _NOTHING]
         parts = [
-            f'it should tell {one.name} from {one.rival} by {one.z:.0f} standard deviations'
+            f'it should tell {one.name} from {one.rival} by {_many(one.z)} standard deviations'
             for one in told[:_SAID]
         ]
         if len(told) > _SAID:
@@ -111,6 +113,11 @@ class NextRun:
             ],
             'expected_z': self.expected_z,
         }
+
+
+def _many(deviations: float) -> str:
+    """Return a number of deviations as far as it says anything."""
+    return f'{deviations:.0f}' if deviations < _CERTAIN else f'more than {_CERTAIN:.0f}'
 
 
 def next_run(
