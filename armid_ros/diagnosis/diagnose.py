@@ -39,7 +39,6 @@ from armid_ros.diagnosis.verdict.headline import (
     shares_of,
     smallest,
 )
-from armid_ros.diagnosis.verdict.pattern import find_pattern, Pattern
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left
 from armid_ros.motion import FloatArray
@@ -95,8 +94,6 @@ class Diagnosis:
         Names of the catalogue that these data cannot show.
     refitted : bool
         Whether the rigid body and known effects were fitted anew.
-    pattern : Pattern or None
-        What all values that are off have in common, where nothing was named.
     notes : tuple of str
         What a reader should know.
     baseline : str
@@ -117,7 +114,6 @@ class Diagnosis:
     floors: tuple[NoiseFloor, ...]
     not_visible: tuple[str, ...]
     refitted: bool
-    pattern: Pattern | None
     notes: tuple[str, ...]
     baseline: str
 
@@ -254,11 +250,6 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         notes += more
     found = findings(explanation, shares, arm, asked.rng)
     worse = _harmed(chosen, explanation, unseen, settings)
-    pattern = None
-    if not explanation.steps and explanation.base is not None:
-        pattern = find_pattern(explanation, arm, evidence.data, evidence.sigma)
-    if pattern is not None:
-        notes.append(pattern.sentence)
     data = evidence.data
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
     left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings')]
@@ -293,7 +284,6 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         floors=floors,
         not_visible=_not_visible(explanation, settings),
         refitted=explanation.base is not None,
-        pattern=pattern,
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
     )
@@ -402,7 +392,6 @@ def _bad(
         floors=(),
         not_visible=(),
         refitted=False,
-        pattern=None,
         notes=tuple(notes),
         baseline='',
     )
