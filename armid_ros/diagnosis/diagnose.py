@@ -17,7 +17,7 @@ from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Trajectory
 from armid_ros.diagnosis.data.floor import noise_floor, NoiseFloor
-from armid_ros.diagnosis.data.gate import check_data, Gate
+from armid_ros.diagnosis.data.gate import check_data
 from armid_ros.diagnosis.data.prepare import choose_filters, prepare, Prepared
 from armid_ros.diagnosis.search.bodies import as_bodies
 from armid_ros.diagnosis.search.choice import (
@@ -28,20 +28,19 @@ from armid_ros.diagnosis.search.choice import (
     NOISE,
 )
 from armid_ros.diagnosis.search.explain import Explanation
-from armid_ros.diagnosis.search.unharmed import harmed
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.explain_ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, findings, small_print
-from armid_ros.diagnosis.verdict.gap import Gap, measure_gap
-from armid_ros.diagnosis.verdict.headline import headline, shares_of, smallest
-from armid_ros.diagnosis.verdict.own_causes import own_causes_first
-from armid_ros.diagnosis.verdict.pattern import find_pattern, Pattern
+from armid_ros.diagnosis.verdict.gap import Gap, harmed, measure_gap
+from armid_ros.diagnosis.verdict.headline import (
+    headline,
+    own_causes_first,
+    shares_of,
+    smallest,
+)
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left
-from armid_ros.errors import IdentificationError
-from armid_ros.identification.rows.checks import check_motion
-from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -87,8 +86,6 @@ class Diagnosis:
         How it was found.
     arm : ArmModel
         The patched model; as given where nothing was named or a patch would harm.
-    gate : Gate or None
-        What the data are like.
     data : tuple of Trajectory
         What was looked at.
     floors : tuple of NoiseFloor
@@ -97,8 +94,6 @@ class Diagnosis:
         Names of the catalogue that these data cannot show.
     refitted : bool
         Whether the rigid body and known effects were fitted anew.
-    pattern : Pattern or None
-        What all values that are off have in common, where nothing was named.
     notes : tuple of str
         What a reader should know.
     baseline : str
@@ -115,12 +110,10 @@ class Diagnosis:
     gap: Gap | None
     explanation: Explanation | None
     arm: ArmModel
-    gate: Gate | None
     data: tuple[Trajectory, ...]
     floors: tuple[NoiseFloor, ...]
     not_visible: tuple[str, ...]
     refitted: bool
-    pattern: Pattern | None
     notes: tuple[str, ...]
     baseline: str
 
@@ -191,46 +184,34 @@ def diagnose(
     tell(0.02, 'filtering')
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
-    gate = check_data(arm, recordings, data)
-    faults, notes = _faults(arm, recordings, used)
-    if gate.faults or faults:
-        return _bad(arm, gate, data, (*gate.faults, *faults))
-    notes = [*gate.notes, *notes]
+    faults, notes = check_data(arm, recordings, used, data)
+    if faults:
+        return _bad(arm, data, faults, notes)
     tell(0.1, 'noise floor')
     prepared = prepare(arm, recordings, used, data, settings, rng)
     if any(floor.period is None for floor in prepared.floors):
         notes.append(_ASSUMED)
     before = trajectories(baseline, prepared.used, arm)
     known = Baseline.of(arm, before, rng) if baseline else None
-    context = (arm, gate, prepared, validate, settings, rng, tell)
+    asked = _Asked(arm, prepared, validate, settings, rng, tell)
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
         tied = diagnose_ties(arm, recordings, prepared, settings)
         if tied is not None:
-            return _said(tied, notes, context)
+            return _said(tied, notes, asked)
     written = None if misfit is None else misfit.of(arm.robot)
 
-    def explain(asked: DiagnosisSettings) -> Chosen:
-        return explained(arm, prepared, known, asked, rng, tell, written)
+    def explain(by: DiagnosisSettings) -> Chosen:
+        return explained(arm, prepared, known, by, rng, tell, written)
 
     chosen = own_causes_first(explain, settings)
-    said = _said(chosen, notes, context)
+    said = _said(chosen, notes, asked)
     if said.verdict != 'unknown' or not chosen.explanation.steps:
         return said
     gone = {own.effect.name for own in chosen.explanation.fitted.named}
     fewer = replace(settings, library=tuple(name for name in settings.library if name not in gone))
-    again = _said(own_causes_first(explain, fewer), notes, context)
+    again = _said(own_causes_first(explain, fewer), notes, asked)
     return again if again.findings else said
-
-
-def _faults(
-    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
-) -> tuple[list[str], list[str]]:
-    """Return what is wrong with a motion, and what a reader should know of it."""
-    try:
-        return [], list(check_motion(arm.robot, recordings, used))
-    except IdentificationError as error:
-        return [str(error)], []
 
 
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
@@ -240,25 +221,26 @@ def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
     return replace(result, findings=large, minor=(*small, *result.minor))
 
 
-_Context = tuple[
-    ArmModel,
-    Gate,
-    Prepared,
-    Sequence[Recording],
-    DiagnosisSettings,
-    np.random.Generator,
-    Progress,
-]
+@dataclass(frozen=True)
+class _Asked:
+    """What was asked: see the parameters of `diagnose`."""
+
+    arm: ArmModel
+    prepared: Prepared
+    validate: Sequence[Recording]
+    settings: DiagnosisSettings
+    rng: np.random.Generator
+    tell: Progress
 
 
-def _said(chosen: Chosen, notes: Sequence[str], context: _Context) -> Diagnosis:
+def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     """Measure what was found on held-out data, and say it."""
-    arm, gate, prepared, validate, settings, rng, tell = context
-    tell(0.85, 'held-out gap')
+    arm, settings = asked.arm, asked.settings
+    asked.tell(0.85, 'held-out gap')
     explanation, remarks = as_bodies(chosen.explanation, arm)
     notes = [*notes, *chosen.notes, *remarks]
     evidence = explanation.evidence
-    unseen = _unseen(validate, explanation, prepared, chosen)
+    unseen = _unseen(asked, explanation, chosen)
     measured = chosen.floor_in_words in (NOISE, ESTIMATED)
     least = 0.0 if measured else settings.thresholds.headline
     rest, shares = headline(chosen.rest or explanation, unseen, settings, least)
@@ -266,13 +248,8 @@ def _said(chosen: Chosen, notes: Sequence[str], context: _Context) -> Diagnosis:
     if chosen.rest is not None and rest.steps:
         explanation, shares, more = _as_stated(rest, shares, unseen, arm, settings)
         notes += more
-    found = findings(explanation, shares, arm, rng)
+    found = findings(explanation, shares, arm, asked.rng)
     worse = _harmed(chosen, explanation, unseen, settings)
-    pattern = None
-    if not explanation.steps and explanation.base is not None:
-        pattern = find_pattern(explanation, arm, evidence.data, evidence.sigma)
-    if pattern is not None:
-        notes.append(pattern.sentence)
     data = evidence.data
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
     left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings')]
@@ -292,7 +269,7 @@ def _said(chosen: Chosen, notes: Sequence[str], context: _Context) -> Diagnosis:
     total = float(attribute(explanation, None).whole.sum())
     tried = 1 if explanation.survey is None else explanation.survey.tried
     limits = evidence.limits(explanation.fitted.residual, settings)
-    tell(1.0, word.word)
+    asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
         summary=' '.join([word.summary, *_unpatched(found, worse)]),
@@ -303,12 +280,10 @@ def _said(chosen: Chosen, notes: Sequence[str], context: _Context) -> Diagnosis:
         gap=gap,
         explanation=explanation,
         arm=explanation.fitted.arm if found and not worse else arm,
-        gate=gate,
         data=tuple(data),
         floors=floors,
         not_visible=_not_visible(explanation, settings),
         refitted=explanation.base is not None,
-        pattern=pattern,
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
     )
@@ -343,16 +318,11 @@ def _as_stated(
     return bodily, shares, [_COMMON, *remarks]
 
 
-def _unseen(
-    validate: Sequence[Recording],
-    explanation: Explanation,
-    prepared: Prepared,
-    chosen: Chosen,
-) -> Evidence | None:
+def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence | None:
     """Return recordings that are only predicted, in the unit of the gap."""
-    if not validate:
+    if not asked.validate:
         return None
-    data = trajectories(validate, prepared.used, explanation.fitted.arm)
+    data = trajectories(asked.validate, asked.prepared.used, explanation.fitted.arm)
     noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]
     sigma = [np.maximum(one, chosen.misfit) for one in noise]
     return Evidence(tuple(data), tuple(sigma), tuple(noise), explanation.evidence.varies)
@@ -406,7 +376,7 @@ def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str,
 
 
 def _bad(
-    arm: ArmModel, gate: Gate, data: Sequence[Trajectory], faults: tuple[str, ...]
+    arm: ArmModel, data: Sequence[Trajectory], faults: Sequence[str], notes: Sequence[str]
 ) -> Diagnosis:
     return Diagnosis(
         verdict='bad_data',
@@ -418,13 +388,11 @@ def _bad(
         gap=None,
         explanation=None,
         arm=arm,
-        gate=gate,
         data=tuple(data),
         floors=(),
         not_visible=(),
         refitted=False,
-        pattern=None,
-        notes=gate.notes,
+        notes=tuple(notes),
         baseline='',
     )
 

@@ -25,5 +25,5 @@ def test_an_effect_is_not_named_with_a_value_of_zero(lead):
 
 def test_nothing_is_closed_while_a_joint_is_far_above_its_noise(lead):
     elbow = float(lead.explanation.chi2_per_row[1])
-    before = float(lead.explanation.reference_chi2_per_row[1])
+    before = float(lead.gap.chi2_before[1])
     assert lead.gap.closed < 1.2 * (1.0 - (elbow - 1.0) / (before - 1.0)) + 0.02

@@ -194,7 +194,6 @@ def test_the_document_has_what_the_schema_says(bench):
         'candidates',
         'not_visible',
         'detectable',
-        'pattern',
         'model',
     }
 

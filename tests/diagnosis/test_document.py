@@ -45,7 +45,7 @@ def test_every_field_of_the_schema_is_there(document):
     assert document['verdict'] == 'named'
     assert set(document) >= {
         *('summary', 'minor', 'baseline', 'where', 'gap', 'candidates', 'not_visible'),
-        *('detectable', 'pattern', 'model'),
+        *('detectable', 'model'),
     }
     assert document['baseline'] == 'noise'
     for one in document['minor']:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which described value is wrong, by the pattern of what has changed."""
 
-from armid_ros.diagnosis import diagnose, diagnosis_document
+from armid_ros.diagnosis import diagnose
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
@@ -39,30 +39,10 @@ def links(robot, *factors):
 
 
 @pytest.mark.xfail(strict=True, reason=A_PAYLOAD)
-def test_a_factor_on_all_masses_is_a_scale_of_the_masses(bench, other):
-    found = other(links(bench.robot, 1.05, 1.05))
-    assert not found.findings
-    assert found.pattern.name == 'mass_scale'
-    assert found.pattern.factor == pytest.approx(1.05, abs=0.002)
-    assert any('masses' in note for note in found.notes)
-    assert diagnosis_document(found)['pattern']['share'] > 0.95
-
-
-@pytest.mark.xfail(strict=True, reason=A_PAYLOAD)
-def test_a_factor_on_all_torques_and_friction_is_a_gain_of_the_drives(bench):
-    hidden = bench.recordings(lambda m, tau: 0.05 * tau)
-    found = diagnose(bench.arm, hidden, rng=np.random.default_rng(0))
-    assert not found.findings
-    assert found.pattern.name == 'torque_gain'
-    assert found.pattern.factor == pytest.approx(1.05, abs=0.002)
-
-
-@pytest.mark.xfail(strict=True, reason=A_PAYLOAD)
 @pytest.mark.parametrize('factors', [(1.06, 0.96), (0.93, 1.08)])
-def test_links_that_are_off_each_by_its_own_factor_have_no_pattern(bench, other, factors):
+def test_links_that_are_off_each_by_its_own_factor_have_no_name(bench, other, factors):
     found = other(links(bench.robot, *factors))
     assert not found.findings
-    assert found.pattern is None
 
 
 def test_a_factor_in_one_joint_is_a_gain_of_its_drive(bench):

@@ -22,7 +22,6 @@ LEFT = {
     # knowledge that effects ought to have
     'diagnosis/next_run/plan.py': 1,
     'diagnosis/search/shapes.py': 2,
-    'diagnosis/verdict/pattern.py': 3,
     'diagnosis/verdict/words.py': 1,
 }
 

@@ -11,14 +11,16 @@ torques with those of the model, joint by joint, with friction and offset taken 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import product
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.rows.checks import check_motion
 from armid_ros.identification.rows.feedback import laws_of_controllers
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -42,36 +44,32 @@ _UNEVEN = 0.05
 _BLURRED = 0.1
 
 
-@dataclass(frozen=True)
-class Gate:
+def check_data(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    data: Sequence[Trajectory],
+) -> tuple[list[str], list[str]]:
     """
-    What the data are like before any physics.
+    Look for faults of the data.
 
-    Attributes
-    ----------
-    faults : tuple of str
+    Returns
+    -------
+    faults : list of str
         What makes a diagnosis meaningless, in words, with the remedy.
-    notes : tuple of str
+    notes : list of str
         What a reader should know.
-    slopes : ndarray, shape (n, n)
-        Measured torque of each joint (row) on the model's of each (column).
-    correlation : ndarray, shape (n, n)
-        The correlations that go with them.
 
     """
-
-    faults: tuple[str, ...]
-    notes: tuple[str, ...]
-    slopes: FloatArray
-    correlation: FloatArray
-
-
-def check_data(arm: ArmModel, recordings: Sequence[Recording], data: Sequence[Trajectory]) -> Gate:
-    """Look for faults of the data."""
     slopes, correlation = _compare(_as_it_may_be(arm, data), data)
     faults = [*_time_base(recordings, _band(data)), *_torques(arm, slopes, correlation)]
     faults += _laws(arm, data)
-    return Gate(tuple(faults), tuple(_clipped(recordings)), slopes, correlation)
+    notes = _clipped(recordings)
+    try:
+        notes += check_motion(arm.robot, recordings, used)
+    except IdentificationError as error:
+        faults.append(str(error))
+    return faults, notes
 
 
 def _as_it_may_be(arm: ArmModel, data: Sequence[Trajectory]) -> ArmModel:
@@ -218,7 +216,17 @@ def _clipped(recordings: Sequence[Recording]) -> list[str]:
 
 
 def _compare(arm: ArmModel, data: Sequence[Trajectory]) -> tuple[FloatArray, FloatArray]:
-    """Regress torques on the model's, with constant, velocity and its sign taken out."""
+    """
+    Regress torques on the model's, with constant, velocity and its sign taken out.
+
+    Returns
+    -------
+    slopes : ndarray, shape (n, n)
+        Measured torque of each joint (row) on the model's of each (column).
+    correlation : ndarray, shape (n, n)
+        The correlations that go with them.
+
+    """
     n = arm.robot.n_joints
     slopes, correlation = np.zeros((2, n, n))
     measured = np.concatenate([part.residual(arm) for part in data])

@@ -100,11 +100,6 @@ class Explanation:
         """Loss of each joint with the patched arm, shape (n,)."""
         return self.evidence.chi2_per_row(self.fitted.residual)
 
-    @property
-    def reference_chi2_per_row(self) -> FloatArray:
-        """Loss of each joint before, shape (n,)."""
-        return self.evidence.chi2_per_row(self.reference.residual)
-
 
 def explain(
     question: Question,
@@ -231,14 +226,11 @@ class View:
         All columns that were free, those of the base parameters first.
     fitted : Fitted
         The arm.
-    spans : tuple of (int, int)
-        Columns of each name.
 
     """
 
     problem: Problem
     fitted: Fitted
-    spans: tuple[tuple[int, int], ...]
 
     @classmethod
     def of(cls, fitted: Fitted, evidence: Evidence) -> View:
@@ -246,16 +238,21 @@ class View:
         problem = make_problem(
             evidence.data, evidence.sigma, fitted.residual, list(fitted.columns)
         )
-        first, spans = problem.x.shape[2] - len(fitted.estimate.values), []
-        for own in fitted.named:
-            spans.append((first, first + len(own.kept) + len(own.effect.shape)))
-            first = spans[-1][1]
-        return cls(problem, fitted, tuple(spans))
+        return cls(problem, fitted)
+
+    @property
+    def first(self) -> int:
+        """The first column of a name."""
+        return int(self.problem.x.shape[2]) - len(self.fitted.estimate.values)
+
+    def columns(self, name: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Return the columns of the values of a name, and those of its shapes."""
+        values, shapes = self.fitted.places[name]
+        return tuple(self.first + k for k in values), tuple(self.first + k for k in shapes)
 
     def value(self, column: int) -> float:
         """Return the value of a column of a name."""
-        size = self.problem.x.shape[2] - len(self.fitted.estimate.values)
-        return float(self.fitted.estimate.values[column - size])
+        return float(self.fitted.estimate.values[column - self.first])
 
     def without(
         self, columns: Sequence[int], values: Sequence[float], gone: Sequence[int] = ()
@@ -310,6 +307,14 @@ class View:
         beside = Beside(free, hold, pull)
         return (trials[0] if trials else None), problem, beside, float(power.sum())
 
+    def trial_of(self, name: int) -> tuple[Trial | None, Problem, Beside, float]:
+        """Judge a name as if it were asked for now, beside the others."""
+        own = self.fitted.named[name]
+        columns, shapes = self.columns(name)
+        span = slice(0, len(columns))
+        group = Group.of(own.effect, span, own.kept, self.fitted.arm.robot)
+        return self.trial(group, columns, [self.value(c) for c in columns], shapes)
+
 
 def _friction(
     question: Question,
@@ -354,10 +359,7 @@ def _friction(
             good = False
             if trial is not None:
                 here = Round(evidence, work, settings, total)
-                gains = trial.joint_gains(
-                    problem, problem.x[:, :, group.columns], beside.rows(problem)
-                )
-                good = acceptable(trial, here, whole[1]) and material(gains, here)
+                good = _stands(trial, problem, beside, here, whole[1])
                 judged[k] = trial, total
             gain = trial.gain if trial is not None else -np.inf
             if not good and (weakest is None or gain < weakest[0]):
@@ -373,6 +375,13 @@ def _friction(
         step = Step(trial, (), (trial,), total, whole[1])
         result.append((Named(effect, (0,)), step, np.array([value])))
     return result
+
+
+def _stands(trial: Trial, problem: Problem, beside: Beside, here: Round, tried: int) -> bool:
+    """Return whether a cause, whose columns come first, passes and matters."""
+    own = problem.x[:, :, : trial.group.size]
+    gains = trial.joint_gains(problem, own, beside.rows(problem))
+    return acceptable(trial, here, tried) and material(gains, here)
 
 
 def _pruned(
@@ -393,21 +402,12 @@ def _pruned(
         view = View.of(fitted, evidence)
         work = Workspace(memoized_arm(fitted.arm), data)
         needless: list[tuple[float, int]] = []
-        for k, (own, span, step) in enumerate(zip(fitted.named, view.spans, steps, strict=True)):
-            columns = range(span[0], span[0] + len(own.kept))
-            group = Group.of(own.effect, slice(0, len(columns)), own.kept, question.arm.robot)
-            shape = tuple(range(span[0] + len(own.kept), span[1]))
-            trial, problem, beside, _ = view.trial(
-                group, tuple(columns), [view.value(c) for c in columns], shape
-            )
+        for k, step in enumerate(steps):
+            trial, problem, beside, _ = view.trial_of(k)
+            here = Round(evidence, work, settings, step.total)
             if trial is None:
                 needless.append((-np.inf, k))
-                continue
-            here = Round(evidence, work, settings, step.total)
-            gains = trial.joint_gains(
-                problem, problem.x[:, :, group.columns], beside.rows(problem)
-            )
-            if not (acceptable(trial, here, step.tried) and material(gains, here)):
+            elif not _stands(trial, problem, beside, here, step.tried):
                 needless.append((trial.gain, k))
         if not needless:
             return list(fitted.named), steps, fitted

@@ -72,6 +72,17 @@ class Fitted:
     pull: FloatArray
     change: FloatArray
 
+    @property
+    def places(self) -> tuple[tuple[range, range], ...]:
+        """Where the values of each name are in the estimate, and where its shapes are."""
+        places, start = [], 0
+        for own in self.named:
+            shapes = start + len(own.kept)
+            stop = shapes + len(own.effect.shape)
+            places.append((range(start, shapes), range(shapes, stop)))
+            start = stop
+        return tuple(places)
+
 
 @dataclass(frozen=True)
 class Told:

@@ -117,12 +117,8 @@ def _explanation(ties: Ties, fitted: Fitted) -> Explanation:
     survey, rivals = _rivals(ties, reference, fitted, evidence)
     view = View.of(fitted, evidence)
     steps = []
-    for own, span in zip(fitted.named, view.spans, strict=True):
-        columns = range(span[0], span[0] + len(own.kept))
-        group = Group.of(own.effect, slice(0, len(columns)), own.kept, ties.arm.robot)
-        shape = tuple(range(columns.stop, span[1]))
-        values = [view.value(c) for c in columns]
-        trial, _, _, total = view.trial(group, tuple(columns), values, shape)
+    for k in range(len(fitted.named)):
+        trial, _, _, total = view.trial_of(k)
         assert trial is not None
         steps.append(Step(trial, rivals, (trial,), total, survey.tried))
     base: BaseParameters | None = ties.base
@@ -136,8 +132,7 @@ def _rivals(
     data, sigma, settings = ties.data, ties.sigma, ties.settings
     found = candidates(reference, data, sigma, settings.kinds)
     rank, first = reference.columns[0].shape[2], found.columns[0].shape[2]
-    sizes = [len(own.kept) + len(own.effect.shape) for own in fitted.named]
-    stiffness = rank + np.cumsum([0, *sizes[:-1]])
+    stiffness = [rank + values.start for values, _ in fitted.places]
     blocks = [
         np.concatenate([others, tied[:, :, stiffness], free], axis=2)
         for others, free, tied in zip(

@@ -211,7 +211,6 @@ def _certainty(fitted: Fitted, *, last: bool = False) -> list[float]:
     """Return the first or the last value of each name over its standard deviation."""
     if not fitted.named:
         return []
-    sizes = [len(own.kept) + len(own.effect.shape) for own in fitted.named]
-    ends = np.cumsum(sizes) - 1 if last else np.cumsum([0, *sizes[:-1]])
+    ends = [shapes.stop - 1 if last else values.start for values, shapes in fitted.places]
     values, std = fitted.estimate.values, fitted.estimate.std
     return [float(values[k] / std[k]) if 0.0 < std[k] < np.inf else 0.0 for k in ends]

@@ -105,15 +105,8 @@ def _left_out(
     view = View.of(explanation.fitted, explanation.evidence)
     named = explanation.fitted.named
     arm = explanation.reference.arm
-    columns = [
-        list(range(span[0], span[0] + len(own.kept)))
-        for own, span in zip(named, view.spans, strict=True)
-    ]
-    shapes = [
-        c
-        for own, span in zip(named, view.spans, strict=True)
-        for c in range(span[0] + len(own.kept), span[1])
-    ]
+    columns = [view.columns(k)[0] for k in range(len(named))]
+    shapes = [c for k in range(len(named)) for c in view.columns(k)[1]]
     left = list(range(len(named)))
     taken = made = np.zeros((len(named), 0))
     order: list[int] = []

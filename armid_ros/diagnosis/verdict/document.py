@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 import math
 from typing import Any
 
@@ -49,7 +48,6 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
         'candidates': _candidates(diagnosis),
         'not_visible': list(diagnosis.not_visible),
         'detectable': _detectable(diagnosis),
-        'pattern': None if diagnosis.pattern is None else asdict(diagnosis.pattern),
         'model': model,
     }
 

@@ -12,8 +12,7 @@ from armid_ros.diagnosis.search.explain import Explanation
 from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.step import Step
 from armid_ros.diagnosis.verdict.attribution import Attribution
-from armid_ros.diagnosis.verdict.experiment import separating
-from armid_ros.effects import Effect
+from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.effects.tied import Tied
 from armid_ros.estimate import ParameterName
 from armid_ros.model.spring_ties import Tie
@@ -140,7 +139,7 @@ def findings(
                 attribution.interval(indices, rng),
                 max(min(1.0, step.trial.p * step.tried) for step in steps),
                 rivals,
-                separating(name, rivals[0].name, order) if rivals else '',
+                _separating(name, rivals[0].name, order) if rivals else '',
                 float(attribution.taken[indices].sum()),
                 _ties([part.effect for part in parts], order),
             )
@@ -177,11 +176,10 @@ def small_print(
 def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Said]]:
     """Return the effects of the catalogue that each name of an explanation stands for."""
     fitted = explanation.fitted
-    starts = np.cumsum([0, *(len(own.kept) + len(own.effect.shape) for own in fitted.named)])
     covariance = fitted.estimate.covariance
     result = []
-    for k, (own, values) in enumerate(zip(fitted.named, fitted.values, strict=True)):
-        span = slice(starts[k], starts[k + 1])
+    for own, values, place in zip(fitted.named, fitted.values, fitted.places, strict=True):
+        span = slice(place[0].start, place[1].stop)
         words = own.effect.named_as(values, arm)
         if len(words) == 1 and words[0][0] is own.effect:
             result.append(
@@ -259,3 +257,10 @@ def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]
     if any(len(group) > 1 for group in groups):
         return tuple(dict.fromkeys(joints))
     return tuple(joint for joint in arm.robot.joints if joint in joints)
+
+
+def _separating(name: str, rival: str, joints: Sequence[str]) -> str:
+    """Say which experiment separates two names."""
+    where = f' of {", ".join(joints)}' if joints else ''
+    shown = dict.fromkeys(CATALOGUE.get(one, Effect).shown_by for one in (name, rival))
+    return f'To separate {name} from {rival}{where}: {", and ".join(shown)}.'

@@ -1,6 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The gap between model and measurement, before and after, beside the noise, on held-out data."""
+"""
+The gap between model and measurement, before and after, beside the noise, on held-out data.
+
+No patch makes a model worse: in no joint, on the data it was found in or on others, may the
+patched model leave more than the given one beyond what blocks of the data differ by, unless what
+is left is no gap.
+
+"""
 
 from __future__ import annotations
 
@@ -9,12 +16,18 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
+from armid_ros.diagnosis.data.rows import block_rows
 from armid_ros.diagnosis.search.explain import Explanation
+from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 
 #: A joint has a gap where the squares beyond the floor are this many times the floor.
 _A_GAP = 0.2
+#: Deviations beyond which a joint is surely worse, and share of its squares that nobody would
+#: call worse.
+_SURELY, _SLIGHTLY = 3.0, 0.05
 
 
 @dataclass(frozen=True)
@@ -52,8 +65,8 @@ class Gap:
     ----------
     before, after, floor : ndarray, shape (n,)
         Root mean square error of each joint without and with what was named, and the noise [N m].
-    chi2_before, chi2_after : ndarray, shape (n,)
-        Mean square over noise.
+    chi2_before : ndarray, shape (n,)
+        Mean square over noise without what was named.
     closed : float
         Share of the excess over the noise that is gone, 0 to 1, in the joints that had a gap or
         have one.
@@ -68,7 +81,6 @@ class Gap:
     after: FloatArray
     floor: FloatArray
     chi2_before: FloatArray
-    chi2_after: FloatArray
     closed: float
     predicted: bool
     overlays: tuple[Overlay, ...]
@@ -107,8 +119,6 @@ def measure_gap(
         return np.asarray(np.sum(squares, axis=0, where=told) / count)
 
     left = [[o.measured - o.before for o in overlays], [o.measured - o.after for o in overlays]]
-    unit = [[row / o.sigma for row, o in zip(rows, overlays, strict=True)] for rows in left]
-    losses = [mean(rows) for rows in unit]
     least = mean([np.broadcast_to(s, part.informative.shape) for part, _, s in parts])
     beyond = [np.maximum(mean(rows) - least, 0.0) / np.maximum(least, 1e-24) for rows in left]
     gap = beyond[0] > _A_GAP
@@ -117,8 +127,7 @@ def measure_gap(
         np.sqrt(mean(left[0])),
         np.sqrt(mean(left[1])),
         np.sqrt(least),
-        losses[0],
-        losses[1],
+        mean([row / o.sigma for row, o in zip(left[0], overlays, strict=True)]),
         float(np.clip(closed, 0.0, 1.0)),
         unseen is not None,
         tuple(overlays),
@@ -130,3 +139,43 @@ def _overlay(part: Trajectory, sigma: FloatArray, before: ArmModel, after: ArmMo
     measured = part.reduce(part.motion.tau)
     without, patched = part.residual(before), part.residual(after)
     return Overlay(part.source, part, measured, measured - without, measured - patched, sigma)
+
+
+def harmed(
+    explanation: Explanation, unseen: Evidence | None, settings: DiagnosisSettings
+) -> tuple[str, ...]:
+    """Return the joints in which the patched model is worse than the given one."""
+    if not explanation.steps:
+        return ()
+    before, after = explanation.given, explanation.fitted.arm
+    sets = [explanation.evidence, *([] if unseen is None else [unseen])]
+    worse = np.any([_worse(before, after, evidence, settings) for evidence in sets], axis=0)
+    return tuple(j for j, bad in zip(before.robot.joints, worse, strict=True) if bad)
+
+
+def _worse(
+    before: ArmModel, after: ArmModel, evidence: Evidence, settings: DiagnosisSettings
+) -> npt.NDArray[np.bool_]:
+    data, sigma = evidence.data, evidence.sigma
+    squares = [
+        [
+            (part.residual(arm) * part.informative / s) ** 2
+            for part, s in zip(data, sigma, strict=True)
+        ]
+        for arm in (before, after)
+    ]
+    block, _ = block_rows(data)
+    joints = range(squares[0][0].shape[1])
+    sums = [
+        np.array([np.bincount(block, np.concatenate(rows)[:, j]) for j in joints])
+        for rows in squares
+    ]
+    more = sums[1] - sums[0]
+    spread = more.std(axis=1, ddof=1) * np.sqrt(more.shape[1])
+    total = more.sum(axis=1)
+    floor = np.maximum(sums[0].sum(axis=1), evidence.count)
+    left = [part.residual(after) for part in evidence.data]
+    gap = evidence.chi2_per_row(left) > evidence.as_good(settings) + evidence.matters(settings)
+    surely = (total > _SURELY * spread) & (total > _SLIGHTLY * floor)
+    by_far = total > (settings.thresholds.same_fit - 1.0) * floor
+    return np.asarray((surely | by_far) & gap)

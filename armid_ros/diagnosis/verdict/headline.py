@@ -1,19 +1,75 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which names are the headline: those that other data do not deny, and that take enough."""
+"""
+Which names are the headline.
+
+Causes of the arm itself go before a person or a strap: whoever pushes may push anywhere and in any
+way, and takes a little more of what a wrong model gets wrong of any cause, or of two together. Of
+the names those stay that other data do not deny, and that take enough.
+
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.choice import in_model_as_given
+from armid_ros.diagnosis.search.choice import at_floor, Chosen, freedom, in_model_as_given
 from armid_ros.diagnosis.search.explain import Explanation
+from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
+from armid_ros.effects import CATALOGUE
 from armid_ros.identification.fitting.identifiability import excludes_zero
 import numpy as np
 
 #: Recordings hardly show what takes less than this share of the share it takes of others.
 _HARDLY = 0.1
+
+#: Explains the gap by what a library has.
+Explain = Callable[[DiagnosisSettings], Chosen]
+
+
+def own_causes_first(explain: Explain, settings: DiagnosisSettings) -> Chosen:
+    """
+    Explain the gap, by the arm's own causes where they do as well as others from outside.
+
+    They do if they leave no gap, have fewer values, and take as much of data left out; what acts
+    from outside is the rival of the first of them then.
+
+    """
+    found = explain(settings)
+    outside = [s for s in found.explanation.steps if s.trial.group.effect.external]
+    if not outside:
+        return found
+    own = tuple(name for name in settings.library if not CATALOGUE[name].external)
+    inside = explain(replace(settings, library=own))
+    if not _as_good(inside.explanation, found.explanation, settings):
+        return found
+    rivals = tuple(step.trial for step in outside)
+    rest = None if inside.rest is None else _with_rivals(inside.rest, rivals)
+    return replace(inside, explanation=_with_rivals(inside.explanation, rivals), rest=rest)
+
+
+def _as_good(inside: Explanation, found: Explanation, settings: DiagnosisSettings) -> bool:
+    if not inside.steps or not at_floor(inside, settings):
+        return False
+    if freedom(inside, settings) > freedom(found, settings):
+        return False
+    return _left_out(inside) >= _left_out(found) - settings.thresholds.tie
+
+
+def _left_out(explanation: Explanation) -> float:
+    """Return the share of the gap that names take of each part of the data left out."""
+    return attribute(explanation, None).share(range(len(explanation.steps)))
+
+
+def _with_rivals(explanation: Explanation, rivals: tuple[Trial, ...]) -> Explanation:
+    """Return an explanation whose first name may be something else as well."""
+    first, *others = explanation.steps
+    first = replace(first, rivals=(*first.rivals, *rivals))
+    return replace(explanation, steps=(first, *others))
 
 
 def headline(
@@ -94,13 +150,12 @@ def may_be_nothing(explanation: Explanation, name: int) -> bool:
 
     """
     fitted = explanation.fitted
-    own, sizes = fitted.named[name], [len(o.kept) + len(o.effect.shape) for o in fitted.named]
-    first = sum(sizes[:name])
-    span = np.arange(first, first + sizes[name])
+    values, shapes = fitted.places[name]
+    span = np.arange(values.start, shapes.stop)
     variance = np.diag(fitted.estimate.covariance)
     known = span[np.isfinite(variance[span])]
     precision = np.linalg.pinv(fitted.estimate.covariance[np.ix_(known, known)], hermitian=True)
-    asked = known < first + len(own.kept)
+    asked = known < values.stop
     at_shapes = np.linalg.pinv(precision[np.ix_(asked, asked)], hermitian=True)
     deviation = np.sqrt(np.diag(at_shapes))
     return not np.any(excludes_zero(fitted.estimate.values[known[asked]], deviation))
