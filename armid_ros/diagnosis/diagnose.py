@@ -256,25 +256,27 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     if unseen is not None:
         sure, least_sure = _sure(unseen, chosen), settings.thresholds.predicted
         left.append(_left(rest, sure, settings, 'recordings that were not used', least_sure))
+    total = float(attribute(explanation, None).whole.sum())
+    tried = 1 if explanation.survey is None else explanation.survey.tried
+    minor = small_print(explanation.minor, max(total, 1e-300), tried, arm)
     word = decide(
         found,
         floors if measured else (),
         left,
         arm,
         NOISE if measured else chosen.floor_in_words,
-        refitted=explanation.base is not None,
+        None if explanation.base is None else _as_it_is(arm, _sure(evidence, chosen), settings),
+        minor,
     )
     floor = evidence.sigma if unseen is None else unseen.sigma
     gap = measure_gap(explanation, unseen, floor)
-    total = float(attribute(explanation, None).whole.sum())
-    tried = 1 if explanation.survey is None else explanation.survey.tried
     limits = evidence.limits(explanation.fitted.residual, settings)
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
         summary=' '.join([word.summary, *_unpatched(found, worse)]),
         findings=found,
-        minor=small_print(explanation.minor, max(total, 1e-300), tried, arm),
+        minor=minor,
         where=_where(explanation, limits, bool(found)),
         left=locate(arm, evidence, explanation.fitted.residual, limits),
         gap=gap,
@@ -367,6 +369,12 @@ def _left(
         residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
     excess = evidence.chi2_per_row(residual) / (more * evidence.limits(residual, settings))
     return Left(excess, f'in {where}')
+
+
+def _as_it_is(arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings) -> Left:
+    residual = [part.residual(arm) for part in evidence.data]
+    excess = evidence.chi2_per_row(residual) / evidence.limits(residual, settings)
+    return Left(excess, 'in the recordings')
 
 
 def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:

@@ -69,8 +69,8 @@ def decide(
     left: Sequence[Left],
     arm: ArmModel,
     floor_in_words: str,
-    *,
-    refitted: bool,
+    as_it_is: Left | None = None,
+    minor: Sequence[Finding] = (),
 ) -> Verdict:
     """
     Decide what may be said.
@@ -87,8 +87,10 @@ def decide(
         Gives the joints.
     floor_in_words : str
         What was there before, or noise.
-    refitted : bool
-        Whether the body was fitted anew.
+    as_it_is : Left or None
+        What the model leaves as it is, where its body and known effects were fitted anew.
+    minor : sequence of Finding
+        The small print, the most important first.
 
     """
     worst = max(left, key=lambda one: float(one.excess.max()))
@@ -105,9 +107,7 @@ def decide(
         if open_gap:
             text = f'Something is missing: {rest}. Nothing in the catalogue explains it.'
             return Verdict('unknown', text)
-        how = ' once its rigid body and friction are fitted' if refitted else ''
-        text = f'The model explains the recordings{how}: what is left is {floor_in_words}.'
-        return Verdict('consistent', text)
+        return Verdict('consistent', _consistent(floor_in_words, as_it_is, minor, arm.robot))
     said = ' '.join(sentence(finding, arm.robot) for finding in findings)
     if open_gap:
         return Verdict('partial', f'{said} There is more: {rest}.')
@@ -118,6 +118,21 @@ def decide(
         text = f'{said} These data cannot tell it from {others}. {first.experiment}'
         return Verdict('ambiguous', text)
     return Verdict('named', f'{said} The rest is {floor_in_words}.')
+
+
+def _consistent(
+    floor_in_words: str, as_it_is: Left | None, minor: Sequence[Finding], robot: Robot
+) -> str:
+    """Say what a model explains, and what has to be fitted anew for that."""
+    if as_it_is is None or as_it_is.excess.max() <= 1.0:
+        return f'The model explains the recordings: what is left is {floor_in_words}.'
+    worst = int(np.argmax(as_it_is.excess))
+    text = (
+        'The model explains the recordings once its rigid body and friction are fitted: what is '
+        f'left is {floor_in_words}. As it is, the error of {robot.joints[worst]} is '
+        f'{_factor(np.sqrt(as_it_is.excess[worst]))} times as large as that can be.'
+    )
+    return ' '.join([text, *(f'{sentence(one, robot)}' for one in minor[:1])])
 
 
 def _factor(ratio: float) -> str:

@@ -1,0 +1,30 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Sentences say what the evidence bears out, and no more."""
+
+from armid_ros.diagnosis.verdict.words import decide, Left
+import numpy as np
+
+FLOOR = 'the misfit that the model had before'
+
+
+def said(arm, as_it_is):
+    closed = Left(np.full(arm.robot.n_joints, 0.9), 'in the recordings')
+    return decide((), (), [closed], arm, FLOOR, as_it_is)
+
+
+def test_a_model_that_explains_as_it_is_needs_no_fit(bench):
+    closed = Left(np.full(bench.robot.n_joints, 0.8), 'in the recordings')
+    for as_it_is in (None, closed):
+        verdict = said(bench.arm, as_it_is)
+        assert verdict.word == 'consistent'
+        assert verdict.summary == f'The model explains the recordings: what is left is {FLOOR}.'
+
+
+def test_a_model_that_has_to_be_fitted_says_where_it_is_off_and_by_how_much(bench):
+    excess = np.full(bench.robot.n_joints, 0.8)
+    excess[-1] = 4.0
+    verdict = said(bench.arm, Left(excess, 'in the recordings'))
+    assert verdict.word == 'consistent'
+    assert 'once its rigid body and friction are fitted' in verdict.summary
+    assert f'the error of {bench.robot.joints[-1]} is 2.0 times as large' in verdict.summary
