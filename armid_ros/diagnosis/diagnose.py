@@ -48,6 +48,8 @@ import numpy as np
 #: Told the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
+#: Verdicts by which no gap is open.
+_CLOSED = ('named', 'ambiguous')
 #: Said where no two equal periods measure the noise.
 _ASSUMED = (
     'nothing repeats in some recordings: their noise is assumed from what rows differ by from '
@@ -206,12 +208,17 @@ def diagnose(
 
     chosen = own_causes_first(explain, settings)
     said = _said(chosen, notes, asked)
-    if said.verdict != 'unknown' or not chosen.explanation.steps:
-        return said
-    gone = {own.effect.name for own in chosen.explanation.fitted.named}
-    fewer = replace(settings, library=tuple(name for name in settings.library if name not in gone))
-    again = _said(own_causes_first(explain, fewer), notes, asked)
-    return again if again.findings else said
+    if said.verdict == 'unknown' and chosen.explanation.steps:
+        gone = {own.effect.name for own in chosen.explanation.fitted.named}
+        library = tuple(name for name in settings.library if name not in gone)
+        again = _said(own_causes_first(explain, replace(settings, library=library)), notes, asked)
+        said = again if again.findings else said
+    if said.verdict == 'unknown' and validate and said.minor:
+        small = tuple(dict.fromkeys(one.name for one in said.minor))
+        matters = replace(settings.without_small_print(), library=small)
+        again = _said(own_causes_first(explain, matters), notes, asked)
+        said = again if again.verdict in _CLOSED else said
+    return said
 
 
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
