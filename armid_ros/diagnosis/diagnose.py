@@ -204,14 +204,7 @@ def diagnose(
     def explain(by: DiagnosisSettings) -> Chosen:
         return explained(arm, prepared, known, by, rng, tell, written)
 
-    chosen = own_causes_first(explain, settings)
-    said = _said(chosen, notes, asked)
-    if said.verdict != 'unknown' or not chosen.explanation.steps:
-        return said
-    gone = {own.effect.name for own in chosen.explanation.fitted.named}
-    fewer = replace(settings, library=tuple(name for name in settings.library if name not in gone))
-    again = _said(own_causes_first(explain, fewer), notes, asked)
-    return again if again.findings else said
+    return _said(own_causes_first(explain, settings), notes, asked)
 
 
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
