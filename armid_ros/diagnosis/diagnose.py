@@ -257,8 +257,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         NOISE if measured else chosen.floor_in_words,
         refitted=explanation.base is not None,
     )
-    floor = evidence.sigma if unseen is None else unseen.sigma
-    gap = measure_gap(explanation, unseen, floor)
+    gap = measure_gap(explanation, unseen)
     total = float(attribute(explanation, None).whole.sum())
     tried = 1 if explanation.survey is None else explanation.survey.tried
     limits = evidence.limits(explanation.fitted.residual, settings)
