@@ -20,8 +20,8 @@ LIBRARY = {
     'real_recordings',
     'two_days',
 }
-#: Runs only when it is asked for: it takes an hour.
-LONG = {'endurance'}
+#: Run only when they are asked for: they take an hour.
+LONG = {'ablation', 'endurance'}
 
 
 def main() -> int:

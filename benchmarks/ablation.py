@@ -1,14 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What each rule of the diagnosis earns: the score with it and without it.
+What each rule of the diagnosis earns: the score as it is, and without the rule.
 
-    python -m benchmarks.ablation [--kind KIND] [--cases FIRST:LAST] [--only RULE ...]
-        [--processes N]
+    python -m benchmarks.ablation [KIND] [--cases FIRST:LAST] [--only RULE ...] [--processes N]
 
-A rule is one function of the search or the verdict; without the rule it answers as if nothing had
-been asked. Kinds are those of benchmarks.lived that are there to choose by, or 'laboratory', the
-slice of its development set.
+KIND is one of benchmarks.lived that is there to choose by. What was measured, and what became of
+each rule, is in docs/diagnosis.md.
 
 """
 
@@ -24,30 +22,26 @@ from pkgutil import resolve_name
 from typing import Any
 from unittest.mock import patch
 
+from armid_ros.diagnosis.search.fit import fit
 import numpy as np
 
-from benchmarks import hidden_effects
 from benchmarks.lived import run, select
-from benchmarks.lived_scoring import LivedJudged
+from benchmarks.lived_scoring import LivedJudged, VISIBLE
 from benchmarks.two_days import Answer, ask
 from tests.hidden.lived.specification import KINDS
-from tests.hidden.scoring import Judged
-from tests.hidden.specification import CaseSpec
-
-KIND, LABORATORY = 'development', 'laboratory'
 
 
 @dataclass(frozen=True)
 class Rule:
     """
-    A rule of the diagnosis.
+    A rule of the diagnosis: one function.
 
     Attributes
     ----------
     place : str
-        Its function, below armid_ros.diagnosis, where it is looked up when it is asked.
+        Where it is looked up when it is asked, below armid_ros.diagnosis.
     without : callable
-        What answers instead.
+        What answers in its place if there is no such rule.
 
     """
 
@@ -57,21 +51,107 @@ class Rule:
     @contextmanager
     def left_out(self) -> Iterator[None]:
         """Diagnose without the rule."""
-        module, _, name = f'armid_ros.diagnosis.{self.place}'.partition(':')
-        owner, _, attribute = name.rpartition('.')
-        there = resolve_name(f'{module}:{owner}') if owner else resolve_name(module)
-        with patch.object(there, attribute, self.without):
+        owner, _, name = f'armid_ros.diagnosis.{self.place}'.rpartition('.')
+        with patch.object(resolve_name(owner), name, self.without):
             yield
 
 
-def _no(*_: object, **__: object) -> bool:
+def no(*_: object) -> bool:
+    """Say no to whatever is asked."""
     return False
 
 
-def _yes(*_: object, **__: object) -> bool:
+def yes(*_: object) -> bool:
+    """Say yes to whatever is asked."""
     return True
 
 
+def first(tied: Sequence[Any], *_: object) -> Any:
+    """Take the one that takes most."""
+    return tied[0]
+
+
+def as_fitted(fitted: Any, *_: object) -> Any:
+    """Return what was fitted, deviations included."""
+    return fitted
+
+
+def as_they_are(*arguments: Any) -> list[Any]:
+    """Return causes as they were tried beside the others, (problem, beside, causes, round)."""
+    return list(arguments[2])
+
+
+def nowhere(problem: Any, *_: object) -> np.ndarray:
+    """Return squares of an open gap in no joint."""
+    return np.full(problem.y.shape[1], np.inf)
+
+
+def all_names(question, named, steps, values, evidence, settings):
+    """Fit all names together and drop none."""
+    data, sigma = evidence.data, evidence.sigma
+    fitted = fit(question.arm, named, data, sigma, question.base, values, question.told)
+    return list(fitted.named), list(steps), fitted
+
+
+#: By the names of the table in docs/diagnosis.md.
 RULES = {
-    'own causes before a person': Rule('verdict.headline:_as_good', _no),
+    'own causes before a person': Rule('verdict.headline._as_good', no),
+    'names that may be nothing go': Rule('verdict.headline.may_be_nothing', no),
+    'small names that close a gap stay': Rule('verdict.headline._opens', no),
+    'names that other data deny go': Rule('verdict.attribution.Attribution.denied', no),
+    'needless names go': Rule('search.explain._pruned', all_names),
+    'a small lead decides nothing': Rule('search.explain.undecided', no),
+    'the simplest that closes the gap': Rule('search.step.likeliest', first),
+    'what contains a cause is no rival': Rule('search.step.contains', no),
+    'compared beside what each was': Rule('search.step._compared', as_they_are),
+    'most of one joint matters': Rule('search.step._open_squares', nowhere),
+    'small changes do not matter': Rule('search.step.material', yes),
+    'noise explains no noise': Rule('search.step.made_of_noise', no),
+    'the body stays as given': Rule('search.choice._as_good', no),
+    'deviations from part to part': Rule('search.explain.widened', as_fitted),
 }
+
+
+def asked_without(rule: str, *arguments: Any, **options: Any) -> Answer:
+    """Ask the diagnosis without a rule; see two_days.ask."""
+    with RULES[rule].left_out():
+        return ask(*arguments, **options)
+
+
+def counts(judged: Sequence[LivedJudged]) -> str:
+    """Return how often names are right, as text; causes below the misfit count apart."""
+    there = [one for one in judged if one.truth.name]
+    seen = [one for one in there if one.truth.gap >= VISIBLE]
+    faint = [one for one in there if one.truth.gap < VISIBLE]
+    quiet = [one for one in judged if not one.truth.name]
+    errors = [error for one in there for error in one.parameter_errors()]
+    return (
+        f'{sum(one.first for one in seen):3d} of {len(seen)} first, '
+        f'{sum(one.tied and not one.first for one in seen)} tied; '
+        f'faint {sum(one.first for one in faint)} of {len(faint)} first; '
+        f'{sum(bool(one.answer.headline) for one in quiet)} of {len(quiet)} alarms; '
+        f'{sum(one.too_many for one in there)} too many; '
+        f'{sum(holds for _, holds in errors)} of {len(errors)} intervals hold'
+    )
+
+
+def main() -> None:
+    """Print one line for the diagnosis as it is, and one without each rule."""
+    kinds = [kind for kind in KINDS if not kind.startswith('locked')]
+    parser = argparse.ArgumentParser(prog='python -m benchmarks.ablation')
+    parser.add_argument('kind', nargs='?', default=kinds[0], choices=kinds)
+    parser.add_argument('--cases', default='0:24', metavar='FIRST:LAST', help='some of them')
+    parser.add_argument('--only', nargs='+', default=list(RULES), metavar='RULE', choices=RULES)
+    parser.add_argument('--processes', type=int, default=2)
+    options = parser.parse_args()
+    for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
+        os.environ.setdefault(variable, '1')
+    cases = select(options.kind, options.cases)
+    questions = {'as it is': ask, **{rule: partial(asked_without, rule) for rule in options.only}}
+    for name, question in questions.items():
+        judged = run(options.kind, cases, options.processes, again=False, question=question)
+        print(f'{name:34s} {counts(judged)}', flush=True)
+
+
+if __name__ == '__main__':
+    main()

@@ -206,13 +206,7 @@ def diagnose(
     def explain(by: DiagnosisSettings) -> Chosen:
         return explained(arm, prepared, known, by, rng, tell, written)
 
-    chosen = own_causes_first(explain, settings)
-    said = _said(chosen, notes, asked)
-    if said.verdict == 'unknown' and chosen.explanation.steps:
-        gone = {own.effect.name for own in chosen.explanation.fitted.named}
-        library = tuple(name for name in settings.library if name not in gone)
-        again = _said(own_causes_first(explain, replace(settings, library=library)), notes, asked)
-        said = again if again.findings else said
+    said = _said(own_causes_first(explain, settings), notes, asked)
     if said.verdict == 'unknown' and validate and said.minor:
         small = tuple(dict.fromkeys(one.name for one in said.minor))
         matters = replace(settings.without_small_print(), library=small)
@@ -275,8 +269,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         None if explanation.base is None else _as_it_is(arm, _sure(evidence, chosen), settings),
         minor,
     )
-    floor = evidence.sigma if unseen is None else unseen.sigma
-    gap = measure_gap(explanation, unseen, floor)
+    gap = measure_gap(explanation, unseen)
     limits = evidence.limits(explanation.fitted.residual, settings)
     asked.tell(1.0, word.word)
     return Diagnosis(

@@ -96,6 +96,12 @@ class Trajectory:
         """Return the repeated period of the motion; see `find_period`."""
         return find_period(self.motion)
 
+    @property
+    def torque(self) -> FloatArray:
+        """Measured torque in rows, shape (M, n) [N m]."""
+        assert self.motion.tau is not None
+        return self.reduce(self.motion.tau)
+
     def residual(self, arm: ArmModel) -> FloatArray:
         """Return measured torque minus that of a model, in rows, shape (M, n) [N m]."""
         assert self.motion.tau is not None
@@ -146,11 +152,7 @@ class Evidence:
     @cached_property
     def torque_rms(self) -> FloatArray:
         """Root mean square of the measured torque of each joint, shape (n,) [N m]."""
-        squares = np.zeros_like(self.count)
-        for part in self.data:
-            assert part.motion.tau is not None
-            squares += np.sum(part.reduce(part.motion.tau) ** 2, axis=0, where=part.informative)
-        return np.sqrt(squares / np.maximum(self.count, 1.0))
+        return np.sqrt(self.power([part.torque for part in self.data]))
 
     @cached_property
     def noise_share(self) -> FloatArray:
@@ -160,9 +162,13 @@ class Evidence:
 
     def chi2_per_row(self, residual: Sequence[FloatArray]) -> FloatArray:
         """Return the mean square over the unit of each joint, shape (n,)."""
+        return self.power([left / s for left, s in zip(residual, self.sigma, strict=True)])
+
+    def power(self, torque: Sequence[FloatArray]) -> FloatArray:
+        """Return the mean square of torques in rows (M, n), of each joint, shape (n,)."""
         squares = np.zeros_like(self.count)
-        for part, sigma, left in zip(self.data, self.sigma, residual, strict=True):
-            squares += np.sum((left / sigma) ** 2, axis=0, where=part.informative)
+        for part, rows in zip(self.data, torque, strict=True):
+            squares += np.sum(rows**2, axis=0, where=part.informative)
         return np.asarray(squares / np.maximum(self.count, 1.0))
 
     def split(self, weighted: FloatArray, weight: FloatArray) -> list[FloatArray]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -106,6 +106,13 @@ def weighted_rows(
     for own, part, s in zip(rows, data, sigma, strict=True):
         weight = row_weights([part], [s])
         yield own * (weight[:, :, np.newaxis] if own.ndim > 2 else weight)
+
+
+def block_squares(residual: Sequence[FloatArray], evidence: Evidence) -> FloatArray:
+    """Return the squares over the unit of what is left (M, n), by block and joint, (B, n)."""
+    block, _ = block_rows(evidence.data)
+    rows = np.concatenate(list(weighted_rows(residual, evidence.data, evidence.sigma)))
+    return np.column_stack([np.bincount(block, column) for column in rows.T**2])
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:

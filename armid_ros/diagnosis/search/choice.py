@@ -216,11 +216,7 @@ def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
 
 def _left_by(explanation: Explanation) -> FloatArray:
     """Return the root mean square that an explanation leaves of each joint, (n,) [N m]."""
-    evidence = explanation.evidence
-    newton_metres = (np.ones_like(evidence.count),) * len(evidence.data)
-    return np.sqrt(
-        replace(evidence, sigma=newton_metres).chi2_per_row(explanation.fitted.residual)
-    )
+    return np.sqrt(explanation.evidence.power(explanation.fitted.residual))
 
 
 def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings) -> bool:

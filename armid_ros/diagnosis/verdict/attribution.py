@@ -15,13 +15,12 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import block_rows
+from armid_ros.diagnosis.data.rows import block_squares
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.explain import Explanation, View
 from armid_ros.diagnosis.search.held_out import held_out
 from armid_ros.motion import FloatArray
 import numpy as np
-import numpy.typing as npt
 
 #: Resamplings of the blocks: ends of a 95 % interval are known to a tenth of it.
 _RESAMPLINGS = 500
@@ -146,14 +145,14 @@ def _left_out(
 def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
     """Predict other data with the first name, the first two, and so on, fitted to the data."""
     arms = [explanation.reference.arm, *_staircase(explanation, order)]
-    blocks, _ = block_rows(unseen.data)
     left = [[part.residual(arm) for part in unseen.data] for arm in arms]
-    squares = [_squares(rows, unseen, blocks) for rows in left]
+    squares = [block_squares(rows, unseen).sum(axis=1) for rows in left]
     taken, made = np.zeros((2, len(order), len(squares[0])))
     for position, k in enumerate(order):
         taken[k] = squares[position] - squares[position + 1]
         steps = zip(left[position], left[position + 1], strict=True)
-        made[k] = _squares([before - after for before, after in steps], unseen, blocks)
+        predicted = [before - after for before, after in steps]
+        made[k] = block_squares(predicted, unseen).sum(axis=1)
     return Attribution(tuple(order), squares[0], taken, made)
 
 
@@ -161,14 +160,3 @@ def _staircase(explanation: Explanation, order: Sequence[int]) -> list[ArmModel]
     """Return the arm with the first name, with the first two, and so on, each fitted."""
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
     return [*(one.fitted.arm for one in fewer), explanation.fitted.arm] if order else []
-
-
-def _squares(
-    torque: Sequence[FloatArray], evidence: Evidence, blocks: npt.NDArray[np.intp]
-) -> FloatArray:
-    """Return the squares over the unit of torques (M, n) of each trajectory in every block."""
-    rows = [
-        np.sum((values * part.informative / sigma) ** 2, axis=1)
-        for values, part, sigma in zip(torque, evidence.data, evidence.sigma, strict=True)
-    ]
-    return np.asarray(np.bincount(blocks, np.concatenate(rows)))

@@ -11,12 +11,11 @@ is left is no gap.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
-from armid_ros.diagnosis.data.rows import block_rows
+from armid_ros.diagnosis.data.rows import block_squares
 from armid_ros.diagnosis.search.explain import Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -91,9 +90,7 @@ class Gap:
         return 'held-out' if self.predicted else 'the data it was found in'
 
 
-def measure_gap(
-    explanation: Explanation, unseen: Evidence | None, floor: Sequence[FloatArray]
-) -> Gap:
+def measure_gap(explanation: Explanation, unseen: Evidence | None) -> Gap:
     """
     Measure the gap on data that are only predicted, else on the data themselves.
 
@@ -102,32 +99,26 @@ def measure_gap(
     explanation : Explanation
         What was found.
     unseen : Evidence or None
-        Data that nothing was fitted to.
-    floor : sequence of ndarray, each (n,)
-        What a perfect model would leave of each trajectory [N m].
+        Data that nothing was fitted to; their unit is what a perfect model would leave.
 
     """
     before, after = explanation.reference.arm, explanation.fitted.arm
     evidence = explanation.evidence if unseen is None else unseen
-    parts = list(zip(evidence.data, evidence.sigma, floor, strict=True))
-    overlays = [_overlay(part, sigma, before, after) for part, sigma, _ in parts]
-    told = np.concatenate([part.informative for part, _, _ in parts])
-    count = np.maximum(told.sum(axis=0), 1)
-
-    def mean(rows: Sequence[FloatArray]) -> FloatArray:
-        squares = np.concatenate(rows) ** 2
-        return np.asarray(np.sum(squares, axis=0, where=told) / count)
-
+    overlays = [
+        _overlay(part, sigma, before, after)
+        for part, sigma in zip(evidence.data, evidence.sigma, strict=True)
+    ]
     left = [[o.measured - o.before for o in overlays], [o.measured - o.after for o in overlays]]
-    least = mean([np.broadcast_to(s, part.informative.shape) for part, _, s in parts])
-    beyond = [np.maximum(mean(rows) - least, 0.0) / np.maximum(least, 1e-24) for rows in left]
+    power = [evidence.power(rows) for rows in left]
+    floor = evidence.power([np.broadcast_to(o.sigma, o.measured.shape) for o in overlays])
+    beyond = [np.maximum(own - floor, 0.0) / np.maximum(floor, 1e-24) for own in power]
     gap = beyond[0] > _A_GAP
     closed = 1.0 - beyond[1][gap].sum() / beyond[0][gap].sum() if gap.any() else 0.0
     return Gap(
-        np.sqrt(mean(left[0])),
-        np.sqrt(mean(left[1])),
-        np.sqrt(least),
-        mean([row / o.sigma for row, o in zip(left[0], overlays, strict=True)]),
+        np.sqrt(power[0]),
+        np.sqrt(power[1]),
+        np.sqrt(floor),
+        evidence.chi2_per_row(left[0]),
         float(np.clip(closed, 0.0, 1.0)),
         unseen is not None,
         tuple(overlays),
@@ -135,8 +126,7 @@ def measure_gap(
 
 
 def _overlay(part: Trajectory, sigma: FloatArray, before: ArmModel, after: ArmModel) -> Overlay:
-    assert part.motion.tau is not None
-    measured = part.reduce(part.motion.tau)
+    measured = part.torque
     without, patched = part.residual(before), part.residual(after)
     return Overlay(part.source, part, measured, measured - without, measured - patched, sigma)
 
@@ -156,26 +146,13 @@ def harmed(
 def _worse(
     before: ArmModel, after: ArmModel, evidence: Evidence, settings: DiagnosisSettings
 ) -> npt.NDArray[np.bool_]:
-    data, sigma = evidence.data, evidence.sigma
-    squares = [
-        [
-            (part.residual(arm) * part.informative / s) ** 2
-            for part, s in zip(data, sigma, strict=True)
-        ]
-        for arm in (before, after)
-    ]
-    block, _ = block_rows(data)
-    joints = range(squares[0][0].shape[1])
-    sums = [
-        np.array([np.bincount(block, np.concatenate(rows)[:, j]) for j in joints])
-        for rows in squares
-    ]
-    more = sums[1] - sums[0]
-    spread = more.std(axis=1, ddof=1) * np.sqrt(more.shape[1])
-    total = more.sum(axis=1)
-    floor = np.maximum(sums[0].sum(axis=1), evidence.count)
-    left = [part.residual(after) for part in evidence.data]
-    gap = evidence.chi2_per_row(left) > evidence.as_good(settings) + evidence.matters(settings)
+    left = [[part.residual(arm) for part in evidence.data] for arm in (before, after)]
+    had, has = (block_squares(rows, evidence) for rows in left)
+    more = has - had
+    spread = more.std(axis=0, ddof=1) * np.sqrt(len(more))
+    total = more.sum(axis=0)
+    floor = np.maximum(had.sum(axis=0), evidence.count)
+    gap = evidence.chi2_per_row(left[1]) > evidence.as_good(settings) + evidence.matters(settings)
     surely = (total > _SURELY * spread) & (total > _SLIGHTLY * floor)
     by_far = total > (settings.thresholds.same_fit - 1.0) * floor
     return np.asarray((surely | by_far) & gap)

@@ -116,14 +116,6 @@ def _opens(fewer: Explanation, explanation: Explanation, settings: DiagnosisSett
     return bool(np.any((fewer.chi2_per_row > limits) & (explanation.chi2_per_row <= limits)))
 
 
-def _share_without(name: int, explanation: Explanation, unseen: Evidence) -> float:
-    """Return the share that the other names take of data; infinite where there are none."""
-    if len(explanation.steps) == 1:
-        return float('inf')
-    fewer = explanation.without(name)
-    return attribute(fewer, unseen).share(range(len(fewer.steps)))
-
-
 def shares_of(explanation: Explanation, unseen: Evidence | None) -> tuple[Attribution, list[int]]:
     """Share out the gap, and return the names that other data deny, the least first."""
     left_out = attribute(explanation, None)
@@ -131,12 +123,7 @@ def shares_of(explanation: Explanation, unseen: Evidence | None) -> tuple[Attrib
         return left_out, []
     names = range(len(explanation.steps))
     seen = attribute(explanation, unseen)
-    whole = seen.share(names)
-    denied = [
-        k
-        for k in reversed(seen.order)
-        if seen.denied(k) and _share_without(k, explanation, unseen) >= whole
-    ]
+    denied = [k for k in reversed(seen.order) if seen.denied(k)]
     shown = seen.share(names) > _HARDLY * left_out.share(names)
     return (seen if shown else left_out), denied
 
