@@ -235,7 +235,7 @@ def felt_directions(chain: Chain) -> FloatArray:
 def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
     """Compute all metrics."""
     free = [j for j in judged if not j.truth.name]
-    named = [j for j in judged if _can_be_named(j.truth)]
+    named = [j for j in judged if nameable(j.truth)]
     seen = [j for j in named if j.truth.gap >= VISIBLE]
     large = [j for j in seen if j.truth.size in ('natural', 'clear')]
     unseen = [j for j in named if j.truth.gap < VISIBLE]
@@ -282,7 +282,7 @@ def breakdown(judged: Sequence[LivedJudged]) -> str:
         counts = []
         for group in groups:
             own = [j for j in seen if getattr(j.truth, what) == group]
-            hits = sum(j.first if _can_be_named(j.truth) else j.admitted for j in own)
+            hits = sum(j.first if nameable(j.truth) else j.admitted for j in own)
             counts.append(f'{group} {hits}/{len(own)}')
         rows.append(f'by {what}: {", ".join(counts)}')
     return '\n'.join(rows)
@@ -293,7 +293,8 @@ def _near(error: tuple[float, float]) -> bool:
     return degrees <= 1.0 and abs(share) <= 0.02
 
 
-def _can_be_named(truth: LivedTruth) -> bool:
+def nameable(truth: LivedTruth) -> bool:
+    """Return whether the catalogue has a name for what happened."""
     return truth.in_catalogue or truth.name == 'gravity'
 
 
