@@ -219,7 +219,9 @@ def gravity_of(headline: Iterable[Named], described: FloatArray) -> FloatArray:
         return np.array([values[f'gravity_{axis}'] for axis in 'xyz'])
     turn = Rotation.from_rotvec([values.get('tilt_x', 0.0), values.get('tilt_y', 0.0), 0.0])
     size = np.linalg.norm(described)
-    return turn.inv().apply(described) * (1.0 + values.get('gravity_difference', 0.0) / size)
+    return turn.inv().apply(np.array(described)) * (
+        1.0 + values.get('gravity_difference', 0.0) / size
+    )
 
 
 def felt_directions(chain: Chain) -> FloatArray:

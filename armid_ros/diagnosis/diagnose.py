@@ -285,6 +285,7 @@ def _said(chosen: Chosen, notes: Sequence[str], context: _Context) -> Diagnosis:
         left,
         arm,
         NOISE if measured else chosen.floor_in_words,
+        settings.thresholds,
         refitted=explanation.base is not None,
     )
     floor = evidence.sigma if unseen is None else unseen.sigma
