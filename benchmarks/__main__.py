@@ -13,6 +13,7 @@ LIBRARY = {
     'browser',
     'change_information',
     'leg_pair_in_mujoco',
+    'lived_questions',
     'lived_scoring',
     'looks',
     'plain_ranking',

@@ -32,6 +32,7 @@ from armid_ros.recording import Recording
 import numpy as np
 
 from benchmarks.hidden_effects import table
+from benchmarks.lived_questions import score_of_question
 from benchmarks.lived_scoring import breakdown, LivedJudged, LivedTruth, score
 from benchmarks.looks import look
 from benchmarks.plain_ranking import plain_ranking
@@ -151,14 +152,15 @@ def main() -> None:
         locked = options.kind.startswith('locked')
         record = stack.enter_context(look(what)) if locked else None
         judged = run(options.kind, cases, options.processes, not options.no_again, question)
-        print(f'\n{what}\n{table(score(judged))}')
+        rows = table((*score(judged), *score_of_question(options.kind, judged)))
+        print(f'\n{what}\n{rows}')
         if not locked:
             print(breakdown(judged))
         if record is not None:
-            record.table = table(score(judged))
+            record.table = rows
     if options.out:
-        rows = [asdict(one) for one in judged]
-        options.out.write_text(json.dumps(rows, indent=1, default=_plain), encoding='utf-8')
+        answers = [asdict(one) for one in judged]
+        options.out.write_text(json.dumps(answers, indent=1, default=_plain), encoding='utf-8')
 
 
 def select(kind: str, cases: str = ':', only: Sequence[str] = ()) -> list[int]:

@@ -49,6 +49,27 @@ class Thresholds:
     predicted : float
         Factor by which squares may be larger on motions that were not used: values that others
         told are not exact there.
+    open_share : float
+        Share of the squares of a joint in which a gap is open that a cause takes if it matters
+        there, however little that is of the gap of the arm.
+    beyond_bounds : float
+        Deviations by which a value may be beyond what is physically possible.
+    contained : float
+        Share of the torque of a simpler cause, in squares, that what contains it leaves at most.
+    same : float
+        Share by which causes differ that are one in other words.
+    smooth_share : float
+        A cause that takes less than this share of its squares without the noise of positions
+        beyond the band of the motion is made of that noise.
+    below_noise : float
+        What is made of the measured torque and leaves less than this share of its noise explains
+        noise with itself.
+    one_period : float
+        Power of the difference of two periods at low frequency over that at high frequency from
+        which something happened in one of them only: 3.6 at the most in 60 sets of the laboratory
+        in which nothing did.
+    one_period_on_average : float
+        The same as the mean of three recordings or more: 2.4 at the most in those.
     few_causes, many_causes : int
         Causes that are looked for in a model as given, and beside a body that is fitted anew.
 
@@ -66,6 +87,14 @@ class Thresholds:
     least_visible: float = 0.02
     confidence: float = 0.99
     predicted: float = 2.0
+    open_share: float = 0.5
+    beyond_bounds: float = 3.0
+    contained: float = 0.02
+    same: float = 1e-3
+    smooth_share: float = 0.1
+    below_noise: float = 0.8
+    one_period: float = 8.0
+    one_period_on_average: float = 3.5
     few_causes: int = 4
     many_causes: int = 16
 

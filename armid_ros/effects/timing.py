@@ -14,8 +14,8 @@ from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 from scipy.signal import butter, lfilter, sosfiltfilt
+from scipy.sparse import csr_array, dia_array
 
 #: Time constants after which a low-pass has forgotten what went in.
 _FORGOTTEN = 20.0
@@ -89,12 +89,14 @@ class TimeDelay(LateReading):
     def _shifted(
         self, values: FloatArray, motion: Motion, x: FloatArray, derivative: int = 0
     ) -> FloatArray:
-        curve = CubicHermiteSpline(motion.t, x, rate_of_change(motion.t, x))
-        shifted = curve(motion.t, derivative) if derivative else x.copy()
+        earlier = rate_of_change(motion.t, x) if derivative else x
+        shifted = earlier.copy()
         groups = [[j] for j in self.indices(motion.joints)] or [list(range(motion.n_joints))]
         for delay, rows in zip(values, groups, strict=True):
             if delay:
-                shifted[:, rows] = curve(motion.t - delay, derivative)[:, rows]
+                weights = earlier_samples(motion.t, float(delay), derivative)
+                own = x[:, rows]
+                shifted[:, rows] = (weights @ own.reshape(len(x), -1)).reshape(own.shape)
         return np.asarray(shifted)
 
 
@@ -150,12 +152,58 @@ class TorqueLag(LateReading):
 
 def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
     """Differentiate samples along the first axis."""
+    _require_change(t)
+    return np.asarray(np.gradient(x, t, axis=0))
+
+
+def _require_change(t: FloatArray) -> None:
     if len(t) < 2:
         raise ModelError(
             'delay, lag, elasticity and backlash depend on how the torque changes: they need a '
             'motion of two samples or more'
         )
-    return np.asarray(np.gradient(x, t, axis=0))
+
+
+def earlier_samples(t: FloatArray, delay: float, derivative: int = 0) -> csr_array:
+    """
+    Return how samples of earlier, or their derivative, are made of samples, shape (N, N).
+
+    By the cubic between neighbours with the slopes of `rate_of_change` at both; beyond the ends
+    the first and the last cubic go on. All columns of a model are delayed alike, so that the
+    weights are made once and few.
+
+    """
+    _require_change(t)
+    count = len(t)
+    at = np.clip(np.searchsorted(t, t - delay, side='right') - 1, 0, count - 2)
+    step = t[at + 1] - t[at]
+    u = (t - delay - t[at]) / step
+    if derivative:
+        rise = 6.0 * u * (1.0 - u) / step
+        value, slope = (-rise, rise), ((1.0 - u) * (1.0 - 3.0 * u), u * (3.0 * u - 2.0))
+    else:
+        rise = u**2 * (3.0 - 2.0 * u)
+        value = 1.0 - rise, rise
+        slope = step * u * (1.0 - u) ** 2, -step * u**2 * (1.0 - u)
+    rows = np.arange(count)
+    by_value, by_slope = (
+        csr_array(
+            (np.concatenate(part), (np.tile(rows, 2), np.concatenate([at, at + 1]))),
+            shape=(count, count),
+        )
+        for part in (value, slope)
+    )
+    return csr_array(by_value + by_slope @ _slopes(t))
+
+
+def _slopes(t: FloatArray) -> dia_array:
+    """Return the weights of `rate_of_change` as a matrix, shape (N, N)."""
+    before, after = np.diff(t)[:-1], np.diff(t)[1:]
+    first, last = 1.0 / (t[1] - t[0]), 1.0 / (t[-1] - t[-2])
+    lower = np.concatenate([-after / (before * (before + after)), [-last, 0.0]])
+    middle = np.concatenate([[-first], (after - before) / (before * after), [last]])
+    upper = np.concatenate([[0.0, first], before / (after * (before + after))])
+    return dia_array((np.stack([lower, middle, upper]), [-1, 0, 1]), shape=(len(t), len(t)))
 
 
 def within_band(motion: Motion, x: FloatArray) -> FloatArray:

@@ -4,12 +4,15 @@
 
 from armid_ros.diagnosis.data.evidence import trajectories
 from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from tests.diagnosis.conftest import PERIODS
+
+ONE_PERIOD = Thresholds().one_period
 
 
 def cut(recordings):
@@ -79,7 +82,9 @@ def test_no_torque_is_known_to_more_than_its_resolution(bench):
         size = np.sqrt(np.mean(part.motion.tau**2, axis=0))
         floor = noise_floor(part, bench.arm)
         assert np.all(floor.sigma >= 0.99e-4 * size)
-        assert np.all(floor.repeats)  # what two periods of it differ by is nothing to speak of
+        assert np.all(
+            floor.structure < ONE_PERIOD
+        )  # what two periods of it differ by is nothing to speak of
 
 
 def test_each_trajectory_has_a_floor_of_its_own(bench):
@@ -111,8 +116,8 @@ def test_coloured_noise_repeats_and_a_machine_nearby_does_not(bench):
         ]
         for size in (0.0, 0.8)
     )
-    assert all(floor.repeats.all() for floor in quiet)
+    assert all(np.all(floor.structure < ONE_PERIOD) for floor in quiet)
     assert max(floor.structure.max() for floor in quiet) < 4.0
     assert min(floor.structure[1] for floor in swept) > 4.0
-    assert not swept[0].repeats[1]
-    assert all(floor.repeats[0] for floor in swept)
+    assert swept[0].structure[1] >= ONE_PERIOD
+    assert all(floor.structure[0] < ONE_PERIOD for floor in swept)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sentences say what the evidence bears out, and no more."""
 
+from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.words import decide, Left
 import numpy as np
 
@@ -10,7 +11,7 @@ FLOOR = 'the misfit that the model had before'
 
 def said(arm, as_it_is):
     closed = Left(np.full(arm.robot.n_joints, 0.9), 'in the recordings')
-    return decide((), (), [closed], arm, FLOOR, as_it_is)
+    return decide((), (), [closed], arm, FLOOR, Thresholds(), as_it_is)
 
 
 def test_a_model_that_explains_as_it_is_needs_no_fit(bench):

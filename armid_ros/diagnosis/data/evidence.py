@@ -256,10 +256,29 @@ def trajectories(
     return result
 
 
-def _trajectory(source: str, fold: int, motion: Motion, used: Conditioning) -> Trajectory:
-    thin = max(1, used.decimation // _OVERSAMPLING)
-    while used.decimation % thin:
+def thinnable(decimation: int) -> int:
+    """
+    Return a decimation, or the next smaller one by which motions can be thinned out first.
+
+    Columns are computed at a rate that divides that of the recording and of which rows are a
+    whole part: of a prime decimation that is the rate of the recording, however high it is.
+
+    """
+    while 2 * _thin(decimation) <= decimation // _OVERSAMPLING:
+        decimation -= 1
+    return decimation
+
+
+def _thin(decimation: int) -> int:
+    """Return by how much a motion is thinned out before columns are made of it."""
+    thin = max(1, decimation // _OVERSAMPLING)
+    while decimation % thin:
         thin -= 1
+    return thin
+
+
+def _trajectory(source: str, fold: int, motion: Motion, used: Conditioning) -> Trajectory:
+    thin = _thin(used.decimation)
     if thin > 1:
         first = replace(used, decimation=thin)
         assert motion.tau is not None

@@ -21,10 +21,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-#: Where the difference of two periods has this many times the power at low frequency that it has
-#: at high frequency, something happened in one period that did not in the other: coloured noise
-#: of torques came to 3.6 at the most in 60 sets of recordings in which nothing happened.
-_STRUCTURED = 8.0
 #: No drive tells its torque to more than this share of it, which is 13 bits; what a simulation
 #: without noise leaves of a motion that is differentiated is less.
 _RESOLUTION = 1e-4
@@ -61,11 +57,6 @@ class NoiseFloor:
     period: float | None
     structure: FloatArray
     growth: FloatArray
-
-    @property
-    def repeats(self) -> npt.NDArray[np.bool_]:
-        """Whether each joint did the same in both periods, shape (n,)."""
-        return np.asarray(self.structure < _STRUCTURED)
 
 
 def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:

@@ -6,39 +6,34 @@ from __future__ import annotations
 
 from armid_ros.diagnosis.data.rows import Problem, Projection
 from armid_ros.diagnosis.search.held_out import Trial
-from armid_ros.diagnosis.search.refine import Workspace
+from armid_ros.diagnosis.search.round import Round
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Columns that take less than this share of their gain without the noise of positions beyond the
-#: band of the motion are made of that noise.
-_NOT_NOISE = 0.1
-#: A group made of the measured torque that leaves less than this share of its noise explains noise
-#: with itself.
-_TAUTOLOGY = 0.8
 
-
-def made_of_noise(
-    trial: Trial, problem: Problem, projection: Projection, work: Workspace, noise: FloatArray
-) -> bool:
+def made_of_noise(trial: Trial, problem: Problem, projection: Projection, here: Round) -> bool:
     """
     Return whether a group explains noise with that noise.
 
     What positions have beyond the motion is in the accelerations that the model takes, and so in
     what is left, and in columns that are derived from them. And columns that are made of the
-    measured torque can leave less than its noise, whose squares over the unit of the gap are given
-    for every joint, (n,).
+    measured torque can leave less than its noise.
 
     """
-    effect, kept = trial.group.effect, trial.group.kept
+    effect, kept, work = trial.group.effect, trial.group.kept, here.work
+    thresholds = here.settings.thresholds
     left = projection.rest(problem.y)
     smooth = work.smooth_columns(effect, kept) * problem.weight[:, :, np.newaxis]
     rough = problem.x[:, :, trial.group.columns]
-    if _taken(smooth, projection, left) < _NOT_NOISE * _taken(rough, projection, left):
+    if _taken(smooth, projection, left) < thresholds.smooth_share * _taken(
+        rough, projection, left
+    ):
         return True
     after = problem.chi2_per_row(left - projection.rest(rough) @ trial.values)
-    before = np.minimum(problem.chi2_per_row(left), noise)
-    return bool(np.any(after < _TAUTOLOGY * before)) and work.reads_torque(effect, kept)
+    before = np.minimum(problem.chi2_per_row(left), here.evidence.noise_share)
+    return bool(np.any(after < thresholds.below_noise * before)) and work.reads_torque(
+        effect, kept
+    )
 
 
 def _taken(columns: FloatArray, projection: Projection, left: FloatArray) -> float:

@@ -13,10 +13,6 @@ from armid_ros.effects import CATALOGUE
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: What contains a simpler cause makes all but this share of its torque; what differs from it by
-#: less is the same cause in other words.
-_CONTAINED, _SAME = 0.02, 1e-3
-
 
 def beaten(other: Trial, first: Trial, here: Round) -> bool:
     """Return whether one trial is so far behind another that it is no rival."""
@@ -92,14 +88,15 @@ def contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: R
     """
     if not big.group.effect.joints and small.group.effect.joints:
         return False
+    thresholds = here.settings.thresholds
     projection = project(problem, beside.free, beside.hold)
     columns = projection.rest(problem.x[:, :, big.group.columns])
     target = projection.rest(problem.x[:, :, small.group.columns]) @ small.values
     squares = float(np.sum(target**2))
-    if np.sum((columns @ big.values - target) ** 2) < _SAME * squares:
+    if np.sum((columns @ big.values - target) ** 2) < thresholds.same * squares:
         return here.before is not None  # links do not change; a description of them may be off
     if cost(big, here.settings) <= cost(small, here.settings):
         return False
     flat = columns.reshape(-1, big.group.size)
     fit = np.linalg.lstsq(flat, target.ravel(), rcond=1e-6)[0]
-    return bool(np.sum((target.ravel() - flat @ fit) ** 2) < _CONTAINED * squares)
+    return bool(np.sum((target.ravel() - flat @ fit) ** 2) < thresholds.contained * squares)

@@ -32,9 +32,6 @@ _LOOKED_AT, _REFINED, _PROMISING = 30, 6, 0.4
 _COMPARED = 8
 #: Rivals that are told of a name: the likeliest; more than two help nobody.
 _RIVALS = 2
-#: A cause that takes this share of a joint in which a gap is open matters there, however little
-#: that is of the gap of the arm.
-_MOST = 0.5
 #: Causes in the small print.
 _SMALL_PRINT = 5
 
@@ -169,7 +166,7 @@ def _inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
     """Return which values are physically possible, or differ from that by noise, shape (p,)."""
     kept = list(trial.group.kept)
     lower, upper = (bound[kept] for bound in room(trial.group.effect, here.work.arm))
-    slack = 3.0 * trial.deviation
+    slack = here.settings.thresholds.beyond_bounds * trial.deviation
     return np.asarray((trial.values > lower - slack) & (trial.values < upper + slack))
 
 
@@ -268,6 +265,7 @@ def _examined(
     least = 0.0 if here.before is None else here.settings.thresholds.headline * here.total
     free = beside.rows(problem)
     open_squares = _open_squares(problem, beside, here)
+    most = here.settings.thresholds.open_share
     there: list[Trial] = []
     large: list[tuple[Trial, FloatArray]] = []
     for trial in ranking[:_LOOKED_AT]:
@@ -279,7 +277,7 @@ def _examined(
         there.append(change)
         own = problem.x[:, :, trial.group.columns]
         takes = trial.joint_gains(problem, own, free)
-        matters = change.gain >= least or bool(np.any(takes > _MOST * open_squares))
+        matters = change.gain >= least or bool(np.any(takes > most * open_squares))
         if matters and material(_size(change, takes, own, here), here):
             large.append((trial, takes))
     best = large[:_COMPARED]
@@ -389,6 +387,6 @@ def _passing(
         if id(trial) not in gains or (result and beaten(trial, result[0], here)):
             continue
         projection = projection or project(problem, beside.free, beside.hold)
-        if not made_of_noise(trial, problem, projection, here.work, here.evidence.noise_share):
+        if not made_of_noise(trial, problem, projection, here):
             result.append(trial)
     return result

@@ -10,6 +10,7 @@ from typing import Literal
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.floor import NoiseFloor
+from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
@@ -20,9 +21,8 @@ Word = Literal[
     'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
 ]
 
-#: Several recordings whose periods differ slowly, each a little, tell as well: of 60 sets of
-#: recordings in which nothing happened, none had a geometric mean of the structure above 2.4.
-_SEVERAL, _ON_AVERAGE = 3, 3.5
+#: Recordings whose periods differ slowly, each a little, tell as well if they are so many.
+_SEVERAL = 3
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
 
@@ -69,6 +69,7 @@ def decide(
     left: Sequence[Left],
     arm: ArmModel,
     floor_in_words: str,
+    thresholds: Thresholds,
     as_it_is: Left | None = None,
     minor: Sequence[Finding] = (),
 ) -> Verdict:
@@ -87,6 +88,8 @@ def decide(
         Gives the joints.
     floor_in_words : str
         What was there before, or noise.
+    thresholds : Thresholds
+        What does not repeat.
     as_it_is : Left or None
         What the model leaves as it is, where its body and known effects were fitted anew.
     minor : sequence of Finding
@@ -96,7 +99,7 @@ def decide(
     worst = max(left, key=lambda one: float(one.excess.max()))
     open_gap = bool(worst.excess.max() > 1.0)
     joint = arm.robot.joints[int(np.argmax(worst.excess))]
-    strange = _not_repeating(floors, arm)
+    strange = _not_repeating(floors, arm, thresholds)
     if strange and (not findings or open_gap):
         return Verdict('not_repeatable', _strange(strange, findings))
     rest = (
@@ -179,15 +182,18 @@ def _with_degrees(value: float, std: float, unit: str) -> str:
     return text
 
 
-def _not_repeating(floors: Sequence[NoiseFloor], arm: ArmModel) -> list[str]:
+def _not_repeating(
+    floors: Sequence[NoiseFloor], arm: ArmModel, thresholds: Thresholds
+) -> list[str]:
     """Return the joints that did not do the same in equal periods."""
     known = [floor for floor in floors if floor.period is not None]
     if not known:
         return []
-    often = np.sum([~floor.repeats for floor in known], axis=0) >= max(1, len(known) / 2)
+    odd_ones = [floor.structure >= thresholds.one_period for floor in known]
+    often = np.sum(odd_ones, axis=0) >= max(1, len(known) / 2)
     if len(known) >= _SEVERAL:
         mean = np.exp(np.mean([np.log(floor.structure) for floor in known], axis=0))
-        often = often | (mean > _ON_AVERAGE)
+        often = often | (mean > thresholds.one_period_on_average)
     return [joint for joint, odd in zip(arm.robot.joints, often, strict=True) if odd]
 
 

@@ -169,14 +169,19 @@ def lived_case(kind: str, index: int) -> LivedCase:
 
     """
     spec = specify(kind, index)
-    case = kept(spec.key.replace('/', '_'), lambda: _record_case(draw_case(spec)))
+    case = kept(spec.key.replace('/', '_'), lambda: case_of(spec))
     return replace(case, urdf=_path_of(load_arm(spec.arm)))
 
 
 def case_with(kind: str, index: int, cause: str, size: tuple[float, float]) -> LivedCase:
     """Make a case with another cause, of a gap in the middle of a range."""
     wanted = float(np.sqrt(size[0] * size[1]))
-    return _record_case(draw_case(replace(specify(kind, index), cause=cause, wanted=wanted)))
+    return case_of(replace(specify(kind, index), cause=cause, wanted=wanted))
+
+
+def case_of(spec: LivedSpec) -> LivedCase:
+    """Make a case of any specification."""
+    return _record_case(draw_case(spec))
 
 
 def _record_case(draft: Draft) -> LivedCase:

@@ -1,0 +1,75 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The diagnosis is right wherever the plain ranking is: on a few cheap cases of every kind."""
+
+from dataclasses import asdict
+import json
+
+from armid_ros.effects import CATALOGUE
+import numpy as np
+import pytest
+
+from benchmarks.against_plain import counts, FAMILIES, family_of, lived_rows, read, right, Row
+from benchmarks.against_plain import table as side_by_side
+from benchmarks.lived import judge
+from benchmarks.plain_ranking import plain_ranking
+
+
+def test_rows_count_for_every_group_that_they_are_of():
+    rows = [
+        Row(('development', 'motion: natural'), True, False),
+        Row(('development',), True, True),
+    ]
+    assert counts(rows) == {
+        'development': (2, 1, 2),
+        'motion: natural': (1, 0, 1),
+        'all': (2, 1, 2),
+    }
+
+
+def test_a_group_in_which_the_rival_is_better_is_marked():
+    lines = side_by_side({'a': (1, 2, 2), 'b': (2, 2, 2)}).splitlines()
+    assert [line.endswith('NOT beaten') for line in lines[1:]] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ('name', 'family'),
+    [
+        ('', 'nothing'),
+        ('payload', 'bodies'),
+        ('gravity', 'gravity'),
+        ('coulomb_friction', 'friction'),
+        ('bumps', 'outside the catalogue'),
+    ],
+)
+def test_causes_have_a_family(name, family):
+    assert family_of(name) == f'cause: {family}'
+
+
+def test_families_are_of_names_of_the_catalogue():
+    known = {*CATALOGUE, 'gravity'}
+    assert {name for names in FAMILIES.values() for name in names} <= known
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ('kind', 'index'),
+    [
+        ('development/exact', 9),  # nothing happened
+        ('development/exact', 12),  # payload
+        ('development/pairs', 18),  # periodic, load-dependent friction
+        ('development/pairs', 19),  # point to point
+        ('development', 8),  # mounting, with a day 1
+    ],
+)
+def test_the_diagnosis_is_right_where_the_plain_ranking_is(kind, index, tmp_path):
+    found = judge(kind, index, again=False)
+    plain = judge(kind, index, again=False, question=plain_ranking)
+    rows = lived_rows([found], [plain])
+    assert len(rows) == 1
+    assert rows[0].found >= rows[0].plain
+    assert rows[0].found
+    path = tmp_path / 'answers.json'
+    path.write_text(json.dumps([asdict(found)], default=np.ndarray.tolist))
+    (again,) = read(path)
+    assert right(again) == right(found)

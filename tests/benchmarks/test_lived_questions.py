@@ -1,0 +1,95 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What only one question of lived arms asks is counted against what was said."""
+
+import numpy as np
+import pytest
+
+from benchmarks.lived_questions import exact, is_consistent, mass_is_right, pairs
+from benchmarks.lived_scoring import felt_directions, LivedJudged, LivedTruth
+from benchmarks.two_days import Answer, Named
+from tests.hidden.lived.arms import load_arm
+from tests.hidden.lived.chain import Chain
+
+EARTH = np.array([0.0, 0.0, -9.81])
+
+
+def truth(key, name='payload', friction='unknown'):
+    """Return what is true of a case."""
+    return LivedTruth(
+        key=key,
+        cause='payload' if name else 'none',
+        size='natural',
+        style='sines',
+        arm='ur5',
+        name=name,
+        joints=('wrist',) if name else (),
+        parameters=(('payload_m', 'wrist', 2.0),) if name else (),
+        in_catalogue=bool(name),
+        gap=5.0,
+        share_of_power=1.0,
+        share_of_excess=1.0,
+        gravity=EARTH,
+        described=EARTH,
+        friction=friction,
+    )
+
+
+def payload(mass):
+    """Return an answer that names a payload."""
+    values = (('payload_m', 'wrist', mass, 0.01),)
+    return Answer('named', (Named('payload', ('wrist',), (), values),))
+
+
+NOTHING = Answer('consistent')
+
+
+def values(metrics):
+    """Return the values of rows in order."""
+    return [metric.value for metric in metrics]
+
+
+def test_point_to_point_is_held_against_what_periodic_data_give():
+    answers = (payload(2.0), payload(2.0), payload(2.0), NOTHING, NOTHING, payload(2.0))
+    judged = [LivedJudged(truth(f'development/pairs/{k}'), one) for k, one in enumerate(answers)]
+    periodic, dwells, ratio = pairs(judged)
+    assert (periodic.value, dwells.value) == (pytest.approx(2 / 3), pytest.approx(2 / 3))
+    assert ratio.value == 1.0
+    assert ratio.good
+    assert pairs(judged[:4])[2].value == 0.5
+    assert not pairs(judged[:4])[2].good
+
+
+def test_half_a_pair_is_left_out():
+    judged = [LivedJudged(truth('development/pairs/0'), payload(2.0))]
+    assert [metric.count for metric in pairs(judged)] == [0, 0, 0]
+
+
+@pytest.mark.parametrize(('mass', 'right'), [(2.09, True), (1.91, True), (2.11, False)])
+def test_a_mass_is_right_within_five_per_cent(mass, right):
+    judged = LivedJudged(truth('development/exact/0'), payload(mass))
+    assert mass_is_right(judged) is right
+    assert not mass_is_right(LivedJudged(truth('development/exact/0'), NOTHING))
+
+
+def test_silence_without_the_word_is_not_consistent():
+    free = truth('development/exact/2', name='')
+    assert is_consistent(LivedJudged(free, NOTHING))
+    assert not is_consistent(LivedJudged(free, Answer('unknown')))
+
+
+def test_exact_arms_are_counted_by_what_is_known_of_friction():
+    judged = [
+        LivedJudged(truth('development/exact/0', friction='values'), payload(2.0)),
+        LivedJudged(truth('development/exact/1', friction='names'), payload(3.0)),
+        LivedJudged(truth('development/exact/2', name='', friction='values'), NOTHING),
+        LivedJudged(truth('development/exact/4', name='', friction='names'), Answer('unknown')),
+    ]
+    assert values(exact(judged)) == [1.0, 1.0, 1.0, 1.0, 0.0, 0.0]
+
+
+def test_gravity_along_axes_that_are_all_parallel_is_not_felt():
+    np.testing.assert_allclose(
+        felt_directions(Chain.of(load_arm('drawn-3-0'))), np.diag([1.0, 0.0, 1.0]), atol=1e-9
+    )
+    np.testing.assert_allclose(felt_directions(Chain.of(load_arm('ur5'))), np.eye(3), atol=1e-9)

@@ -1,0 +1,68 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which numbers change an answer is found by changing many together, and taking them apart."""
+
+from dataclasses import fields
+
+from armid_ros.diagnosis.settings import Thresholds
+import numpy as np
+import pytest
+
+from benchmarks.lived_scoring import LivedJudged, LivedTruth
+from benchmarks.thresholds import Asked, counts, deciding, one_case, SAMPLE, varied
+from benchmarks.two_days import Answer, Named
+
+NAMES = [field.name for field in fields(Thresholds)]
+TRUTH = LivedTruth(
+    key='development/14',
+    cause='rotor',
+    size='medium',
+    style='sines',
+    arm='ur5',
+    name='rotor_inertia',
+    joints=('elbow',),
+    parameters=(),
+    in_catalogue=True,
+    gap=1.5,
+    share_of_power=0.5,
+    share_of_excess=0.5,
+    gravity=np.zeros(3),
+    described=np.zeros(3),
+)
+RIGHT = LivedJudged(TRUTH, Answer('named', (Named('rotor_inertia', ('elbow',)),)))
+SILENT = LivedJudged(TRUTH, Answer('consistent'))
+
+
+@pytest.mark.parametrize('name', NAMES)
+@pytest.mark.parametrize('factor', [0.7, 1.3])
+def test_one_number_is_changed_and_no_other(name, factor):
+    changed, usual = varied([name], factor).thresholds, Thresholds()
+    assert [other for other in NAMES if getattr(changed, other) != getattr(usual, other)] == [name]
+    assert 0.0 < changed.confidence < 1.0
+
+
+@pytest.mark.parametrize('guilty', [set(), {'price'}, {'price', 'many_causes'}, set(NAMES)])
+def test_the_numbers_that_change_an_answer_are_found(guilty):
+    asked = []
+
+    def said(names):
+        asked.append(names)
+        return SILENT if guilty & set(names) else RIGHT
+
+    assert {name for name, _ in deciding(NAMES, said, RIGHT)} == guilty
+    if len(guilty) < 2:
+        assert len(asked) < len(NAMES)
+
+
+def test_a_changed_answer_counts_where_it_was_given():
+    asked = Asked(RIGHT, {('price', 0.7): SILENT})
+    assert asked.with_change(('price', 0.7)) is SILENT
+    assert asked.with_change(('price', 1.3)) is RIGHT
+    assert counts([asked.usual]).startswith('1 of 1 first')
+    assert counts([asked.with_change(('price', 0.7))]).startswith('0 of 1 first')
+    assert 'price 0.7' in one_case(asked)
+
+
+def test_the_sample_is_of_development_kinds_alone():
+    assert all(key.startswith('development') for key in SAMPLE)
+    assert len(set(SAMPLE)) == len(SAMPLE) >= 16

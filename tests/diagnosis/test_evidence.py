@@ -1,0 +1,46 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Columns are computed at a few times the rate of the rows, however fast a recording is."""
+
+from armid_ros.diagnosis.data.evidence import thinnable, trajectories
+from armid_ros.diagnosis.data.prepare import choose_filters
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.identification.rows.signals import Conditioning
+from armid_ros.motion import Motion
+from armid_ros.recording import Recording
+import numpy as np
+import pytest
+
+
+def swings(bench, rate):
+    """Return twenty seconds of swings that were recorded at a rate [Hz]."""
+    t, w = np.arange(round(20.0 * rate)) / rate, 2.0 * np.pi * 0.7
+    angle = w * t[:, np.newaxis] + np.arange(bench.robot.n_joints)
+    q, dq, ddq = 0.4 * np.sin(angle), 0.4 * w * np.cos(angle), -0.4 * w**2 * np.sin(angle)
+    noise = np.random.default_rng(0).normal(size=q.shape)
+    tau = bench.torque(Motion(bench.robot.joints, t, q, dq, ddq)) + 0.01 * noise
+    return Recording(joints=bench.robot.joints, t=t, q=q + 1e-5 * noise, tau=tau, source='swings')
+
+
+@pytest.mark.parametrize('decimation', range(1, 130, 2))
+def test_a_prime_decimation_gives_way_to_one_that_a_motion_can_be_thinned_by(decimation):
+    used = thinnable(decimation)
+    assert 0.88 * decimation <= used <= decimation
+    thin = max(d for d in range(1, max(1, used // 8) + 1) if used % d == 0)
+    assert used / thin < 2 * 8 + 8
+
+
+@pytest.mark.parametrize('rate', [100.0, 1000.0, 1013.0, 2000.0])
+def test_a_motion_has_so_many_samples_a_row_at_any_rate(bench, rate):
+    arm, recordings = bench.arm, [swings(bench, rate)]
+    rng = np.random.default_rng(0)
+    used = choose_filters(arm, recordings, (), DiagnosisSettings(), rng)
+    (part,) = trajectories(recordings, used)
+    assert len(part.motion) < 20 * len(part.rows)
+
+
+def test_a_decimation_that_was_asked_for_stays(bench):
+    recording = swings(bench, 1000.0)
+    (part,) = trajectories([recording], Conditioning(1000.0, 20.0, 53))
+    step = np.diff(part.t)
+    np.testing.assert_allclose(step, 0.053, atol=1e-9)
