@@ -210,8 +210,10 @@ def diagnose(
             return _said(tied, notes, context)
     written = None if misfit is None else misfit.of(arm.robot)
 
+    unseen = trajectories(validate, prepared.used, arm) if known else ()
+
     def explain(asked: DiagnosisSettings) -> Chosen:
-        return explained(arm, prepared, known, asked, rng, tell, written)
+        return explained(arm, prepared, known, asked, rng, tell, written, unseen)
 
     chosen = own_causes_first(explain, settings)
     said = _said(chosen, notes, context)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.data.rows import Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
+from armid_ros.diagnosis.search.exchange import changed
 from armid_ros.diagnosis.search.held_out import (
     products,
     Trial,
@@ -280,7 +281,8 @@ def _examined(
         own = problem.x[:, :, trial.group.columns]
         takes = trial.joint_gains(problem, own, free)
         matters = change.gain >= least or bool(np.any(takes > _MOST * open_squares))
-        if matters and material(_size(change, takes, own, here), here):
+        matters = matters and material(_size(change, takes, own, here), here)
+        if matters and changed(trial, problem, beside, here):
             large.append((trial, takes))
     best = large[:_COMPARED]
     seen = {id(trial) for trial, _ in best}
