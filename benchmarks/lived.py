@@ -63,7 +63,13 @@ def judge(kind: str, index: int, again: bool = True, question: Ask = ask) -> Liv
             arm, shares = found.arm, true_shares(found, held_out, case.held_out.contribution)
         else:
             arm = known_arm(case)
-        answer = question(arm, day_2, validate=[held_out], baseline=day_1)
+        answer = question(
+            arm,
+            day_2,
+            validate=[held_out],
+            baseline=day_1,
+            contribution=case.held_out.contribution if case.truth else None,
+        )
         if day_1 and again:
             repeated = question(arm, day_1[:2], validate=day_1[2:], baseline=day_1)
     except Exception:

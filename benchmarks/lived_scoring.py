@@ -176,8 +176,16 @@ class LivedJudged:
 
     @property
     def share_error(self) -> float:
-        """Stated share less the nearer of the two true ones; nan if none is stated."""
+        """
+        Stated share less the true one; nan if none is stated.
+
+        Where an answer does not tell what its shares are of, the nearer of the two of the rows of
+        the identification.
+
+        """
         said = self.answer.headline[0].share
+        if np.isfinite(self.answer.true_share):
+            return said - self.answer.true_share
         errors = said - np.array([self.truth.share_of_power, self.truth.share_of_excess])
         return float(errors[np.argmin(np.abs(errors))])
 

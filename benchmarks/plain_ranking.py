@@ -76,8 +76,14 @@ def plain_ranking(
     *,
     validate: Sequence[Recording] = (),
     baseline: Sequence[Recording] = (),
+    contribution: FloatArray | None = None,
 ) -> Answer:
-    """Rank causes and name the first, in the form of an answer of the diagnosis."""
+    """
+    Rank causes and name the first, in the form of an answer of the diagnosis.
+
+    Its shares are not of a gap, so that the torque of the cause tells nothing of them.
+
+    """
     begin = time.process_time()
     chain = Chain.of(arm.robot)
     ranked = ranking(chain, [*recordings, *validate], baseline)

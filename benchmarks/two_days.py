@@ -10,14 +10,16 @@ This is the one place of the benchmarks that knows how the question is put.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import time
 from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
+from armid_ros.diagnosis.verdict.gap import Gap
 from armid_ros.effects import make_effect
 from armid_ros.identification import Identification, identify
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
@@ -88,6 +90,9 @@ class Answer:
         In words.
     error : str
         Why there is no diagnosis; empty if there is one.
+    true_share : float
+        Share of the held-out gap that the torque of the cause truly takes, in the rows and the
+        unit of the shares that are stated; nan if that is not known.
 
     """
 
@@ -97,6 +102,7 @@ class Answer:
     seconds: float = np.nan
     summary: str = ''
     error: str = ''
+    true_share: float = np.nan
 
 
 def identification_of(robot: Robot, recordings: Sequence[Recording]) -> Identification:
@@ -114,6 +120,7 @@ def ask(
     validate: Sequence[Recording] = (),
     baseline: Sequence[Recording] = (),
     settings: DiagnosisSettings | None = None,
+    contribution: FloatArray | None = None,
 ) -> Answer:
     """
     Ask the diagnosis what is not in a model.
@@ -128,6 +135,8 @@ def ask(
         Of the day on which the model was identified.
     settings : DiagnosisSettings, optional
         The numbers that decide.
+    contribution : ndarray, shape (N, n), optional
+        Torque of the cause in the only one of ``validate``, which tells its true share [N m].
 
     """
     begin = time.process_time()
@@ -140,7 +149,36 @@ def ask(
         rng=np.random.default_rng(0),
     )
     seconds = time.process_time() - begin
-    return answer_of(diagnosis_document(found), seconds)
+    answer = answer_of(diagnosis_document(found), seconds)
+    if contribution is None or found.gap is None:
+        return answer
+    (held_out,) = validate
+    return replace(answer, true_share=true_share(found.gap, held_out.t, contribution))
+
+
+def true_share(gap: Gap, t: FloatArray, contribution: FloatArray) -> float:
+    """
+    Return the share of the squares of a gap that goes with a torque.
+
+    Parameters
+    ----------
+    gap : Gap
+        Measured on one recording.
+    t : ndarray, shape (N,)
+        Times of the torque [s].
+    contribution : ndarray, shape (N, n)
+        The torque [N m].
+
+    """
+    there = rest = 0.0
+    for one in gap.overlays:
+        part = one.trajectory
+        torque = np.column_stack([np.interp(part.motion.t, t, tau) for tau in contribution.T])
+        weight = part.informative / one.sigma
+        left = one.measured - one.before
+        there += float(np.sum((left * weight) ** 2))
+        rest += float(np.sum(((left - part.reduce(torque)) * weight) ** 2))
+    return 1.0 - rest / there
 
 
 def answer_of(document: dict[str, Any], seconds: float) -> Answer:

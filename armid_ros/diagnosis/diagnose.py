@@ -203,8 +203,10 @@ def diagnose(
             return _said(tied, notes, asked)
     written = None if misfit is None else misfit.of(arm.robot)
 
+    seen = trajectories(validate, prepared.used, arm) if known else ()
+
     def explain(by: DiagnosisSettings) -> Chosen:
-        return explained(arm, prepared, known, by, rng, tell, written)
+        return explained(arm, prepared, known, by, rng, tell, written, seen)
 
     said = _said(own_causes_first(explain, settings), notes, asked)
     if said.verdict == 'unknown' and validate and said.minor:

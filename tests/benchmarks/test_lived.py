@@ -140,6 +140,8 @@ def test_joint_share_and_parameters_are_compared_with_the_truth():
     judged = [LivedJudged(COULOMB, said(one)) for one in (good, replace(bad, share=0.2))]
     assert judged[0].share_error == pytest.approx(-0.03)
     assert judged[1].share_error == pytest.approx(-0.5)
+    known = replace(judged[0], answer=replace(judged[0].answer, true_share=0.75))
+    assert known.share_error == pytest.approx(0.02)
     assert [one.placed for one in judged] == [True, False]
     assert judged[0].parameter_errors() == [(pytest.approx(0.1), True)]
     assert judged[1].parameter_errors() == [(pytest.approx(0.5), False)]
@@ -216,6 +218,12 @@ def test_true_share_is_what_the_torque_of_the_cause_takes():
     assert 0.3 < of_power < of_excess < 1.5
     nothing = np.zeros_like(case.held_out.contribution)
     assert np.isnan(true_shares(found, held_out, nothing)).all()
+
+
+def test_a_share_is_stated_of_the_rows_that_it_is_compared_in():
+    one = judge('development', 9, again=False)
+    assert 0.5 < one.answer.true_share < 1.0
+    assert abs(one.share_error) < 0.03
 
 
 def test_known_friction_is_in_the_model_with_its_values_or_without():

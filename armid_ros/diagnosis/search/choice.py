@@ -68,6 +68,7 @@ def explained(
     rng: np.random.Generator,
     tell: Progress,
     written: FloatArray | None = None,
+    unseen: Sequence[Trajectory] = (),
 ) -> Chosen:
     """
     Explain the gap of an arm.
@@ -88,10 +89,12 @@ def explained(
         Told the share that is done and what is being done.
     written : ndarray, shape (n,), optional
         Misfit that the model is known to have, where there are no recordings of it [N m].
+    unseen : sequence of Trajectory
+        More data of the same day, which nothing is fitted to.
 
     """
     if baseline is not None:
-        return _since(arm, prepared, baseline, settings, rng, tell)
+        return _since(arm, prepared, baseline, settings, rng, tell, unseen)
     if written is not None:
         return _beside(arm, prepared, written, settings, rng, tell)
     few, many = settings.thresholds.few_causes, settings.thresholds.many_causes
@@ -156,6 +159,7 @@ def _since(
     settings: DiagnosisSettings,
     rng: np.random.Generator,
     tell: Progress,
+    unseen: Sequence[Trajectory],
 ) -> Chosen:
     """Explain what has changed since the baseline."""
     tell(0.2, 'what has changed')
@@ -169,7 +173,11 @@ def _since(
     told = baseline.told(free.arm, free.base)
     beside = told if free.beside is arm else baseline.told(free.beside, free.beside_base)
     question = replace(free, told=told, beside_told=beside)
-    found = explain(question, evidence, settings, baseline=baseline)
+    more = None
+    if unseen:
+        unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(unseen)
+        more = Evidence(tuple(unseen), unit, unit, baseline.varies)
+    found = explain(question, evidence, settings, baseline=baseline, unseen=more)
     if not found.steps:
         return Chosen(found, misfit, OWN_MISFIT)
     return Chosen(in_model_as_given(found), misfit, OWN_MISFIT, rest=found)

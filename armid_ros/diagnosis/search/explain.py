@@ -27,7 +27,7 @@ from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.resampled import widened
 from armid_ros.diagnosis.search.rivals import undecided
-from armid_ros.diagnosis.search.round import Before, Beside, Round
+from armid_ros.diagnosis.search.round import Before, Beside, Later, Round
 from armid_ros.diagnosis.search.step import acceptable, material, next_step, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.model import BaseParameters
@@ -107,14 +107,16 @@ def explain(
     settings: DiagnosisSettings,
     start: Sequence[tuple[Named, Step, FloatArray]] = (),
     baseline: Baseline | None = None,
+    unseen: Evidence | None = None,
 ) -> Explanation:
     """Take causes as long as any passes, then name the friction that matters, and prune."""
-    taken = _forward(question, evidence, settings, start, baseline)
+    days = baseline, unseen
+    taken = _forward(question, evidence, settings, start, days)
     width = 0.0 if taken.last is None else taken.last.most
     here = Round(evidence, Workspace(memoized_arm(question.arm), evidence.data), settings, None)
     here = replace(here, width=width)
     if any(undecided(step.trial, step.ranking, here) for step in taken.steps[len(start) :]):
-        taken = _forward(question, evidence, settings, start, baseline, width)
+        taken = _forward(question, evidence, settings, start, days, width)
     named, steps, values, survey = taken.named, taken.steps, taken.values, taken.first
     last = taken.last
     minor = () if last is None else last.there
@@ -161,7 +163,7 @@ def _forward(
     evidence: Evidence,
     settings: DiagnosisSettings,
     start: Sequence[tuple[Named, Step, FloatArray]],
-    baseline: Baseline | None,
+    days: tuple[Baseline | None, Evidence | None],
     width: float = 0.0,
 ) -> _Taken:
     """Take the cause that explains most, and ask again, until none passes."""
@@ -175,16 +177,14 @@ def _forward(
     survey: Survey | None = None
     look: Survey | None = None
     found: Candidates | None = None
-    problem, beside = None, None
+    problem, beside, before = None, None, None
     for _ in range(question.most):
         if found is None:
             found = candidates(current, data, sigma, settings.kinds)
             problem, beside = _problem(found, current, evidence)
+            before = _before(question, current, *days)
         assert problem is not None and beside is not None
         work = Workspace(memoized_arm(current.arm), data)
-        before = None
-        if baseline is not None and question.beside_told is not None:
-            before = Before(baseline, question.beside_told, current.change)
         here = Round(evidence, work, settings, total, before, width)
         step, look, problem = next_step(problem, beside, found.groups, here)
         total, survey = look.total, survey or look
@@ -198,11 +198,38 @@ def _forward(
         steps.append(step)
         if group.effect.linear and not group.effect.shapes:
             beside = beside.and_columns(group)
+            before = None if before is None else before.and_columns(current.arm, group)
         else:
             current = fit(arm, named, data, sigma, base, values, question.beside_told)
             named, values = list(current.named), list(current.values)
             found = None
     return _Taken(named, steps, values, survey, look)
+
+
+def _before(
+    question: Question, current: Fitted, baseline: Baseline | None, unseen: Evidence | None
+) -> Before | None:
+    """Return what other recordings show beside an arm: those from before, and unseen ones."""
+    told = question.beside_told
+    if baseline is None or told is None:
+        return None
+    before = Before(baseline, told, current.change)
+    if unseen is None:
+        return before
+    there = fit(
+        question.beside,
+        current.named,
+        unseen.data,
+        unseen.sigma,
+        question.beside_base,
+        current.values,
+        told,
+        known=current.estimate,
+    )
+    rank = len(current.change)
+    pairs = zip(there.residual, there.columns, strict=True)
+    left = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]
+    return replace(before, later=Later.of(unseen, there.columns, left))
 
 
 def _problem(found: Candidates, current: Fitted, evidence: Evidence) -> tuple[Problem, Beside]:

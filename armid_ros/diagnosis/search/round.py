@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import Problem
+from armid_ros.diagnosis.data.rows import Problem, weighted_rows
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.fit import Told
 from armid_ros.diagnosis.search.held_out import Products, Trial
@@ -55,6 +55,52 @@ class Beside:
 
 
 @dataclass(frozen=True)
+class Later:
+    """
+    Recordings of the day in question that nothing is fitted to, over the unit of the gap.
+
+    Attributes
+    ----------
+    evidence : Evidence
+        The recordings.
+    free : tuple of ndarray, each (S, f)
+        Columns of what is fitted beside every cause, of each recording.
+    left : tuple of ndarray, each (S,)
+        What is left of it.
+
+    """
+
+    evidence: Evidence
+    free: tuple[FloatArray, ...]
+    left: tuple[FloatArray, ...]
+
+    @classmethod
+    def of(
+        cls, evidence: Evidence, columns: Sequence[FloatArray], residual: Sequence[FloatArray]
+    ) -> Later:
+        """Weight columns (M, n, f) and residuals (M, n) of trajectories."""
+        free = weighted_rows(columns, evidence.data, evidence.sigma)
+        left = weighted_rows(residual, evidence.data, evidence.sigma)
+        return cls(
+            evidence,
+            tuple(rows.reshape(-1, rows.shape[2]) for rows in free),
+            tuple(rows.ravel() for rows in left),
+        )
+
+    def own(self, arm: ArmModel, group: Group) -> list[FloatArray]:
+        """Return the columns of a group, each (S, p)."""
+        data, sigma = self.evidence.data, self.evidence.sigma
+        kept = list(group.kept)
+        rows = [part.columns(arm, group.effect)[:, :, kept] for part in data]
+        return [part.reshape(-1, len(kept)) for part in weighted_rows(rows, data, sigma)]
+
+    def and_columns(self, arm: ArmModel, group: Group) -> Later:
+        """Return the same with the columns of a group."""
+        pairs = zip(self.free, self.own(arm, group), strict=True)
+        return replace(self, free=tuple(np.concatenate(pair, axis=1) for pair in pairs))
+
+
+@dataclass(frozen=True)
 class Before:
     """
     Recordings in which nothing was wrong, beside an arm of which something is free.
@@ -67,12 +113,20 @@ class Before:
         What they tell of what is free.
     change : ndarray, shape (r,)
         What was added to that.
+    later : Later or None
+        Recordings of the day in question that nothing is fitted to.
 
     """
 
     baseline: Baseline
     told: Told
     change: FloatArray
+    later: Later | None = None
+
+    def and_columns(self, arm: ArmModel, group: Group) -> Before:
+        """Return the same where a group is fitted beside every cause."""
+        later = None if self.later is None else self.later.and_columns(arm, group)
+        return replace(self, later=later)
 
     def beside(self, groups: Sequence[Group], arm: ArmModel, beside: Beside) -> Beside:
         """

@@ -7,9 +7,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 from armid_ros.diagnosis.data.rows import Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
+from armid_ros.diagnosis.search.exchange import changed
 from armid_ros.diagnosis.search.held_out import (
     products,
     Trial,
@@ -108,7 +110,9 @@ def next_step(
     problem: Problem, beside: Beside, groups: Sequence[Group], here: Round
 ) -> tuple[Step | None, Survey, Problem]:
     """
-    Look for the cause that takes most of what is left.
+    Look for the cause that takes most of what is left, of those that have changed.
+
+    What takes as much stays a rival of it, whether other recordings show it as well or not.
 
     Returns
     -------
@@ -132,11 +136,14 @@ def next_step(
     ranking, there, gains = _examined(ranking, problem, beside, here, max(len(seen), 1))
     survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
     passing = _passing(ranking, gains, problem, beside, here)
-    if not passing:
+    ahead = list(takewhile(lambda t: not changed(t, problem, beside, here), passing))
+    if len(ahead) == len(passing):
         return None, survey, problem
-    first = passing[0]
-    tied = [first, *(t for t in passing[1:] if not beaten(t, first, here))]
-    winner = likeliest(tied, gains, problem, beside, here)
+    first, *others = passing[len(ahead) :]
+    behind = [trial for trial in others if not beaten(trial, first, here)]
+    able = [first, *(trial for trial in behind if changed(trial, problem, beside, here))]
+    winner = likeliest(able, gains, problem, beside, here)
+    tied = [*(trial for trial in ahead if not beaten(first, trial, here)), first, *behind]
     rivals = [
         trial
         for trial in tied
@@ -384,7 +391,7 @@ def _passing(
     projection: Projection | None = None
     result: list[Trial] = []
     for trial in ranking:
-        if id(trial) not in gains or (result and beaten(trial, result[0], here)):
+        if id(trial) not in gains:
             continue
         projection = projection or project(problem, beside.free, beside.hold)
         if not made_of_noise(trial, problem, projection, here):

@@ -1,0 +1,163 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether a cause differs between two days by more than between any recordings.
+
+What a model gets wrong of one motion is another thing than what it gets wrong of the next, and of
+hundreds of causes some lie along the difference. Where nothing happened the recordings of both
+days are exchangeable: divided into two groups in another way they show as much of a cause. It has
+changed between the days if no other division shows more of it: a permutation test, which needs no
+distribution of the misfit.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, islice
+
+from armid_ros.diagnosis.data.rows import Problem
+from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.round import Beside, Round
+from armid_ros.identification.fitting.normal_equations import informative_basis
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+
+#: Divisions that are tried; those that exchange fewest recordings first.
+_DIVISIONS = 200
+#: Directions of the columns of a cause of which the rest leaves less than this share of their
+#: squares tell nothing; and a lead of less than this share of what is explained is rounding.
+_UNSEEN, _ROUNDING = 1e-5, 1e-6
+
+
+@dataclass(frozen=True)
+class Rows:
+    """
+    Rows of one recording, over the unit of the gap.
+
+    Attributes
+    ----------
+    free : ndarray, shape (S, f)
+        Columns of what is fitted beside a cause.
+    own : ndarray, shape (S, p)
+        Columns of the cause.
+    left : ndarray, shape (S,)
+        What is left of the torque.
+
+    """
+
+    free: FloatArray
+    own: FloatArray
+    left: FloatArray
+
+
+def changed(trial: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
+    """Return whether no other division of the recordings shows more of a cause than the days."""
+    if here.before is None:
+        return True
+    first, second = _before(trial, beside, here), _today(trial, problem, beside, here)
+    later = here.before.later
+    if later is not None:
+        more = later.own(here.work.arm, trial.group)
+        second += [Rows(*rows) for rows in zip(later.free, more, later.left, strict=True)]
+    free = beside.rows(problem).reshape(-1, len(beside.free))
+    hold, pull = beside.hold + free.T @ free, beside.pull + free.T @ problem.y.ravel()
+    if later is not None:
+        for columns, left in zip(later.free, later.left, strict=True):
+            hold, pull = hold + columns.T @ columns, pull + columns.T @ left
+    return stands_out(first, second, (hold, pull), trial.group.precision)
+
+
+def stands_out(
+    first: Sequence[Rows],
+    second: Sequence[Rows],
+    known: tuple[FloatArray, FloatArray],
+    precision: FloatArray,
+) -> bool:
+    """
+    Return whether two groups of recordings differ by more than other groups of them would.
+
+    Parameters
+    ----------
+    first, second : sequence of Rows
+        Recordings of the two groups.
+    known : tuple of ndarray, shapes (f, f) and (f,)
+        Products of the free columns of all of them with each other and with what is left, and of
+        whatever else holds them.
+    precision : ndarray, shape (p,)
+        How strongly the values of the cause are held to zero.
+
+    """
+    rows = [*first, *second]
+    basis = informative_basis(known[0])
+    free = basis @ (basis.T @ known[1])
+    border = np.array([basis.T @ (one.free.T @ one.own) for one in rows])
+    own = np.array([one.own.T @ one.own for one in rows])
+    aim = np.array([one.own.T @ (one.left - one.free @ free) for one in rows])
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(own.sum(axis=0)), 1e-300))
+
+    def explained(members: npt.NDArray[np.bool_]) -> float:
+        """Return the squares that go if a cause has one value in all and one more in some."""
+        both = np.concatenate([border.sum(axis=0), border[members].sum(axis=0)], axis=1)
+        part = own[members].sum(axis=0)
+        products = np.block([[own.sum(axis=0), part], [part, part]]) - both.T @ both
+        products += np.diag(np.tile(precision, 2))
+        wanted = np.concatenate([aim.sum(axis=0), aim[members].sum(axis=0)])
+        return _squares(products, wanted, np.tile(scale, 2))
+
+    days = np.arange(len(rows)) >= len(first)
+    least = explained(days) * (1.0 + _ROUNDING)
+    return all(explained(other) <= least for other in _divisions(days))
+
+
+def _divisions(days: npt.NDArray[np.bool_]) -> Iterator[npt.NDArray[np.bool_]]:
+    """Yield other divisions into groups of the same sizes, but for the exchange of all."""
+    before, today = np.flatnonzero(~days), np.flatnonzero(days)
+    pairs = (
+        (out, into)
+        for count in range(1, min(len(before), len(today)) + 1)
+        for out in combinations(today, count)
+        for into in combinations(before, count)
+        if count < len(today) or count < len(before)
+    )
+    for out, into in islice(pairs, _DIVISIONS):
+        other = days.copy()
+        other[list(out)], other[list(into)] = False, True
+        yield other
+
+
+def _squares(products: FloatArray, aim: FloatArray, scale: FloatArray) -> float:
+    """Return the squares that columns of some products take; scale makes them of length one."""
+    values, vectors = np.linalg.eigh(products * np.outer(scale, scale))
+    seen = values > _UNSEEN
+    return float(np.sum((vectors[:, seen].T @ (aim * scale)) ** 2 / values[seen]))
+
+
+def _before(trial: Trial, beside: Beside, here: Round) -> list[Rows]:
+    """Return the recordings from before, in which what was named since does nothing."""
+    assert here.before is not None
+    told, change = here.before.told, here.before.change
+    group = trial.group
+    own = here.before.baseline.columns(here.work.arm, group.effect, group.kept)
+    result, start = [], 0
+    for columns, left in told.recordings(change):
+        free = np.zeros((len(left), len(beside.free)))
+        free[:, : columns.shape[1]] = columns
+        result.append(Rows(free, own[start : start + len(left)], left))
+        start += len(left)
+    return result
+
+
+def _today(trial: Trial, problem: Problem, beside: Beside, here: Round) -> list[Rows]:
+    """Return the recordings in which a cause is looked for."""
+    data = here.evidence.data
+    fold = np.concatenate([np.full(len(part.rows), part.fold) for part in data])
+    result = []
+    for one in np.unique(fold):
+        rows = fold == one
+        x, y = problem.x[rows], problem.y[rows].ravel()
+        free = x[:, :, list(beside.free)].reshape(len(y), -1)
+        result.append(Rows(free, x[:, :, trial.group.columns].reshape(len(y), -1), y))
+    return result

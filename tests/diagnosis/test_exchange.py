@@ -1,0 +1,84 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A cause has changed between two days if no other division of the recordings shows more of it."""
+
+from armid_ros.diagnosis import diagnose
+from armid_ros.diagnosis.search.exchange import Rows, stands_out
+from armid_ros.effects import make_effect
+from armid_ros.identification import identify
+import numpy as np
+import pytest
+
+ROWS = 12
+
+
+def recording(rng, value):
+    """Return rows of a recording in which a cause has a value, beside an unknown slope."""
+    free, own = rng.normal(size=(2, ROWS, 1))
+    return Rows(free, own, value * own[:, 0] + 0.7 * free[:, 0] + 0.05 * rng.normal(size=ROWS))
+
+
+def asked(first, second):
+    rows = [*first, *second]
+    free = np.concatenate([one.free for one in rows])
+    left = np.concatenate([one.left for one in rows])
+    return stands_out(first, second, (free.T @ free, free.T @ left), np.array([1e-9]))
+
+
+@pytest.mark.parametrize('freedom', [1.0, 2.0, 100.0], ids=['wild', 'heavy tails', 'normal'])
+def test_days_that_are_draws_of_one_process_rarely_stand_out(freedom):
+    """With three recordings and four there are 35 divisions: each is the first as often."""
+    rng = np.random.default_rng(1)
+    count = 0
+    for _ in range(250):
+        values = rng.standard_t(freedom, size=7)
+        days = [recording(rng, value) for value in values]
+        count += asked(days[:3], days[3:])
+    assert 1 <= count <= 16  # 250 / 35 is 7, and three deviations more are 15
+
+
+def test_a_change_beyond_what_recordings_differ_by_stands_out():
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        values = rng.normal(size=7) + np.array([0, 0, 0, 9, 9, 9, 9])
+        days = [recording(rng, value) for value in values]
+        assert asked(days[:3], days[3:])
+
+
+def test_what_one_recording_of_the_day_before_had_as_well_is_no_change():
+    rng = np.random.default_rng(3)
+    values = [0.0, 3.0, 0.0, 1.0, 3.0, 1.0]
+    days = [recording(rng, value) for value in values]
+    assert not asked(days[:3], days[3:])
+
+
+def test_one_recording_a_day_cannot_be_divided_otherwise():
+    rng = np.random.default_rng(4)
+    assert asked([recording(rng, 0.0)], [recording(rng, 1.0)])
+
+
+def with_offsets(bench, seed, offsets):
+    """Return recordings of an elbow that has another offset in each [N m]."""
+
+    def on_elbow(offset):
+        return lambda motion, tau: np.column_stack([0.0 * motion.t, 0.0 * motion.t + offset])
+
+    return [bench.recordings(on_elbow(x), seed=seed)[k] for k, x in enumerate(offsets)]
+
+
+@pytest.mark.parametrize(
+    'before, after, named',
+    [
+        ((0.0, 0.8, 0.1), (0.45, 0.55, 0.5), False),
+        ((0.0, 0.05, 0.1), (0.45, 0.55, 0.5), True),
+    ],
+    ids=['one recording from before had it', 'none had it'],
+)
+def test_an_offset_that_differs_from_recording_to_recording(bench, before, after, named):
+    rng = np.random.default_rng(0)
+    old = with_offsets(bench, 1, before)
+    arm = bench.arm.with_effect(make_effect('torque_offset', bench.robot))
+    arm = identify(arm, old, rng=rng).arm
+    new, unseen = with_offsets(bench, 2, after), with_offsets(bench, 3, after)[:1]
+    found = diagnose(arm, new, validate=unseen, baseline=old, rng=rng)
+    assert [one.name for one in found.findings] == ['torque_offset'] * named, found.summary
