@@ -32,6 +32,12 @@ NOISE, ESTIMATED = 'noise', 'an estimate of the misfit that such a model has'
 OWN_MISFIT = 'the misfit that the model had before'
 WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
 
+#: Said where only what a model lacks explains the gap, and not what has changed.
+_EVER = (
+    'the baseline does not tell whether what is named has changed since, or was there and did not '
+    'show: the model lacks it'
+)
+
 
 @dataclass(frozen=True)
 class Chosen:
@@ -178,9 +184,20 @@ def _since(
         unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(unseen)
         more = Evidence(tuple(unseen), unit, unit, baseline.varies)
     found = explain(question, evidence, settings, baseline=baseline, unseen=more)
+    notes: tuple[str, ...] = ()
+    if not found.steps and not at_floor(found, settings):
+        lacking = explain(question, evidence, settings)
+        if _most(lacking, settings):
+            found, notes = lacking, (_EVER,)
     if not found.steps:
         return Chosen(found, misfit, OWN_MISFIT)
-    return Chosen(in_model_as_given(found), misfit, OWN_MISFIT, rest=found)
+    return Chosen(in_model_as_given(found), misfit, OWN_MISFIT, notes, found)
+
+
+def _most(found: Explanation, settings: DiagnosisSettings) -> bool:
+    """Return whether names take most of the gap."""
+    taken = sum(step.trial.gain / step.total for step in found.steps)
+    return taken > settings.thresholds.open_share
 
 
 def _louder(prepared: Prepared, baseline: Baseline) -> FloatArray:
