@@ -51,8 +51,8 @@ def diagnose_ties(
     nothing = np.zeros(arm.robot.n_joints)
     regression = TieRegression(arm, tuple(recordings), prepared.used, settings)
     sure = cache(regression.sure)
-    data, sigma = prepared.data, tuple(prepared.sigma)
-    start = Ties(arm, settings.partner, data, sigma, prepared.base, settings, sure)
+    evidence = Evidence(prepared.data, tuple(prepared.sigma), tuple(prepared.sigma))
+    start = Ties(arm, settings.partner, evidence, prepared.base, settings, sure)
     ties, fitted = start.find()
     if not fitted.named:
         return _within_its_noise(arm, prepared, settings)
@@ -112,24 +112,22 @@ def _as_described(found: Explanation, arm: ArmModel, settings: DiagnosisSettings
 
 def _explanation(ties: Ties, fitted: Fitted) -> Explanation:
     """Return what was fitted as steps, each tie judged beside the others, and its rivals."""
-    evidence = Evidence(ties.data, ties.sigma, ties.sigma)
     reference = ties.fitted(())
-    survey, rivals = _rivals(ties, reference, fitted, evidence)
-    view = View.of(fitted, evidence)
+    survey, rivals = _rivals(ties, reference, fitted)
+    view = View.of(fitted, ties.evidence)
     steps = []
     for k in range(len(fitted.named)):
         trial, _, _, total = view.trial_of(k)
         assert trial is not None
         steps.append(Step(trial, rivals, (trial,), total, survey.tried))
     base: BaseParameters | None = ties.base
-    return Explanation(ties.arm, base, fitted, reference, tuple(steps), survey, evidence)
+    return Explanation(ties.arm, base, fitted, reference, tuple(steps), survey, ties.evidence)
 
 
-def _rivals(
-    ties: Ties, reference: Fitted, fitted: Fitted, evidence: Evidence
-) -> tuple[Survey, tuple[Trial, ...]]:
+def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tuple[Trial, ...]]:
     """Look at all of the library beside the ties as one cause; return what they do not beat."""
-    data, sigma, settings = ties.data, ties.sigma, ties.settings
+    evidence, settings = ties.evidence, ties.settings
+    data, sigma = evidence.data, evidence.sigma
     found = candidates(reference, data, sigma, settings.kinds)
     rank, first = reference.columns[0].shape[2], found.columns[0].shape[2]
     stiffness = [rank + values.start for values, _ in fitted.places]

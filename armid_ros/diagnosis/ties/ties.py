@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
+from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.search.fit import fit, Fitted
@@ -46,10 +46,8 @@ class Ties:
         The arm without them.
     partner : Partner
         Where there may be any.
-    data : tuple of Trajectory
-        The data.
-    sigma : tuple of ndarray, each (n,)
-        Noise of each trajectory [N m].
+    evidence : Evidence
+        The data, and their noise.
     base : BaseParameters or None
         What of the arm is fitted with them; None takes it as described.
     settings : DiagnosisSettings
@@ -61,8 +59,7 @@ class Ties:
 
     arm: ArmModel
     partner: Partner
-    data: tuple[Trajectory, ...]
-    sigma: tuple[FloatArray, ...]
+    evidence: Evidence
     base: BaseParameters | None
     settings: DiagnosisSettings
     sure: Callable[[float], frozenset[str]]
@@ -81,8 +78,8 @@ class Ties:
         """
         joints = self._joints()
         first = self._surely(joints)
-        sigma = tuple(noise_floor(part, first.arm).sigma for part in self.data)
-        ties = replace(self, sigma=sigma)
+        sigma = tuple(noise_floor(part, first.arm).sigma for part in self.evidence.data)
+        ties = replace(self, evidence=Evidence(self.evidence.data, sigma, sigma))
         return ties, ties._damped(ties._surely(joints))
 
     def _joints(self) -> list[str]:
@@ -123,11 +120,12 @@ class Ties:
 
     def fitted(self, named: Sequence[Named], start: Sequence[FloatArray] = ()) -> Fitted:
         """Fit the arm with what is named, from values to start from."""
-        return fit(self.arm, named, self.data, self.sigma, self.base, start)
+        data, sigma = self.evidence.data, self.evidence.sigma
+        return fit(self.arm, named, data, sigma, self.base, start)
 
     def chi2_per_row(self, fitted: Fitted) -> FloatArray:
         """Return the loss of each joint, shape (n,)."""
-        return Evidence(self.data, self.sigma, self.sigma).chi2_per_row(fitted.residual)
+        return self.evidence.chi2_per_row(fitted.residual)
 
     def surely(self, named: Sequence[Named]) -> Fitted:
         """Fit, and take ties away, the weakest first, until all are surely there."""
@@ -161,13 +159,14 @@ class Ties:
     def _common_slack(self, joints: Sequence[str]) -> tuple[float, FloatArray, FloatArray]:
         """Return the slack of all straps that takes most; stiffnesses and how sure they are."""
         reference, arm = self.fitted(()), memoized_arm(self.arm)
-        problem = make_problem(self.data, self.sigma, reference.residual, list(reference.columns))
+        data, sigma = self.evidence.data, self.evidence.sigma
+        problem = make_problem(data, sigma, reference.residual, list(reference.columns))
         projection = project(problem, range(problem.x.shape[2]))
         left = projection.rest(problem.y).ravel()
 
         def solved(slack: float) -> tuple[float, FloatArray, FloatArray]:
             straps = self.partner.slack.on(self.arm.robot, tuple(joints)).with_shape([slack])
-            rows = np.concatenate([part.columns(arm, straps) for part in self.data])
+            rows = np.concatenate([part.columns(arm, straps) for part in data])
             own = projection.rest(rows * problem.weight[:, :, np.newaxis]).reshape(len(left), -1)
             scale = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
             inverse = np.linalg.pinv((own / scale).T @ (own / scale), hermitian=True)
@@ -187,8 +186,8 @@ class Ties:
 
     def _damped(self, fitted: Fitted) -> Fitted:
         """Return springs with dampers, where something is left that those surely take."""
-        evidence = Evidence(self.data, self.sigma, self.sigma)
-        if np.all(self.chi2_per_row(fitted) < evidence.limits(fitted.residual, self.settings)):
+        limits = self.evidence.limits(fitted.residual, self.settings)
+        if np.all(self.chi2_per_row(fitted) < limits):
             return fitted
         springs = [isinstance(own.effect, TiedInteraction) for own in fitted.named]
         both = [
@@ -203,8 +202,7 @@ class Ties:
         return self.fitted(named) if named != list(fitted.named) else fitted
 
     def _squares(self, fitted: Fitted) -> float:
-        count = np.sum([part.informative.sum(axis=0) for part in self.data], axis=0)
-        return float(self.chi2_per_row(fitted) @ count)
+        return float(self.chi2_per_row(fitted) @ self.evidence.count)
 
 
 def _certainty(fitted: Fitted, *, last: bool = False) -> list[float]:
