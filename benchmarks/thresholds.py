@@ -30,7 +30,7 @@ from tests.hidden.lived.cases import lived_case
 
 #: Development kinds alone: locked sets are for looking, not for choosing numbers.
 SAMPLE = (
-    *(f'development/{k}' for k in (14, 18, 22, 23, 26, 45, 53, 68, 69, 87)),  # small, or missed
+    *(f'development/{k}' for k in (14, 18, 22, 23, 45, 53, 63, 68, 69, 87)),  # small, or missed
     *(f'development/{k}' for k in (9, 36)),  # clear
     *(f'development/{k}' for k in (27, 35, 59)),  # nothing happened
     'development/exact/22',  # nothing there, and it is said that there is
