@@ -258,7 +258,7 @@ def thinnable(decimation: int) -> int:
     whole part: of a prime decimation that is the rate of the recording, however high it is.
 
     """
-    while 4 * _thin(decimation) < 3 * (decimation // _OVERSAMPLING):
+    while 2 * _thin(decimation) <= decimation // _OVERSAMPLING:
         decimation -= 1
     return decimation
 
