@@ -89,7 +89,7 @@ def choose_filters(
     if settings.signals.decimation is not None:
         return used
     band = used.rate_hz / (2.5 * MODEL_BANDS * used.decimation)
-    return replace(used, decimation=thinnable(max(1, int(used.rate_hz / (2.5 * _BANDS * band)))))
+    return thinnable(replace(used, decimation=max(1, int(used.rate_hz / (2.5 * _BANDS * band)))))
 
 
 def prepare(
@@ -107,7 +107,7 @@ def prepare(
     free = settings.partner is None and settings.signals.decimation is None
     if not (free and growth and np.max(np.mean(growth, axis=0)) > _GROWTH):
         return prepared
-    narrower = replace(used, decimation=thinnable(round(1.5 * used.decimation + 0.1)))
+    narrower = thinnable(replace(used, decimation=round(1.5 * used.decimation + 0.1)))
     fewer = trajectories(recordings, narrower)
     if np.any(_told(fewer) < _MOVING * _told(data)):
         return prepared
