@@ -173,9 +173,11 @@ def main() -> None:
     print(f'{"as it is":22s} {1.0:4.1f}  {counts([one.usual for one in of_cases])}')
     for change in ((name, factor) for name in names for factor in CHANGES):
         other = sum(change in one.others for one in of_cases)
-        score = counts([one.with_change(change) for one in of_cases])
-        same = f'{other} answers change' if other else 'no answer changes'
-        print(f'{change[0]:22s} {change[1]:4.1f}  {score}; {same}')
+        said = 'no answer changes'
+        if other:
+            score = counts([one.with_change(change) for one in of_cases])
+            said = f'{score}; {other} {"answer changes" if other == 1 else "answers change"}'
+        print(f'{change[0]:22s} {change[1]:4.1f}  {said}')
 
 
 if __name__ == '__main__':
