@@ -295,7 +295,20 @@ def breakdown(judged: Sequence[LivedJudged]) -> str:
             hits = sum(j.first if nameable(j.truth) else j.admitted for j in own)
             counts.append(f'{group} {hits}/{len(own)}')
         rows.append(f'by {what}: {", ".join(counts)}')
-    return '\n'.join(rows)
+    return '\n'.join([*rows, seconds_by_joints(judged)])
+
+
+def seconds_by_joints(judged: Sequence[LivedJudged]) -> str:
+    """Return the median and the longest processor time of arms of so many joints."""
+    taken: dict[int, list[float]] = {}
+    for one in judged:
+        if np.isfinite(one.answer.seconds):
+            taken.setdefault(load_arm(one.truth.arm).n_joints, []).append(one.answer.seconds)
+    counts = [
+        f'{joints}: {np.median(own):.1f}, {max(own):.1f} of {len(own)}'
+        for joints, own in sorted(taken.items())
+    ]
+    return f'processor time by joints, median and longest [s]: {"; ".join(counts)}'
 
 
 def _near(error: tuple[float, float]) -> bool:

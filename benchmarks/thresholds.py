@@ -30,7 +30,7 @@ from tests.hidden.lived.cases import lived_case
 
 #: Development kinds alone: locked sets are for looking, not for choosing numbers.
 SAMPLE = (
-    *(f'development/{k}' for k in (14, 18, 22, 23, 26, 45, 53, 68, 69, 87)),  # small, or missed
+    *(f'development/{k}' for k in (14, 18, 22, 23, 45, 53, 63, 68, 69, 87)),  # small, or missed
     *(f'development/{k}' for k in (9, 36)),  # clear
     *(f'development/{k}' for k in (27, 35, 59)),  # nothing happened
     'development/exact/22',  # nothing there, and it is said that there is
@@ -173,9 +173,11 @@ def main() -> None:
     print(f'{"as it is":22s} {1.0:4.1f}  {counts([one.usual for one in of_cases])}')
     for change in ((name, factor) for name in names for factor in CHANGES):
         other = sum(change in one.others for one in of_cases)
-        score = counts([one.with_change(change) for one in of_cases])
-        same = f'{other} answers change' if other else 'no answer changes'
-        print(f'{change[0]:22s} {change[1]:4.1f}  {score}; {same}')
+        said = 'no answer changes'
+        if other:
+            score = counts([one.with_change(change) for one in of_cases])
+            said = f'{score}; {other} {"answer changes" if other == 1 else "answers change"}'
+        print(f'{change[0]:22s} {change[1]:4.1f}  {said}')
 
 
 if __name__ == '__main__':

@@ -15,7 +15,7 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 from scipy.signal import butter, lfilter, sosfiltfilt
-from scipy.sparse import csr_array, dia_array
+from scipy.sparse import csr_array
 
 #: Time constants after which a low-pass has forgotten what went in.
 _FORGOTTEN = 20.0
@@ -185,25 +185,28 @@ def earlier_samples(t: FloatArray, delay: float, derivative: int = 0) -> csr_arr
         rise = u**2 * (3.0 - 2.0 * u)
         value = 1.0 - rise, rise
         slope = step * u * (1.0 - u) ** 2, -step * u**2 * (1.0 - u)
-    rows = np.arange(count)
-    by_value, by_slope = (
-        csr_array(
-            (np.concatenate(part), (np.tile(rows, 2), np.concatenate([at, at + 1]))),
-            shape=(count, count),
-        )
-        for part in (value, slope)
+    lower, middle, upper = _slopes(t)
+    weights = (
+        slope[0] * lower[at],
+        value[0] + slope[0] * middle[at] + slope[1] * lower[at + 1],
+        value[1] + slope[0] * upper[at] + slope[1] * middle[at + 1],
+        slope[1] * upper[at + 1],
     )
-    return csr_array(by_value + by_slope @ _slopes(t))
+    samples = np.clip(at[:, np.newaxis] + np.arange(-1, 3), 0, count - 1)
+    starts = 4 * np.arange(count + 1)
+    return csr_array(
+        (np.column_stack(weights).ravel(), samples.ravel(), starts), shape=(count, count)
+    )
 
 
-def _slopes(t: FloatArray) -> dia_array:
-    """Return the weights of `rate_of_change` as a matrix, shape (N, N)."""
+def _slopes(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the weights of the sample before, of its own and after in `rate_of_change`, (N,)."""
     before, after = np.diff(t)[:-1], np.diff(t)[1:]
     first, last = 1.0 / (t[1] - t[0]), 1.0 / (t[-1] - t[-2])
-    lower = np.concatenate([-after / (before * (before + after)), [-last, 0.0]])
+    lower = np.concatenate([[0.0], -after / (before * (before + after)), [-last]])
     middle = np.concatenate([[-first], (after - before) / (before * after), [last]])
-    upper = np.concatenate([[0.0, first], before / (after * (before + after))])
-    return dia_array((np.stack([lower, middle, upper]), [-1, 0, 1]), shape=(len(t), len(t)))
+    upper = np.concatenate([[first], before / (after * (before + after)), [0.0]])
+    return lower, middle, upper
 
 
 def within_band(motion: Motion, x: FloatArray) -> FloatArray:

@@ -155,6 +155,7 @@ def test_rates_are_broken_down_by_what_cases_are_made_of():
     rows = breakdown([right, LivedJudged(COULOMB, said()), LivedJudged(bumps, said())])
     assert 'by cause: bumps 0/1, coulomb 1/2' in rows
     assert 'by style: dwells 1/2, sines 0/1' in rows
+    assert '6: 1.0, 1.0 of 3' in rows  # said() takes a second; ur5 has six joints
 
 
 def test_silence_is_right_where_nothing_happened():

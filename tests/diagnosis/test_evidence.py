@@ -24,10 +24,17 @@ def swings(bench, rate):
 
 @pytest.mark.parametrize('decimation', range(1, 130, 2))
 def test_a_prime_decimation_gives_way_to_one_that_a_motion_can_be_thinned_by(decimation):
-    used = thinnable(decimation)
+    used = thinnable(Conditioning(1000.0, 5.0, decimation)).decimation
     assert 0.88 * decimation <= used <= decimation
     thin = max(d for d in range(1, max(1, used // 8) + 1) if used % d == 0)
-    assert used / thin < 2 * 8 + 8
+    assert used / thin < 24
+
+
+@pytest.mark.parametrize('cutoff', [10.0, 40.0, 80.0])
+def test_squares_of_a_motion_are_below_half_of_the_rate_it_is_thinned_to(bench, cutoff):
+    (part,) = trajectories([swings(bench, 1000.0)], Conditioning(1000.0, cutoff, 64))
+    assert 4.0 * cutoff <= part.used.rate_hz <= 1000.0
+    assert part.used.rate_hz / part.used.decimation == 1000.0 / 64
 
 
 @pytest.mark.parametrize('rate', [100.0, 1000.0, 1013.0, 2000.0])

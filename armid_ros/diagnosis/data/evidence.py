@@ -261,29 +261,38 @@ def trajectories(
     return result
 
 
-def thinnable(decimation: int) -> int:
+def thinnable(used: Conditioning) -> Conditioning:
     """
-    Return a decimation, or the next smaller one by which motions can be thinned out first.
+    Return a conditioning, or one of smaller decimation by which motions can be thinned out first.
 
     Columns are computed at a rate that divides that of the recording and of which rows are a
     whole part: of a prime decimation that is the rate of the recording, however high it is.
 
     """
-    while 2 * _thin(decimation) <= decimation // _OVERSAMPLING:
-        decimation -= 1
-    return decimation
+    while 2 * _thin(used) <= _widest(used):
+        used = replace(used, decimation=used.decimation - 1)
+    return used
 
 
-def _thin(decimation: int) -> int:
+def _widest(used: Conditioning) -> int:
+    """
+    Return by how much a motion may be thinned out before columns are made of it.
+
+    Columns go with squares of velocities, which reach to twice the cut-off: half of the rate has
+    to be more than that.
+
+    """
+    fast_enough = int(used.rate_hz / (4.0 * used.cutoff_hz))
+    return max(1, min(used.decimation // _OVERSAMPLING, fast_enough))
+
+
+def _thin(used: Conditioning) -> int:
     """Return by how much a motion is thinned out before columns are made of it."""
-    thin = max(1, decimation // _OVERSAMPLING)
-    while decimation % thin:
-        thin -= 1
-    return thin
+    return max(d for d in range(1, _widest(used) + 1) if used.decimation % d == 0)
 
 
 def _trajectory(source: str, fold: int, motion: Motion, used: Conditioning) -> Trajectory:
-    thin = _thin(used.decimation)
+    thin = _thin(used)
     if thin > 1:
         first = replace(used, decimation=thin)
         assert motion.tau is not None

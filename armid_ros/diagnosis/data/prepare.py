@@ -89,8 +89,8 @@ def choose_filters(
     if settings.signals.decimation is not None:
         return used
     band = used.rate_hz / (2.5 * MODEL_BANDS * used.decimation)
-    wide = thinnable(max(1, int(used.rate_hz / (2.5 * _BANDS * band))))
-    return _fine_enough(recordings, replace(used, decimation=wide))
+    wide = replace(used, decimation=max(1, int(used.rate_hz / (2.5 * _BANDS * band))))
+    return _fine_enough(recordings, thinnable(wide))
 
 
 def _fine_enough(recordings: Sequence[Recording], used: Conditioning) -> Conditioning:
@@ -102,7 +102,7 @@ def _fine_enough(recordings: Sequence[Recording], used: Conditioning) -> Conditi
 
     """
     while used.decimation > 1 and np.min(_kept(trajectories(recordings, used))) < _MOVING:
-        used = replace(used, decimation=thinnable(used.decimation // 2))
+        used = thinnable(replace(used, decimation=used.decimation // 2))
     return used
 
 
@@ -128,7 +128,7 @@ def prepare(
     free = settings.partner is None and settings.signals.decimation is None
     if not (free and growth and np.max(np.mean(growth, axis=0)) > _GROWTH):
         return prepared
-    narrower = replace(used, decimation=thinnable(round(1.5 * used.decimation + 0.1)))
+    narrower = thinnable(replace(used, decimation=round(1.5 * used.decimation + 0.1)))
     fewer = trajectories(recordings, narrower)
     if np.any(_told(fewer) < _MOVING * _told(data)):
         return prepared

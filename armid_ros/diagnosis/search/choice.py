@@ -19,7 +19,7 @@ from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.search.explain import explain, Explanation
-from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.fit import fit, Told
 from armid_ros.diagnosis.search.question import as_given, fitted_anew
 from armid_ros.diagnosis.search.round import cost
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -187,11 +187,27 @@ def _since(
     notes: tuple[str, ...] = ()
     if not found.steps and not at_floor(found, settings):
         lacking = explain(question, evidence, settings)
-        if _most(lacking, settings):
+        if _most(lacking, settings) and not _shown(lacking, baseline, told, settings):
             found, notes = lacking, (_EVER,)
     if not found.steps:
         return Chosen(found, misfit, OWN_MISFIT)
     return Chosen(in_model_as_given(found), misfit, OWN_MISFIT, notes, found)
+
+
+def _shown(
+    found: Explanation, baseline: Baseline, told: Told, settings: DiagnosisSettings
+) -> bool:
+    """Return whether a name would have stood out of the misfit of the baseline in a joint."""
+    counts = Evidence(baseline.data, (), ()).count
+    for step in found.steps:
+        group = step.trial.group
+        own = baseline.columns(found.given, group.effect, group.kept)
+        hidden = told.columns @ np.linalg.lstsq(told.columns, own, rcond=1e-10)[0]
+        torque = ((own - hidden) @ step.trial.values).reshape(-1, len(counts))
+        power = np.sum(torque**2, axis=0) / np.maximum(counts, 1.0)
+        if np.any(power > settings.thresholds.misfit_share):
+            return True
+    return False
 
 
 def _most(found: Explanation, settings: DiagnosisSettings) -> bool:
