@@ -213,7 +213,8 @@ def diagnose(
         small = tuple(dict.fromkeys(one.name for one in said.minor))
         matters = replace(settings.without_small_print(), library=small)
         again = _said(own_causes_first(explain, matters), notes, asked)
-        said = again if again.verdict in _CLOSED else said
+        most = sum(one.share for one in again.findings) > settings.thresholds.open_share
+        said = again if again.verdict in _CLOSED and most else said
     return said
 
 

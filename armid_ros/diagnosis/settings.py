@@ -51,7 +51,8 @@ class Thresholds:
         told are not exact there.
     open_share : float
         Share of the squares of a joint in which a gap is open that a cause takes if it matters
-        there, however little that is of the gap of the arm.
+        there, however little that is of the gap of the arm; and of the whole gap that a cause
+        takes which is named though nothing shows that it has changed, or though it is small.
     beyond_bounds : float
         Deviations by which a value may be beyond what is physically possible.
     contained : float

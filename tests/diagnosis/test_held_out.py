@@ -7,6 +7,7 @@ from dataclasses import replace
 from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.held_out import (
+    denies,
     held_out,
     lead,
     products,
@@ -174,3 +175,14 @@ def test_one_cause_leads_another_by_what_it_takes_more(bench):
     assert squares == pytest.approx(cause.gain - nothing.gain)
     assert z > 3.0
     assert lead(nothing, cause) == (pytest.approx(-squares), pytest.approx(-z))
+
+
+def test_data_deny_a_cause_that_they_do_not_follow_and_nothing_else():
+    rng = np.random.default_rng(0)
+    square = rng.uniform(0.5, 1.5, size=40)
+    noise = 0.1 * rng.normal(size=40)
+    assert denies(noise, square)
+    assert not denies(square + noise, square)
+    assert not denies(0.5 * square + noise, square)
+    assert not denies(noise, np.zeros(40))
+    assert not denies(100.0 * noise, 0.01 * square)

@@ -18,6 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.prepare import Prepared
+from armid_ros.diagnosis.data.rows import weighted_rows
 from armid_ros.diagnosis.search.explain import explain, Explanation
 from armid_ros.diagnosis.search.fit import fit, Told
 from armid_ros.diagnosis.search.question import as_given, fitted_anew
@@ -187,27 +188,38 @@ def _since(
     notes: tuple[str, ...] = ()
     if not found.steps and not at_floor(found, settings):
         lacking = explain(question, evidence, settings)
-        if _most(lacking, settings) and not _shown(lacking, baseline, told, settings):
+        if _most(lacking, settings) and _may_have_been(lacking, baseline, told, settings):
             found, notes = lacking, (_EVER,)
     if not found.steps:
         return Chosen(found, misfit, OWN_MISFIT)
     return Chosen(in_model_as_given(found), misfit, OWN_MISFIT, notes, found)
 
 
-def _shown(
+def _may_have_been(
     found: Explanation, baseline: Baseline, told: Told, settings: DiagnosisSettings
 ) -> bool:
-    """Return whether a name would have stood out of the misfit of the baseline in a joint."""
-    counts = Evidence(baseline.data, (), ()).count
+    """
+    Return whether all names may have been there before, and show only now.
+
+    What the baseline was fitted with hides most of a name there. Of the rest less than the misfit
+    may be seen in every joint of the baseline, and more in some joint of the data.
+
+    """
+    data, sigma = found.evidence.data, found.evidence.sigma
     for step in found.steps:
-        group = step.trial.group
+        group, values = step.trial.group, step.trial.values
         own = baseline.columns(found.given, group.effect, group.kept)
-        hidden = told.columns @ np.linalg.lstsq(told.columns, own, rcond=1e-10)[0]
-        torque = ((own - hidden) @ step.trial.values).reshape(-1, len(counts))
-        power = np.sum(torque**2, axis=0) / np.maximum(counts, 1.0)
-        if np.any(power > settings.thresholds.misfit_share):
-            return True
-    return False
+        hidden = np.linalg.lstsq(told.columns, own, rcond=1e-10)[0] @ values
+        then = (own @ values - told.columns @ hidden).reshape(-1, found.given.robot.n_joints)
+        rows = [part.columns(found.given, group.effect)[:, :, list(group.kept)] for part in data]
+        pairs = zip(rows, found.reference.columns, strict=True)
+        torque = [mine @ values - free @ hidden for mine, free in pairs]
+        now = np.concatenate(list(weighted_rows(torque, data, sigma)))
+        least = settings.thresholds.misfit_share
+        power = np.mean(then**2, axis=0), np.mean(now**2, axis=0)
+        if np.any(power[0] > least) or not np.any(power[1] > least):
+            return False
+    return True
 
 
 def _most(found: Explanation, settings: DiagnosisSettings) -> bool:

@@ -30,6 +30,30 @@ from scipy import stats
 #: Directions of which the free columns leave less than this share of their squares are not seen.
 _UNSEEN = 1e-10
 
+#: Recordings hardly show what takes less than this share of the share it takes of others.
+HARDLY = 0.1
+
+
+def denies(cross: FloatArray, square: FloatArray) -> bool:
+    """
+    Return whether data deny a cause: no more follows it than noise would.
+
+    The slope of what is left on what the cause predicts is one for a cause, zero for none. Data
+    in which it does nothing do not deny it.
+
+    Parameters
+    ----------
+    cross, square : ndarray, shape (B,)
+        x'r and x'x of every block, of what is predicted (x) and what is left (r).
+
+    """
+    made = float(square.sum())
+    if made <= 0.0:
+        return False
+    slope = float(cross.sum()) / made
+    wide = 2.0 * float(np.sqrt(np.sum((cross - slope * square) ** 2))) / made
+    return slope + wide < 1.0 and slope - wide <= 0.0
+
 
 @dataclass(frozen=True)
 class Trial:

@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
-from armid_ros.diagnosis.data.rows import Problem, project, Projection
+from armid_ros.diagnosis.data.rows import fold_rows, Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.exchange import changed
 from armid_ros.diagnosis.search.held_out import (
+    denies,
+    HARDLY,
     products,
     Trial,
     tried_beside,
@@ -156,7 +158,26 @@ def next_step(
 def acceptable(trial: Trial, here: Round, tried: int) -> bool:
     """Return whether a cause is there beyond chance, pays for its freedom, and is possible."""
     surely = trial.p * tried <= here.settings.thresholds.error_rate
-    return surely and worth(trial, here) > 0.0 and possible(trial, here)
+    paid = surely and worth(trial, here) > 0.0
+    return paid and not _denied_by_one(trial, here) and possible(trial, here)
+
+
+def _denied_by_one(trial: Trial, here: Round) -> bool:
+    """
+    Return whether a recording denies a cause that others show, and that should show in it.
+
+    With recordings from before, the divisions of all recordings tell that more sharply.
+
+    """
+    data = here.evidence.data
+    if here.before is not None or len({part.fold for part in data}) < 2:
+        return False
+    recording = np.concatenate([np.full(len(part.rows), part.fold) for part in data])
+    _, first = np.unique(fold_rows(data), return_index=True)
+    owner = recording[first][trial.piece]
+    made = np.bincount(owner, trial.square)
+    shown = np.flatnonzero(made > HARDLY * made.max())
+    return any(denies(trial.cross[owner == k], trial.square[owner == k]) for k in shown)
 
 
 def possible(trial: Trial, here: Round) -> bool:

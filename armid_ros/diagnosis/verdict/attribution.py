@@ -18,7 +18,7 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import block_squares
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.explain import Explanation, View
-from armid_ros.diagnosis.search.held_out import held_out
+from armid_ros.diagnosis.search.held_out import denies, held_out
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -50,21 +50,8 @@ class Attribution:
     made: FloatArray
 
     def denied(self, name: int) -> bool:
-        """
-        Return whether data deny a name: no more follows it than noise would.
-
-        The slope of what is left on what the name predicts is one for a cause, zero for none.
-        Data in which it does nothing do not deny it.
-
-        """
-        made = self.made[name]
-        if not made.any():
-            return False
-        cross = (self.taken[name] + made) / 2.0
-        slope = float(cross.sum() / max(float(made.sum()), 1e-300))
-        scatter = cross - slope * made
-        wide = 2.0 * float(np.sqrt(np.sum(scatter**2)) / max(float(made.sum()), 1e-300))
-        return slope + wide < 1.0 and slope - wide <= 0.0
+        """Return whether data deny a name; see `denies`."""
+        return denies((self.taken[name] + self.made[name]) / 2.0, self.made[name])
 
     def share(self, names: Sequence[int]) -> float:
         """Return the share that some of the names take together."""

@@ -17,15 +17,12 @@ from dataclasses import replace
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.choice import at_floor, Chosen, freedom, in_model_as_given
 from armid_ros.diagnosis.search.explain import Explanation
-from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.held_out import HARDLY, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.fitting.identifiability import excludes_zero
 import numpy as np
-
-#: Recordings hardly show what takes less than this share of the share it takes of others.
-_HARDLY = 0.1
 
 #: Explains the gap by what a library has.
 Explain = Callable[[DiagnosisSettings], Chosen]
@@ -124,7 +121,7 @@ def shares_of(explanation: Explanation, unseen: Evidence | None) -> tuple[Attrib
     names = range(len(explanation.steps))
     seen = attribute(explanation, unseen)
     denied = [k for k in reversed(seen.order) if seen.denied(k)]
-    shown = seen.share(names) > _HARDLY * left_out.share(names)
+    shown = seen.share(names) > HARDLY * left_out.share(names)
     return (seen if shown else left_out), denied
 
 
