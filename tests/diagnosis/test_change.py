@@ -46,18 +46,3 @@ def test_what_slow_motion_does_not_tell_of_a_body_is_no_change(bench):
     fast = [bench.recordings(seed=seed)[2] for seed in (4, 5, 6)]
     found = asked(bench, slow, fast[:2], fast[2:])
     assert not found.findings, found.summary
-
-
-def test_a_stop_that_only_new_recordings_reach_often_is_named(bench):
-    """In the recordings that are looked at it is small; in those of --validate it is the gap."""
-
-    def at_stop(motion, tau):
-        beyond = np.maximum(
-            motion.q - np.array([np.inf, 0.55 * np.abs(motion.q[:, 1]).max()]), 0.0
-        )
-        return hose(motion, tau) - 9.0 * beyond
-
-    before = bench.recordings(hose, seed=1)
-    after = [*bench.recordings(hose, seed=2)[:2], bench.recordings(at_stop, seed=2)[2]]
-    found = asked(bench, before, after, bench.recordings(at_stop, seed=3))
-    print(found)

@@ -158,8 +158,7 @@ def next_step(
 def acceptable(trial: Trial, here: Round, tried: int) -> bool:
     """Return whether a cause is there beyond chance, pays for its freedom, and is possible."""
     surely = trial.p * tried <= here.settings.thresholds.error_rate
-    paid = surely and worth(trial, here) > 0.0
-    return paid and not _denied_by_one(trial, here) and possible(trial, here)
+    return surely and worth(trial, here) > 0.0 and possible(trial, here)
 
 
 def _denied_by_one(trial: Trial, here: Round) -> bool:
@@ -297,7 +296,7 @@ def _examined(
     there: list[Trial] = []
     large: list[tuple[Trial, FloatArray]] = []
     for trial in ranking[:_LOOKED_AT]:
-        if not acceptable(trial, here, tried):
+        if not acceptable(trial, here, tried) or _denied_by_one(trial, here):
             continue
         (change,) = _changes(problem, beside, [trial], [trial], here)
         if change is None or not acceptable(change, here, tried):
