@@ -94,7 +94,10 @@ def contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: R
     target = projection.rest(problem.x[:, :, small.group.columns]) @ small.values
     squares = float(np.sum(target**2))
     if np.sum((columns @ big.values - target) ** 2) < thresholds.same * squares:
-        return here.before is not None  # links do not change; a description of them may be off
+        if here.before is None:
+            return False
+        if small.group.effect.comes_and_goes and not big.group.effect.comes_and_goes:
+            return True  # links do not change; a description of them may be off
     if cost(big, here.settings) <= cost(small, here.settings):
         return False
     flat = columns.reshape(-1, big.group.size)

@@ -40,7 +40,9 @@ def laws_of_controllers(
     robot: Robot, motion: Motion, told: npt.NDArray[np.bool_]
 ) -> tuple[str, ...]:
     """
-    Say of which joints the torque is a law of position and direction alone.
+    Say that the torque of every joint that is driven is a law of position and direction alone.
+
+    Of a single joint among others it is the model that is wrong: its inertia was not told.
 
     Parameters
     ----------
@@ -54,7 +56,7 @@ def laws_of_controllers(
     Returns
     -------
     tuple of str
-        A sentence for each such joint, with the remedy.
+        A sentence for each such joint, with the remedy; none if any of them obeys no law.
 
     """
     assert motion.tau is not None
@@ -71,15 +73,17 @@ def laws_of_controllers(
         if left is None or lacking is None:
             continue
         size = float(np.sqrt(np.mean(tau**2)))
-        driven = size > _DRIVEN * float(np.sqrt(np.mean(needed[rows, joint] ** 2)))
-        if driven and left < _FOLLOWS * size and left < _WITHOUT_INERTIA * lacking:
-            said.append(
-                f'the torque of {name} is a law of position and direction of motion alone, to '
-                f'{100 * left / size:.1f} %: it holds the weight or pushes along, as a controller '
-                f'commands it, and has nothing of the {lacking:.2g} N m that inertia takes. '
-                'Something else moves the arm, or body and friction cannot be told apart: record '
-                'the arm while it follows a trajectory'
-            )
+        if size < _DRIVEN * float(np.sqrt(np.mean(needed[rows, joint] ** 2))):
+            continue
+        if left > _FOLLOWS * size or left > _WITHOUT_INERTIA * lacking:
+            return ()
+        said.append(
+            f'the torque of {name} is a law of position and direction of motion alone, to '
+            f'{100 * left / size:.1f} %: it holds the weight or pushes along, as a controller '
+            f'commands it, and has nothing of the {lacking:.2g} N m that inertia takes. '
+            'Something else moves the arm, or body and friction cannot be told apart: record '
+            'the arm while it follows a trajectory'
+        )
     return tuple(said)
 
 
