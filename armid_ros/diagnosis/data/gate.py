@@ -64,7 +64,7 @@ def check_data(
     slopes, correlation = _compare(_as_it_may_be(arm, data), data)
     faults = [*_time_base(recordings, _band(data)), *_torques(arm, slopes, correlation)]
     faults += _laws(arm, data)
-    notes = _clipped(recordings)
+    notes = [*_clipped(recordings), *_described_friction(arm)]
     try:
         notes += check_motion(arm.robot, recordings, used)
     except IdentificationError as error:
@@ -181,6 +181,28 @@ def _torques(arm: ArmModel, slopes: FloatArray, correlation: FloatArray) -> list
                         f'takes, {unit}: convert it'
                     )
     return faults
+
+
+def _described_friction(arm: ArmModel) -> list[str]:
+    """Say that a description states friction that the model does not have."""
+    robot = arm.robot
+    there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
+    stated = [
+        joint
+        for k, joint in enumerate(robot.joints)
+        if any(
+            getattr(robot, f'urdf_{kind.urdf_attribute}')[k] > 0.0
+            and (kind.name, joint) not in there
+            for kind in CATALOGUE.values()
+            if kind.urdf_attribute
+        )
+    ]
+    if not stated:
+        return []
+    return [
+        f'the description states friction of {", ".join(stated)} in <dynamics>, which the model '
+        'does not have: it is looked for like any other; give a model that has it'
+    ]
 
 
 def _laws(arm: ArmModel, data: Sequence[Trajectory]) -> Iterator[str]:

@@ -45,6 +45,7 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
             for w in diagnosis.where
         ],
         'gap': _gap(diagnosis),
+        'filters': _filters(diagnosis),
         'candidates': _candidates(diagnosis),
         'not_visible': list(diagnosis.not_visible),
         'detectable': _detectable(diagnosis),
@@ -117,6 +118,18 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
         'noise_floor': table(gap.floor),
         'closed_fraction': gap.closed,
         'data': gap.data,
+    }
+
+
+def _filters(diagnosis: Diagnosis) -> dict[str, float] | None:
+    """Return how recordings were filtered, rates and frequencies in Hz; None of bad data."""
+    if not diagnosis.data:
+        return None
+    used = diagnosis.data[0].used
+    return {
+        'cutoff_hz': used.cutoff_hz,
+        'rows_hz': used.rate_hz / used.decimation,
+        'kept_hz': used.kept_hz,
     }
 
 
