@@ -249,7 +249,7 @@ def test_a_question_that_fails_is_counted_as_one():
 def test_questions_get_both_days_and_day_1_again():
     asked = []
 
-    def question(arm, recordings, *, validate, baseline):
+    def question(arm, recordings, *, validate, baseline, **_):
         asked.append((len(recordings), len(validate), len(baseline)))
         return said()
 

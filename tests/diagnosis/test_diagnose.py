@@ -191,6 +191,7 @@ def test_the_document_has_what_the_schema_says(bench):
         'baseline',
         'where',
         'gap',
+        'filters',
         'candidates',
         'not_visible',
         'detectable',

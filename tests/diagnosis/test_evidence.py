@@ -51,14 +51,3 @@ def test_a_decimation_that_was_asked_for_stays(bench):
     (part,) = trajectories([recording], Conditioning(1000.0, 20.0, 53))
     step = np.diff(part.t)
     np.testing.assert_allclose(step, 0.053, atol=1e-9)
-
-
-@pytest.mark.parametrize('rate', [100.0, 200.0, 500.0])
-def test_rows_keep_most_of_a_motion_that_turns_round_all_the_time(bench, rate):
-    """Where a joint turns round stops, slack and limits of torque act."""
-    recordings = [swings(bench, rate)]
-    settings = DiagnosisSettings()
-    used = choose_filters(bench.arm, recordings, (), settings, np.random.default_rng(0))
-    (part,) = trajectories(recordings, used, bench.arm)
-    share = part.informative.sum(axis=0) / part.moving.sum(axis=0)
-    assert np.all(share > 0.7)

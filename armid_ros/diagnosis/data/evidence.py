@@ -87,11 +87,6 @@ class Trajectory:
         return replace(self, motion=smoothed(self.motion))
 
     @cached_property
-    def moving(self) -> npt.NDArray[np.bool_]:
-        """Return where joints do not rest, in rows, shape (M, n)."""
-        return ~_at_rest(self.motion)[self.rows]
-
-    @cached_property
     def at_rows(self) -> Motion:
         """Return the motion at the samples that the rows sit on."""
         return self.motion.select(self.rows)

@@ -90,27 +90,7 @@ def choose_filters(
         return used
     band = used.rate_hz / (2.5 * MODEL_BANDS * used.decimation)
     wide = replace(used, decimation=max(1, int(used.rate_hz / (2.5 * _BANDS * band))))
-    return _fine_enough(recordings, thinnable(wide))
-
-
-def _fine_enough(recordings: Sequence[Recording], used: Conditioning) -> Conditioning:
-    """
-    Return filters whose rows keep enough of the motion of every joint.
-
-    Stops, limits of torque and slack act where a joint turns round. A motion of few frequencies
-    turns round so often that what filters hide there may be half of it.
-
-    """
-    while used.decimation > 1 and np.min(_kept(trajectories(recordings, used))) < _MOVING:
-        used = thinnable(replace(used, decimation=used.decimation // 2))
-    return used
-
-
-def _kept(data: Sequence[Trajectory]) -> FloatArray:
-    """Return what share of the rows in which a joint moves tell something, shape (n,)."""
-    moving = np.concatenate([part.moving for part in data]).sum(axis=0)
-    told = np.concatenate([part.informative for part in data]).sum(axis=0)
-    return np.asarray(np.where(moving > 0, told / np.maximum(moving, 1), 1.0))
+    return thinnable(wide)
 
 
 def prepare(
