@@ -371,14 +371,19 @@ def _left(
         residual = explanation.fitted.residual
     else:
         residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
-    excess = evidence.chi2_per_row(residual) / (more * evidence.limits(residual, settings))
-    return Left(excess, f'in {where}')
+    return Left(_excess(residual, evidence, settings) / more, f'in {where}')
 
 
 def _as_it_is(arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings) -> Left:
     residual = [part.residual(arm) for part in evidence.data]
-    excess = evidence.chi2_per_row(residual) / evidence.limits(residual, settings)
-    return Left(excess, 'in the recordings')
+    return Left(_excess(residual, evidence, settings), 'in the recordings')
+
+
+def _excess(
+    residual: Sequence[FloatArray], evidence: Evidence, settings: DiagnosisSettings
+) -> FloatArray:
+    """Return the loss of each joint over that up to which it is no gap, shape (n,)."""
+    return evidence.chi2_per_row(residual) / evidence.limits(residual, settings)
 
 
 def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:

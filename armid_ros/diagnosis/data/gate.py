@@ -207,8 +207,7 @@ def _described_friction(arm: ArmModel) -> list[str]:
 
 def _laws(arm: ArmModel, data: Sequence[Trajectory]) -> Iterator[str]:
     for part in data:
-        assert part.motion.tau is not None
-        rows = part.at_rows.with_torque(part.reduce(part.motion.tau))
+        rows = part.at_rows.with_torque(part.torque)
         for law in laws_of_controllers(arm.body, rows, part.informative):
             yield f'{part.source or "recording"}: {law}'
 
