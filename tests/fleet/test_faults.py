@@ -16,6 +16,7 @@ from armid_ros.fleet.bags import find_bags
 from armid_ros.fleet.cluster import connected
 from armid_ros.fleet.store import Store
 from armid_ros.identification import SignalSettings
+import dask
 from distributed import get_worker
 import fsspec
 from fsspec import AbstractFileSystem
@@ -185,6 +186,15 @@ def test_a_bag_that_ends_its_workers_is_given_up_and_the_others_are_used(bags, t
     assert (outcome.done, refused.failed) == (8, True)
     assert refused.bag.url.endswith('arm_0001/2026-01-02')
     assert 'workers ended' in refused.reason
+
+
+def test_a_worker_that_is_given_up_is_started_anew():
+    with dask.config.set({'distributed.deploy.lost-worker-timeout': '100 ms'}):
+        with connected(None, 1) as client:
+            (given_up,) = client.cluster.workers.values()
+            client.cluster.sync(given_up.close)
+            assert client.submit(os.getpid).result(timeout=100)
+            assert given_up not in client.cluster.workers.values()
 
 
 class Cluster:
