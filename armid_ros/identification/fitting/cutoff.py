@@ -68,26 +68,48 @@ def cutoff_of_torques(
         The same with the cut-off that was chosen.
 
     """
-    tried: list[tuple[float, FloatArray]] = []
+    tried: dict[float, list[list[Regression]]] = {}
+    losses: dict[float, FloatArray] = {}
     cutoff, rows = used.cutoff_hz, 0
     while True:
+        lower = replace(used, cutoff_hz=cutoff)
         try:
-            problem = regressions(arm, columns, recordings, replace(used, cutoff_hz=cutoff))
+            problem = [regressions(arm, columns, [one], lower) for one in recordings]
         except IdentificationError:
             break
-        count = sum(len(part.tau) for part in problem)
-        if count < _KEPT * rows or not problem:
+        count = sum(len(part.tau) for parts in problem for part in parts)
+        if count < _KEPT * rows or not count:
             break
         rows = max(rows, count)
-        tried.append((cutoff, _losses(problem)))
-        best = min(tried, key=lambda one: float(np.mean(one[1])))
-        if not _as_good(tried[-1][1], best[1]):
+        tried[cutoff] = problem
+        losses = {hz: _losses(_shared(one, problem)) for hz, one in tried.items()}
+        best = min(losses.values(), key=np.mean)
+        if not _as_good(losses[cutoff], best):
             break
         cutoff *= _STEP
     if not tried:
         return used
-    good = [hz for hz, losses in tried if _as_good(losses, best[1])]
-    return replace(used, cutoff_hz=max(good))
+    return replace(used, cutoff_hz=max(hz for hz, own in losses.items() if _as_good(own, best)))
+
+
+def _shared(
+    problem: Sequence[Sequence[Regression]], shorter: Sequence[Sequence[Regression]]
+) -> list[Regression]:
+    """
+    Return the rows of each recording that a lower cut-off has as well.
+
+    It cuts more off the ends, where arms start and stop: other rows have other losses.
+
+    """
+    result = []
+    for parts, others in zip(problem, shorter, strict=True):
+        for part in parts:
+            t = part.motion.t
+            inside = [(t >= own.motion.t[0]) & (t <= own.motion.t[-1]) for own in others]
+            kept = np.flatnonzero(np.any(inside, axis=0))
+            if len(kept):
+                result.append(part.select(kept))
+    return result
 
 
 def _as_good(losses: FloatArray, best: FloatArray) -> bool:

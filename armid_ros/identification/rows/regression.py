@@ -81,6 +81,16 @@ class Regression:
             return self
         return replace(self, columns=self.columns[:, :, columns])
 
+    def select(self, rows: npt.NDArray[np.intp]) -> Regression:
+        """Return the problem in some of its rows."""
+        return replace(
+            self,
+            motion=self.motion.select(rows),
+            columns=self.columns[rows],
+            informative=self.informative[rows],
+            constant=None if self.constant is None else self.constant[rows],
+        )
+
 
 def regressions(
     arm: ArmModel,

@@ -160,6 +160,22 @@ def sampling_rate(recording: Recording) -> float:
     return float(1.0 / np.median(np.diff(recording.t)))
 
 
+def velocity_noise(recording: Recording, used: Conditioning) -> FloatArray:
+    """
+    Return by how much noise of the positions makes velocities wrong that are made of them.
+
+    White noise up to the cut-off, times the square of its frequency.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Standard deviation [rad/s or m/s].
+
+    """
+    _, _, floor = _position_spectrum(recording)
+    return np.asarray(2.0 * np.pi * np.sqrt(floor * used.cutoff_hz**3 / 3.0))
+
+
 def _require_rate(recording: Recording) -> None:
     """Raise an IdentificationError where samples are so far apart that stamps are no seconds."""
     rate = sampling_rate(recording)
@@ -341,11 +357,28 @@ def _noise_crossing(recording: Recording) -> FloatArray:
     The noise is white at the sensor; its level is the median of the upper two fifths.
 
     """
+    frequency, power, floor = _position_spectrum(recording)
+    above = power > NOISE_MARGIN * floor
+    return np.array([frequency[np.argmin(column)] for column in above.T])
+
+
+def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Return the spectra of positions, and what of them is white noise.
+
+    Returns
+    -------
+    frequency : ndarray, shape (K,)
+        Frequencies [Hz].
+    power : ndarray, shape (K, n)
+        Power [rad^2/Hz or m^2/Hz].
+    floor : ndarray, shape (n,)
+        Its median in the upper two fifths.
+
+    """
     rate = sampling_rate(recording)
     length = min(len(recording), int(8.0 * rate))
     frequency, power = signal.welch(
         recording.q, fs=rate, window='blackmanharris', nperseg=length, axis=0
     )
-    floor = np.median(power[frequency > 0.3 * rate], axis=0)
-    above = power > NOISE_MARGIN * floor
-    return np.array([frequency[np.argmin(column)] for column in above.T])
+    return frequency, power, np.median(power[frequency > 0.3 * rate], axis=0)
