@@ -101,6 +101,9 @@ class Effect(ABC):
     #: Attributes of a joint of URDF and of MJCF that hold its one quantity; '' if none does.
     urdf_attribute: ClassVar[str] = ''
     mjcf_attribute: ClassVar[str] = ''
+    #: Whether it says that the description is wrong, and never happens to an arm: where one value
+    #: of a description is wrong, others may be.
+    corrects: ClassVar[bool] = False
     #: Whether it comes from outside the arm: a person, another machine.
     external: ClassVar[bool] = False
     #: Whether it is learned from the residual, and so names no cause.

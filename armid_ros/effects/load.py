@@ -118,6 +118,7 @@ class LinkInertia(_LinkBody):
 
     name = 'link_inertia'
     summary = 'mass, centre or inertia of a link other than described'
+    corrects = True
     shown_by = 'fast motion beside static holds'
     quantities = tuple(
         Quantity(f'{name}_difference', unit)

@@ -26,6 +26,7 @@ from armid_ros.identification.rows.signals import (
     decimate,
     decimated_samples,
     segments,
+    velocity_noise,
 )
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -37,10 +38,11 @@ from scipy import stats
 _OVERSAMPLING = 8
 #: A joint slower than this share of its top speed for this long [s] is at rest.
 _REST_SPEED, _REST_TIME = 0.02, 0.2
-#: Below this share of the top speed the sign of a velocity is uncertain, and so is dry friction in
-#: as many rows around as the filter rings over: beyond three rows the residuals of six-joint
-#: arms are at their noise again, in the third they can be at four times its power.
-_REVERSAL_SPEED, _REVERSAL_ROWS = 0.004, 3
+#: Below this share of the top speed, or so many deviations of its noise, the sign of a velocity is
+#: uncertain, and so is dry friction in as many rows around as the filter rings over: beyond three
+#: rows the residuals of six-joint arms are at their noise again, in the third they can be at four
+#: times its power.
+_REVERSAL_SPEED, _REVERSAL_NOISE, _REVERSAL_ROWS = 0.004, 3.0, 3
 #: Rows apart that what is left may be alike.
 _LAGS = 20
 
@@ -101,6 +103,11 @@ class Trajectory:
         """Measured torque in rows, shape (M, n) [N m]."""
         assert self.motion.tau is not None
         return self.reduce(self.motion.tau)
+
+    def with_torque_moved(self, by: FloatArray) -> Trajectory:
+        """Return the same where more torque was measured, by as much all the time, (n,) [N m]."""
+        assert self.motion.tau is not None
+        return replace(self, motion=self.motion.with_torque(self.motion.tau + by))
 
     def residual(self, arm: ArmModel) -> FloatArray:
         """Return measured torque minus that of a model, in rows, shape (M, n) [N m]."""
@@ -243,7 +250,9 @@ def trajectories(
     """
     result = []
     for fold, recording in enumerate(recordings):
-        found = [_trajectory(recording.source, fold, m, used) for m in segments(recording, used)]
+        least = _REVERSAL_NOISE * velocity_noise(recording, used)
+        stretches = segments(recording, used)
+        found = [_trajectory(recording.source, fold, m, used, least) for m in stretches]
         if not found:
             raise IdentificationError(
                 f'{recording.source}: no stretch is long enough to be filtered at '
@@ -286,7 +295,9 @@ def _thin(used: Conditioning) -> int:
     return max(d for d in range(1, _widest(used) + 1) if used.decimation % d == 0)
 
 
-def _trajectory(source: str, fold: int, motion: Motion, used: Conditioning) -> Trajectory:
+def _trajectory(
+    source: str, fold: int, motion: Motion, used: Conditioning, least: FloatArray
+) -> Trajectory:
     thin = _thin(used)
     if thin > 1:
         first = replace(used, decimation=thin)
@@ -295,7 +306,7 @@ def _trajectory(source: str, fold: int, motion: Motion, used: Conditioning) -> T
         motion = motion.select(kept).with_torque(decimate(motion.tau, first))
         used = Conditioning(used.rate_hz / thin, used.cutoff_hz, used.decimation // thin)
     rows = np.array(decimated_samples(len(motion), used), dtype=np.intp)
-    informative = ~(_at_rest(motion) | _turning(motion, used))[rows]
+    informative = ~(_at_rest(motion) | _turning(motion, used, least))[rows]
     return Trajectory(source, fold, motion, used, rows, informative)
 
 
@@ -312,9 +323,10 @@ def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
     return rest
 
 
-def _turning(motion: Motion, used: Conditioning) -> npt.NDArray[np.bool_]:
+def _turning(motion: Motion, used: Conditioning, least: FloatArray) -> npt.NDArray[np.bool_]:
     """Return where joints are too slow for the sign of their velocity, rows around included."""
-    slow = np.abs(motion.dq) < _REVERSAL_SPEED * np.abs(motion.dq).max(axis=0)
+    speed = np.abs(motion.dq)
+    slow = speed < np.maximum(_REVERSAL_SPEED * speed.max(axis=0), least)
     slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
     reach = _REVERSAL_ROWS * used.decimation
     wide = np.cumsum(np.pad(slow, ((reach + 1, reach), (0, 0))), axis=0)

@@ -110,13 +110,17 @@ def explained(
     tell(0.2, 'the model as given')
     first = explain(given, told, settings)
     nothing = np.zeros(arm.robot.n_joints)
-    if at_floor(first, settings):
+    closed = at_floor(first, settings)
+    if closed and not _beside_a_correction(first):
         return Chosen(first, nothing, NOISE)
     tell(0.4, 'the model fitted anew')
     noise = Evidence(prepared.data, tuple(prepared.sigma), tuple(prepared.sigma))
     anew = explain(fitted_anew(arm, prepared.data, many, settings.library, rng), noise, settings)
     misfit = _left_by(anew)
     if at_floor(anew, settings):
+        misfit, words = nothing, NOISE
+        first = _that_stand(first, anew) if closed else first
+    elif closed:
         misfit, words = nothing, NOISE
     else:
         tell(0.7, 'the model as given')
@@ -265,6 +269,25 @@ def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
     evidence = explanation.evidence
     limits = evidence.limits(explanation.fitted.residual, settings)
     return bool(np.all(explanation.chi2_per_row <= limits))
+
+
+def _beside_a_correction(first: Explanation) -> bool:
+    """Return whether several causes are named, and one corrects the description, or may."""
+    trials = [trial for step in first.steps for trial in (step.trial, *step.rivals)]
+    return len(first.steps) > 1 and any(trial.group.effect.corrects for trial in trials)
+
+
+def _that_stand(first: Explanation, anew: Explanation) -> Explanation:
+    """
+    Return an explanation that corrects the description, without what a full correction explains.
+
+    Corrections stay, the first cause, and those that are named beside a body fitted anew.
+
+    """
+    there = {step.trial.group.key[:2] for step in anew.steps}
+    groups = [step.trial.group for step in first.steps]
+    stand = [group.effect.corrects or group.key[:2] in there for group in groups]
+    return first.only([k for k, good in enumerate(stand) if good or k == 0])
 
 
 def _left_by(explanation: Explanation) -> FloatArray:

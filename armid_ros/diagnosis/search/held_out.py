@@ -117,11 +117,18 @@ class Trial:
 
     @cached_property
     def z(self) -> float:
-        """Return the slope over its deviation."""
+        """
+        Return the slope over its deviation.
+
+        That is what blocks differ by, and no less than white noise makes: a cause that acts in two
+        blocks may do so alike by chance.
+
+        """
         scatter = self.cross - self.slope * self.square
         count = len(scatter)
-        deviation = np.sqrt(np.sum(scatter**2) * count / (count - 1))
-        return float(self.cross.sum() / max(float(deviation), 1e-300))
+        variance = float(np.sum(scatter**2)) * count / (count - 1)
+        variance = max(variance, float(self.square.sum()))
+        return float(self.cross.sum() / max(np.sqrt(variance), 1e-300))
 
     @property
     def p(self) -> float:

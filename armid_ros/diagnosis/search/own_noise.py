@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from armid_ros.diagnosis.data.rows import Problem, Projection
 from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.round import Round
@@ -13,27 +15,40 @@ import numpy as np
 
 def made_of_noise(trial: Trial, problem: Problem, projection: Projection, here: Round) -> bool:
     """
-    Return whether a group explains noise with that noise.
+    Return whether a group explains noise of positions with that noise.
 
     What positions have beyond the motion is in the accelerations that the model takes, and so in
-    what is left, and in columns that are derived from them. And columns that are made of the
-    measured torque can leave less than its noise.
+    what is left, and in columns that are derived from them.
 
     """
     effect, kept, work = trial.group.effect, trial.group.kept, here.work
-    thresholds = here.settings.thresholds
     left = projection.rest(problem.y)
     smooth = work.smooth_columns(effect, kept) * problem.weight[:, :, np.newaxis]
     rough = problem.x[:, :, trial.group.columns]
-    if _taken(smooth, projection, left) < thresholds.smooth_share * _taken(
-        rough, projection, left
-    ):
-        return True
-    after = problem.chi2_per_row(left - projection.rest(rough) @ trial.values)
-    before = np.minimum(problem.chi2_per_row(left), here.evidence.noise_share)
-    return bool(np.any(after < thresholds.below_noise * before)) and work.reads_torque(
-        effect, kept
-    )
+    least = here.settings.thresholds.smooth_share * _taken(rough, projection, left)
+    return _taken(smooth, projection, left) < least
+
+
+def without_echo(trial: Trial, problem: Problem, here: Round) -> Trial:
+    """
+    Return a trial without what noise of the torque makes of it.
+
+    Columns that are made of the measured torque follow its noise, which is in what is left as
+    well. A function g of a signal goes with the noise of that signal, of variance s^2, as s^2 g'
+    (Stein, Estimation of the mean of a multivariate normal distribution, 1981).
+
+    """
+    effect, kept, evidence = trial.group.effect, trial.group.kept, here.evidence
+    echo = here.work.torque_slope(effect, kept, evidence.noise)
+    if not echo.any():
+        return trial
+    pairs = zip(evidence.data, evidence.noise, evidence.sigma, strict=True)
+    share = [np.tile((noise / unit) ** 2, (len(part.rows), 1)) for part, noise, unit in pairs]
+    rows = np.einsum('rjp,rj->rp', echo, np.concatenate(share) * problem.used)
+    blocks = np.zeros((len(trial.cross), rows.shape[1]))
+    np.add.at(blocks, problem.block, rows)
+    made = np.sum(blocks * trial.held_values[trial.piece], axis=1)
+    return replace(trial, cross=trial.cross - made)
 
 
 def _taken(columns: FloatArray, projection: Projection, left: FloatArray) -> float:

@@ -46,15 +46,24 @@ class Workspace:
         smooth = tuple(part.smooth for part in self.data)
         return replace(self, data=smooth).columns(effect, kept)
 
-    def reads_torque(self, effect: Effect, kept: Sequence[int]) -> bool:
-        """Return whether the columns of an effect are made of the measured torque."""
-        silent = tuple(
-            replace(part, motion=part.motion.with_torque(np.zeros_like(part.motion.q)))
-            for part in self.data
+    def torque_slope(
+        self, effect: Effect, kept: Sequence[int], step: Sequence[FloatArray]
+    ) -> FloatArray:
+        """
+        Differentiate the columns of an effect by the measured torque, shape (R, n, p).
+
+        By central differences over twice a step for each trajectory, (n,) [N m].
+
+        """
+        ends = []
+        for sign in (-1.0, 1.0):
+            pairs = zip(self.data, step, strict=True)
+            moved = [part.with_torque_moved(sign * by) for part, by in pairs]
+            ends.append(replace(self, data=tuple(moved)).columns(effect, kept))
+        wide = np.concatenate(
+            [np.tile(2.0 * by, (len(p.rows), 1)) for p, by in zip(self.data, step, strict=True)]
         )
-        columns = self.columns(effect, kept)
-        change = replace(self, data=silent).columns(effect, kept) - columns
-        return bool(np.abs(change).max() > _ROUNDING * np.abs(columns).max())
+        return np.asarray((ends[1] - ends[0]) / wide[:, :, np.newaxis])
 
 
 def refine(

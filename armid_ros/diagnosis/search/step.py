@@ -20,7 +20,7 @@ from armid_ros.diagnosis.search.held_out import (
     tried_beside,
     with_group,
 )
-from armid_ros.diagnosis.search.own_noise import made_of_noise
+from armid_ros.diagnosis.search.own_noise import made_of_noise, without_echo
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.refine import refine
 from armid_ros.diagnosis.search.rivals import beaten, contains, likeliest, rarity
@@ -137,7 +137,7 @@ def next_step(
     ranking, problem = _with_refined_shapes(problem, beside, ranking, here)
     ranking, there, gains = _examined(ranking, problem, beside, here, max(len(seen), 1))
     survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
-    passing = _passing(ranking, gains, problem, beside, here)
+    passing = _passing(ranking, gains, problem, beside, here, max(len(seen), 1))
     ahead = list(takewhile(lambda t: not changed(t, problem, beside, here), passing))
     if len(ahead) == len(passing):
         return None, survey, problem
@@ -406,6 +406,7 @@ def _passing(
     problem: Problem,
     beside: Beside,
     here: Round,
+    tried: int,
 ) -> list[Trial]:
     """Return the causes that could be taken, best first."""
     projection: Projection | None = None
@@ -414,6 +415,8 @@ def _passing(
         if id(trial) not in gains:
             continue
         projection = projection or project(problem, beside.free, beside.hold)
-        if not made_of_noise(trial, problem, projection, here):
+        if made_of_noise(trial, problem, projection, here):
+            continue
+        if acceptable(without_echo(trial, problem, here), here, tried):
             result.append(trial)
     return result
