@@ -208,14 +208,45 @@ def diagnose(
     def explain(by: DiagnosisSettings) -> Chosen:
         return explained(arm, prepared, known, by, rng, tell, written, seen)
 
-    said = _said(own_causes_first(explain, settings), notes, asked)
-    if said.verdict == 'unknown' and validate and said.minor:
-        small = tuple(dict.fromkeys(one.name for one in said.minor))
-        matters = replace(settings.without_small_print(), library=small)
-        again = _said(own_causes_first(explain, matters), notes, asked)
-        most = sum(one.share for one in again.findings) > settings.thresholds.open_share
-        said = again if again.verdict in _CLOSED and most else said
-    return said
+    def ask(by: DiagnosisSettings) -> tuple[Diagnosis, frozenset[str]]:
+        chosen = own_causes_first(explain, by)
+        said = _said(chosen, notes, asked)
+        taken = {step.trial.group.effect.name for step in chosen.explanation.steps}
+        return said, frozenset(taken - {one.name for one in said.findings})
+
+    said, denied = ask(settings)
+    if said.verdict != 'unknown' or not validate:
+        return said
+    return _not_denied(ask, settings, denied) or _small_but_all(ask, settings, said) or said
+
+
+#: Says what was found with settings, and which names of it were dropped.
+_Ask = Callable[[DiagnosisSettings], tuple[Diagnosis, frozenset[str]]]
+
+
+def _not_denied(
+    ask: _Ask, settings: DiagnosisSettings, denied: frozenset[str]
+) -> Diagnosis | None:
+    """Return what closes the gap without names that held-out recordings deny; None if none."""
+    while denied:
+        library = tuple(name for name in settings.library if name not in denied)
+        said, more = ask(replace(settings, library=library))
+        if said.verdict in _CLOSED:
+            return said
+        if said.verdict != 'unknown' or not more:
+            break
+        denied |= more
+    return None
+
+
+def _small_but_all(ask: _Ask, settings: DiagnosisSettings, said: Diagnosis) -> Diagnosis | None:
+    """Return what closes the gap of causes that are small, but take most of it; None if none."""
+    if not said.minor:
+        return None
+    small = tuple(dict.fromkeys(one.name for one in said.minor))
+    again, _ = ask(replace(settings.without_small_print(), library=small))
+    most = sum(one.share for one in again.findings) > settings.thresholds.open_share
+    return again if again.verdict in _CLOSED and most else None
 
 
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:

@@ -186,3 +186,12 @@ def test_data_deny_a_cause_that_they_do_not_follow_and_nothing_else():
     assert not denies(0.5 * square + noise, square)
     assert not denies(noise, np.zeros(40))
     assert not denies(100.0 * noise, 0.01 * square)
+
+
+def test_two_blocks_that_are_alike_are_no_more_sure_than_white_noise(bench):
+    problem = make_problem(np.random.default_rng(3))
+    (trial, *_), _ = held_out(problem, (), [group(bench)], np.zeros((0, 0)), np.zeros(0))
+    square, cross = np.zeros((2, len(FOLDS)))
+    square[:2], cross[:2] = (7.0, 6.0), (7.1, 5.9)
+    alike = replace(trial, square=square, cross=cross)
+    assert alike.z == pytest.approx(13.0 / np.sqrt(13.0))

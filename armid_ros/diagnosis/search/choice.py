@@ -119,7 +119,8 @@ def explained(
     misfit = _left_by(anew)
     if at_floor(anew, settings):
         misfit, words = nothing, NOISE
-        first = _that_stand(first, anew) if closed else first
+        if closed and not _stands(first, anew):
+            return Chosen(anew, nothing, NOISE)
     elif closed:
         misfit, words = nothing, NOISE
     else:
@@ -277,17 +278,16 @@ def _beside_a_correction(first: Explanation) -> bool:
     return len(first.steps) > 1 and any(trial.group.effect.corrects for trial in trials)
 
 
-def _that_stand(first: Explanation, anew: Explanation) -> Explanation:
+def _stands(first: Explanation, anew: Explanation) -> bool:
     """
-    Return an explanation that corrects the description, without what a full correction explains.
+    Return whether causes beside a correction of the description are causes beside a full one.
 
-    Corrections stay, the first cause, and those that are named beside a body fitted anew.
+    Where they are not, one correction was too few: the description is off in more than that.
 
     """
     there = {step.trial.group.key[:2] for step in anew.steps}
     groups = [step.trial.group for step in first.steps]
-    stand = [group.effect.corrects or group.key[:2] in there for group in groups]
-    return first.only([k for k, good in enumerate(stand) if good or k == 0])
+    return all(group.effect.corrects or group.key[:2] in there for group in groups[1:])
 
 
 def _left_by(explanation: Explanation) -> FloatArray:

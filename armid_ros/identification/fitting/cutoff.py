@@ -34,6 +34,8 @@ _STRETCHES = 16
 #: Nor is a cut-off lowered for less than a tenth of the error; jitter and slack cost a third and
 #: more on every machine that was tried.
 _NEAR = 0.1
+#: No drive tells its torque to more than this share of it.
+_RESOLUTION = 1e-4
 #: Rows that are enough to compare cut-offs, some hundred for every parameter of seven joints.
 _ROWS = 6000
 
@@ -116,18 +118,20 @@ def _as_good(losses: FloatArray, best: FloatArray) -> bool:
     """Tell whether stretches are predicted as well as the best way does, to one deviation."""
     worse = losses - best
     deviation = np.std(worse, ddof=1) / np.sqrt(len(worse))
-    return bool(np.mean(worse) <= max(float(deviation), _NEAR * float(np.mean(best))))
+    return bool(np.mean(worse) <= max(float(deviation), _NEAR))
 
 
 def _losses(problem: Sequence[Regression]) -> FloatArray:
     """
     Predict every second stretch from the others, and those from it.
 
+    Every joint counts by the ratio of its errors: a light one whose torque is mostly noise gains
+    by a low cut-off, and must not hide that a heavy one loses.
+
     Returns
     -------
     ndarray, shape (S,)
-        Root mean square of the residual relative to the torque, mean of the joints, of each
-        stretch.
+        Logarithm of the root mean square of the residual, mean of the joints, of each stretch.
 
     """
     step = max(1, sum(len(part.tau) for part in problem) // _ROWS)
@@ -142,8 +146,9 @@ def _losses(problem: Sequence[Regression]) -> FloatArray:
         chosen = stretch % 2 == odd
         value = _fit(x[chosen], y[chosen], told[chosen], weight)
         left[~chosen] = y[~chosen] - x[~chosen] @ value
-    rms = [_rms(left[stretch == k], told[stretch == k]) for k in range(_STRETCHES)]
-    return np.asarray(np.mean(rms / np.maximum(_rms(y, told), 1e-12), axis=1))
+    rms = np.array([_rms(left[stretch == k], told[stretch == k]) for k in range(_STRETCHES)])
+    least = np.maximum(_RESOLUTION * _rms(y, told), 1e-12)
+    return np.asarray(np.mean(np.log(np.maximum(rms, least)), axis=1))
 
 
 def _rms(values: FloatArray, told: npt.NDArray[np.bool_]) -> FloatArray:

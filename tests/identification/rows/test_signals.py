@@ -10,6 +10,7 @@ from armid_ros.identification.rows.signals import (
     decimated_samples,
     segments,
     SignalSettings,
+    velocity_noise,
 )
 from armid_ros.recording import Recording
 import numpy as np
@@ -92,6 +93,17 @@ def test_cutoff_is_where_positions_meet_their_noise(arm):
     assert noisy.cutoff_hz < quiet.cutoff_hz <= 200.0
     assert noisy.cutoff_hz >= 0.5  # the fastest harmonic
     assert noisy.decimation == quiet.decimation
+
+
+@pytest.mark.parametrize('cutoff', [10.0, 40.0])
+def test_noise_of_velocities_is_what_white_noise_of_positions_makes(cutoff):
+    rng = np.random.default_rng(0)
+    t = np.arange(20_000) / 500.0
+    q = np.array([1e-4, 3e-3]) * rng.normal(size=(len(t), 2))
+    recording = Recording(joints=('a', 'b'), t=t, q=q, tau=q, source='bag')
+    used = Conditioning(500.0, cutoff, 5)
+    (motion,) = segments(recording, used)
+    np.testing.assert_allclose(velocity_noise(recording, used), motion.dq.std(axis=0), rtol=0.15)
 
 
 @pytest.mark.parametrize('settings', [{'cutoff_hz': -1.0}, {'decimation': 0}])
