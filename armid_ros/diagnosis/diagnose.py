@@ -301,6 +301,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         arm,
         NOISE if measured else chosen.floor_in_words,
         settings.thresholds,
+        settings.material * evidence.torque_rms,
         None if explanation.base is None else _as_it_is(arm, _sure(evidence, chosen), settings),
         minor,
     )

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sentences say what the evidence bears out, and no more."""
 
+from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.words import decide, Left
 import numpy as np
@@ -11,7 +12,8 @@ FLOOR = 'the misfit that the model had before'
 
 def said(arm, as_it_is):
     closed = Left(np.full(arm.robot.n_joints, 0.9), 'in the recordings')
-    return decide((), (), [closed], arm, FLOOR, Thresholds(), as_it_is)
+    nothing = np.zeros(arm.robot.n_joints)
+    return decide((), (), [closed], arm, FLOOR, Thresholds(), nothing, as_it_is)
 
 
 def test_a_model_that_explains_as_it_is_needs_no_fit(bench):
@@ -29,3 +31,17 @@ def test_a_model_that_has_to_be_fitted_says_where_it_is_off_and_by_how_much(benc
     assert verdict.word == 'consistent'
     assert 'once its rigid body and friction are fitted' in verdict.summary
     assert f'the error of {bench.robot.joints[-1]} is 2.0 times as large' in verdict.summary
+
+
+def test_what_does_not_repeat_has_to_matter(bench):
+    joints = bench.robot.n_joints
+    one = np.ones(joints)
+    floor = NoiseFloor(0.1 * one, 8.0, 20.0 * one, np.array([0.05, 0.2]), one)
+    closed = Left(0.5 * one, 'in the recordings')
+
+    def word(least):
+        return decide((), [floor] * 3, [closed], bench.arm, FLOOR, Thresholds(), least * one)
+
+    assert word(0.1).word == 'not_repeatable'
+    assert 'elbow' in word(0.1).summary and 'shoulder' not in word(0.1).summary
+    assert word(0.3).word == 'consistent'

@@ -47,6 +47,8 @@ class NoiseFloor:
         Length of the repeated period [s]; None where nothing repeats.
     structure : ndarray, shape (n,)
         Power of the difference of two periods at low frequency over that at high frequency.
+    slow : ndarray, shape (n,)
+        Deviation that one period has at low frequency [N m]; zero where nothing repeats.
     growth : ndarray, shape (n,)
         Power per bin of that difference in the upper third of what rows keep, over that in the
         lower one: noise of positions grows with frequency on its way through the model.
@@ -56,6 +58,7 @@ class NoiseFloor:
     sigma: FloatArray
     period: float | None
     structure: FloatArray
+    slow: FloatArray
     growth: FloatArray
 
 
@@ -81,11 +84,12 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     least = _least(trajectory, arm)
     if found is None:
         sigma = np.maximum(_assumed(trajectory, smooth), least)
-        return NoiseFloor(sigma, None, *np.ones((2, motion.n_joints)))
+        one, zero = np.ones(motion.n_joints), np.zeros(motion.n_joints)
+        return NoiseFloor(sigma, None, one, zero, one)
     lag, where = found
     first = np.arange(max(where.start, half), min(where.stop, len(motion) - lag - half))
     rows = first[:: trajectory.used.decimation]
-    sigma, structure, growth = np.empty((3, motion.n_joints))
+    sigma, structure, slow, growth = np.empty((4, motion.n_joints))
     kept = trajectory.used.kept_hz
     for joint in range(motion.n_joints):
         rest, used = _difference(trajectory, smooth, rows, lag, joint)
@@ -94,10 +98,12 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
         rest, used = _difference(trajectory, left, first, lag, joint)
         spectrum = _spectrum(np.where(used, rest, 0.0), trajectory.used.rate_hz)
         structure[joint] = _over(spectrum, (0.0, _SLOW_HZ), _FAST_HZ)
+        slow[joint] = _deviation(spectrum) * np.sqrt(len(used) / max(2.0 * used.sum(), 1.0))
         growth[joint] = _over(spectrum, (2.0 * kept / 3.0, kept), (kept / 12.0, kept / 3.0))
     structure[sigma < least] = growth[sigma < least] = 1.0
     sigma = np.maximum(sigma, least)
-    return NoiseFloor(sigma, lag * float(motion.t[1] - motion.t[0]), structure, growth)
+    period = lag * float(motion.t[1] - motion.t[0])
+    return NoiseFloor(sigma, period, structure, slow, growth)
 
 
 def _difference(
@@ -135,6 +141,13 @@ def _spectrum(difference: FloatArray, rate: float) -> tuple[FloatArray, FloatArr
     length = min(len(difference), int(_WINDOW * rate))
     frequency, power = signal.welch(difference, fs=rate, nperseg=length, detrend=False)
     return frequency, power
+
+
+def _deviation(spectrum: tuple[FloatArray, FloatArray]) -> float:
+    """Return the deviation at low frequency."""
+    frequency, power = spectrum
+    low = frequency < _SLOW_HZ
+    return float(np.sqrt(np.sum(power[low]) * frequency[1]))
 
 
 def _over(

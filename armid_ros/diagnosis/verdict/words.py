@@ -70,6 +70,7 @@ def decide(
     arm: ArmModel,
     floor_in_words: str,
     thresholds: Thresholds,
+    least: FloatArray,
     as_it_is: Left | None = None,
     minor: Sequence[Finding] = (),
 ) -> Verdict:
@@ -90,6 +91,8 @@ def decide(
         What was there before, or noise.
     thresholds : Thresholds
         What does not repeat.
+    least : ndarray, shape (n,)
+        Torque of each joint that matters [N m].
     as_it_is : Left or None
         What the model leaves as it is, where its body and known effects were fitted anew.
     minor : sequence of Finding
@@ -99,7 +102,7 @@ def decide(
     worst = max(left, key=lambda one: float(one.excess.max()))
     open_gap = bool(worst.excess.max() > 1.0)
     joint = arm.robot.joints[int(np.argmax(worst.excess))]
-    strange = _not_repeating(floors, arm, thresholds)
+    strange = _not_repeating(floors, arm, thresholds, least)
     if strange and (not findings or open_gap):
         return Verdict('not_repeatable', _strange(strange, findings))
     rest = (
@@ -183,16 +186,20 @@ def _with_degrees(value: float, std: float, unit: str) -> str:
 
 
 def _not_repeating(
-    floors: Sequence[NoiseFloor], arm: ArmModel, thresholds: Thresholds
+    floors: Sequence[NoiseFloor], arm: ArmModel, thresholds: Thresholds, least: FloatArray
 ) -> list[str]:
-    """Return the joints that did not do the same in equal periods."""
-    known = [floor for floor in floors if floor.period is not None]
+    """Return the joints that did not do the same in equal periods, by as much as matters."""
+    known = [
+        np.where(floor.slow > least, floor.structure, 1.0)
+        for floor in floors
+        if floor.period is not None
+    ]
     if not known:
         return []
-    odd_ones = [floor.structure >= thresholds.one_period for floor in known]
+    odd_ones = [structure >= thresholds.one_period for structure in known]
     often = np.sum(odd_ones, axis=0) >= max(1, len(known) / 2)
     if len(known) >= _SEVERAL:
-        mean = np.exp(np.mean([np.log(floor.structure) for floor in known], axis=0))
+        mean = np.exp(np.mean(np.log(known), axis=0))
         often = often | (mean > thresholds.one_period_on_average)
     return [joint for joint, odd in zip(arm.robot.joints, often, strict=True) if odd]
 

@@ -1,0 +1,48 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which causes stay beside a correction of the description."""
+
+from types import SimpleNamespace
+
+from armid_ros.diagnosis.search.candidates import Group
+from armid_ros.diagnosis.search.choice import _beside_a_correction, _stands
+from armid_ros.effects import CATALOGUE
+import pytest
+
+
+def explanation(bench, *names, rivals=()):
+    """Return an explanation by names in the elbow, with rivals of the first one."""
+
+    def trial(name):
+        effect = CATALOGUE[name].on(bench.robot, ('elbow',))
+        return SimpleNamespace(group=Group.of(effect, slice(0, 1), (0,), bench.robot))
+
+    steps = [SimpleNamespace(trial=trial(name), rivals=[]) for name in names]
+    if steps:
+        steps[0].rivals = [trial(name) for name in rivals]
+    return SimpleNamespace(steps=steps)
+
+
+def test_a_cause_that_a_full_correction_explains_does_not_stand(bench):
+    first = explanation(bench, 'link_inertia', 'joint_spring')
+    assert _beside_a_correction(first)
+    assert not _stands(first, explanation(bench))
+    assert not _stands(first, explanation(bench, 'torque_offset'))
+
+
+def test_a_cause_beside_a_full_correction_stands(bench):
+    first = explanation(bench, 'link_inertia', 'torque_offset', 'link_inertia')
+    assert _stands(first, explanation(bench, 'torque_offset'))
+
+
+@pytest.mark.parametrize(
+    ('names', 'rivals', 'asked'),
+    [
+        (('payload', 'torque_offset'), ('link_inertia',), True),
+        (('payload', 'torque_offset'), ('encoder_offset',), False),
+        (('link_inertia',), (), False),
+        ((), (), False),
+    ],
+)
+def test_what_may_be_a_correction_is_asked_about(bench, names, rivals, asked):
+    assert _beside_a_correction(explanation(bench, *names, rivals=rivals)) == asked
