@@ -67,6 +67,7 @@ class TorqueGain(TorqueReading):
 
     name = 'torque_gain'
     summary = 'torque readings too large or too small by a share'
+    sign = 'readings are too large by that share'
     shown_by = 'the same motion with and without a known payload'
     familiar = True
     quantities = (Quantity('gain_error', '', lower=-0.95, typical=(0.005, 0.3)),)
@@ -139,6 +140,7 @@ class EncoderOffset(Displacing):
 
     name = 'encoder_offset'
     summary = 'zero of a position encoder that is off'
+    sign = 'the joint is at its reading plus that'
     shown_by = 'hard stops, or a payload at two poses'
     familiar = True
     quantities = (Quantity('encoder_offset', 'rad', typical=(0.001, 0.1)),)

@@ -2,9 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sentences say what the evidence bears out, and no more."""
 
+from dataclasses import replace
+
 from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
+from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.diagnosis.verdict.words import decide, Left
+from armid_ros.effects import CATALOGUE
 import numpy as np
 
 FLOOR = 'the misfit that the model had before'
@@ -45,3 +49,32 @@ def test_what_does_not_repeat_has_to_matter(bench):
     assert word(0.1).word == 'not_repeatable'
     assert 'elbow' in word(0.1).summary and 'shoulder' not in word(0.1).summary
     assert word(0.3).word == 'consistent'
+
+
+def test_what_is_not_explained_is_said_with_what_explains_most_of_it(bench):
+    gap = Left(4.0 * np.ones(bench.robot.n_joints), 'in the recordings')
+    effect = CATALOGUE['encoder_offset'].on(bench.robot, ('elbow',))
+    names = effect.parameters(bench.robot)
+    small = Finding(
+        'encoder_offset',
+        ('elbow',),
+        names,
+        (0.1,),
+        (0.01,),
+        0.3,
+        (0.2, 0.4),
+        0.0,
+        sign=effect.sign,
+    )
+
+    def text(minor):
+        nothing = np.zeros(bench.robot.n_joints)
+        return decide((), (), [gap], bench.arm, FLOOR, Thresholds(), nothing, None, minor).summary
+
+    assert text(()).endswith('Nothing in the catalogue explains it.')
+    assert text([replace(small, share=0.001)]) == text(())
+    assert text([small]).endswith(
+        'Nothing in the catalogue closes it. An encoder offset in elbow (encoder offset 0.100 '
+        '+- 0.020 rad, 5.7 degrees: the joint is at its reading plus that) explains 30 % of the '
+        'gap.'
+    )

@@ -58,6 +58,8 @@ class Finding:
         What would separate them; empty if there is nothing to separate.
     gain : float
         Squares over the unit of the gap that it takes, held out.
+    sign : str
+        What a positive value means, where the name does not say it.
     ties : tuple of Tie
         Where it holds the arm, in the order of its joints, if it ends at another machine.
 
@@ -74,6 +76,7 @@ class Finding:
     rivals: tuple[Rival, ...] = ()
     experiment: str = ''
     gain: float = 0.0
+    sign: str = ''
     ties: tuple[Tie, ...] = ()
 
     @property
@@ -141,6 +144,7 @@ def findings(
                 rivals,
                 _separating(name, rivals[0].name, order) if rivals else '',
                 float(attribution.taken[indices].sum()),
+                parts[0].effect.sign,
                 _ties([part.effect for part in parts], order),
             )
         )
@@ -168,6 +172,7 @@ def small_print(
                 (share - wide, share + wide),
                 min(1.0, trial.p * tried),
                 gain=trial.gain,
+                sign=effect.sign,
             )
         )
     return tuple(result)

@@ -23,6 +23,8 @@ Word = Literal[
 
 #: Recordings whose periods differ slowly, each a little, tell as well if they are so many.
 _SEVERAL = 3
+#: Less of the gap than this is none in a sentence.
+_SAID = 0.01
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
 
@@ -111,7 +113,7 @@ def decide(
     )
     if not findings:
         if open_gap:
-            text = f'Something is missing: {rest}. Nothing in the catalogue explains it.'
+            text = f'Something is missing: {rest}. {_unexplained(minor, arm.robot)}'
             return Verdict('unknown', text)
         return Verdict('consistent', _consistent(floor_in_words, as_it_is, minor, arm.robot))
     said = ' '.join(sentence(finding, arm.robot) for finding in findings)
@@ -141,6 +143,13 @@ def _consistent(
     return ' '.join([text, *(sentence(one, robot) for one in minor[:1])])
 
 
+def _unexplained(minor: Sequence[Finding], robot: Robot) -> str:
+    """Say that no cause explains a gap, and what explains most of it where something does."""
+    if not minor or minor[0].share < _SAID:
+        return 'Nothing in the catalogue explains it.'
+    return f'Nothing in the catalogue closes it. {sentence(minor[0], robot)}'
+
+
 def _factor(ratio: float) -> str:
     """Return a ratio with as many digits as tell it from one."""
     return f'{ratio:.1f}' if ratio >= 1.05 else f'{ratio:.2f}'
@@ -166,7 +175,8 @@ def sentence(finding: Finding, robot: Robot) -> str:
     ]
     if len(shown) > 3:
         shown = [*shown[:2], f'and {len(shown) - 2} more']
-    numbers = f' ({", ".join(shown)})' if shown else ''
+    meant = f': {finding.sign}' if finding.sign else ''
+    numbers = f' ({", ".join(shown)}{meant})' if shown else ''
     return f'{article} {words}{where}{numbers} {explains}.'
 
 
