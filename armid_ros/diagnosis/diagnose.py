@@ -214,28 +214,28 @@ def diagnose(
         taken = {step.trial.group.effect.name for step in chosen.explanation.steps}
         return said, frozenset(taken - {one.name for one in said.findings})
 
-    said, denied = ask(settings)
+    said, fallen = ask(settings)
     if said.verdict != 'unknown' or not validate:
         return said
-    return _not_denied(ask, settings, denied) or _small_but_all(ask, settings, said) or said
+    return _what_stands(ask, settings, fallen) or _small_but_all(ask, settings, said) or said
 
 
-#: Says what was found with settings, and which names of it were dropped.
+#: Says what is found with settings, and which names did not stand on other recordings.
 _Ask = Callable[[DiagnosisSettings], tuple[Diagnosis, frozenset[str]]]
 
 
-def _not_denied(
-    ask: _Ask, settings: DiagnosisSettings, denied: frozenset[str]
+def _what_stands(
+    ask: _Ask, settings: DiagnosisSettings, fallen: frozenset[str]
 ) -> Diagnosis | None:
-    """Return what closes the gap without names that held-out recordings deny; None if none."""
-    while denied:
-        library = tuple(name for name in settings.library if name not in denied)
+    """Return what closes the gap without names that did not stand; None if nothing does."""
+    while fallen:
+        library = tuple(name for name in settings.library if name not in fallen)
         said, more = ask(replace(settings, library=library))
         if said.verdict in _CLOSED:
             return said
         if said.verdict != 'unknown' or not more:
             break
-        denied |= more
+        fallen |= more
     return None
 
 

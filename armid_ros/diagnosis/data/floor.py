@@ -16,14 +16,12 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.identification.rows.signals import TORQUE_RESOLUTION
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-#: No drive tells its torque to more than this share of it, which is 13 bits; what a simulation
-#: without noise leaves of a motion that is differentiated is less.
-_RESOLUTION = 1e-4
 #: Fewer rows than this are not enough to leave any out.
 _FEW = 20
 #: Noise of torques is coloured: white noise that bends rows as much is smaller by up to this
@@ -185,6 +183,6 @@ def _least(trajectory: Trajectory, arm: ArmModel) -> FloatArray:
     """Return what no torque is better known than, shape (n,) [N m]."""
     assert trajectory.motion.tau is not None
     size = np.sqrt(np.mean(trajectory.motion.tau**2, axis=0))
-    least = np.maximum(_RESOLUTION * np.maximum(size, 1e-2 * size.max()), 1e-12)
+    least = np.maximum(TORQUE_RESOLUTION * np.maximum(size, 1e-2 * size.max()), 1e-12)
     sensors = trajectory.sensors
     return np.asarray(least if sensors is None else np.maximum(least, sensors.floor(arm)))

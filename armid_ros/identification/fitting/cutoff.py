@@ -19,7 +19,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.fitting.normal_equations import informative_solution
 from armid_ros.identification.rows.regression import Regression, regressions
-from armid_ros.identification.rows.signals import Conditioning
+from armid_ros.identification.rows.signals import Conditioning, TORQUE_RESOLUTION
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -34,8 +34,6 @@ _STRETCHES = 16
 #: Nor is a cut-off lowered for less than a tenth of the error; jitter and slack cost a third and
 #: more on every machine that was tried.
 _NEAR = 0.1
-#: No drive tells its torque to more than this share of it.
-_RESOLUTION = 1e-4
 #: Rows that are enough to compare cut-offs, some hundred for every parameter of seven joints.
 _ROWS = 6000
 
@@ -147,7 +145,7 @@ def _losses(problem: Sequence[Regression]) -> FloatArray:
         value = _fit(x[chosen], y[chosen], told[chosen], weight)
         left[~chosen] = y[~chosen] - x[~chosen] @ value
     rms = np.array([_rms(left[stretch == k], told[stretch == k]) for k in range(_STRETCHES)])
-    least = np.maximum(_RESOLUTION * _rms(y, told), 1e-12)
+    least = np.maximum(TORQUE_RESOLUTION * _rms(y, told), 1e-12)
     return np.asarray(np.mean(np.log(np.maximum(rms, least)), axis=1))
 
 

@@ -41,6 +41,9 @@ NOISE_MARGIN = 3.0
 EDGE_PERIODS = 4.0
 #: Samples per period of the cut-off that describe a smooth function of the filtered positions.
 SMOOTH_SAMPLES = 5.0
+#: No drive tells its torque to more than this share of it, which is 13 bits; what a simulation
+#: without noise leaves of a motion that is differentiated is less.
+TORQUE_RESOLUTION = 1e-4
 #: Half length of the decimation filter in output samples; its edges are cut off.
 _HALF_TAPS = 4
 #: Share of their rate up to which rows keep what is there, where the decimation filter ends.
