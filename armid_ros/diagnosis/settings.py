@@ -75,7 +75,7 @@ class Thresholds:
 
     price: float = 0.002
     outside: float = 10.0
-    error_rate: float = 0.01
+    error_rate: float = 0.002
     rival_z: float = 2.0
     tie: float = 0.02
     far: float = 0.25

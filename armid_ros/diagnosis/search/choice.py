@@ -119,7 +119,8 @@ def explained(
     misfit = _left_by(anew)
     if at_floor(anew, settings):
         misfit, words = nothing, NOISE
-        if closed and not _stands(first, anew):
+        several = _beside_a_correction(first) if closed else len(first.steps) > 1
+        if several and not _stands(first, anew):
             return Chosen(anew, nothing, NOISE)
     elif closed:
         misfit, words = nothing, NOISE
@@ -280,9 +281,9 @@ def _beside_a_correction(first: Explanation) -> bool:
 
 def _stands(first: Explanation, anew: Explanation) -> bool:
     """
-    Return whether causes beside a correction of the description are causes beside a full one.
+    Return whether causes are causes beside a full correction of the description as well.
 
-    Where they are not, one correction was too few: the description is off in more than that.
+    Where they are not, and that explains the data, it is off in more than one of its values.
 
     """
     there = {step.trial.group.key[:2] for step in anew.steps}
