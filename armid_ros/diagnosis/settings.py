@@ -62,6 +62,9 @@ class Thresholds:
     smooth_share : float
         A cause that takes less than this share of its squares without the noise of positions
         beyond the band of the motion is made of that noise.
+    below_noise : float
+        What is made of the measured torque and leaves less than this share of its noise explains
+        torque with itself.
     one_period : float
         Power of the difference of two periods at low frequency over that at high frequency from
         which something happened in one of them only: 3.6 at the most in 60 sets of the laboratory
@@ -90,6 +93,7 @@ class Thresholds:
     contained: float = 0.02
     same: float = 1e-3
     smooth_share: float = 0.1
+    below_noise: float = 0.8
     one_period: float = 8.0
     one_period_on_average: float = 3.5
     few_causes: int = 4

@@ -29,9 +29,24 @@ def made_of_noise(trial: Trial, problem: Problem, projection: Projection, here: 
     return _taken(smooth, projection, left) < least
 
 
+def explains_itself(trial: Trial, problem: Problem, projection: Projection, here: Round) -> bool:
+    """
+    Return whether a group leaves less than the noise of the torque that its columns are made of.
+
+    Where most of a torque is what the model lacks, any function of the measured one explains that,
+    its noise included.
+
+    """
+    left = projection.rest(problem.y)
+    own = projection.rest(problem.x[:, :, trial.group.columns])
+    after = problem.chi2_per_row(left - own @ trial.values)
+    before = np.minimum(problem.chi2_per_row(left), here.evidence.noise_share)
+    return bool(np.any(after < here.settings.thresholds.below_noise * before))
+
+
 def without_echo(trial: Trial, problem: Problem, here: Round) -> Trial:
     """
-    Return a trial without what noise of the torque makes of it.
+    Return a trial without what noise of the torque makes of it; itself if that is nothing.
 
     Columns that are made of the measured torque follow its noise, which is in what is left as
     well. A function g of a signal goes with the noise of that signal, of variance s^2, as s^2 g'

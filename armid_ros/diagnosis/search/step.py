@@ -20,7 +20,7 @@ from armid_ros.diagnosis.search.held_out import (
     tried_beside,
     with_group,
 )
-from armid_ros.diagnosis.search.own_noise import made_of_noise, without_echo
+from armid_ros.diagnosis.search.own_noise import explains_itself, made_of_noise, without_echo
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.refine import refine
 from armid_ros.diagnosis.search.rivals import beaten, contains, likeliest, rarity
@@ -417,6 +417,9 @@ def _passing(
         projection = projection or project(problem, beside.free, beside.hold)
         if made_of_noise(trial, problem, projection, here):
             continue
-        if acceptable(without_echo(trial, problem, here), here, tried):
+        fair = without_echo(trial, problem, here)
+        if fair is not trial and explains_itself(trial, problem, projection, here):
+            continue
+        if acceptable(fair, here, tried):
             result.append(trial)
     return result
