@@ -20,7 +20,7 @@ def explanation(bench, *names, rivals=()):
     steps = [SimpleNamespace(trial=trial(name), rivals=[]) for name in names]
     if steps:
         steps[0].rivals = [trial(name) for name in rivals]
-    return SimpleNamespace(steps=steps)
+    return SimpleNamespace(steps=steps, given=bench.arm)
 
 
 def test_a_cause_that_a_full_correction_explains_does_not_stand(bench):
@@ -35,11 +35,19 @@ def test_a_cause_beside_a_full_correction_stands(bench):
     assert _stands(first, explanation(bench, 'torque_offset'))
 
 
+def test_friction_without_values_is_part_of_the_correction(bench):
+    first = explanation(bench, 'link_inertia', 'coulomb_friction')
+    assert not _stands(first, explanation(bench))
+    first.given = bench.named_friction()
+    assert _stands(first, explanation(bench))
+
+
 @pytest.mark.parametrize(
     ('names', 'rivals', 'asked'),
     [
         (('payload', 'torque_offset'), ('link_inertia',), True),
         (('payload', 'torque_offset'), ('encoder_offset',), False),
+        (('rotor_inertia', 'torque_offset'), ('link_inertia',), False),
         (('link_inertia',), (), False),
         ((), (), False),
     ],

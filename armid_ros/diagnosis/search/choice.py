@@ -23,6 +23,7 @@ from armid_ros.diagnosis.search.explain import explain, Explanation
 from armid_ros.diagnosis.search.fit import fit, Told
 from armid_ros.diagnosis.search.question import as_given, fitted_anew
 from armid_ros.diagnosis.search.round import cost
+from armid_ros.diagnosis.search.step import Step
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -274,9 +275,13 @@ def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
 
 
 def _beside_a_correction(first: Explanation) -> bool:
-    """Return whether several causes are named, and one corrects the description, or may."""
-    trials = [trial for step in first.steps for trial in (step.trial, *step.rivals)]
-    return len(first.steps) > 1 and any(trial.group.effect.corrects for trial in trials)
+    """Return whether one of several causes corrects the description, or another body may."""
+    return len(first.steps) > 1 and any(_may_correct(step) for step in first.steps)
+
+
+def _may_correct(step: Step) -> bool:
+    effect, others = step.trial.group.effect, [rival.group.effect for rival in step.rivals]
+    return effect.corrects or (effect.changes_body and any(one.corrects for one in others))
 
 
 def _stands(first: Explanation, anew: Explanation) -> bool:
@@ -284,11 +289,16 @@ def _stands(first: Explanation, anew: Explanation) -> bool:
     Return whether causes are causes beside a full correction of the description as well.
 
     Where they are not, and that explains the data, it is off in more than one of its values.
+    Effects that nobody gave values of are part of the correction.
 
     """
     there = {step.trial.group.key[:2] for step in anew.steps}
-    groups = [step.trial.group for step in first.steps]
-    return all(group.effect.corrects or group.key[:2] in there for group in groups[1:])
+    given = zip(first.given.effects, first.given.values, strict=True)
+    open_values = {effect.name for effect, values in given if not np.any(values)}
+    return all(
+        group.effect.corrects or group.effect.name in open_values or group.key[:2] in there
+        for group in (step.trial.group for step in first.steps[1:])
+    )
 
 
 def _left_by(explanation: Explanation) -> FloatArray:
