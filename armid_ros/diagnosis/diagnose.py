@@ -40,7 +40,7 @@ from armid_ros.diagnosis.verdict.headline import (
     smallest,
 )
 from armid_ros.diagnosis.verdict.where import locate, Where
-from armid_ros.diagnosis.verdict.words import decide, Left
+from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -294,14 +294,13 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     total = float(attribute(explanation, None).whole.sum())
     tried = 1 if explanation.survey is None else explanation.survey.tried
     minor = small_print(explanation.minor, max(total, 1e-300), tried, arm)
+    matters = settings.material * evidence.torque_rms
     word = decide(
         found,
-        floors if measured else (),
+        not_repeating(floors, arm, settings.thresholds, matters) if measured else (),
         left,
         arm,
         NOISE if measured else chosen.floor_in_words,
-        settings.thresholds,
-        settings.material * evidence.torque_rms,
         None if explanation.base is None else _as_it_is(arm, _sure(evidence, chosen), settings),
         minor,
     )

@@ -7,7 +7,7 @@ from dataclasses import replace
 from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding
-from armid_ros.diagnosis.verdict.words import decide, Left
+from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating
 from armid_ros.effects import CATALOGUE
 import numpy as np
 
@@ -16,8 +16,7 @@ FLOOR = 'the misfit that the model had before'
 
 def said(arm, as_it_is):
     closed = Left(np.full(arm.robot.n_joints, 0.9), 'in the recordings')
-    nothing = np.zeros(arm.robot.n_joints)
-    return decide((), (), [closed], arm, FLOOR, Thresholds(), nothing, as_it_is)
+    return decide((), (), [closed], arm, FLOOR, as_it_is)
 
 
 def test_a_model_that_explains_as_it_is_needs_no_fit(bench):
@@ -44,7 +43,8 @@ def test_what_does_not_repeat_has_to_matter(bench):
     closed = Left(0.5 * one, 'in the recordings')
 
     def word(least):
-        return decide((), [floor] * 3, [closed], bench.arm, FLOOR, Thresholds(), least * one)
+        strange = not_repeating([floor] * 3, bench.arm, Thresholds(), least * one)
+        return decide((), strange, [closed], bench.arm, FLOOR)
 
     assert word(0.1).word == 'not_repeatable'
     assert 'elbow' in word(0.1).summary and 'shoulder' not in word(0.1).summary
@@ -68,8 +68,7 @@ def test_what_is_not_explained_is_said_with_what_explains_most_of_it(bench):
     )
 
     def text(minor):
-        nothing = np.zeros(bench.robot.n_joints)
-        return decide((), (), [gap], bench.arm, FLOOR, Thresholds(), nothing, None, minor).summary
+        return decide((), (), [gap], bench.arm, FLOOR, None, minor).summary
 
     assert text(()).endswith('Nothing in the catalogue explains it.')
     assert text([replace(small, share=0.001)]) == text(())

@@ -67,12 +67,10 @@ class Verdict:
 
 def decide(
     findings: Sequence[Finding],
-    floors: Sequence[NoiseFloor],
+    strange: Sequence[str],
     left: Sequence[Left],
     arm: ArmModel,
     floor_in_words: str,
-    thresholds: Thresholds,
-    least: FloatArray,
     as_it_is: Left | None = None,
     minor: Sequence[Finding] = (),
 ) -> Verdict:
@@ -83,18 +81,14 @@ def decide(
     ----------
     findings : sequence of Finding
         What was named.
-    floors : sequence of NoiseFloor
-        Noise of the recordings.
+    strange : sequence of str
+        Joints that did not do the same in equal periods; see `not_repeating`.
     left : sequence of Left
         What the patched model leaves, of each set of data.
     arm : ArmModel
         Gives the joints.
     floor_in_words : str
         What was there before, or noise.
-    thresholds : Thresholds
-        What does not repeat.
-    least : ndarray, shape (n,)
-        Torque of each joint that matters [N m].
     as_it_is : Left or None
         What the model leaves as it is, where its body and known effects were fitted anew.
     minor : sequence of Finding
@@ -104,7 +98,6 @@ def decide(
     worst = max(left, key=lambda one: float(one.excess.max()))
     open_gap = bool(worst.excess.max() > 1.0)
     joint = arm.robot.joints[int(np.argmax(worst.excess))]
-    strange = _not_repeating(floors, arm, thresholds, least)
     if strange and (not findings or open_gap):
         return Verdict('not_repeatable', _strange(strange, findings))
     rest = (
@@ -195,10 +188,24 @@ def _with_degrees(value: float, std: float, unit: str) -> str:
     return text
 
 
-def _not_repeating(
+def not_repeating(
     floors: Sequence[NoiseFloor], arm: ArmModel, thresholds: Thresholds, least: FloatArray
 ) -> list[str]:
-    """Return the joints that did not do the same in equal periods, by as much as matters."""
+    """
+    Return the joints that did not do the same in equal periods, by as much as matters.
+
+    Parameters
+    ----------
+    floors : sequence of NoiseFloor
+        Noise of the recordings.
+    arm : ArmModel
+        Gives the joints.
+    thresholds : Thresholds
+        How much slower than noise what does not repeat is.
+    least : ndarray, shape (n,)
+        Torque of each joint that matters [N m].
+
+    """
     known = [
         np.where(floor.slow > least, floor.structure, 1.0)
         for floor in floors
