@@ -25,7 +25,8 @@ class Thresholds:
         Values that a cause from outside the arm counts for beside its own: a person or a strap can
         pull in any way.
     error_rate : float
-        Probability of a name where nothing is, over all groups that were tried.
+        Probability of a name where nothing is, over all groups that were tried: an alarm in five
+        hundred healthy arms.
     rival_z : float
         Deviations by which a name has to be ahead of another one to exclude it.
     tie : float
@@ -45,7 +46,7 @@ class Thresholds:
         A group of which what is free leaves less than this share of its columns is not visible.
     confidence : float
         Level, of all joints together, up to which what is left counts as noise that two periods
-        tell so well.
+        tell so well: of a thousand healthy arms one is `unknown`.
     predicted : float
         Factor by which squares may be larger on motions that were not used: values that others
         told are not exact there.
