@@ -53,6 +53,10 @@ def numbers_page(package: Path, sensitivity: str) -> str:
         for path in sorted(package.rglob('*.py'))
         for name, value, why in _constants(path.read_text(encoding='utf-8'))
     ]
+    others += [
+        (f'`{name}`', cell(value), cell(why), f'`{path}`')
+        for path, name, value, why in _borrowed(package)
+    ]
     return '\n'.join(
         [
             '# Numbers of the diagnosis',
@@ -103,6 +107,21 @@ def _constants(source: str) -> Iterator[tuple[str, str, str]]:
             above.insert(0, lines[first].removeprefix('#:').strip())
             first -= 1
         yield ast.unparse(node.targets[0]).strip('()'), ast.unparse(node.value), ' '.join(above)
+
+
+def _borrowed(package: Path) -> Iterator[tuple[str, str, str, str]]:
+    """Yield files, names, values and comments of numbers that other packages have."""
+    wanted: dict[str, set[str]] = {}
+    for path in package.rglob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                wanted.setdefault(node.module, set()).update(alias.name for alias in node.names)
+    for module, names in sorted(wanted.items()):
+        path = package.parents[1].joinpath(*module.split('.')).with_suffix('.py')
+        if path.is_file() and package not in path.parents:
+            for name, value, why in _constants(path.read_text(encoding='utf-8')):
+                if name in names:
+                    yield path.relative_to(package.parents[1]).as_posix(), name, value, why
 
 
 def _is_numbers(node: ast.expr) -> bool:

@@ -65,4 +65,4 @@ def test_what_is_made_of_the_motion_has_no_echo(bench):
     data = tuple(trajectories(bench.recordings(), USED))
     noise = [noise_floor(part, bench.arm).sigma for part in data]
     effect = CATALOGUE['viscous_friction'].on(bench.robot, ('elbow',))
-    assert not Workspace(bench.arm, data).torque_slope(effect, (0,), noise).any()
+    assert not Workspace(bench.arm, data).torque_echo(effect, (0,), noise).any()

@@ -51,7 +51,9 @@ class Flaky(AbstractFileSystem):
         left = Path(rpath).parents[1] / f'failures_{Path(rpath).parent.name}'
         count = int(left.read_text()) if left.exists() else 0
         if count:
-            left.write_text(str(count - 1))
+            fewer = left.with_name(f'{left.name}_{os.getpid()}')
+            fewer.write_text(str(count - 1))
+            fewer.replace(left)  # whole, for whoever reads it now
             raise TimeoutError('the store does not answer')
         shutil.copytree(rpath, lpath)
 

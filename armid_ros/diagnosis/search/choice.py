@@ -117,15 +117,12 @@ def explained(
     tell(0.4, 'the model fitted anew')
     noise = Evidence(prepared.data, tuple(prepared.sigma), tuple(prepared.sigma))
     anew = explain(fitted_anew(arm, prepared.data, many, settings.library, rng), noise, settings)
-    misfit = _left_by(anew)
-    if at_floor(anew, settings):
-        misfit, words = nothing, NOISE
-        several = _beside_a_correction(first) if closed else len(first.steps) > 1
-        if several and not _stands(first, anew):
-            return Chosen(anew, nothing, NOISE)
-    elif closed:
-        misfit, words = nothing, NOISE
-    else:
+    corrected = at_floor(anew, settings)
+    if corrected and len(first.steps) > 1 and not _stands(first, anew):
+        return Chosen(anew, nothing, NOISE)
+    misfit, words = nothing, NOISE
+    if not (closed or corrected):
+        misfit = _left_by(anew)
         tell(0.7, 'the model as given')
         sigma = tuple(np.maximum(one, misfit) for one in prepared.as_described)
         first = explain(given, replace(told, sigma=sigma), settings)

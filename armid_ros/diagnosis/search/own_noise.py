@@ -53,13 +53,10 @@ def without_echo(trial: Trial, problem: Problem, here: Round) -> Trial:
     (Stein, Estimation of the mean of a multivariate normal distribution, 1981).
 
     """
-    effect, kept, evidence = trial.group.effect, trial.group.kept, here.evidence
-    echo = here.work.torque_slope(effect, kept, evidence.noise)
+    echo = here.work.torque_echo(trial.group.effect, trial.group.kept, here.evidence.noise)
     if not echo.any():
         return trial
-    pairs = zip(evidence.data, evidence.noise, evidence.sigma, strict=True)
-    share = [np.tile((noise / unit) ** 2, (len(part.rows), 1)) for part, noise, unit in pairs]
-    rows = np.einsum('rjp,rj->rp', echo, np.concatenate(share) * problem.used)
+    rows = np.einsum('rjp,rj->rp', echo, problem.weight**2)
     blocks = np.zeros((len(trial.cross), rows.shape[1]))
     np.add.at(blocks, problem.block, rows)
     made = np.sum(blocks * trial.held_values[trial.piece], axis=1)

@@ -25,8 +25,6 @@ _NEAR = {'ripple_order': 1.0, 'saturation_torque': 0.08}
 _LOBES, _LOWEST_ORDER = 3.0, 3.0
 #: Rounds and evaluations per shape of a refinement.
 _GOLDEN, _ROUNDS = 7, 2
-#: Share of a column that rounding may be: the same sums in another place in memory.
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -46,24 +44,23 @@ class Workspace:
         smooth = tuple(part.smooth for part in self.data)
         return replace(self, data=smooth).columns(effect, kept)
 
-    def torque_slope(
-        self, effect: Effect, kept: Sequence[int], step: Sequence[FloatArray]
+    def torque_echo(
+        self, effect: Effect, kept: Sequence[int], noise: Sequence[FloatArray]
     ) -> FloatArray:
         """
-        Differentiate the columns of an effect by the measured torque, shape (R, n, p).
+        Return what columns of an effect times noise of the torque are in the mean, (R, n, p).
 
-        By central differences over twice a step for each trajectory, (n,) [N m].
+        Columns where the torque is one deviation of each trajectory, (n,) [N m], higher and lower.
 
         """
-        ends = []
-        for sign in (-1.0, 1.0):
-            pairs = zip(self.data, step, strict=True)
-            moved = [part.with_torque_moved(sign * by) for part, by in pairs]
-            ends.append(replace(self, data=tuple(moved)).columns(effect, kept))
-        wide = np.concatenate(
-            [np.tile(2.0 * by, (len(p.rows), 1)) for p, by in zip(self.data, step, strict=True)]
-        )
-        return np.asarray((ends[1] - ends[0]) / wide[:, :, np.newaxis])
+        blocks = []
+        for part, deviation in zip(self.data, noise, strict=True):
+            higher, lower = (
+                part.with_torque_moved(by).columns(self.arm, effect)
+                for by in (deviation, -deviation)
+            )
+            blocks.append(deviation[:, np.newaxis] * (higher - lower) / 2.0)
+        return np.asarray(np.concatenate(blocks)[:, :, list(kept)])
 
 
 def refine(

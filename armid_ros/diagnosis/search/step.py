@@ -135,9 +135,10 @@ def next_step(
     ranking = _best_per_key(seen, here)
     survey = _survey(groups, ranking, total, len(seen))
     ranking, problem = _with_refined_shapes(problem, beside, ranking, here)
-    ranking, there, gains = _examined(ranking, problem, beside, here, max(len(seen), 1))
+    tried = max(len(seen), 1)
+    ranking, there, gains = _examined(ranking, problem, beside, here, tried)
     survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
-    passing = _passing(ranking, gains, problem, beside, here, max(len(seen), 1))
+    passing = _passing(ranking, gains, problem, beside, here, tried)
     ahead = list(takewhile(lambda t: not changed(t, problem, beside, here), passing))
     if len(ahead) == len(passing):
         return None, survey, problem

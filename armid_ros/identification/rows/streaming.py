@@ -13,7 +13,6 @@ its top speed within the piece.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from armid_ros.arm import ArmModel
@@ -96,12 +95,7 @@ def _owned(
     which = np.flatnonzero(inside)
     if not len(which):
         return None
-    return replace(
-        rows,
-        motion=rows.motion.select(which),
-        columns=rows.columns[which],
-        informative=rows.informative[which],
-    )
+    return rows.select(which)
 
 
 def streamed(
