@@ -193,7 +193,7 @@ def diagnose(
     prepared = prepare(arm, recordings, used, data, settings, rng)
     if any(floor.period is None for floor in prepared.floors):
         notes.append(_ASSUMED)
-    before = trajectories(baseline, prepared.used, arm)
+    before = trajectories(baseline, prepared.used, arm, prepared.allowed)
     known = Baseline.of(arm, before, rng) if baseline else None
     asked = _Asked(arm, prepared, validate, settings, rng, tell)
     if settings.partner is not None:
@@ -203,7 +203,7 @@ def diagnose(
             return _said(tied, notes, asked)
     written = None if misfit is None else misfit.of(arm.robot)
 
-    seen = trajectories(validate, prepared.used, arm) if known else ()
+    seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
 
     def explain(by: DiagnosisSettings) -> Chosen:
         return explained(arm, prepared, known, by, rng, tell, written, seen)
@@ -359,7 +359,8 @@ def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence
     """Return recordings that are only predicted, in the unit of the gap."""
     if not asked.validate:
         return None
-    data = trajectories(asked.validate, asked.prepared.used, explanation.fitted.arm)
+    prepared = asked.prepared
+    data = trajectories(asked.validate, prepared.used, explanation.fitted.arm, prepared.allowed)
     noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]
     sigma = [np.maximum(one, chosen.misfit) for one in noise]
     return Evidence(tuple(data), tuple(sigma), tuple(noise), explanation.evidence.varies)

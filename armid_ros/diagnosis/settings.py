@@ -42,6 +42,9 @@ class Thresholds:
     same_fit : float
         Factor between losses of two explanations that are as good as each other where the unit is
         a misfit of other data, which varies so from motion to motion as a rule.
+    uncertain : float
+        Share of the noise of a row that dry friction may be wrong by where the sign of a velocity
+        is uncertain: beside reversals it is wrong by 0.5 to 2 times itself in five kinds of arms.
     least_visible : float
         A group of which what is free leaves less than this share of its columns is not visible.
     confidence : float
@@ -86,6 +89,7 @@ class Thresholds:
     misfit_share: float = 1.0
     headline: float = 0.1
     same_fit: float = 1.5
+    uncertain: float = 0.25
     least_visible: float = 0.02
     confidence: float = 0.999
     predicted: float = 2.0

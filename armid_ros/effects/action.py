@@ -73,6 +73,11 @@ class DryFriction:
             half = half + self.widening(load)
         return np.asarray((half * np.sign(dq @ self.directions.T) + middle) @ self.directions)
 
+    def largest(self, load: FloatArray) -> FloatArray:
+        """Return the most that it can be of each joint under a load (..., n), the same shape."""
+        half = (self.upper - self.lower) / 2 + self.widening(load)
+        return np.asarray(half @ np.abs(self.directions))
+
     def widening(self, load: FloatArray) -> FloatArray:
         """Return by how much load moves the levels apart, shape (..., m) [N m]."""
         if self.load_share is None:

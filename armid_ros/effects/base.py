@@ -110,6 +110,8 @@ class Effect(ABC):
     external: ClassVar[bool] = False
     #: Whether it is learned from the residual, and so names no cause.
     learned: ClassVar[bool] = False
+    #: Whether its columns are made of the measured torque where there is one, noise included.
+    reads_torque: ClassVar[bool] = False
     #: Whether its torque changes smoothly with position and velocity.
     smooth: ClassVar[bool] = False
     #: Quantities that stand for causes of their own, if not all of them stand for one together.

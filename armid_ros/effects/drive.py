@@ -117,6 +117,7 @@ class ActuatorSaturation(TorqueReading):
     name = 'actuator_saturation'
     summary = 'torque beyond a level that the drive does not give, or does not report'
     shown_by = 'the same motion at rising amplitudes'
+    reads_torque = True
     separate = ((0,), (1,))  # together they are measured minus modelled torque: anything
     quantities = (
         Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),

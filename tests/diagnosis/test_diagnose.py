@@ -44,7 +44,7 @@ def test_values_that_are_off_are_no_effect(bench):
 
 def test_links_of_a_patched_arm_are_bodies(bench):
     robot = bench.robot
-    off = robot.rigid_parameters * np.tile([1.06, 1.04] + [0.95] * 8, robot.n_joints)
+    off = robot.rigid_parameters * np.tile([0.9] + [1.1] * 9, robot.n_joints)
     arm = bench.arm.with_theta(np.concatenate([off, [0.32, 0.19], [0.47, 0.32]]))
     drag = bench.recordings(lambda m, tau: on_elbow(0.08 * m.dq[:, 1] * np.abs(m.dq[:, 1])))
     found = look(bench, drag, arm)

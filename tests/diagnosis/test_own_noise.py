@@ -61,8 +61,14 @@ def test_torque_that_is_lost_stays_a_cause(bench):
     assert trial.values[0] == pytest.approx(0.5, abs=0.1)
 
 
-def test_what_is_made_of_the_motion_has_no_echo(bench):
+@pytest.mark.parametrize('name', CATALOGUE)
+def test_what_has_an_echo_is_said_to_read_the_torque(bench, name):
     data = tuple(trajectories(bench.recordings(), USED))
     noise = [noise_floor(part, bench.arm).sigma for part in data]
-    effect = CATALOGUE['viscous_friction'].on(bench.robot, ('elbow',))
-    assert not Workspace(bench.arm, data).torque_echo(effect, (0,), noise).any()
+    effect = CATALOGUE[name].on(bench.robot)
+    highest = max(np.abs(bench.torque(part.motion)).max() for part in data)
+    if effect.reads_torque:
+        effect = effect.with_shape((0.5 * highest,))
+    every = range(len(effect.parameters(bench.robot)))
+    echo = Workspace(bench.arm, data).torque_echo(effect, every, noise)
+    assert echo.any() == effect.reads_torque

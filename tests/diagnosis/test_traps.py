@@ -79,7 +79,7 @@ def test_noise_of_the_torque_sensor_alone_makes_a_false_stribeck_friction(bench)
     by_sensor, by_floor = [], []
     for seed in range(1, 7):
         data = cut(shaken(bench.recordings(seed=seed), 3e-4, seed))
-        everywhere = [replace(part, informative=np.ones_like(part.informative)) for part in data]
+        everywhere = [replace(part, unsure=np.zeros_like(part.unsure)) for part in data]
         sensor = [np.full(2, TORQUE_NOISE * np.linalg.norm(part.used.taps())) for part in data]
         floor = [noise_floor(part, bench.arm).sigma for part in data]
         assert np.all(np.mean(floor, axis=0) > np.mean(sensor, axis=0))

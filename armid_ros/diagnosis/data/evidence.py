@@ -26,23 +26,23 @@ from armid_ros.identification.rows.signals import (
     decimate,
     decimated_samples,
     segments,
-    velocity_noise,
+    velocity_error,
 )
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import signal, stats
 
 #: Columns are computed at this many times the rate of the rows: enough for signs and hysteresis.
 _OVERSAMPLING = 8
 #: A joint slower than this share of its top speed for this long [s] is at rest.
 _REST_SPEED, _REST_TIME = 0.02, 0.2
 #: Below this share of the top speed, or so many deviations of its noise, the sign of a velocity is
-#: uncertain, and so is dry friction in as many rows around as the filter rings over: beyond three
-#: rows the residuals of six-joint arms are at their noise again, in the third they can be at four
-#: times its power.
-_REVERSAL_SPEED, _REVERSAL_NOISE, _REVERSAL_ROWS = 0.004, 3.0, 3
+#: uncertain, and so is dry friction.
+_REVERSAL_SPEED, _REVERSAL_NOISE = 0.004, 3.0
+#: Share of a row of which that sign may be uncertain in any case: three rows beside a reversal.
+UNSURE = 0.003
 #: Rows apart that what is left may be alike.
 _LAGS = 20
 
@@ -64,8 +64,10 @@ class Trajectory:
         From motion to rows.
     rows : ndarray of int, shape (M,)
         Samples of the motion that the rows sit on.
-    informative : ndarray of bool, shape (M, n)
-        False where a joint rests or turns round: friction is undetermined there.
+    unsure : ndarray, shape (M, n)
+        Share of each row of which the sign of the velocity is uncertain; infinite at rest.
+    allowed : ndarray, shape (n,)
+        The largest such share of a row that tells something.
     sensors : SensorNoise or None
         What their noise does beside another machine; None where there is none.
 
@@ -76,8 +78,14 @@ class Trajectory:
     motion: Motion
     used: Conditioning
     rows: npt.NDArray[np.intp]
-    informative: npt.NDArray[np.bool_]
+    unsure: FloatArray
+    allowed: FloatArray
     sensors: SensorNoise | None = None
+
+    @cached_property
+    def informative(self) -> npt.NDArray[np.bool_]:
+        """Return False where a joint rests or turns round: its friction is unknown, (M, n)."""
+        return np.asarray(self.unsure <= self.allowed)
 
     def reduce(self, values: FloatArray) -> FloatArray:
         """Filter and decimate samples (N, ...) to rows (M, ...)."""
@@ -234,10 +242,15 @@ class Evidence:
 
 
 def trajectories(
-    recordings: Sequence[Recording], used: Conditioning, arm: ArmModel | None = None
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    arm: ArmModel | None = None,
+    allowed: FloatArray | None = None,
 ) -> list[Trajectory]:
     """
     Cut recordings into unbroken stretches, conditioned alike.
+
+    Rows may be uncertain by as much as is allowed, (n,); see `Trajectory`.
 
     Where another machine was recorded beside the arm, what noise of the angles does to it is
     measured as well.
@@ -250,7 +263,7 @@ def trajectories(
     """
     result = []
     for fold, recording in enumerate(recordings):
-        least = _REVERSAL_NOISE * velocity_noise(recording, used)
+        least = _REVERSAL_NOISE * velocity_error(recording, used)
         stretches = segments(recording, used)
         found = [_trajectory(recording.source, fold, m, used, least) for m in stretches]
         if not found:
@@ -258,6 +271,8 @@ def trajectories(
                 f'{recording.source}: no stretch is long enough to be filtered at '
                 f'{used.cutoff_hz:g} Hz'
             )
+        if allowed is not None:
+            found = [replace(part, allowed=allowed) for part in found]
         if recording.partner is not None and arm is not None:
             sensors = SensorNoise(arm.robot, recording, used)
             found = [replace(part, sensors=sensors) for part in found]
@@ -306,8 +321,8 @@ def _trajectory(
         motion = motion.select(kept).with_torque(decimate(motion.tau, first))
         used = Conditioning(used.rate_hz / thin, used.cutoff_hz, used.decimation // thin)
     rows = np.array(decimated_samples(len(motion), used), dtype=np.intp)
-    informative = ~(_at_rest(motion) | _turning(motion, used, least))[rows]
-    return Trajectory(source, fold, motion, used, rows, informative)
+    unsure = np.where(_at_rest(motion), np.inf, _unsure(motion, used, least))[rows]
+    return Trajectory(source, fold, motion, used, rows, unsure, np.full(motion.n_joints, UNSURE))
 
 
 def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
@@ -323,11 +338,11 @@ def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
     return rest
 
 
-def _turning(motion: Motion, used: Conditioning, least: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return where joints are too slow for the sign of their velocity, rows around included."""
+def _unsure(motion: Motion, used: Conditioning, least: FloatArray) -> FloatArray:
+    """Return of what share of filtered samples the sign of the velocity is uncertain, (N, n)."""
     speed = np.abs(motion.dq)
     slow = speed < np.maximum(_REVERSAL_SPEED * speed.max(axis=0), least)
     slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
-    reach = _REVERSAL_ROWS * used.decimation
-    wide = np.cumsum(np.pad(slow, ((reach + 1, reach), (0, 0))), axis=0)
-    return np.asarray(wide[2 * reach + 1 :] - wide[: -2 * reach - 1] > 0)
+    taps = np.abs(used.taps())
+    share = signal.oaconvolve(slow.astype(float), taps[:, np.newaxis], mode='same', axes=0)
+    return np.asarray(np.maximum(share, 0.0))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import thinnable, trajectories, Trajectory
+from armid_ros.diagnosis.data.evidence import thinnable, trajectories, Trajectory, UNSURE
 from armid_ros.diagnosis.data.floor import noise_floor, NoiseFloor
 from armid_ros.diagnosis.search.fit import excited, fit
 from armid_ros.diagnosis.search.question import with_friction
@@ -61,6 +61,11 @@ class Prepared:
     as_described: tuple[FloatArray, ...]
 
     @property
+    def allowed(self) -> FloatArray:
+        """What rows may be uncertain by, shape (n,); see `Trajectory`."""
+        return self.data[0].allowed
+
+    @property
     def sigma(self) -> list[FloatArray]:
         """Noise of each trajectory, shape (n,) [N m]."""
         return [floor.sigma for floor in self.floors]
@@ -106,13 +111,17 @@ def prepare(
     prepared = _measured(arm, used, data, whole)
     growth = [floor.growth for floor in prepared.floors if floor.period is not None]
     free = settings.partner is None and settings.signals.decimation is None
-    if not (free and growth and np.max(np.mean(growth, axis=0)) > _GROWTH):
-        return prepared
-    narrower = thinnable(replace(used, decimation=round(1.5 * used.decimation + 0.1)))
-    fewer = trajectories(recordings, narrower)
-    if np.any(_told(fewer) < _MOVING * _told(data)):
-        return prepared
-    return _measured(arm, narrower, fewer, whole)
+    if free and growth and np.max(np.mean(growth, axis=0)) > _GROWTH:
+        narrower = thinnable(replace(used, decimation=round(1.5 * used.decimation + 0.1)))
+        fewer = trajectories(recordings, narrower)
+        if np.all(_told(fewer) >= _MOVING * _told(data)):
+            prepared = _measured(arm, narrower, fewer, whole)
+    beside, _ = with_friction(arm, settings.library)
+    uncertain = settings.thresholds.uncertain
+    allowed = uncertain * _noise_over_friction(beside, prepared, rng.spawn(1)[0])
+    allowed = np.maximum(allowed, UNSURE)
+    wider = [replace(part, allowed=allowed) for part in prepared.data]
+    return _measured(arm, prepared.used, wider, whole)
 
 
 def _told(data: Sequence[Trajectory]) -> FloatArray:
@@ -129,3 +138,19 @@ def _measured(
     floors = tuple(noise_floor(part, refit.arm) for part in data)
     as_described = tuple((a if a.period else b).sigma for a, b in zip(told, floors, strict=True))
     return Prepared(used, tuple(data), base, floors, as_described)
+
+
+def _noise_over_friction(
+    arm: ArmModel, prepared: Prepared, rng: np.random.Generator
+) -> FloatArray:
+    """Return the noise of rows over dry friction as a fit tells it, shape (n,)."""
+    data, sigma = prepared.data, prepared.sigma
+    base, _ = excited(arm, arm.base_parameters(rng), data)
+    arm = fit(arm, (), data, sigma, base).arm
+    friction = arm.action().dry_friction
+    if friction is None:
+        return np.full(arm.robot.n_joints, np.inf)
+    dry = np.concatenate([friction.largest(arm.load(part.at_rows)) for part in data])
+    noise = np.sqrt(np.mean(np.square(sigma), axis=0))
+    size = np.sqrt(np.mean(dry**2, axis=0))
+    return np.asarray(noise / np.maximum(size, 1e-300))

@@ -272,10 +272,9 @@ def _settled(
     loss = loss_of(state, residual)
     columns = [patch_columns(state, part, base) for part in data]
     for _ in range(rounds):
-        step = _step(columns, residual, data, sigma, pull, aim - pull @ state.change)
         moved, after = state, residual
-        for share in (1.0, 0.5, 0.2):
-            trial = state.moved(share * step, base)
+        for step in _steps(state, columns, residual, rows, (pull, aim)):
+            trial = state.moved(step, base)
             left = _residuals(trial, data)
             if loss_of(trial, left) < loss:
                 moved, after = trial, left
@@ -288,6 +287,27 @@ def _settled(
         if settled:
             break
     return state, residual, columns
+
+
+def _steps(
+    state: Patch,
+    columns: Sequence[FloatArray],
+    residual: Sequence[FloatArray],
+    rows: tuple[Sequence[Trajectory], Sequence[FloatArray]],
+    held: tuple[FloatArray, FloatArray],
+) -> Iterator[FloatArray]:
+    """
+    Yield steps of all that is free to try in turn, shape (f,).
+
+    Where a shape and its value say nearly the same, both want to go far, and a shape may not: the
+    last one leaves shapes as they are.
+
+    """
+    pull, aim = held
+    whole = _step(columns, residual, *rows, pull, aim - pull @ state.change)
+    yield from (whole, 0.5 * whole, 0.2 * whole)
+    flat = [block * state.linear for block in columns]
+    yield _step(flat, residual, *rows, pull, aim - pull @ state.change)
 
 
 def _residuals(state: Patch, data: Sequence[Trajectory]) -> list[FloatArray]:

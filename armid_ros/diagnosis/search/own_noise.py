@@ -53,9 +53,9 @@ def without_echo(trial: Trial, problem: Problem, here: Round) -> Trial:
     (Stein, Estimation of the mean of a multivariate normal distribution, 1981).
 
     """
-    echo = here.work.torque_echo(trial.group.effect, trial.group.kept, here.evidence.noise)
-    if not echo.any():
+    if not trial.group.effect.reads_torque:
         return trial
+    echo = here.work.torque_echo(trial.group.effect, trial.group.kept, here.evidence.noise)
     rows = np.einsum('rjp,rj->rp', echo, problem.weight**2)
     blocks = np.zeros((len(trial.cross), rows.shape[1]))
     np.add.at(blocks, problem.block, rows)

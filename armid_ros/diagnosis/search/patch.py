@@ -14,6 +14,7 @@ from armid_ros.estimate import ParameterName
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
+import numpy.typing as npt
 
 #: Largest relative step of a shape in a round: the search has refined it already.
 _SHAPE_STEP = 0.1
@@ -95,6 +96,14 @@ class Patch:
                 start += count
             named.append(Named(effect, own.kept))
         return Patch(arm, tuple(named), tuple(values), self.change + change[: len(self.change)])
+
+    @property
+    def linear(self) -> npt.NDArray[np.bool_]:
+        """Which of all that is free is no shape, (f,)."""
+        own = [np.ones(len(self.change), dtype=bool)]
+        for named in self.named:
+            own += [np.ones(len(named.kept), dtype=bool), np.zeros(len(named.effect.shape), bool)]
+        return np.concatenate(own)
 
     def parameters(self) -> tuple[tuple[ParameterName, ...], FloatArray]:
         """Name the free parameters of the named effects, shapes behind quantities."""

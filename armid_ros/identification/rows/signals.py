@@ -163,11 +163,12 @@ def sampling_rate(recording: Recording) -> float:
     return float(1.0 / np.median(np.diff(recording.t)))
 
 
-def velocity_noise(recording: Recording, used: Conditioning) -> FloatArray:
+def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
     """
-    Return by how much noise of the positions makes velocities wrong that are made of them.
+    Return by how much velocities are wrong that are made of filtered positions.
 
-    White noise up to the cut-off, times the square of its frequency.
+    They have white noise of the positions up to the cut-off, times the square of its frequency,
+    and lack what the positions show of the motion beyond it.
 
     Returns
     -------
@@ -175,8 +176,11 @@ def velocity_noise(recording: Recording, used: Conditioning) -> FloatArray:
         Standard deviation [rad/s or m/s].
 
     """
-    _, _, floor = _position_spectrum(recording)
-    return np.asarray(2.0 * np.pi * np.sqrt(floor * used.cutoff_hz**3 / 3.0))
+    frequency, power, floor = _position_spectrum(recording)
+    lost = (frequency[:, np.newaxis] > used.cutoff_hz) & (power > NOISE_MARGIN * floor)
+    lacking = np.sum(frequency[:, np.newaxis] ** 2 * (power - floor), axis=0, where=lost)
+    noise = floor * used.cutoff_hz**3 / 3.0
+    return np.asarray(2.0 * np.pi * np.sqrt(noise + lacking * frequency[1]))
 
 
 def _require_rate(recording: Recording) -> None:

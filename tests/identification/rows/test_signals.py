@@ -10,7 +10,7 @@ from armid_ros.identification.rows.signals import (
     decimated_samples,
     segments,
     SignalSettings,
-    velocity_noise,
+    velocity_error,
 )
 from armid_ros.recording import Recording
 import numpy as np
@@ -103,7 +103,19 @@ def test_noise_of_velocities_is_what_white_noise_of_positions_makes(cutoff):
     recording = Recording(joints=('a', 'b'), t=t, q=q, tau=q, source='bag')
     used = Conditioning(500.0, cutoff, 5)
     (motion,) = segments(recording, used)
-    np.testing.assert_allclose(velocity_noise(recording, used), motion.dq.std(axis=0), rtol=0.15)
+    np.testing.assert_allclose(velocity_error(recording, used), motion.dq.std(axis=0), rtol=0.15)
+
+
+def test_velocities_lack_what_positions_show_beyond_the_cutoff():
+    t = np.arange(20_000) / 500.0
+    fast = 0.02 * np.sin(2.0 * np.pi * 12.0 * t)
+    q = (np.sin(2.0 * np.pi * t) + fast)[:, None]
+    q = q + 1e-6 * np.random.default_rng(0).normal(size=q.shape)
+    recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
+    lacking = 2.0 * np.pi * 12.0 * fast.std()
+    below, above = (velocity_error(recording, Conditioning(500.0, hz, 5)) for hz in (4.0, 30.0))
+    np.testing.assert_allclose(below, lacking, rtol=0.05)
+    assert above < 0.01 * lacking
 
 
 @pytest.mark.parametrize('settings', [{'cutoff_hz': -1.0}, {'decimation': 0}])
