@@ -41,7 +41,8 @@ class Thresholds:
         is small print.
     same_fit : float
         Factor between losses of two explanations that are as good as each other where the unit is
-        a misfit of other data, which varies so from motion to motion as a rule.
+        a misfit of other data, which varies so from motion to motion as a rule, or a noise that
+        is assumed because nothing repeats.
     uncertain : float
         Share of the noise of a row that dry friction may be wrong by where the sign of a velocity
         is uncertain: beside reversals it is wrong by 0.5 to 2 times itself in five kinds of arms.

@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Columns are computed at a few times the rate of the rows, however fast a recording is."""
 
-from armid_ros.diagnosis.data.evidence import thinnable, trajectories
+from dataclasses import replace
+
+from armid_ros.diagnosis.data.evidence import Evidence, thinnable, trajectories
+from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.rows.signals import Conditioning
@@ -51,3 +54,18 @@ def test_a_decimation_that_was_asked_for_stays(bench):
     (part,) = trajectories([recording], Conditioning(1000.0, 20.0, 53))
     step = np.diff(part.t)
     np.testing.assert_allclose(step, 0.053, atol=1e-9)
+
+
+def test_noise_that_nothing_repeats_is_no_surer_than_a_misfit(bench):
+    data = trajectories(bench.recordings(), Conditioning(200.0, 10.0, 11))
+    single = [replace(part) for part in data]
+    for part in single:
+        vars(part)['period'] = None
+    settings = DiagnosisSettings()
+    sigma = tuple(noise_floor(part, bench.arm).sigma for part in data)
+    left = [part.residual(bench.arm) for part in data]
+    repeated, assumed = (
+        evidence.limits(left, settings) - evidence.matters(settings)
+        for evidence in (Evidence(tuple(own), sigma, sigma) for own in (data, single))
+    )
+    np.testing.assert_allclose(assumed, settings.thresholds.same_fit * repeated)

@@ -198,14 +198,16 @@ class Evidence:
 
         Two periods determine their noise as well as so many independent rows do, and so do the
         rows that are compared with it: the ratio of the two has Fisher's distribution. Where the
-        unit is a misfit, another motion makes another one. And what is left may not matter.
+        unit is a misfit, another motion makes another one, and noise that nothing repeated tells
+        is no surer than that. And what is left may not matter.
 
         """
         thresholds = settings.thresholds
         count = np.maximum(self.count, 2.0)
         free = np.maximum(count / self._lasting(residual), 4.0)
         each = 1.0 - (1.0 - thresholds.confidence) / len(count)
-        noise = stats.f.ppf(each, free, free)
+        assumed = any(part.period is None for part in self.data)
+        noise = stats.f.ppf(each, free, free) * (thresholds.same_fit if assumed else 1.0)
         own = self.noise_share
         misfit = np.where(own < 1.0 / thresholds.same_fit, self.as_good(settings), 1.0)
         return np.asarray(np.maximum(noise, misfit) + self.matters(settings))
