@@ -296,6 +296,44 @@ class _Base:
         )
 
 
+@dataclass(frozen=True)
+class _Part:
+    """
+    A part that is held out.
+
+    Attributes
+    ----------
+    test : ndarray of int, shape (b,)
+        Its blocks, and ``train``, of bool, shape (B,), all others.
+    base : _Base
+        What is free, fitted to the others.
+    left : ndarray, shape (b, f)
+        Of the free columns with what that leaves.
+    target : ndarray, shape (b, C)
+        Of the columns of the groups with what that leaves.
+    spared : ndarray, shape (b, f, C)
+        Of the free columns with what the others make of those of the groups.
+
+    """
+
+    test: npt.NDArray[np.intp]
+    train: npt.NDArray[np.bool_]
+    base: _Base
+    left: FloatArray
+    target: FloatArray
+    spared: FloatArray
+
+    @classmethod
+    def of(
+        cls, known: Products, train: npt.NDArray[np.bool_], hold: FloatArray, pull: FloatArray
+    ) -> _Part:
+        base, test = _Base.of(known, train, hold, pull), np.flatnonzero(~train)
+        free, border = known.free[test], known.border[test]
+        left = known.aim[test] - free @ base.theta
+        target = known.target[test] - base.theta @ border
+        return cls(test, train, base, left, target, free @ base.solved)
+
+
 def held_out(
     problem: Problem,
     free: Sequence[int],
@@ -346,11 +384,11 @@ def tried_beside(
     every = np.ones(len(known.power), dtype=bool)
     folding = problem.fold_of_block
     everything = _Base.of(known, every, hold, pull)
-    bases = [_Base.of(known, folding != part, hold, pull) for part in range(folding.max() + 1)]
-    power = _left(known, bases, folding)
+    parts = [_Part.of(known, folding != k, hold, pull) for k in range(folding.max() + 1)]
+    power = _left(known, [part.base for part in parts], folding)
     counted = (hold, pull) if whole else (np.zeros_like(hold), np.zeros_like(pull))
     trials = [
-        _tried(known, group, k, everything, bases, folding, counted)
+        _tried(known, group, k, everything, parts, folding, counted)
         for k, group in enumerate(groups)
     ]
     return [trial for trial in trials if trial is not None], power
@@ -371,7 +409,7 @@ def _tried(
     group: Group,
     position: int,
     everything: _Base,
-    bases: Sequence[_Base],
+    parts: Sequence[_Part],
     folding: npt.NDArray[np.intp],
     counted: tuple[FloatArray, FloatArray],
 ) -> Trial | None:
@@ -389,24 +427,17 @@ def _tried(
     values = inverse @ aim
     cross, square = np.zeros((2, len(folding)))
     held_values, held_free = [], []
-    for part, base in enumerate(bases):
-        test = folding == part
-        train = ~test
-        inside = own[train].sum(axis=0)
-        seen = inside - base.border[:, span].T @ base.solved[:, span] + hold
-        v = _inverse(seen, whole) @ (
-            target[train].sum(axis=0) - base.border[:, span].T @ base.theta
-        )
-        change = -base.solved[:, span] @ v
-        left = known.aim[test] - known.free[test] @ base.theta
-        own_left = target[test] - np.einsum('bfp,f->bp', border[test], base.theta)
-        cross[test] = own_left @ v + left @ change
-        square[test] = (
-            np.einsum('p,bpq,q->b', v, own[test], v)
-            + 2.0 * np.einsum('f,bfp,p->b', change, border[test], v)
-            + np.einsum('f,bfg,g->b', change, known.free[test], change)
-        )
-        share = 1.0 / (len(bases) * max(int(test.sum()), 1))
+    for part in parts:
+        test, base = part.test, part.base
+        solved = base.solved[:, span]
+        seen = own[part.train].sum(axis=0) - base.border[:, span].T @ solved + hold
+        aim = target[part.train].sum(axis=0) - base.border[:, span].T @ base.theta
+        v = _inverse(seen, whole) @ aim
+        change = -solved @ v
+        made = border[test] @ v
+        cross[test] = part.target[:, span] @ v + part.left @ change
+        square[test] = (own[test] @ v) @ v + (2.0 * made - part.spared[:, :, span] @ v) @ change
+        share = 1.0 / (len(parts) * max(len(test), 1))
         cross[test] += share * change @ (counted[1] - counted[0] @ base.theta)
         square[test] += share * change @ counted[0] @ change
         held_values.append(v)
@@ -421,7 +452,7 @@ def _tried(
         square,
         np.array(held_values),
         np.array(held_free),
-        np.array([base.theta for base in bases]),
+        np.array([part.base.theta for part in parts]),
         folding,
     )
 
