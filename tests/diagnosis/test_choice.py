@@ -5,7 +5,13 @@
 from types import SimpleNamespace
 
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.choice import _beside_a_correction, _stands
+from armid_ros.diagnosis.search.choice import (
+    _beside_a_correction,
+    _more_freedom,
+    _stands,
+    freedom,
+)
+from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 import pytest
 
@@ -15,12 +21,13 @@ def explanation(bench, *names, rivals=()):
 
     def trial(name):
         effect = CATALOGUE[name].on(bench.robot, ('elbow',))
-        return SimpleNamespace(group=Group.of(effect, slice(0, 1), (0,), bench.robot))
+        group = Group.of(effect, slice(0, 1), (0,), bench.robot)
+        return SimpleNamespace(group=group, freedom=1.0)
 
     steps = [SimpleNamespace(trial=trial(name), rivals=[]) for name in names]
     if steps:
         steps[0].rivals = [trial(name) for name in rivals]
-    return SimpleNamespace(steps=steps, given=bench.arm)
+    return SimpleNamespace(steps=steps, given=bench.arm, base=None)
 
 
 def test_a_cause_that_a_full_correction_explains_does_not_stand(bench):
@@ -54,3 +61,19 @@ def test_friction_without_values_is_part_of_the_correction(bench):
 )
 def test_what_may_be_a_correction_is_asked_about(bench, names, rivals, asked):
     assert _beside_a_correction(explanation(bench, *names, rivals=rivals)) == asked
+
+
+@pytest.mark.parametrize(
+    ('names', 'body'),
+    [
+        (('payload', 'torque_offset'), 30),
+        (('link_inertia',), 30),
+        (('link_inertia', 'torque_offset'), 0),
+        (('torque_offset', 'link_inertia'), 0),
+    ],
+)
+def test_a_body_costs_nothing_where_one_of_several_causes_corrects_it_anyway(bench, names, body):
+    first, anew, settings = explanation(bench, *names), explanation(bench), DiagnosisSettings()
+    anew.base = SimpleNamespace(rank=30)
+    assert freedom(anew, settings) == 30
+    assert _more_freedom(first, anew, settings) == body - freedom(first, settings)

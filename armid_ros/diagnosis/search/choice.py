@@ -320,8 +320,23 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     if at_floor(anew, settings):
         return False
     gap = max(float(evidence.count @ evidence.chi2_per_row(first.reference.residual)), 1e-300)
-    price = settings.thresholds.price * (freedom(anew, settings) - freedom(first, settings))
+    price = settings.thresholds.price * _more_freedom(first, anew, settings)
     return float(evidence.count @ (after - least)) <= price * gap
+
+
+def _more_freedom(first: Explanation, anew: Explanation, settings: DiagnosisSettings) -> float:
+    """
+    Return how many more values were chosen with a body fitted anew.
+
+    Those of the body are no choice where one of several causes says that the description is wrong
+    anyway.
+
+    """
+    more = freedom(anew, settings) - freedom(first, settings)
+    wrong = any(step.trial.group.effect.corrects for step in first.steps)
+    if anew.base is not None and len(first.steps) > 1 and wrong:
+        more -= anew.base.rank
+    return more
 
 
 def freedom(explanation: Explanation, settings: DiagnosisSettings) -> float:
