@@ -2,7 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The weighted rows and what free columns leave of them."""
 
+from armid_ros.diagnosis.data.evidence import Evidence, trajectories
 from armid_ros.diagnosis.data.rows import Problem, project
+from armid_ros.diagnosis.search.candidates import candidates
+from armid_ros.diagnosis.search.explain import _problem
+from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.patch import Named
+from armid_ros.effects import CATALOGUE
+from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
 import pytest
 
@@ -39,3 +46,20 @@ def test_products_of_what_is_left_need_not_know_what_is_left(problem):
     np.testing.assert_allclose(
         projection.products(columns.reshape(-1, 2)), left.T @ left, atol=1e-12
     )
+
+
+def test_shapes_of_a_name_are_held_by_what_all_data_tell_of_them(bench):
+    def hidden(motion, tau):
+        return [0.0, 0.2] * np.sign(motion.dq) * np.exp(-((motion.dq / 0.3) ** 2))
+
+    data = trajectories(bench.recordings(hidden), Conditioning(200.0, 10.0, 11))
+    sigma = [np.full(2, 0.01)] * len(data)
+    effect = CATALOGUE['stribeck_friction'].on(bench.robot, ('elbow',)).with_shape((0.2, 2.0))
+    fitted = fit(bench.arm, [Named(effect, (0,))], data, sigma, None, [np.array([0.2])])
+    assert fitted.named[0].effect.shape[0] == pytest.approx(0.3, rel=0.2)
+    evidence = Evidence(tuple(data), tuple(sigma), tuple(sigma))
+    found = candidates(fitted, data, sigma, [CATALOGUE['viscous_friction']])
+    problem, beside = _problem(found, fitted, evidence)
+    value, *shapes = np.sum(problem.x[:, :, list(beside.free)] ** 2, axis=(0, 1))
+    assert value > 0.0
+    np.testing.assert_allclose(np.diag(beside.hold), [0.0, *shapes])

@@ -233,13 +233,23 @@ def _before(
 
 
 def _problem(found: Candidates, current: Fitted, evidence: Evidence) -> tuple[Problem, Beside]:
-    """Stack the columns of all groups, and behind them those of what is free."""
+    """
+    Stack the columns of all groups, and behind them those of what is free.
+
+    Shapes of names are held by what all data tell of them: a part alone may tell next to nothing
+    of where a strap is fixed, and predict the others by that.
+
+    """
     pairs = zip(found.columns, current.columns, strict=True)
     columns = [np.concatenate(pair, axis=2) for pair in pairs]
     problem = make_problem(evidence.data, evidence.sigma, current.residual, columns)
     size = problem.x.shape[2]
     free = tuple(range(size - current.columns[0].shape[2], size))
-    return problem, Beside(free, current.hold, current.pull)
+    told = np.zeros(len(free))
+    first = len(free) - len(current.estimate.values)
+    shapes = [first + k for _, own in current.places for k in own]
+    told[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
+    return problem, Beside(free, current.hold + np.diag(told), current.pull)
 
 
 @dataclass(frozen=True)
