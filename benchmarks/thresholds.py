@@ -33,7 +33,7 @@ SAMPLE = (
     *(f'development/{k}' for k in (14, 18, 22, 23, 45, 53, 63, 68, 69, 87)),  # small, or missed
     *(f'development/{k}' for k in (9, 36)),  # clear
     *(f'development/{k}' for k in (27, 35, 59)),  # nothing happened
-    'development/exact/22',  # nothing there, and it is said that there is
+    'development/exact/22',  # nothing there, and nothing repeats
 )
 #: By how much every number is changed.
 CHANGES = (0.7, 1.3)
