@@ -6,14 +6,8 @@ from dataclasses import replace
 
 from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.held_out import (
-    denies,
-    held_out,
-    lead,
-    products,
-    tried_beside,
-    with_group,
-)
+from armid_ros.diagnosis.search.held_out import denies, held_out, lead, tried_beside
+from armid_ros.diagnosis.search.products import products, with_group
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest

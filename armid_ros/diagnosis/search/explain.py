@@ -27,7 +27,7 @@ from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.resampled import widened
 from armid_ros.diagnosis.search.rivals import undecided
-from armid_ros.diagnosis.search.round import Before, Beside, Later, Round
+from armid_ros.diagnosis.search.round import Before, Beside, beside_fit, Later, Round
 from armid_ros.diagnosis.search.step import acceptable, material, next_step, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.model import BaseParameters
@@ -181,7 +181,7 @@ def _forward(
     for _ in range(question.most):
         if found is None:
             found = candidates(current, data, sigma, settings.kinds)
-            problem, beside = _problem(found, current, evidence)
+            problem, beside = beside_fit(found, current, evidence)
             before = _before(question, current, *days)
         assert problem is not None and beside is not None
         work = Workspace(memoized_arm(current.arm), data)
@@ -230,26 +230,6 @@ def _before(
     pairs = zip(there.residual, there.columns, strict=True)
     left = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]
     return replace(before, later=Later.of(unseen, there.columns, left))
-
-
-def _problem(found: Candidates, current: Fitted, evidence: Evidence) -> tuple[Problem, Beside]:
-    """
-    Stack the columns of all groups, and behind them those of what is free.
-
-    Shapes of names are held by what all data tell of them: a part alone may tell next to nothing
-    of where a strap is fixed, and predict the others by that.
-
-    """
-    pairs = zip(found.columns, current.columns, strict=True)
-    columns = [np.concatenate(pair, axis=2) for pair in pairs]
-    problem = make_problem(evidence.data, evidence.sigma, current.residual, columns)
-    size = problem.x.shape[2]
-    free = tuple(range(size - current.columns[0].shape[2], size))
-    told = np.zeros(len(free))
-    first = len(free) - len(current.estimate.values)
-    shapes = [first + k for _, own in current.places for k in own]
-    told[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
-    return problem, Beside(free, current.hold + np.diag(told), current.pull)
 
 
 @dataclass(frozen=True)

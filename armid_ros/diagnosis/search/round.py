@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import Problem, weighted_rows
-from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.fit import Told
-from armid_ros.diagnosis.search.held_out import Products, Trial
+from armid_ros.diagnosis.data.rows import make_problem, Problem, weighted_rows
+from armid_ros.diagnosis.search.candidates import Candidates, Group
+from armid_ros.diagnosis.search.fit import Fitted, Told
+from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.products import Products
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -52,6 +53,26 @@ class Beside:
         hold[: len(self.free), : len(self.free)] = self.hold
         hold[len(self.free) :, len(self.free) :] = np.diag(group.precision)
         return Beside((*self.free, *span), hold, np.concatenate([self.pull, np.zeros(len(span))]))
+
+
+def beside_fit(found: Candidates, current: Fitted, evidence: Evidence) -> tuple[Problem, Beside]:
+    """
+    Return the problem of all groups, and what is free beside each, whose columns come last.
+
+    Shapes of names are held by what all data tell of them: a part alone may tell next to nothing
+    of where a strap is fixed, and predict the others by that.
+
+    """
+    pairs = zip(found.columns, current.columns, strict=True)
+    columns = [np.concatenate(pair, axis=2) for pair in pairs]
+    problem = make_problem(evidence.data, evidence.sigma, current.residual, columns)
+    size = problem.x.shape[2]
+    free = tuple(range(size - current.columns[0].shape[2], size))
+    told = np.zeros(len(free))
+    first = len(free) - len(current.estimate.values)
+    shapes = [first + k for _, own in current.places for k in own]
+    told[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
+    return problem, Beside(free, current.hold + np.diag(told), current.pull)
 
 
 @dataclass(frozen=True)

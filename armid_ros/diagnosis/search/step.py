@@ -12,16 +12,10 @@ from itertools import takewhile
 from armid_ros.diagnosis.data.rows import fold_rows, Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.exchange import changed
-from armid_ros.diagnosis.search.held_out import (
-    denies,
-    HARDLY,
-    products,
-    Trial,
-    tried_beside,
-    with_group,
-)
+from armid_ros.diagnosis.search.held_out import denies, HARDLY, Trial, tried_beside
 from armid_ros.diagnosis.search.own_noise import explains_itself, made_of_noise, without_echo
 from armid_ros.diagnosis.search.patch import room
+from armid_ros.diagnosis.search.products import products, with_group
 from armid_ros.diagnosis.search.refine import refine
 from armid_ros.diagnosis.search.rivals import beaten, contains, likeliest, rarity
 from armid_ros.diagnosis.search.round import Beside, Round, worth
