@@ -190,7 +190,7 @@ def diagnose(
     if faults:
         return _bad(arm, data, faults, notes)
     tell(0.1, 'noise floor')
-    prepared = prepare(arm, recordings, used, data, settings, rng)
+    prepared = prepare(arm, recordings, used, data, settings, rng, bool(baseline))
     if any(floor.period is None for floor in prepared.floors):
         notes.append(_ASSUMED)
     before = trajectories(baseline, prepared.used, arm, prepared.allowed)

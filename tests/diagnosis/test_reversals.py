@@ -14,7 +14,7 @@ import pytest
 USED = Conditioning(200.0, 10.0, 11)
 
 
-def prepared(bench, noise, arm=None, without=0.0, shaken=0.0):
+def prepared(bench, noise, arm=None, without=0.0, shaken=0.0, misfit=False):
     """Return recordings as they are looked at, with noise, and with less of their friction."""
     rng = np.random.default_rng(3)
     recordings = [
@@ -26,7 +26,8 @@ def prepared(bench, noise, arm=None, without=0.0, shaken=0.0):
         for one in bench.recordings()
     ]
     data = trajectories(recordings, USED)
-    return prepare(arm or bench.arm, recordings, USED, data, DiagnosisSettings(), rng)
+    arm = arm or bench.arm
+    return prepare(arm, recordings, USED, data, DiagnosisSettings(), rng, misfit)
 
 
 def friction(bench, recording):
@@ -81,3 +82,8 @@ def test_friction_that_the_model_has_not_got_counts(bench):
 
 def test_no_row_is_refused_for_less_than_the_ends_of_the_filter(bench):
     np.testing.assert_array_less(UNSURE - 1e-12, prepared(bench, 0.0).allowed)
+
+
+def test_rows_beside_reversals_do_not_count_where_the_unit_is_a_misfit(bench):
+    found = prepared(bench, 0.3, misfit=True)
+    np.testing.assert_array_equal(found.allowed, UNSURE)

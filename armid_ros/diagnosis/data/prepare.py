@@ -105,8 +105,15 @@ def prepare(
     data: Sequence[Trajectory],
     settings: DiagnosisSettings,
     rng: np.random.Generator,
+    misfit: bool = False,
 ) -> Prepared:
-    """Measure the noise of data, and once more without the upper third of the band if it is it."""
+    """
+    Measure the noise of data, and once more without the upper third of the band if it is it.
+
+    Rows beside reversals count as far as noise covers their friction; where the unit is a misfit,
+    they do not: dry friction is what a model gets wrong most, and otherwise in every motion.
+
+    """
     whole = arm.base_parameters(rng)
     prepared = _measured(arm, used, data, whole)
     growth = [floor.growth for floor in prepared.floors if floor.period is not None]
@@ -116,6 +123,8 @@ def prepare(
         fewer = trajectories(recordings, narrower)
         if np.all(_told(fewer) >= _MOVING * _told(data)):
             prepared = _measured(arm, narrower, fewer, whole)
+    if misfit:
+        return prepared
     beside, _ = with_friction(arm, settings.library)
     uncertain = settings.thresholds.uncertain
     allowed = uncertain * _noise_over_friction(beside, prepared, rng.spawn(1)[0])
