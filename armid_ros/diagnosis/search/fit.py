@@ -306,6 +306,8 @@ def _steps(
     pull, aim = held
     whole = _step(columns, residual, *rows, pull, aim - pull @ state.change)
     yield from (whole, 0.5 * whole, 0.2 * whole)
+    if state.linear.all():
+        return
     flat = [block * state.linear for block in columns]
     yield _step(flat, residual, *rows, pull, aim - pull @ state.change)
 

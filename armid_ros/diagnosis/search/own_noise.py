@@ -56,6 +56,8 @@ def without_echo(trial: Trial, problem: Problem, here: Round) -> Trial:
     if not trial.group.effect.reads_torque:
         return trial
     echo = here.work.torque_echo(trial.group.effect, trial.group.kept, here.evidence.noise)
+    if not echo.any():
+        return trial
     rows = np.einsum('rjp,rj->rp', echo, problem.weight**2)
     blocks = np.zeros((len(trial.cross), rows.shape[1]))
     np.add.at(blocks, problem.block, rows)
