@@ -32,6 +32,7 @@ from armid_ros.model import (
     random_motion,
     regressor,
     rigid_parameter_names,
+    ROUNDED_ANGLE,
 )
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.robots import load_robot, Robot
@@ -422,13 +423,28 @@ class ArmModel:
         """Return what the rigid body feels of a motion of the links: all, or its weight alone."""
         return motion.at_rest() if self.quasi_static else motion
 
-    def base_parameters(self, rng: np.random.Generator) -> BaseParameters:
-        """Find the combinations of all standard parameters that any motion can tell apart."""
+    def base_parameters(
+        self, rng: np.random.Generator, free: npt.NDArray[np.intp] | None = None
+    ) -> BaseParameters:
+        """
+        Find the combinations of standard parameters that any motion can tell apart.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Draws the states over which they are told apart.
+        free : ndarray of int, optional
+            Which ``parameters`` may change; all by default.
+
+        """
         motion = random_motion(self.robot, 40 * self.robot.n_joints, rng)
         names = tuple(name for effect in self.effects for name in effect.points)
         if names:
             size = (len(motion), len(names), 3)
             points = MovingPoints(names, rng.normal(size=size), rng.normal(size=size))
             motion = replace(motion, partner=points)
-        columns = self.columns(motion)
-        return group_columns(columns.reshape(-1, columns.shape[-1]), self.parameters)
+        every = self.parameters
+        free = np.arange(len(every)) if free is None else free
+        columns = self.columns(motion)[:, :, free].reshape(-1, len(free))
+        chosen = tuple(every[k] for k in free)
+        return group_columns(columns, chosen, rounded=ROUNDED_ANGLE).among(every, free)

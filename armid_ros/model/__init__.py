@@ -8,6 +8,7 @@ from armid_ros.model.base_parameters import (
     group_columns,
     regroup,
     rigid_base_parameters,
+    ROUNDED_ANGLE,
 )
 from armid_ros.model.kinematics import LinkFrames, point_motion, points_motion
 from armid_ros.model.rigid_body import (
@@ -24,6 +25,7 @@ __all__ = [
     'BaseParameters',
     'LINK_PARAMETERS',
     'LinkFrames',
+    'ROUNDED_ANGLE',
     'gravity_composites',
     'gravity_sensitivity',
     'group_columns',

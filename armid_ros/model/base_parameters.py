@@ -30,9 +30,18 @@ import numpy.typing as npt
 #: 1e-15 to 1e-13, and what they leave of an independent one is rarely below 1e-5.
 RANK_TOLERANCE = 1e-9
 
+#: Mass of a link of which a description gives none, for its first moments to stand on [kg].
+_LEAST_MASS = 1e-6
+
+#: Angles of a description are rounded: an axis that is vertical but for 1e-6 rad shows first
+#: moments by that share of what others show, far below noise. Below this share they are unseen.
+ROUNDED_ANGLE = 1e-4
+
 #: The order in which the parameters of a link are kept: inertia first, mass last, so that masses
 #: are grouped into moments and moments of later links into those of earlier ones.
 _KEEP_ORDER = ('Ixx', 'Ixy', 'Ixz', 'Iyy', 'Iyz', 'Izz', 'mx', 'my', 'mz', 'm')
+#: Those of one unit.
+_KINDS = _KEEP_ORDER[:6], _KEEP_ORDER[6:9], _KEEP_ORDER[9:]
 
 
 @dataclass(frozen=True)
@@ -72,6 +81,24 @@ class BaseParameters:
             for row in self.grouping
         )
 
+    def among(
+        self, standard: tuple[ParameterName, ...], columns: npt.NDArray[np.intp]
+    ) -> BaseParameters:
+        """
+        Return the same as parameters of a longer list, of which the others stay as they are.
+
+        Parameters
+        ----------
+        standard : tuple of ParameterName
+            The longer list.
+        columns : ndarray of int, shape (P,)
+            Where the standard parameters are in it.
+
+        """
+        grouping = np.zeros((self.rank, len(standard)))
+        grouping[:, columns] = self.grouping
+        return BaseParameters(standard, self.parameters, columns[self.independent], grouping)
+
     def values(self, theta: npt.ArrayLike) -> FloatArray:
         """Return the base parameters, shape (r,), of standard parameters, shape (P,)."""
         return np.asarray(self.grouping @ np.asarray(theta, dtype=float))
@@ -93,13 +120,18 @@ class BaseParameters:
             The minimum-norm correction of the prior; grouping @ result = beta.
 
         """
-        prior = np.asarray(prior, dtype=float)
+        prior = np.array(prior, dtype=float)
+        masses = [_symbol_of(parameter) == 'm' for parameter in self.standard]
+        prior[masses & (prior == 0.0)] = _LEAST_MASS
         correction = np.linalg.pinv(self.grouping) @ (np.asarray(beta) - self.values(prior))
         return np.asarray(prior + correction)
 
 
 def group_columns(
-    w: FloatArray, standard: tuple[ParameterName, ...], tolerance: float = RANK_TOLERANCE
+    w: FloatArray,
+    standard: tuple[ParameterName, ...],
+    tolerance: float = RANK_TOLERANCE,
+    rounded: float = 0.0,
 ) -> BaseParameters:
     """
     Find the base parameters of a stacked regressor.
@@ -113,6 +145,9 @@ def group_columns(
         those of one link go inertia first, mass last.
     tolerance : float
         A column of which the kept ones leave less than this share of its length is grouped.
+    rounded : float
+        A column of a rigid parameter that is shorter than this share of the longest of its unit is
+        rounding of the description.
 
     Returns
     -------
@@ -123,6 +158,9 @@ def group_columns(
     order = _keep_order(standard)
     scale = np.linalg.norm(w, axis=0)
     seen = scale > RANK_TOLERANCE * scale.max(initial=1e-300)
+    for kind in _KINDS:
+        alike = [j for j, parameter in enumerate(standard) if _symbol_of(parameter) in kind]
+        seen[alike] &= scale[alike] > rounded * scale[alike].max(initial=0.0)
     candidates = [j for j in order if seen[j]]
     triangle = np.asarray(np.linalg.qr(w[:, candidates] / scale[candidates], mode='r'))
 
@@ -144,9 +182,7 @@ def group_columns(
     if dependent and kept:
         coefficients = np.linalg.lstsq(triangle[:, kept], triangle[:, dependent], rcond=None)[0]
         columns = [candidates[position] for position in dependent]
-        coefficients *= scale[columns] / scale[independent][:, np.newaxis]
-        coefficients[np.abs(coefficients) < RANK_TOLERANCE] = 0.0
-        grouping[:, columns] = coefficients
+        grouping[:, columns] = coefficients * scale[columns] / scale[independent][:, np.newaxis]
     return _named(standard, independent, grouping)
 
 
@@ -169,6 +205,7 @@ def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
 def _named(
     standard: tuple[ParameterName, ...], independent: npt.NDArray[np.intp], grouping: FloatArray
 ) -> BaseParameters:
+    grouping = np.where(np.abs(grouping) < RANK_TOLERANCE, 0.0, grouping)
     parameters = tuple(
         ParameterName(
             _expression(row, leader, standard), standard[leader].joint, standard[leader].unit
@@ -181,7 +218,7 @@ def _named(
 def rigid_base_parameters(robot: Robot, rng: np.random.Generator) -> BaseParameters:
     """Find the base parameters of the rigid body for the gravity in use."""
     w = _stack(regressor(robot, random_motion(robot, 40 * robot.n_joints, rng)))
-    return group_columns(w, rigid_parameter_names(robot))
+    return group_columns(w, rigid_parameter_names(robot), rounded=ROUNDED_ANGLE)
 
 
 def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters:
@@ -197,16 +234,21 @@ def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters
     names = rigid_parameter_names(robot)
     static = [j for j in range(len(names)) if j % len(LINK_PARAMETERS) < 4]
     w = _stack(regressor(robot, rest))[:, static]
-    return group_columns(w, tuple(names[j] for j in static))
+    return group_columns(w, tuple(names[j] for j in static), rounded=ROUNDED_ANGLE)
 
 
 def _stack(columns: FloatArray) -> FloatArray:
     return columns.reshape(-1, columns.shape[-1])
 
 
+def _symbol_of(parameter: ParameterName) -> str:
+    """Return the name of a parameter without the number of its link."""
+    return parameter.name.rstrip('0123456789')
+
+
 def _keep_order(standard: tuple[ParameterName, ...]) -> list[int]:
     def key(position: int) -> tuple[int, int]:
-        name = standard[position].name.rstrip('0123456789')
+        name = _symbol_of(standard[position])
         number = standard[position].name[len(name) :]
         if name in _KEEP_ORDER and number:
             return int(number), _KEEP_ORDER.index(name)
