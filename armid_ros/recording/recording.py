@@ -187,6 +187,14 @@ class Recording:
             values = getattr(self, name)
             if values is not None:
                 object.__setattr__(self, name, read_only(values))
+        backwards = np.flatnonzero(np.diff(self.t) <= 0.0)
+        if len(backwards):
+            k = int(backwards[0]) + 1
+            raise RecordingError(
+                f'{self.source or "recording"}: time does not increase at sample {k} '
+                f'({self.t[k]:.6f} s after {self.t[k - 1]:.6f} s): sort the samples by time and '
+                'leave out those of equal stamps'
+            )
         expected = (len(self.t), len(self.joints))
         for name in ('q', 'dq', 'tau'):
             values = getattr(self, name)
