@@ -17,7 +17,7 @@ from armid_ros.effects.action import (
     TorqueLaw,
     Transmission,
 )
-from armid_ros.effects.base import Effect, Kind
+from armid_ros.effects.base import Effect
 from armid_ros.effects.catalogue import (
     CATALOGUE,
     make_effect,
@@ -29,6 +29,7 @@ from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.merge import merge_actions
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
+from armid_ros.effects.registry import Kind
 from armid_ros.effects.slipping import Hysteresis
 
 __all__ = [

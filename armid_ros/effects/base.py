@@ -25,6 +25,7 @@ from typing import Any, ClassVar, Protocol, Self
 from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.quantities import joint_unit, Quantity, Shape
 from armid_ros.effects.smooth import SmoothColumns
+from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.model import LinkFrames
@@ -255,6 +256,10 @@ class Effect(ABC):
         """
         return tuple(np.tile(s.grid, (len(self.owners), 1)) for s in self.shapes)
 
+    def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
+        """Return where a search for the shape should start in data: `shape_grids`, or better."""
+        return self.shape_grids(unexplained.motion, arm)
+
     @property
     def said_as(self) -> str:
         """Return what it is called in the catalogue."""
@@ -378,24 +383,6 @@ def _spread_shape(
     spread = np.tile([[s.default] for s in shapes], len(among))
     spread[:, _places(joints, among)] = np.array(values).reshape(-1, len(shapes)).T
     return read_only(spread)
-
-
-class Kind(Protocol):
-    """A kind of effect: a class of the catalogue, or anything else that makes effects so."""
-
-    @property
-    def name(self) -> str:
-        """Return what its effects are called."""
-
-    @property
-    def changes_body(self) -> bool:
-        """Whether they act by changing the rigid body or its gravity."""
-
-    def on(self, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
-        """Make the effect for a robot."""
-
-    def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the sets of joints on which it is one cause."""
 
 
 class Arm(Protocol):

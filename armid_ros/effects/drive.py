@@ -13,6 +13,7 @@ from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_column
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.effects.smooth import SmoothColumns
+from armid_ros.effects.unexplained import Unexplained, wave_orders
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 #: A drive that gives nothing beyond its level cannot be asked for more than it gives: without a
 #: report of what it was asked for, this share of the excess is the most that it can lose.
 _MOST_LOST = 0.99
+#: Orders of a ripple that a search looks at [1/rad, 1/m]: below, it is gravity and springs; above,
+#: filters take it away. Screws and racks have a tooth or turn every 4 to 60 mm.
+_IN_A_TURN, _ON_A_WAY = (3.0, 80.0), (100.0, 1600.0)
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,15 @@ class TorqueRipple(Effect):
     shapes = (
         Shape('ripple_order', '1/rev', 0.1, 1e5, 20.0, (4.0, 6.0, 8.0, 12.0, 20.0, 50.0, 100.0)),
     )
+
+    def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
+        """Return the orders at which waves over the angle take most of what is left."""
+        robot = arm.robot
+        orders = [
+            wave_orders(unexplained, joint, _ON_A_WAY if robot.prismatic[joint] else _IN_A_TURN)
+            for joint in self.indices(robot.joints)
+        ]
+        return (np.array(orders),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(A, B) = (sin(n q), cos(n q)) [-], shape (N, n, P)."""

@@ -14,10 +14,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import Quantity, Shape
+from armid_ros.effects.unexplained import Unexplained
 from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -28,8 +30,16 @@ import numpy.typing as npt
 #: (N, k, 3) for one of each.
 Anchor = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
+#: How far a link reaches from its joint where the arm has no other to tell it [m].
+_REACH = 1.0
 #: A way so short that it has no direction [m].
 _SHORTEST = 1e-12
+
+#: Anchors of straps that are tried: how far from the middle of where the attachment comes to, over
+#: the spread of that, in all directions of a cube. Slacks are quantiles of the length.
+_DISTANCES, _SLACKS = (0.0, 0.7, 1.5, 3.0), (0.0, 0.2, 0.4, 0.6, 0.8)
+#: Straps that go on to be compared with other causes; rows that are looked at.
+_STRAPS, _ROWS = 2, 400
 
 _AXES = ('x', 'y', 'z')
 _ATTACHMENT = tuple(
@@ -44,10 +54,13 @@ class Attached(Effect):
     anchor: Anchor | None = None
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Attach at the centres of mass."""
-        values = self.shape_values
+        """Attach at the centres of mass: where links are, if a fit has put them beyond the arm."""
+        values, model = self.shape_values, robot.model
+        reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
         for row, joint in zip(values, self.joints, strict=True):
-            row[:3] = robot.model.inertias[robot.model.getJointId(joint)].lever
+            lever = model.inertias[model.getJointId(joint)].lever
+            away = float(np.linalg.norm(lever))
+            row[:3] = lever * min((reach or _REACH) / max(away, _SHORTEST), 1.0)
         return values
 
     def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
@@ -206,6 +219,23 @@ class InterfaceSlack(Attached):
                 row[3:6] = middle.places(joint, row[:3])[0]
         return values
 
+    def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
+        """Return the anchors and slacks that take most of what is left."""
+        if self.anchored:
+            return super().shape_starts(unexplained, arm)
+        thin = unexplained.thinned(_ROWS)
+        target = thin.rest(thin.residual[:, :, np.newaxis])[:, 0]
+        starts, frames = [], LinkFrames.of(arm.robot, thin.q)
+        for joint, shape in zip(self.joints, self.shape_values, strict=True):
+            single = InterfaceSlack((joint,), tuple(shape.tolist()))
+            anchors, slacks = _proposals(frames.places(joint, shape[:3]))
+            columns = thin.rest(single.columns_of_straps(frames, anchors, slacks))
+            own, aim = np.sum(columns**2, axis=0), columns.T @ target
+            gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
+            best = np.argsort(-gain)[:_STRAPS]
+            starts.append([(*shape[:3], *anchors[k], slacks[k]) for k in best])
+        return tuple(np.array(starts).transpose(2, 0, 1))
+
     @property
     def slacks(self) -> FloatArray:
         """Slack of every strap, shape (k,) [m]."""
@@ -251,3 +281,15 @@ def _pulls(ways: FloatArray, slack: float) -> FloatArray:
     """Return the force, over stiffness, of a strap that reaches over ways, shape (N, 3) [m]."""
     length = np.sqrt(np.einsum('nx,nx->n', ways, ways))[:, np.newaxis]
     return np.asarray(ways * np.maximum(1.0 - slack / np.maximum(length, _SHORTEST), 0.0))
+
+
+def _proposals(places: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return anchors (A, 3) and slacks (A,) around where an attachment comes to."""
+    middle, spread = places.mean(axis=0), float(places.std(axis=0).max())
+    ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    around = [middle + d * spread * ways for d in _DISTANCES if d]
+    anchors = np.concatenate([middle[np.newaxis], *around])
+    lengths = np.linalg.norm(places - anchors[:, np.newaxis], axis=2)
+    slacks = np.quantile(lengths, _SLACKS, axis=1).T * (np.array(_SLACKS) > 0.0)
+    return np.repeat(anchors, len(_SLACKS), axis=0), slacks.ravel()

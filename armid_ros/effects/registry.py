@@ -17,15 +17,35 @@ import inspect
 import logging
 import re
 from types import ModuleType
+from typing import Protocol
 
 from armid_ros.effects.base import Effect
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.errors import ModelError
+from armid_ros.robots import Robot
 
 #: Entry-point group of packages that bring effects.
 GROUP = 'armid_ros.effects'
 #: Names stand in files, on command lines and between '@', '+', ':' and ','.
 _NAME = re.compile(r'[a-z][a-z0-9_]*')
+
+
+class Kind(Protocol):
+    """A kind of effect: a class of the catalogue, or anything else that makes effects so."""
+
+    @property
+    def name(self) -> str:
+        """Return what its effects are called."""
+
+    @property
+    def changes_body(self) -> bool:
+        """Whether they act by changing the rigid body or its gravity."""
+
+    def on(self, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
+        """Make the effect for a robot."""
+
+    def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
+        """Return the sets of joints on which it is one cause."""
 
 
 class Catalogue(Mapping[str, type[Effect]]):

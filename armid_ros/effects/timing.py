@@ -37,6 +37,16 @@ class LateReading(TorqueReading):
         """
         return super().columns(arm.smoothed(motion), arm)
 
+    @classmethod
+    def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
+        """Return the whole arm, whose drives and clocks are alike, and every joint."""
+        return ((), *((joint,) for joint in robot.joints))
+
+    def _owned(self, motion: Motion) -> list[list[int]]:
+        """Return the joints that each of its owners has: all of them, or one."""
+        joints = self.indices(motion.joints)
+        return [[joint] for joint in joints] or [list(range(motion.n_joints))]
+
 
 @dataclass(frozen=True)
 class TimeDelay(LateReading):
@@ -62,11 +72,6 @@ class TimeDelay(LateReading):
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         return ()
 
-    @classmethod
-    def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the whole arm, and every joint."""
-        return ((), *((joint,) for joint in robot.joints))
-
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return the torque of earlier, shape (N, n) [N m]."""
         return self._shifted(values, motion, tau)
@@ -91,8 +96,7 @@ class TimeDelay(LateReading):
     ) -> FloatArray:
         earlier = rate_of_change(motion.t, x) if derivative else x
         shifted = earlier.copy()
-        groups = [[j] for j in self.indices(motion.joints)] or [list(range(motion.n_joints))]
-        for delay, rows in zip(values, groups, strict=True):
+        for delay, rows in zip(values, self._owned(motion), strict=True):
             if delay:
                 weights = earlier_samples(motion.t, float(delay), derivative)
                 own = x[:, rows]
@@ -130,12 +134,11 @@ class TorqueLag(LateReading):
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return dreading/dT [N m/s], which is -dtau/dt where the lag is zero, (N, n, P)."""
-        columns = self.indices(motion.joints)
         rates = -rate_of_change(motion.t, tau)
-        for lag, joint in zip(values, columns, strict=True):
+        for lag, rows in zip(values, self._owned(motion), strict=True):
             if lag > 0.0:
-                ends = [low_pass(motion.t, tau[:, joint], lag * s) for s in (_MORE, 1 / _MORE)]
-                rates[:, joint] = (ends[0] - ends[1]) / (lag * (_MORE - 1 / _MORE))
+                ends = [low_pass(motion.t, tau[:, rows], lag * s) for s in (_MORE, 1 / _MORE)]
+                rates[:, rows] = (ends[0] - ends[1]) / (lag * (_MORE - 1 / _MORE))
         return _by_owner(self, motion, rates)
 
     def memory(self, values: FloatArray) -> float:
@@ -144,9 +147,9 @@ class TorqueLag(LateReading):
 
     def _filtered(self, values: FloatArray, motion: Motion, x: FloatArray) -> FloatArray:
         result = x.copy()
-        for lag, joint in zip(values, self.indices(motion.joints), strict=True):
+        for lag, rows in zip(values, self._owned(motion), strict=True):
             if lag:
-                result[:, joint] = low_pass(motion.t, x[:, joint], float(lag))
+                result[:, rows] = low_pass(motion.t, x[:, rows], float(lag))
         return result
 
 

@@ -21,7 +21,6 @@ LEFT = {
     'elastic/identification/output.py': 3,
     # knowledge that effects ought to have
     'diagnosis/next_run/plan.py': 1,
-    'diagnosis/search/shapes.py': 2,
     'diagnosis/verdict/words.py': 1,
 }
 

@@ -12,17 +12,19 @@ once and shared out.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.data.rows import row_weights
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
-from armid_ros.diagnosis.search.shapes import shape_starts
 from armid_ros.effects import Effect, Kind
 from armid_ros.effects.gravity import with_exact_vector
+from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -86,17 +88,13 @@ def group_effects(robot: Robot, kinds: Sequence[Kind]) -> Iterator[tuple[Effect,
 
 
 def shaped(
-    effect: Effect,
-    members: list[Effect],
-    fitted: Fitted,
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
+    effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
     """Yield an effect and its groups with every shape that a search starts from."""
     if not effect.shapes:
         yield effect, members
         return
-    grids = shape_starts(effect, fitted, data, sigma)
+    grids = effect.shape_starts(unexplained, arm)
     counts = [grid.shape[1] for grid in grids]
     together = len(set(counts)) == 1 and int(np.prod(counts)) > _MOST_SHAPES
     chosen = (
@@ -139,14 +137,13 @@ def candidates(
     kinds: Sequence[Kind],
 ) -> Candidates:
     """Compute the columns of every effect that was not named yet."""
-    fitted = replace(fitted, arm=memoized_arm(fitted.arm))
-    arm = fitted.arm
+    arm, left = memoized_arm(fitted.arm), _left(fitted, data, sigma)
     taken = {(own.effect.name, own.effect.joints) for own in fitted.named}
     groups: list[Group] = []
     blocks: list[list[FloatArray]] = [[] for _ in data]
     start = 0
     for effect, members in group_effects(arm.robot, kinds):
-        for whole, singles in shaped(effect, members, fitted, data, sigma):
+        for whole, singles in shaped(effect, members, arm, left):
             for block, part in zip(blocks, data, strict=True):
                 block.append(part.columns(arm, whole))
             for single in singles:
@@ -157,3 +154,19 @@ def candidates(
                         groups.append(Group.of(single, span, kept, arm.robot))
                 start += size
     return Candidates(tuple(groups), tuple(np.concatenate(block, axis=2) for block in blocks))
+
+
+def _left(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> Unexplained:
+    """Return what a fitted arm leaves of the torque."""
+    motions = [part.motion for part in data]
+    arrays = (
+        np.concatenate([getattr(motion, name) for motion in motions])
+        for name in ('t', 'q', 'dq', 'ddq', 'tau')
+    )
+    return Unexplained(
+        Motion(motions[0].joints, *arrays),
+        np.concatenate([part.motion.q[part.rows] for part in data]),
+        np.concatenate(fitted.residual),
+        row_weights(data, sigma),
+        np.concatenate(fitted.columns),
+    )

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a search for the order of a ripple starts."""
 
-from armid_ros.diagnosis.search.shapes import wave_gains
+from armid_ros.effects.unexplained import wave_gains
 import numpy as np
 import pytest
 
