@@ -5,7 +5,8 @@ The model's own misfit: what it leaves of recordings in which nothing was wrong.
 
 No real arm is as its model to the noise. What the model leaves of recordings that it was
 identified from is smaller than what it leaves of others, so each of them is predicted with
-parameters that the others have.
+parameters that the others have. What others do not tell stays as it is in the model, as far as a
+description can be believed: a joint may have been moved in one recording alone.
 
 """
 
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.rows import fold_rows, weighted_rows
-from armid_ros.diagnosis.search.fit import excited, Told
+from armid_ros.diagnosis.search.fit import described_precision, excited, Told
 from armid_ros.effects import Effect
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -52,7 +53,8 @@ class Baseline:
     def of(cls, arm: ArmModel, data: Sequence[Trajectory], rng: np.random.Generator) -> Baseline:
         """Measure the misfit of a model."""
         residual = [part.residual(arm) for part in data]
-        _, columns = excited(arm, arm.base_parameters(rng), data)
+        base, columns = excited(arm, arm.base_parameters(rng), data)
+        held = described_precision(base, arm)
         informative = np.concatenate([part.informative for part in data])
         left = np.concatenate(residual)
         w = np.concatenate(columns)
@@ -65,9 +67,9 @@ class Baseline:
         folds = range(int(fold.max()) + 1)
         own = [np.einsum('rnp,rnq->pq', rows[fold == k], rows[fold == k]) for k in folds]
         to = [np.einsum('rnp,rn->p', rows[fold == k], aim[fold == k]) for k in folds]
-        whole = np.linalg.lstsq(sum(own), sum(to), rcond=1e-10)[0]
+        whole = np.linalg.lstsq(sum(own) + held, sum(to), rcond=1e-10)[0]
         for k in folds:
-            others = np.linalg.lstsq(sum(own) - own[k], sum(to) - to[k], rcond=1e-10)[0]
+            others = np.linalg.lstsq(sum(own) - own[k] + held, sum(to) - to[k], rcond=1e-10)[0]
             left[fold == k] += w[fold == k] @ (whole - others)
         others = np.sqrt(np.mean(left**2, axis=0, where=informative))
         counts = np.array([informative[fold == k].sum(axis=0) for k in folds])
