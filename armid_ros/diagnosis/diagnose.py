@@ -16,9 +16,10 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Trajectory
-from armid_ros.diagnosis.data.floor import noise_floor, NoiseFloor
+from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.data.gate import check_data
 from armid_ros.diagnosis.data.prepare import choose_filters, prepare, Prepared
+from armid_ros.diagnosis.result import Diagnosis
 from armid_ros.diagnosis.search.bodies import as_bodies
 from armid_ros.diagnosis.search.choice import (
     Chosen,
@@ -32,7 +33,7 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.explain_ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, findings, small_print
-from armid_ros.diagnosis.verdict.gap import Gap, harmed, measure_gap
+from armid_ros.diagnosis.verdict.gap import harmed, measure_gap
 from armid_ros.diagnosis.verdict.headline import (
     headline,
     own_causes_first,
@@ -60,68 +61,6 @@ _COMMON = (
     'the baseline did not determine the model for these motions: a rigid body and friction common '
     'to both were fitted'
 )
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """
-    What a diagnosis came to.
-
-    Attributes
-    ----------
-    verdict : str
-        consistent, named, ambiguous, partial, unknown, not_repeatable or bad_data.
-    summary : str
-        The same in a sentence or two.
-    findings : tuple of Finding
-        The headline: what was named, with share, parameters, rivals and the experiment that would
-        separate them.
-    minor : tuple of Finding
-        What is statistically there and does not matter.
-    where : tuple of Where
-        Where the gap was before anything was named, or is where nothing was.
-    left : tuple of Where
-        Where what remains lives.
-    gap : Gap or None
-        Errors before and after beside the floor; None where the data are bad.
-    explanation : Explanation or None
-        How it was found.
-    arm : ArmModel
-        The patched model; as given where nothing was named or a patch would harm.
-    data : tuple of Trajectory
-        What was looked at.
-    floors : tuple of NoiseFloor
-        Noise of each trajectory.
-    not_visible : tuple of str
-        Names of the catalogue that these data cannot show.
-    refitted : bool
-        Whether the rigid body and known effects were fitted anew.
-    notes : tuple of str
-        What a reader should know.
-    baseline : str
-        What the floor of the gap is: the noise, the model's own misfit, or an estimate of it.
-
-    """
-
-    verdict: str
-    summary: str
-    findings: tuple[Finding, ...]
-    minor: tuple[Finding, ...]
-    where: tuple[Where, ...]
-    left: tuple[Where, ...]
-    gap: Gap | None
-    explanation: Explanation | None
-    arm: ArmModel
-    data: tuple[Trajectory, ...]
-    floors: tuple[NoiseFloor, ...]
-    not_visible: tuple[str, ...]
-    refitted: bool
-    notes: tuple[str, ...]
-    baseline: str
-
-    def __repr__(self) -> str:
-        """Return the verdict and what was said."""
-        return f'Diagnosis: {self.verdict}. {self.summary}'
 
 
 def diagnose(
@@ -211,17 +150,23 @@ def diagnose(
     def ask(by: DiagnosisSettings) -> tuple[Diagnosis, frozenset[str]]:
         chosen = own_causes_first(explain, by)
         said = _said(chosen, notes, asked)
-        taken = {step.trial.group.effect.name for step in chosen.explanation.steps}
-        return said, frozenset(taken - {one.name for one in said.findings})
+        return said, _fallen(chosen, said)
 
     said, fallen = ask(settings)
-    if said.verdict != 'unknown' or not validate:
+    if not validate or not (said.verdict == 'unknown' or said.harmful):
         return said
     return _what_stands(ask, settings, fallen) or _small_but_all(ask, settings, said) or said
 
 
-#: Says what is found with settings, and which names did not stand on other recordings.
+#: Says what is found with settings, and which names do not stand on other recordings.
 _Ask = Callable[[DiagnosisSettings], tuple[Diagnosis, frozenset[str]]]
+
+
+def _fallen(chosen: Chosen, said: Diagnosis) -> frozenset[str]:
+    """Return the names that were found, and are not said or make the model worse."""
+    taken = {step.trial.group.effect.name for step in chosen.explanation.steps}
+    stands = () if said.harmful else said.findings
+    return frozenset(taken - {one.name for one in stands})
 
 
 def _what_stands(
@@ -231,9 +176,9 @@ def _what_stands(
     while fallen:
         library = tuple(name for name in settings.library if name not in fallen)
         said, more = ask(replace(settings, library=library))
-        if said.verdict in _CLOSED:
+        if said.verdict in _CLOSED and not said.harmful:
             return said
-        if said.verdict != 'unknown' or not more:
+        if not (said.verdict == 'unknown' or said.harmful) or not more:
             break
         fallen |= more
     return None
@@ -241,7 +186,7 @@ def _what_stands(
 
 def _small_but_all(ask: _Ask, settings: DiagnosisSettings, said: Diagnosis) -> Diagnosis | None:
     """Return what closes the gap of causes that are small, but take most of it; None if none."""
-    if not said.minor:
+    if said.verdict != 'unknown' or not said.minor:
         return None
     small = tuple(dict.fromkeys(one.name for one in said.minor))
     again, _ = ask(replace(settings.without_small_print(), library=small))
@@ -323,6 +268,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         refitted=explanation.base is not None,
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
+        harmful=bool(found and worse),
     )
 
 

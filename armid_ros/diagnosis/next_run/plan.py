@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from armid_ros.diagnosis.diagnose import Diagnosis
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
 from armid_ros.diagnosis.next_run.templates import CLEARANCE, Template, templates
+from armid_ros.diagnosis.result import Diagnosis
 from armid_ros.effects.tied import Tied
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (

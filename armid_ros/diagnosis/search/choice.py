@@ -179,7 +179,8 @@ def _since(
     sigma = tuple(np.maximum(one, misfit) for one in noise)
     evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
     most = 2 * settings.thresholds.few_causes
-    free = fitted_anew(arm, [*prepared.data, *baseline.data], most, settings.library, rng)
+    data = [*prepared.data, *baseline.data]
+    free = fitted_anew(arm, data, most, settings.library, rng, known_too=True)
     assert free.base is not None and free.beside_base is not None
     told = baseline.told(free.arm, free.base)
     beside = told if free.beside is arm else baseline.told(free.beside, free.beside_base)

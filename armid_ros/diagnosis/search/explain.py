@@ -18,17 +18,17 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import make_problem, Problem
-from armid_ros.diagnosis.search.candidates import Candidates, candidates, Group
+from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.fit import fit, Fitted, Told
+from armid_ros.diagnosis.search.forward import Search, Taken
 from armid_ros.diagnosis.search.held_out import held_out, Trial
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.resampled import widened
-from armid_ros.diagnosis.search.rivals import undecided
-from armid_ros.diagnosis.search.round import Before, Beside, beside_fit, Later, Round
-from armid_ros.diagnosis.search.step import acceptable, material, next_step, Step, Survey
+from armid_ros.diagnosis.search.round import Beside, Round
+from armid_ros.diagnosis.search.step import acceptable, material, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -105,20 +105,13 @@ def explain(
     question: Question,
     evidence: Evidence,
     settings: DiagnosisSettings,
-    start: Sequence[tuple[Named, Step, FloatArray]] = (),
+    start: Sequence[Taken] = (),
     baseline: Baseline | None = None,
     unseen: Evidence | None = None,
 ) -> Explanation:
     """Take causes as long as any passes, then name the friction that matters, and prune."""
-    days = baseline, unseen
-    taken = _forward(question, evidence, settings, start, days)
-    width = 0.0 if taken.last is None else taken.last.most
-    here = Round(evidence, Workspace(memoized_arm(question.arm), evidence.data), settings, None)
-    here = replace(here, width=width)
-    if any(undecided(step.trial, step.ranking, here) for step in taken.steps[len(start) :]):
-        taken = _forward(question, evidence, settings, start, days, width)
-    named, steps, values, survey = taken.named, taken.steps, taken.values, taken.first
-    last = taken.last
+    way = Search(question, evidence, settings, baseline, unseen).forward(start)
+    named, steps, values, survey, last = way.named, way.steps, way.values, way.first, way.last
     minor = () if last is None else last.there
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
     kept = _friction(question, named, values, evidence, settings, whole)
@@ -145,91 +138,6 @@ def explain(
         question.told,
         by_chance,
     )
-
-
-@dataclass(frozen=True)
-class _Taken:
-    """Causes in the order in which they were taken, the first look at all, and the last one."""
-
-    named: list[Named]
-    steps: list[Step]
-    values: list[FloatArray]
-    first: Survey | None
-    last: Survey | None
-
-
-def _forward(
-    question: Question,
-    evidence: Evidence,
-    settings: DiagnosisSettings,
-    start: Sequence[tuple[Named, Step, FloatArray]],
-    days: tuple[Baseline | None, Evidence | None],
-    width: float = 0.0,
-) -> _Taken:
-    """Take the cause that explains most, and ask again, until none passes."""
-    data, sigma = evidence.data, evidence.sigma
-    named = [row[0] for row in start]
-    steps = [row[1] for row in start]
-    values = [row[2] for row in start]
-    arm, base = question.beside, question.beside_base
-    current = fit(arm, named, data, sigma, base, values, question.beside_told)
-    total: float | None = None
-    survey: Survey | None = None
-    look: Survey | None = None
-    found: Candidates | None = None
-    problem, beside, before = None, None, None
-    for _ in range(question.most):
-        if found is None:
-            found = candidates(current, data, sigma, settings.kinds)
-            problem, beside = beside_fit(found, current, evidence)
-            before = _before(question, current, *days)
-        assert problem is not None and beside is not None
-        work = Workspace(memoized_arm(current.arm), data)
-        here = Round(evidence, work, settings, total, before, width)
-        step, look, problem = next_step(problem, beside, found.groups, here)
-        total, survey = look.total, survey or look
-        if step is None:
-            break
-        group = step.trial.group
-        starts = np.zeros(len(group.effect.parameters(arm.robot)))
-        starts[list(group.kept)] = step.trial.values
-        named.append(Named(group.effect, group.kept))
-        values.append(starts)
-        steps.append(step)
-        if group.effect.linear and not group.effect.shapes:
-            beside = beside.and_columns(group)
-            before = None if before is None else before.and_columns(current.arm, group)
-        else:
-            current = fit(arm, named, data, sigma, base, values, question.beside_told)
-            named, values = list(current.named), list(current.values)
-            found = None
-    return _Taken(named, steps, values, survey, look)
-
-
-def _before(
-    question: Question, current: Fitted, baseline: Baseline | None, unseen: Evidence | None
-) -> Before | None:
-    """Return what other recordings show beside an arm: those from before, and unseen ones."""
-    told = question.beside_told
-    if baseline is None or told is None:
-        return None
-    before = Before(baseline, told, current.change)
-    if unseen is None:
-        return before
-    there = fit(
-        question.beside,
-        current.named,
-        unseen.data,
-        unseen.sigma,
-        question.beside_base,
-        current.values,
-        told,
-        known=current.estimate,
-    )
-    rank = len(current.change)
-    pairs = zip(there.residual, there.columns, strict=True)
-    left = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]
-    return replace(before, later=Later.of(unseen, there.columns, left))
 
 
 @dataclass(frozen=True)
@@ -340,7 +248,7 @@ def _friction(
     evidence: Evidence,
     settings: DiagnosisSettings,
     whole: tuple[float | None, int],
-) -> list[tuple[Named, Step, FloatArray]]:
+) -> list[Taken]:
     """
     Return the friction of unknown value that is there, beside what was named.
 

@@ -198,7 +198,7 @@ def fit(
     """
     values = list(start) or [np.zeros(len(n.effect.parameters(arm.robot))) for n in named]
     state = Patch(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
-    pull = np.zeros((0, 0)) if base is None else _described(base, arm)
+    pull = np.zeros((0, 0)) if base is None else described_precision(base, arm)
     aim = np.zeros(len(pull))
     if told is not None and base is not None:
         pull, aim = pull + told.precision, told.aim
@@ -323,7 +323,7 @@ def _loss(
     return float(sum(np.sum(left**2) for left in weighted_rows(residual, data, sigma)))
 
 
-def _described(base: BaseParameters, arm: ArmModel) -> FloatArray:
+def described_precision(base: BaseParameters, arm: ArmModel) -> FloatArray:
     """
     Return how strongly the description holds the base parameters, as a precision (r, r).
 

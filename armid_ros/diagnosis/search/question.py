@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
@@ -13,6 +13,7 @@ from armid_ros.diagnosis.search.fit import excited, Told
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.model import BaseParameters, group_columns
 import numpy as np
+import numpy.typing as npt
 
 #: Friction of which the rest leaves less than this share of its columns is fitted with the rest.
 _TOLD = 1e-4
@@ -68,17 +69,27 @@ def fitted_anew(
     most: int,
     library: Sequence[str],
     rng: np.random.Generator,
+    known_too: bool = False,
 ) -> Question:
-    """Ask what a model lacks of which only the structure counts."""
+    """
+    Ask what a model lacks beside a rigid body that is fitted anew.
+
+    Effects without values are fitted with it, and those that have values as well if `known_too`;
+    else a value that is off is a cause like any other.
+
+    """
     beside, unknown = with_friction(arm, library)
-    return Question(
-        arm,
-        excited(arm, arm.base_parameters(rng), data)[0],
-        beside,
-        excited(beside, beside.base_parameters(rng), data)[0],
-        unknown,
-        most,
-    )
+    bases = []
+    for one in (arm, beside):
+        free = None if known_too else _not_known(one)
+        bases.append(excited(one, one.base_parameters(rng, free), data)[0])
+    return Question(arm, bases[0], beside, bases[1], unknown, most)
+
+
+def _not_known(arm: ArmModel) -> npt.NDArray[np.intp]:
+    """Return the parameters of the rigid body, and those of effects that have no value yet."""
+    rigid, theta = len(arm.robot.rigid_parameters), arm.theta
+    return np.array([k for k in range(len(theta)) if k < rigid or theta[k] == 0.0], dtype=np.intp)
 
 
 def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
@@ -103,7 +114,4 @@ def _without_values(arm: ArmModel, data: Sequence[Trajectory]) -> BaseParameters
         return None
     columns = [part.reduce(arm.effect_columns(part.motion)[:, :, free - rigid]) for part in data]
     stacked = np.concatenate([block.reshape(-1, len(free)) for block in columns])
-    kept = group_columns(stacked, tuple(names[k] for k in free), tolerance=_TOLD)
-    grouping = np.zeros((kept.rank, len(names)))
-    grouping[:, free] = kept.grouping
-    return replace(kept, standard=names, independent=free[kept.independent], grouping=grouping)
+    return group_columns(stacked, tuple(names[k] for k in free), _TOLD).among(names, free)

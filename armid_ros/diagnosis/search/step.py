@@ -102,52 +102,79 @@ class Survey:
         return float(np.mean(each)) if each else 0.0
 
 
-def next_step(
-    problem: Problem, beside: Beside, groups: Sequence[Group], here: Round
-) -> tuple[Step | None, Survey, Problem]:
+@dataclass(frozen=True)
+class Look:
     """
-    Look for the cause that takes most of what is left, of those that have changed.
+    A look at all causes beside what is free, from which one may be taken.
 
-    What takes as much stays a rival of it, whether other recordings show it as well or not.
-
-    Returns
-    -------
-    step : Step or None
-        The cause, with its rivals; None if nothing passes.
+    Attributes
+    ----------
     survey : Survey
         All groups.
     problem : Problem
         With the columns of refined shapes behind the others.
+    beside : Beside
+        What is free.
+    passing : tuple of Trial
+        The causes that could be taken, best first.
+    gains : dict of int to ndarray
+        What each of them, by its id, takes of every joint, shape (n,).
+    ranking : tuple of Trial
+        The best groups, one per name and joints, best first.
+    here : Round
+        What it knows.
 
     """
-    thresholds = here.settings.thresholds
+
+    survey: Survey
+    problem: Problem
+    beside: Beside
+    passing: tuple[Trial, ...]
+    gains: dict[int, FloatArray]
+    ranking: tuple[Trial, ...]
+    here: Round
+
+    def step(self, width: float = 0.0) -> Step | None:
+        """
+        Return the cause that takes most of what is left, of those that have changed.
+
+        What takes as much stays a rival of it, whether other recordings show it as well or not.
+        A lead of less than `width` squares decides nothing. None if nothing passes.
+
+        """
+        problem, beside, here = self.problem, self.beside, replace(self.here, width=width)
+        ahead = list(takewhile(lambda t: not changed(t, problem, beside, here), self.passing))
+        if len(ahead) == len(self.passing):
+            return None
+        first, *others = self.passing[len(ahead) :]
+        behind = [trial for trial in others if not beaten(trial, first, here)]
+        able = [first, *(trial for trial in behind if changed(trial, problem, beside, here))]
+        winner = likeliest(able, self.gains, problem, beside, here)
+        tied = [*(trial for trial in ahead if not beaten(first, trial, here)), first, *behind]
+        rivals = [
+            trial
+            for trial in tied
+            if trial is not winner and not contains(trial, winner, problem, beside, here)
+        ]
+        likely = tuple(sorted(rivals, key=rarity)[:_RIVALS])
+        return Step(winner, likely, self.ranking, self.survey.total, self.survey.tried)
+
+
+def look_at(problem: Problem, beside: Beside, groups: Sequence[Group], here: Round) -> Look:
+    """Try every cause beside what is free."""
     known = products(problem, beside.free, groups)
     trials, power = tried_beside(known, problem, groups, beside.hold, beside.pull)
     total = float(power.sum()) if here.total is None else here.total
     here = replace(here, total=total, known=known)
-    seen = [trial for trial in trials if trial.visible >= thresholds.least_visible]
+    seen = [t for t in trials if t.visible >= here.settings.thresholds.least_visible]
     ranking = _best_per_key(seen, here)
     survey = _survey(groups, ranking, total, len(seen))
     ranking, problem = _with_refined_shapes(problem, beside, ranking, here)
     tried = max(len(seen), 1)
     ranking, there, gains = _examined(ranking, problem, beside, here, tried)
     survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
-    passing = _passing(ranking, gains, problem, beside, here, tried)
-    ahead = list(takewhile(lambda t: not changed(t, problem, beside, here), passing))
-    if len(ahead) == len(passing):
-        return None, survey, problem
-    first, *others = passing[len(ahead) :]
-    behind = [trial for trial in others if not beaten(trial, first, here)]
-    able = [first, *(trial for trial in behind if changed(trial, problem, beside, here))]
-    winner = likeliest(able, gains, problem, beside, here)
-    tied = [*(trial for trial in ahead if not beaten(first, trial, here)), first, *behind]
-    rivals = [
-        trial
-        for trial in tied
-        if trial is not winner and not contains(trial, winner, problem, beside, here)
-    ]
-    likely = tuple(sorted(rivals, key=rarity)[:_RIVALS])
-    return Step(winner, likely, tuple(ranking), total, len(seen)), survey, problem
+    passing = tuple(_passing(ranking, gains, problem, beside, here, tried))
+    return Look(survey, problem, beside, passing, gains, tuple(ranking), here)
 
 
 def acceptable(trial: Trial, here: Round, tried: int) -> bool:

@@ -21,7 +21,7 @@ from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.round import Beside, Round
-from armid_ros.diagnosis.search.step import next_step, Step, Survey
+from armid_ros.diagnosis.search.step import look_at, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
 from armid_ros.diagnosis.ties.ties import Ties
@@ -150,7 +150,8 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
     trials, power = held_out(problem, free, [group], beside.hold, beside.pull)
     work = Workspace(memoized_arm(reference.arm), data)
     here = Round(evidence, work, settings, float(power.sum()))
-    step, survey, _ = next_step(problem, beside, found.groups, here)
+    look = look_at(problem, beside, found.groups, here)
+    step, survey = look.step(), look.survey
     survey = replace(survey, ranking=(*trials, *survey.ranking), tried=survey.tried + 1)
     if step is None or not trials:
         return survey, ()

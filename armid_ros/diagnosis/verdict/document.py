@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from armid_ros.diagnosis.diagnose import Diagnosis
+from armid_ros.diagnosis.result import Diagnosis
 from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.verdict.detectable import detectable, smallest_size
 from armid_ros.diagnosis.verdict.finding import Finding

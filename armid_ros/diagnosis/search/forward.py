@@ -1,0 +1,190 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Causes taken one after the other: the one that explains most, until none passes.
+
+What nothing explains is known in the end only. Where it shows that a lead decides nothing, the
+way is gone again; places that were reached before are not looked at again.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field, replace
+
+from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.search.candidates import Candidates, candidates
+from armid_ros.diagnosis.search.fit import fit, Fitted
+from armid_ros.diagnosis.search.memoized_arm import memoized_arm
+from armid_ros.diagnosis.search.patch import Named
+from armid_ros.diagnosis.search.question import Question
+from armid_ros.diagnosis.search.refine import Workspace
+from armid_ros.diagnosis.search.rivals import undecided
+from armid_ros.diagnosis.search.round import Before, beside_fit, Later, Round
+from armid_ros.diagnosis.search.step import Look, look_at, Step, Survey
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: A name with its step and the values it starts from, one for each of its parameters.
+Taken = tuple[Named, Step, FloatArray]
+
+
+@dataclass(frozen=True)
+class Way:
+    """
+    Causes in the order in which they were taken.
+
+    Attributes
+    ----------
+    named : list of Named
+        The causes.
+    steps : list of Step
+        How each was taken.
+    values : list of ndarray
+        Values of all parameters of each.
+    first, last : Survey or None
+        The first look at all causes, and the last one.
+
+    """
+
+    named: list[Named]
+    steps: list[Step]
+    values: list[FloatArray]
+    first: Survey | None
+    last: Survey | None
+
+
+@dataclass(frozen=True)
+class _Place:
+    """What was taken on a way, the fit beside which it goes on, and a look at all causes there."""
+
+    named: tuple[Named, ...]
+    values: tuple[FloatArray, ...]
+    current: Fitted
+    found: Candidates
+    before: Before | None
+    look: Look
+    next: dict[Hashable, _Place] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Search:
+    """
+    A search for the causes of a gap.
+
+    Attributes
+    ----------
+    question : Question
+        What is asked of which arm.
+    evidence : Evidence
+        The data.
+    settings : DiagnosisSettings
+        Library and thresholds.
+    baseline : Baseline or None
+        Recordings in which nothing was wrong.
+    unseen : Evidence or None
+        More data of the same day, which nothing is fitted to.
+
+    """
+
+    question: Question
+    evidence: Evidence
+    settings: DiagnosisSettings
+    baseline: Baseline | None = None
+    unseen: Evidence | None = None
+
+    def forward(self, start: Sequence[Taken] = ()) -> Way:
+        """Take causes beside those to start with as long as any passes."""
+        steps = [row[1] for row in start]
+        if not self.question.most:
+            return Way([row[0] for row in start], steps, [row[2] for row in start], None, None)
+        first = self._fitted_place([row[0] for row in start], [row[2] for row in start], None)
+        way = self._way(first, steps, 0.0)
+        assert way.last is not None
+        width = way.last.most
+        here = replace(first.look.here, total=None, before=None, width=width)
+        if any(undecided(step.trial, step.ranking, here) for step in way.steps[len(start) :]):
+            way = self._way(first, steps, width)
+        return way
+
+    def _way(self, place: _Place, steps: Sequence[Step], width: float) -> Way:
+        """Go from a place, where a lead of less than some squares decides nothing."""
+        first, taken = place.look.survey, list(steps)
+        for left in range(self.question.most, 0, -1):
+            step = place.look.step(width)
+            if step is None:
+                break
+            taken.append(step)
+            if left == 1:
+                named, values = self._and_named(place, step)
+                return Way(named, taken, values, first, place.look.survey)
+            place = self._after(place, step)
+        return Way(list(place.named), taken, list(place.values), first, place.look.survey)
+
+    def _after(self, place: _Place, step: Step) -> _Place:
+        """Return the place behind a step."""
+        group = step.trial.group
+        way = group.key, group.effect.shape
+        if way not in place.next:
+            named, values = self._and_named(place, step)
+            if group.effect.linear and not group.effect.shapes:
+                arm = place.current.arm
+                before = None if place.before is None else place.before.and_columns(arm, group)
+                problem, beside = place.look.problem, place.look.beside.and_columns(group)
+                here = replace(place.look.here, before=before, known=None)
+                look = look_at(problem, beside, place.found.groups, here)
+                after = replace(place, before=before, look=look, next={})
+                place.next[way] = replace(after, named=tuple(named), values=tuple(values))
+            else:
+                place.next[way] = self._fitted_place(named, values, place.look.survey.total)
+        return place.next[way]
+
+    def _and_named(self, place: _Place, step: Step) -> tuple[list[Named], list[FloatArray]]:
+        group = step.trial.group
+        start = np.zeros(len(group.effect.parameters(self.question.arm.robot)))
+        start[list(group.kept)] = step.trial.values
+        return [*place.named, Named(group.effect, group.kept)], [*place.values, start]
+
+    def _fitted_place(
+        self, named: Sequence[Named], values: Sequence[FloatArray], total: float | None
+    ) -> _Place:
+        """Fit what is named, and look at all causes beside it."""
+        question, data, sigma = self.question, self.evidence.data, self.evidence.sigma
+        arm, base = question.beside, question.beside_base
+        current = fit(arm, named, data, sigma, base, values, question.beside_told)
+        found = candidates(current, data, sigma, self.settings.kinds)
+        problem, beside = beside_fit(found, current, self.evidence)
+        before = self._before(current)
+        work = Workspace(memoized_arm(current.arm), data)
+        here = Round(self.evidence, work, self.settings, total, before)
+        look = look_at(problem, beside, found.groups, here)
+        if named:
+            named, values = current.named, current.values
+        return _Place(tuple(named), tuple(values), current, found, before, look)
+
+    def _before(self, current: Fitted) -> Before | None:
+        """Return what other recordings show beside an arm: those from before, and unseen ones."""
+        question, unseen = self.question, self.unseen
+        told = question.beside_told
+        if self.baseline is None or told is None:
+            return None
+        before = Before(self.baseline, told, current.change)
+        if unseen is None:
+            return before
+        there = fit(
+            question.beside,
+            current.named,
+            unseen.data,
+            unseen.sigma,
+            question.beside_base,
+            current.values,
+            told,
+            known=current.estimate,
+        )
+        rank = len(current.change)
+        pairs = zip(there.residual, there.columns, strict=True)
+        left = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]
+        return replace(before, later=Later.of(unseen, there.columns, left))
