@@ -107,6 +107,8 @@ class Effect(ABC):
     #: Whether it says that the description is wrong, and never happens to an arm: where one value
     #: of a description is wrong, others may be.
     corrects: ClassVar[bool] = False
+    #: Whether it is of the whole arm as a rule, and seldom of one joint; else it is the reverse.
+    whole_arm: ClassVar[bool] = False
     #: Whether it comes from outside the arm: a person, another machine.
     external: ClassVar[bool] = False
     #: Whether it is learned from the residual, and so names no cause.

@@ -45,6 +45,17 @@ def test_a_change_beyond_what_recordings_differ_by_stands_out():
         assert asked(days[:3], days[3:])
 
 
+def test_values_that_no_motion_shows_hide_no_change():
+    """An arm in a plane shows four of the ten values of a payload."""
+    rng = np.random.default_rng(2)
+    values = rng.normal(size=7) + np.array([0, 0, 0, 9, 9, 9, 9])
+    days = [recording(rng, value) for value in values]
+    wide = [Rows(one.free, np.hstack([one.own, 0.0 * one.own]), one.left) for one in days]
+    free, left = (np.concatenate([getattr(one, n) for one in days]) for n in ('free', 'left'))
+    known = free.T @ free, free.T @ left
+    assert stands_out(wide[:3], wide[3:], known, np.array([1e-9, 0.3]))
+
+
 def test_what_one_recording_of_the_day_before_had_as_well_is_no_change():
     rng = np.random.default_rng(3)
     values = [0.0, 3.0, 0.0, 1.0, 3.0, 1.0]

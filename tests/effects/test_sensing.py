@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
+from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.effects.timing import earlier_samples
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
@@ -102,6 +102,16 @@ def test_delay_and_lag_are_the_same_to_first_order(robot, sines):
     delay = arm.columns_of(make_effect('time_delay', robot), fine)[:, :, 0]
     lag = arm.columns_of(make_effect('torque_lag', robot), fine).sum(axis=2)
     np.testing.assert_allclose(delay, lag, atol=1e-12)
+
+
+def test_a_lag_of_the_whole_arm_is_that_of_every_joint(robot, sines):
+    motion, tau = sines(2.0, 500.0), np.random.default_rng(0).normal(size=(1000, 6)).cumsum(axis=0)
+    motion, tau = motion.select(slice(0, 1000)), tau[: len(motion)]
+    whole, each = CATALOGUE['torque_lag'].on(robot, ()), make_effect('torque_lag', robot)
+    one, six = np.array([0.02]), np.full(6, 0.02)
+    np.testing.assert_array_equal(whole.read(one, motion, tau), each.read(six, motion, tau))
+    sums = each.sensitivity(six, motion, tau).sum(axis=2, keepdims=True)
+    np.testing.assert_allclose(whole.sensitivity(one, motion, tau), sums)
 
 
 def test_lateness_needs_more_than_one_sample(robot, motion):

@@ -119,6 +119,19 @@ def test_a_spring_to_the_world_is_the_gradient_of_its_energy(robot, motion):
     assert not np.any(torque[:, 4:])
 
 
+@pytest.mark.parametrize('name', ['human_interaction', 'interface_slack'])
+def test_a_person_holds_the_arm_where_it_is_though_a_fit_has_no_mass_there(robot, name):
+    """First moments without mass put a centre kilometres away."""
+    theta = robot.rigid_parameters.copy()
+    theta[50:53] = 1e-6, 0.3, -0.2
+    light = make_effect(name, robot.with_inertias(theta))
+    attached = light.shape_values[-1, :3]
+    assert 0.1 < np.linalg.norm(attached) < 1.0
+    np.testing.assert_allclose(attached[1] / attached[0], -0.2 / 0.3)
+    others = make_effect(name, robot).shape_values[:-1, :3]
+    np.testing.assert_allclose(light.shape_values[:-1, :3], others)
+
+
 def test_a_damper_takes_energy(robot, motion, added):
     power = added(motion, 'human_interaction', [0.0, 20.0, 0.0, 0.0, 0.0]) * motion.dq
     assert np.all(power.sum(axis=1) > 0.0)

@@ -184,6 +184,12 @@ def test_a_recording_refuses_arrays_that_do_not_match():
         Recording(joints=('a', 'b', 'c'), t=np.arange(4.0), q=np.zeros((4, 2)))
 
 
+@pytest.mark.parametrize('times', [[0.0, 0.1, 0.1, 0.2], [0.0, 0.2, 0.1, 0.3]])
+def test_a_recording_refuses_times_that_do_not_increase(times):
+    with pytest.raises(Exception, match=r'time does not increase at sample 2 .*sort the samples'):
+        Recording(joints=('a',), t=np.array(times), q=np.zeros((4, 1)))
+
+
 def test_a_recording_of_no_samples_is_a_bag_that_says_so(tmp_path):
     empty = Recording(joints=('a',), t=np.empty(0), q=np.empty((0, 1)))
     write_recording(tmp_path / 'bag', empty)

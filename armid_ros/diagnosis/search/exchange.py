@@ -96,7 +96,8 @@ def stands_out(
     border = np.array([basis.T @ (one.free.T @ one.own) for one in rows])
     own = np.array([one.own.T @ one.own for one in rows])
     aim = np.array([one.own.T @ (one.left - one.free @ free) for one in rows])
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(own.sum(axis=0)), 1e-300))
+    length = np.diag(own.sum(axis=0)) + precision  # a planar arm shows some values of a body only
+    scale = 1.0 / np.sqrt(np.maximum(length, 1e-300))
 
     def explained(members: npt.NDArray[np.bool_]) -> float:
         """Return the squares that go if a cause has one value in all and one more in some."""

@@ -13,6 +13,10 @@ from armid_ros.effects import CATALOGUE
 from armid_ros.motion import FloatArray
 import numpy as np
 
+#: Places in the catalogue that an effect is behind where it is seldom: a delay of one joint, which
+#: is a lag as a rule, and a lag of the whole arm, which is a delay.
+_ELSEWHERE = 1.5
+
 
 def beaten(other: Trial, first: Trial, here: Round) -> bool:
     """Return whether one trial is so far behind another that it is no rival."""
@@ -71,11 +75,11 @@ def undecided(first: Trial, ranking: Sequence[Trial], here: Round) -> bool:
     return any((round(cost(t, here.settings)), rarity(t)) < own for t in close)
 
 
-def rarity(trial: Trial) -> int:
+def rarity(trial: Trial) -> float:
     """Return the position in the catalogue, which goes from the common to the rare."""
-    names = list(CATALOGUE)
-    name = trial.group.effect.name
-    return names.index(name) if name in CATALOGUE else len(names)
+    names, effect = list(CATALOGUE), trial.group.effect
+    place = names.index(effect.name) if effect.name in CATALOGUE else len(names)
+    return place + (_ELSEWHERE if bool(effect.joints) == effect.whole_arm else 0.0)
 
 
 def contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
