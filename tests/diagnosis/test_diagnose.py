@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a diagnosis says of arms in which something is hidden, or nothing."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import json
 
 from armid_ros.arm import ArmModel
@@ -226,3 +226,20 @@ def test_an_effect_of_ones_own_is_one_class(bench):
     found = look(bench, hidden, settings=DiagnosisSettings(own=(CubicSpring,)))
     assert [finding.name for finding in found.findings] == ['cubic_spring']
     assert found.findings[0].values[0] == pytest.approx(0.4, rel=0.05)
+
+
+@pytest.mark.parametrize('factors', [(1.15, 0.9), (0.92, 1.1)])
+def test_friction_that_has_grown_is_named_beside_a_body_that_is_off(upright, factors):
+    """Its values are known: a body that is fitted anew does not take the change."""
+    inertias = upright.robot.rigid_parameters.reshape(-1, 10).copy()
+    inertias[1:] *= np.array(factors)[:, np.newaxis]
+    described = replace(upright.arm, robot=upright.robot.with_inertias(inertias.ravel()))
+    grown = np.array([0.0, 0.0, 0.35])
+    found = diagnose(
+        described,
+        upright.recordings(lambda motion, tau: grown * np.sign(motion.dq)),
+        rng=np.random.default_rng(0),
+    )
+    friction = [one for one in found.findings if one.name == 'coulomb_friction']
+    assert [one.joints for one in friction] == [('elbow',)], found.summary
+    assert friction[0].values[0] == pytest.approx(0.35, abs=4.0 * friction[0].std[0])
