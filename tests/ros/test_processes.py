@@ -169,6 +169,24 @@ def test_a_recorder_whose_terminal_is_closed_completes_its_bag(bench, processes,
     assert read_recording(bag, joints=load_robot('humanoid_arm').joints).report.clean
 
 
+def test_a_process_that_cannot_leave_is_ended_and_says_where_it_hangs(tmp_path):
+    """As where another process was killed while it held shared memory."""
+    program = (
+        'import time\n'
+        'from armid_ros.nodes.recorder import RecorderNode\n'
+        'from armid_ros.nodes.running import process\n'
+        'process.LEAVING = 1.0\n'
+        'RecorderNode.destroy_node = lambda self: time.sleep(3600.0)\n'
+        'RecorderNode.finished = property(lambda self: True)\n'
+        f"process.run(RecorderNode, ['--ros-args', '-p', 'bag:={tmp_path / 'bag'}'])\n"
+    )
+    command = [sys.executable, '-c', program]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert ended.returncode == 1
+    assert 'in _leave' in ended.stderr
+    assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
+
+
 @pytest.mark.parametrize('name', ['bag.mcap', 'bag.db3', 'bag.mcap.zstd'])
 def test_a_player_refuses_a_fifo_at_once(processes, tmp_path, name):
     os.mkfifo(tmp_path / name)

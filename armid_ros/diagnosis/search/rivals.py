@@ -25,9 +25,29 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
     squares, z = lead(first, other)
     if squares <= here.width:
         return False
+    if _never_happens(first, here) and not _never_happens(other, here):
+        return squares > thresholds.far * first.gain
     if squares <= thresholds.tie * here.total * 0.5 and squares <= thresholds.far * first.gain:
         return False
     return z >= thresholds.rival_z or squares > thresholds.far * first.gain
+
+
+def _never_happens(trial: Trial, here: Round) -> bool:
+    """Return whether a cause is none that could come between two days: links do not change."""
+    return here.before is not None and trial.group.effect.corrects
+
+
+def what_happens_first(
+    passing: Sequence[Trial], problem: Problem, beside: Beside, here: Round
+) -> list[Trial]:
+    """Return causes, best first: before one that never happens what happens and says the same."""
+    first, *others = passing
+    if _never_happens(first, here):
+        for other in others:
+            happens = not _never_happens(other, here)
+            if happens and contains(first, other, problem, beside, here):
+                return [other, first, *(trial for trial in others if trial is not other)]
+    return list(passing)
 
 
 def likeliest(

@@ -17,7 +17,13 @@ from armid_ros.diagnosis.search.own_noise import explains_itself, made_of_noise,
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.products import products, with_group
 from armid_ros.diagnosis.search.refine import refine
-from armid_ros.diagnosis.search.rivals import beaten, contains, likeliest, rarity
+from armid_ros.diagnosis.search.rivals import (
+    beaten,
+    contains,
+    likeliest,
+    rarity,
+    what_happens_first,
+)
 from armid_ros.diagnosis.search.round import Beside, Round, worth
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -28,7 +34,7 @@ import numpy.typing as npt
 _LOOKED_AT, _REFINED, _PROMISING = 30, 6, 0.4
 #: Causes that are compared with each other beside what each of them was before.
 _COMPARED = 8
-#: Rivals that are told of a name: the likeliest; more than two help nobody.
+#: Rivals that are told of a name: the likeliest, each name once; more than two help nobody.
 _RIVALS = 2
 #: Causes in the small print.
 _SMALL_PRINT = 5
@@ -146,7 +152,7 @@ class Look:
         ahead = list(takewhile(lambda t: not changed(t, problem, beside, here), self.passing))
         if len(ahead) == len(self.passing):
             return None
-        first, *others = self.passing[len(ahead) :]
+        first, *others = what_happens_first(self.passing[len(ahead) :], problem, beside, here)
         behind = [trial for trial in others if not beaten(trial, first, here)]
         able = [first, *(trial for trial in behind if changed(trial, problem, beside, here))]
         winner = likeliest(able, self.gains, problem, beside, here)
@@ -156,7 +162,8 @@ class Look:
             for trial in tied
             if trial is not winner and not contains(trial, winner, problem, beside, here)
         ]
-        likely = tuple(sorted(rivals, key=rarity)[:_RIVALS])
+        best = {trial.group.effect.name: trial for trial in reversed(rivals)}
+        likely = tuple(sorted(best.values(), key=rarity)[:_RIVALS])
         return Step(winner, likely, self.ranking, self.survey.total, self.survey.tried)
 
 

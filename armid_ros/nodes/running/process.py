@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+import faulthandler
 import signal
 import sys
 
@@ -19,6 +20,8 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
+#: How long leaving DDS may take [s].
+LEAVING = 20.0
 #: How often it is looked whether the process is to end [s].
 _LOOK_PERIOD = 0.1
 
@@ -113,7 +116,7 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
             signal.signal(number, signal.SIG_IGN)
         if node is not None:
             trouble += _closed(node)
-        rclpy.try_shutdown()
+        _leave(node)
     if hung_up:
         trouble.append('ended by SIGHUP, as by a terminal that is closed')
     _exit(trouble, node)
@@ -144,6 +147,19 @@ def _closed(node: ArmidNode) -> list[str]:
         node.close()
     except ArmidError as error:
         return [str(error)]
-    finally:
-        node.destroy_node()
     return []
+
+
+def _leave(node: ArmidNode | None) -> None:
+    """
+    Leave DDS, in limited time: what must not be lost is complete.
+
+    Fast DDS waits for what other processes hold in shared memory, and for ever where one of them
+    was killed. The watchdog is a thread in C: it says where the process hangs, and ends it.
+
+    """
+    faulthandler.dump_traceback_later(LEAVING, exit=True)
+    if node is not None:
+        node.destroy_node()
+    rclpy.try_shutdown()
+    faulthandler.cancel_dump_traceback_later()
