@@ -32,7 +32,8 @@ class Thresholds:
     tie : float
         Share by which it has to be ahead as well.
     far : float
-        Lead over its own share that excludes another one however few blocks show it.
+        Lead over its own share that excludes another one however few blocks show it, and that
+        a link, which never changes, has to have over what may happen between two days.
     misfit_share : float
         Power of a cause over that of the model's own misfit, below which it is small print in that
         joint: a quarter of it names a change in one of five arms to which nothing happened.
