@@ -163,10 +163,19 @@ _Ask = Callable[[DiagnosisSettings], tuple[Diagnosis, frozenset[str]]]
 
 
 def _fallen(chosen: Chosen, said: Diagnosis) -> frozenset[str]:
-    """Return the names that were found, and are not said or make the model worse."""
-    taken = {step.trial.group.effect.name for step in chosen.explanation.steps}
-    stands = () if said.harmful else said.findings
-    return frozenset(taken - {one.name for one in stands})
+    """
+    Return the names that were found, and are not said or make the model worse.
+
+    A person who makes it worse may push otherwise in other recordings.
+
+    """
+    taken = {step.trial.group.effect for step in chosen.explanation.steps}
+    stands = {one.name for one in said.findings}
+    return frozenset(
+        effect.name
+        for effect in taken
+        if effect.name not in stands or (said.harmful and not effect.external)
+    )
 
 
 def _what_stands(
