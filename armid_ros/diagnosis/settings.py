@@ -47,6 +47,9 @@ class Thresholds:
     uncertain : float
         Share of the noise of a row that dry friction may be wrong by where the sign of a velocity
         is uncertain: beside reversals it is wrong by 0.5 to 2 times itself in five kinds of arms.
+    described : float
+        Share of a described friction by which it may be off; one fitted to more has changed.
+        Values of the laboratory are off by up to 0.1, friction of an arm by 0.2 in a day.
     least_visible : float
         A group of which what is free leaves less than this share of its columns is not visible.
     confidence : float
@@ -92,6 +95,7 @@ class Thresholds:
     headline: float = 0.1
     same_fit: float = 1.5
     uncertain: float = 0.25
+    described: float = 0.25
     least_visible: float = 0.02
     confidence: float = 0.999
     predicted: float = 2.0

@@ -105,7 +105,7 @@ def explained(
         return _since(arm, prepared, baseline, settings, rng, tell, unseen)
     if written is not None:
         return _beside(arm, prepared, written, settings, rng, tell)
-    few, many = settings.thresholds.few_causes, settings.thresholds.many_causes
+    few = settings.thresholds.few_causes
     given = as_given(arm, prepared.data, few, settings.library)
     told = Evidence(prepared.data, prepared.as_described, prepared.as_described)
     tell(0.2, 'the model as given')
@@ -116,7 +116,7 @@ def explained(
         return Chosen(first, nothing, NOISE)
     tell(0.4, 'the model fitted anew')
     noise = Evidence(prepared.data, tuple(prepared.sigma), tuple(prepared.sigma))
-    anew = explain(fitted_anew(arm, prepared.data, many, settings.library, rng), noise, settings)
+    anew = _anew(arm, noise, settings, rng)
     corrected = at_floor(anew, settings)
     if corrected and len(first.steps) > 1 and not _stands(first, anew):
         return Chosen(anew, nothing, NOISE)
@@ -156,11 +156,30 @@ def _beside(
         return Chosen(found, misfit, WRITTEN_MISFIT)
     tell(0.6, 'the model fitted anew')
     sigma = tuple(np.maximum(one, misfit) for one in prepared.sigma)
-    question = fitted_anew(
-        arm, prepared.data, settings.thresholds.many_causes, settings.library, rng
-    )
-    anew = explain(question, Evidence(prepared.data, sigma, tuple(prepared.sigma)), settings)
+    anew = _anew(arm, Evidence(prepared.data, sigma, tuple(prepared.sigma)), settings, rng)
     return Chosen(found if _as_good(found, anew, settings) else anew, misfit, WRITTEN_MISFIT)
+
+
+def _anew(
+    arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings, rng: np.random.Generator
+) -> Explanation:
+    """
+    Explain the data beside a rigid body and known effects that are fitted anew.
+
+    A described value may be off by a share of it. One that is fitted to more than that has
+    changed, and is asked about as a cause.
+
+    """
+    many, library = settings.thresholds.many_causes, settings.library
+    found = explain(fitted_anew(arm, evidence.data, many, library, rng), evidence, settings)
+    rigid, described = len(arm.robot.rigid_parameters), arm.theta
+    change = np.abs(found.fitted.arm.theta[: len(described)] - described)
+    known = (np.arange(len(described)) >= rigid) & (described != 0.0)
+    changed = np.flatnonzero(known & (change > settings.thresholds.described * np.abs(described)))
+    if not len(changed):
+        return found
+    question = fitted_anew(arm, evidence.data, many, library, rng, changed.tolist())
+    return explain(question, evidence, settings)
 
 
 def _since(
@@ -179,8 +198,7 @@ def _since(
     sigma = tuple(np.maximum(one, misfit) for one in noise)
     evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
     most = 2 * settings.thresholds.few_causes
-    data = [*prepared.data, *baseline.data]
-    free = fitted_anew(arm, data, most, settings.library, rng, known_too=True)
+    free = fitted_anew(arm, [*prepared.data, *baseline.data], most, settings.library, rng)
     assert free.base is not None and free.beside_base is not None
     told = baseline.told(free.arm, free.base)
     beside = told if free.beside is arm else baseline.told(free.beside, free.beside_base)

@@ -13,7 +13,6 @@ from armid_ros.diagnosis.search.fit import excited, Told
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.model import BaseParameters, group_columns
 import numpy as np
-import numpy.typing as npt
 
 #: Friction of which the rest leaves less than this share of its columns is fitted with the rest.
 _TOLD = 1e-4
@@ -69,27 +68,33 @@ def fitted_anew(
     most: int,
     library: Sequence[str],
     rng: np.random.Generator,
-    known_too: bool = False,
+    held: Sequence[int] = (),
 ) -> Question:
     """
-    Ask what a model lacks beside a rigid body that is fitted anew.
+    Ask what a model lacks of which only the structure counts.
 
-    Effects without values are fitted with it, and those that have values as well if `known_too`;
-    else a value that is off is a cause like any other.
+    Parameters
+    ----------
+    arm : ArmModel
+        The arm.
+    data : sequence of Trajectory
+        The data.
+    most : int
+        Causes that are looked for.
+    library : sequence of str
+        Names that may be given.
+    rng : numpy.random.Generator
+        Draws states.
+    held : sequence of int
+        Parameters of the arm that stay as they are, so that a change of them is a cause.
 
     """
     beside, unknown = with_friction(arm, library)
     bases = []
     for one in (arm, beside):
-        free = None if known_too else _not_known(one)
+        free = np.setdiff1d(np.arange(len(one.parameters)), held)
         bases.append(excited(one, one.base_parameters(rng, free), data)[0])
     return Question(arm, bases[0], beside, bases[1], unknown, most)
-
-
-def _not_known(arm: ArmModel) -> npt.NDArray[np.intp]:
-    """Return the parameters of the rigid body, and those of effects that have no value yet."""
-    rigid, theta = len(arm.robot.rigid_parameters), arm.theta
-    return np.array([k for k in range(len(theta)) if k < rigid or theta[k] == 0.0], dtype=np.intp)
 
 
 def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
