@@ -81,6 +81,8 @@ class Effect(ABC):
     shown_by: ClassVar[str] = 'faster motion'
     #: What a positive value means, where the name does not say it.
     sign: ClassVar[str] = ''
+    #: Whether a person says it by its weight, the first quantity, and where it is.
+    weighs: ClassVar[bool] = False
     #: Whether the torque of a joint at rest is anything between two levels, and so says nothing.
     holds_at_rest: ClassVar[bool] = False
     #: Whether the torque is linear in the quantities; to the first order only where it is not.

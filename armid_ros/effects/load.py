@@ -76,6 +76,7 @@ class Payload(_LinkBody):
     name = 'payload'
     summary = 'a body fixed to a link'
     shown_by = 'the same motion with and without the tool'
+    weighs = True
     familiar = True
     comes_and_goes = True
     quantities = tuple(

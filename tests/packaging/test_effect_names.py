@@ -19,9 +19,8 @@ LEFT = {
     'elastic/plant/setup.py': 3,
     # fields of springs.json that are called as an effect is
     'elastic/identification/output.py': 3,
-    # knowledge that effects ought to have
+    # a key of diagnosis.json that is called as an effect is
     'diagnosis/next_run/plan.py': 1,
-    'diagnosis/verdict/words.py': 1,
 }
 
 

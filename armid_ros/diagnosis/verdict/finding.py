@@ -62,6 +62,8 @@ class Finding:
         What a positive value means, where the name does not say it.
     ties : tuple of Tie
         Where it holds the arm, in the order of its joints, if it ends at another machine.
+    weighs : bool
+        Whether its first value is a weight that says what it is.
 
     """
 
@@ -78,6 +80,7 @@ class Finding:
     gain: float = 0.0
     sign: str = ''
     ties: tuple[Tie, ...] = ()
+    weighs: bool = False
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
@@ -146,6 +149,7 @@ def findings(
                 float(attribution.taken[indices].sum()),
                 parts[0].effect.sign,
                 _ties([part.effect for part in parts], order),
+                parts[0].effect.weighs,
             )
         )
     return tuple(sorted(result, key=lambda one: -one.share))
@@ -173,6 +177,7 @@ def small_print(
                 min(1.0, trial.p * tried),
                 gain=trial.gain,
                 sign=effect.sign,
+                weighs=effect.weighs,
             )
         )
     return tuple(result)

@@ -157,8 +157,8 @@ def sentence(finding: Finding, robot: Robot) -> str:
     if finding.ties:
         where = ', '.join(_tie(finding, tie.joint, tie.name) for tie in finding.ties)
         return f'{words.capitalize()} at {where} {explains}.'
-    if finding.name == 'payload' and finding.values:
-        return f'A payload {_weight(finding)} on {finding.joints[0]} {explains}.'
+    if finding.weighs and finding.values:
+        return f'{article} {words} {_weight(finding)} on {finding.joints[0]} {explains}.'
     if len(finding.joints) > _JOINTS_SAID:
         return f'{words.capitalize()} in {len(finding.joints)} joints {explains}.'
     where = f' in {", ".join(finding.joints)}' if finding.joints else ''

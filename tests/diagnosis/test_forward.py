@@ -1,0 +1,54 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Causes are taken one by one; a way that is gone twice is looked along once."""
+
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.search import forward
+from armid_ros.diagnosis.search.question import as_given
+from armid_ros.diagnosis.settings import DiagnosisSettings
+import numpy as np
+import pytest
+
+from tests.diagnosis.conftest import TORQUE_NOISE
+from tests.diagnosis.test_floor import cut
+
+LIBRARY = ('viscous_friction', 'coulomb_friction', 'torque_offset', 'joint_spring')
+
+
+@pytest.fixture
+def search(bench):
+    def hidden(motion, tau):
+        return np.array([0.4, 0.0]) * motion.dq + np.array([0.0, 0.5]) * motion.q
+
+    data = tuple(cut(bench.recordings(hidden)))
+    sigma = (np.full(2, TORQUE_NOISE),) * len(data)
+    settings = DiagnosisSettings(library=LIBRARY)
+    question = as_given(bench.arm, data, 4, LIBRARY)
+    return forward.Search(question, Evidence(data, sigma, sigma), settings)
+
+
+def taken(way):
+    return [(own.effect.name, own.effect.joints) for own in way.named]
+
+
+@pytest.mark.parametrize('undecided', [False, True])
+def test_the_cause_that_takes_most_is_taken_first(search, monkeypatch, undecided):
+    looks = []
+    look_at = forward.look_at
+
+    def counted(*args):
+        looks.append(args)
+        return look_at(*args)
+
+    monkeypatch.setattr(forward, 'look_at', counted)
+    monkeypatch.setattr(forward, 'undecided', lambda *_: undecided)
+    way = search.forward()
+    assert taken(way) == [('viscous_friction', ('shoulder',)), ('joint_spring', ('elbow',))]
+    assert len(looks) == 3
+    assert way.first.most > way.last.most
+
+
+def test_a_search_for_no_cause_takes_none(bench, search):
+    question = as_given(bench.arm, search.evidence.data, 0, LIBRARY)
+    way = forward.Search(question, search.evidence, search.settings).forward()
+    assert taken(way) == [] and way.first is None
