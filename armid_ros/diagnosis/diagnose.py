@@ -49,6 +49,8 @@ import numpy as np
 #: Told the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
+#: How often it is asked again without names that do not stand.
+_MORE_QUESTIONS = 2
 #: Verdicts by which no gap is open.
 _CLOSED = ('named', 'ambiguous')
 #: Said where no two equal periods measure the noise.
@@ -182,7 +184,7 @@ def _what_stands(
     ask: _Ask, settings: DiagnosisSettings, fallen: frozenset[str]
 ) -> Diagnosis | None:
     """Return what closes the gap without names that did not stand; None if nothing does."""
-    while fallen:
+    for _ in range(_MORE_QUESTIONS if fallen else 0):
         library = tuple(name for name in settings.library if name not in fallen)
         said, more = ask(replace(settings, library=library))
         if said.verdict in _CLOSED and not said.harmful:
