@@ -30,6 +30,8 @@ from scipy import stats
 
 #: Directions of which the free columns leave less than this share of their squares are not seen.
 _UNSEEN = 1e-10
+#: Squares over noise of columns that are rounding, whatever the units.
+_NOTHING = 1e-100
 
 #: Recordings hardly show what takes less than this share of the share it takes of others.
 HARDLY = 0.1
@@ -321,7 +323,7 @@ def _tried(
     whole = own.sum(axis=0)
     rest = whole - everything.border[:, span].T @ everything.solved[:, span]
     size = float(np.trace(whole))
-    visible = float(np.sqrt(max(np.trace(rest), 0.0) / size)) if size > 0.0 else 0.0
+    visible = float(np.sqrt(max(np.trace(rest), 0.0) / size)) if size > _NOTHING else 0.0
     if visible < 1e-5:
         return None
     aim = target.sum(axis=0) - everything.border[:, span].T @ everything.theta
