@@ -239,8 +239,10 @@ def _excitation_findings(result: Identification) -> list[Caution]:
     if result.condition_number > _WEAK_EXCITATION:
         findings.append(
             Caution(
-                f'The excitation is weak: condition number {result.condition_number:.3g}.',
-                'Design an excitation for this robot and record that.',
+                f'The excitation is weak: condition number {result.condition_number:.3g}. Other '
+                'motions may be predicted badly.',
+                'Design an excitation for this robot and record that. With these recordings, '
+                '--physical keeps links near their description where the motion does not tell.',
             )
         )
     return findings
