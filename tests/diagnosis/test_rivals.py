@@ -4,8 +4,10 @@
 
 from types import SimpleNamespace
 
-from armid_ros.diagnosis.search.rivals import rarity
+from armid_ros.diagnosis.search.rivals import beaten, rarity
+from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
+import numpy as np
 import pytest
 
 
@@ -25,3 +27,33 @@ def trial(bench, name, joints):
 )
 def test_the_common_goes_first(bench, first, second):
     assert rarity(trial(bench, *first)) < rarity(trial(bench, *second))
+
+
+class Told:
+    """A cause with what it takes of each of some blocks."""
+
+    def __init__(self, bench, name, gains):
+        self.group = trial(bench, name, ('elbow',)).group
+        self.gains = np.asarray(gains, dtype=float)
+        self.gain = float(self.gains.sum())
+
+
+def asked(total, before):
+    return SimpleNamespace(total=total, width=0.0, before=before, settings=DiagnosisSettings())
+
+
+@pytest.mark.parametrize(
+    ('before', 'less', 'wanted'),
+    [(None, 0.85, True), (object(), 0.85, False), (object(), 0.6, True), (None, 0.995, False)],
+)
+def test_a_link_has_to_take_a_quarter_more_than_what_happens(bench, before, less, wanted):
+    """Links do not change from one day to the next; their description may be off on one."""
+    gains = 10.0 + np.random.default_rng(0).normal(size=36)
+    link, rotor = Told(bench, 'link_inertia', gains), Told(bench, 'rotor_inertia', less * gains)
+    assert beaten(rotor, link, asked(400.0, before)) == wanted
+
+
+def test_of_two_that_happen_the_lead_decides(bench):
+    gains = 10.0 + np.random.default_rng(0).normal(size=36)
+    gain, rotor = Told(bench, 'torque_gain', gains), Told(bench, 'rotor_inertia', 0.85 * gains)
+    assert beaten(rotor, gain, asked(400.0, object()))

@@ -44,7 +44,7 @@ def what_happens_first(
     first, *others = passing
     if _never_happens(first, here):
         for other in others:
-            happens = not _never_happens(other, here)
+            happens = not _never_happens(other, here) and not beaten(other, first, here)
             if happens and contains(first, other, problem, beside, here):
                 return [other, first, *(trial for trial in others if trial is not other)]
     return list(passing)
