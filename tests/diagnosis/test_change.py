@@ -46,3 +46,20 @@ def test_what_slow_motion_does_not_tell_of_a_body_is_no_change(bench):
     fast = [bench.recordings(seed=seed)[2] for seed in (4, 5, 6)]
     found = asked(bench, slow, fast[:2], fast[2:])
     assert not found.findings, found.summary
+
+
+@pytest.mark.parametrize('with_baseline', [True, False])
+def test_friction_that_has_become_less_is_named(bench, with_baseline):
+    """A value may go down to zero: what is left of it is no bound of what it lost."""
+    less = np.array([0.0, -0.2])
+    before = bench.recordings(seed=1)
+    after, new = (
+        bench.recordings(lambda motion, tau: less * np.sign(motion.dq), seed=seed)
+        for seed in (2, 3)
+    )
+    rng = np.random.default_rng(0)
+    arm = identify(bench.arm, before, rng=rng).arm
+    found = diagnose(arm, after, validate=new, baseline=before if with_baseline else (), rng=rng)
+    (first, *others) = found.findings
+    assert (first.name, first.joints, others) == ('coulomb_friction', ('elbow',), [])
+    assert first.values[0] == pytest.approx(-0.2, abs=4.0 * first.std[0])

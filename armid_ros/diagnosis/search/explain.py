@@ -270,7 +270,7 @@ def _friction(
         column = names.index((parameter.name, parameter.joint))
         if column in where:
             left.append((effect, where[column], float(theta[column])))
-    work = Workspace(memoized_arm(fitted.arm), evidence.data)
+    work = Workspace(memoized_arm(arm), evidence.data)
     gone: list[int] = []
     alive = dict(enumerate(left))
     judged: dict[int, tuple[Trial, float]] = {}
@@ -325,7 +325,7 @@ def _pruned(
         if not named:
             return named, steps, fitted
         view = View.of(fitted, evidence)
-        work = Workspace(memoized_arm(fitted.arm), data)
+        work = Workspace(memoized_arm(question.arm), data)
         needless: list[tuple[float, int]] = []
         for k, step in enumerate(steps):
             trial, problem, beside, _ = view.trial_of(k)
