@@ -28,11 +28,11 @@ from armid_ros.model import (
     group_columns,
     inverse_dynamics,
     inverse_dynamics_derivatives,
+    levelled,
     LinkFrames,
     random_motion,
     regressor,
     rigid_parameter_names,
-    ROUNDED_ANGLE,
 )
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.robots import load_robot, Robot
@@ -445,6 +445,6 @@ class ArmModel:
             motion = replace(motion, partner=points)
         every = self.parameters
         free = np.arange(len(every)) if free is None else free
-        columns = self.columns(motion)[:, :, free].reshape(-1, len(free))
-        chosen = tuple(every[k] for k in free)
-        return group_columns(columns, chosen, rounded=ROUNDED_ANGLE).among(every, free)
+        level = replace(self, robot=levelled(self.robot))
+        columns = level.columns(motion)[:, :, free].reshape(-1, len(free))
+        return group_columns(columns, tuple(every[k] for k in free)).among(every, free)

@@ -19,7 +19,7 @@ from armid_ros.excitation.search.criteria import (
     SubsetCriterion,
 )
 from armid_ros.excitation.settings import DesignSettings
-from armid_ros.model import BaseParameters, group_columns, random_motion, ROUNDED_ANGLE
+from armid_ros.model import BaseParameters, group_columns, levelled, random_motion
 from armid_ros.motion import FloatArray, Motion, read_only
 import numpy as np
 import numpy.typing as npt
@@ -99,8 +99,9 @@ class DesignProblem:
             raise TrajectoryError(
                 f"target '{settings.target}': {arm.robot.name} has no such parameter to see"
             )
-        flat = columns.reshape(-1, columns.shape[-1])
-        base = group_columns(flat, whole.parameters, rounded=ROUNDED_ANGLE)
+        level = replace(whole, robot=levelled(whole.robot))
+        flat = target_columns(level, settings.target, motion).reshape(-1, columns.shape[-1])
+        base = group_columns(flat, whole.parameters)
         columns = (columns / noise[:, np.newaxis]).reshape(flat.shape)
         selected = base.independent
         if rival is not None:

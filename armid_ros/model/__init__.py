@@ -6,9 +6,9 @@ from armid_ros.model.base_parameters import (
     BaseParameters,
     gravity_composites,
     group_columns,
+    levelled,
     regroup,
     rigid_base_parameters,
-    ROUNDED_ANGLE,
 )
 from armid_ros.model.kinematics import LinkFrames, point_motion, points_motion
 from armid_ros.model.rigid_body import (
@@ -25,12 +25,12 @@ __all__ = [
     'BaseParameters',
     'LINK_PARAMETERS',
     'LinkFrames',
-    'ROUNDED_ANGLE',
     'gravity_composites',
     'gravity_sensitivity',
     'group_columns',
     'inverse_dynamics',
     'inverse_dynamics_derivatives',
+    'levelled',
     'point_motion',
     'points_motion',
     'random_motion',

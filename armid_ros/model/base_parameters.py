@@ -33,15 +33,13 @@ RANK_TOLERANCE = 1e-9
 #: Mass of a link of which a description gives none, for its first moments to stand on [kg].
 _LEAST_MASS = 1e-6
 
-#: Angles of a description are rounded: an axis that is vertical but for 1e-6 rad shows first
-#: moments by that share of what others show, far below noise. Below this share they are unseen.
-ROUNDED_ANGLE = 1e-4
+#: Angles of a description are rounded. Gravity that is across an axis by less than this share of
+#: it is along the axis: it would show first moments by that share of what others show.
+_ROUNDED = 2e-3
 
 #: The order in which the parameters of a link are kept: inertia first, mass last, so that masses
 #: are grouped into moments and moments of later links into those of earlier ones.
 _KEEP_ORDER = ('Ixx', 'Ixy', 'Ixz', 'Iyy', 'Iyz', 'Izz', 'mx', 'my', 'mz', 'm')
-#: Those of one unit.
-_KINDS = _KEEP_ORDER[:6], _KEEP_ORDER[6:9], _KEEP_ORDER[9:]
 
 
 @dataclass(frozen=True)
@@ -128,10 +126,7 @@ class BaseParameters:
 
 
 def group_columns(
-    w: FloatArray,
-    standard: tuple[ParameterName, ...],
-    tolerance: float = RANK_TOLERANCE,
-    rounded: float = 0.0,
+    w: FloatArray, standard: tuple[ParameterName, ...], tolerance: float = RANK_TOLERANCE
 ) -> BaseParameters:
     """
     Find the base parameters of a stacked regressor.
@@ -145,9 +140,6 @@ def group_columns(
         those of one link go inertia first, mass last.
     tolerance : float
         A column of which the kept ones leave less than this share of its length is grouped.
-    rounded : float
-        A column of a rigid parameter that is shorter than this share of the longest of its unit is
-        rounding of the description.
 
     Returns
     -------
@@ -158,9 +150,6 @@ def group_columns(
     order = _keep_order(standard)
     scale = np.linalg.norm(w, axis=0)
     seen = scale > RANK_TOLERANCE * scale.max(initial=1e-300)
-    for kind in _KINDS:
-        alike = [j for j, parameter in enumerate(standard) if _symbol_of(parameter) in kind]
-        seen[alike] &= scale[alike] > rounded * scale[alike].max(initial=0.0)
     candidates = [j for j in order if seen[j]]
     triangle = np.asarray(np.linalg.qr(w[:, candidates] / scale[candidates], mode='r'))
 
@@ -217,8 +206,23 @@ def _named(
 
 def rigid_base_parameters(robot: Robot, rng: np.random.Generator) -> BaseParameters:
     """Find the base parameters of the rigid body for the gravity in use."""
+    robot = levelled(robot)
     w = _stack(regressor(robot, random_motion(robot, 40 * robot.n_joints, rng)))
-    return group_columns(w, rigid_parameter_names(robot), rounded=ROUNDED_ANGLE)
+    return group_columns(w, rigid_parameter_names(robot))
+
+
+def levelled(robot: Robot) -> Robot:
+    """
+    Return a robot whose gravity is along an axis of its first joint, if it is but for rounding.
+
+    A base that hangs by an angle of 3.1416 shows first moments by 7e-6 of their weight, which no
+    recording tells.
+
+    """
+    turn = robot.model.jointPlacements[1].rotation
+    own = turn.T @ robot.gravity
+    across = np.abs(own) < _ROUNDED * np.linalg.norm(own)
+    return robot.with_gravity(turn @ np.where(across, 0.0, own)) if np.any(own[across]) else robot
 
 
 def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters:
@@ -229,12 +233,13 @@ def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters
     gravity they are the composite gravity parameters of Table 5 of the humanoid-arm paper.
 
     """
+    robot = levelled(robot)
     motion = random_motion(robot, 40 * robot.n_joints, rng)
     rest = Motion(motion.joints, motion.t, motion.q, 0.0 * motion.dq, 0.0 * motion.ddq)
     names = rigid_parameter_names(robot)
     static = [j for j in range(len(names)) if j % len(LINK_PARAMETERS) < 4]
     w = _stack(regressor(robot, rest))[:, static]
-    return group_columns(w, tuple(names[j] for j in static), rounded=ROUNDED_ANGLE)
+    return group_columns(w, tuple(names[j] for j in static))
 
 
 def _stack(columns: FloatArray) -> FloatArray:
