@@ -165,11 +165,24 @@ def _height(text: str) -> float | None:
     return height
 
 
+def _carrier(robot: Robot, up: FloatArray) -> tuple[str, float]:
+    """Return the fixed link that carries the first joint, and how far it leans [rad]."""
+    model = robot.model
+    frame = model.frames[model.frames[model.getFrameId(model.names[1])].parentFrame]
+    return str(frame.name), float(np.arccos(np.clip(frame.placement.rotation[:, 2] @ up, -1, 1)))
+
+
 def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
     """Say why the floor of an arm is not its base plane; empty when it is."""
     normal = np.array([0.0, 0.0, 1.0])
     if up[2] < np.cos(np.pi / 4.0):
         return 'gravity does not pull it onto its base plane'
+    carrier, lean = _carrier(collision.robot, up)
+    if lean > np.pi / 4.0:
+        return (
+            f'{carrier} is mounted turned by {np.rad2deg(lean):.0f} degrees, as on a wall or a '
+            'ceiling that the description does not have (give it with --environment)'
+        )
     q = zero_pose(collision.robot)[np.newaxis]
     heights = [
         (link, float(low[0]), float(high[0]))

@@ -62,6 +62,19 @@ def test_an_arm_on_a_wall_or_a_ceiling_is_asked_for(gravity):
         find_floor(bodies(ABOVE, gravity=gravity))
 
 
+@pytest.mark.parametrize('mount', ['0 1.5708 0', '3.1416 0 0'], ids=['wall', 'ceiling'])
+def test_a_mount_below_a_world_is_no_floor(mount):
+    """The usual root link: its plane is the floor, and not what the arm is screwed to."""
+    carried = (
+        '<link name="world"/><joint name="mount" type="fixed"><parent link="world"/>'
+        f'<child link="base"/><origin xyz="0 0 2.4" rpy="{mount}"/></joint></robot>'
+    )
+    collision = collision_model(robot_from_urdf(urdf(ABOVE).replace('</robot>', carried)))
+    with pytest.raises(TrajectoryError, match=r'base is mounted turned by (90|180) degrees'):
+        find_floor(collision)
+    assert find_floor(collision, '0').height == 0.0
+
+
 def test_an_arm_whose_only_link_is_below_its_base_is_asked_for():
     with pytest.raises(TrajectoryError, match=r'0\.\d+ m below it \(upper\)'):
         find_floor(bodies(BELOW))
