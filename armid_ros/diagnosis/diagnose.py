@@ -42,6 +42,7 @@ from armid_ros.diagnosis.verdict.headline import (
 )
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating
+from armid_ros.identification.rows.damage import without_damage
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -125,9 +126,11 @@ def diagnose(
         )
         return _with_small_print(result, settings.thresholds.headline)
     tell(0.02, 'filtering')
+    recordings, repairs = without_damage(recordings, settings.signals)
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
     faults, notes = check_data(arm, recordings, used, data)
+    notes += map(str, repairs)
     if faults:
         return _bad(arm, data, faults, notes)
     tell(0.1, 'noise floor')
@@ -137,11 +140,9 @@ def diagnose(
     before = trajectories(baseline, prepared.used, arm, prepared.allowed)
     known = Baseline.of(arm, before, rng) if baseline else None
     asked = _Asked(arm, prepared, validate, settings, rng, tell)
-    if settings.partner is not None:
-        tell(0.2, f'ties to {settings.partner.source}')
-        tied = diagnose_ties(arm, recordings, prepared, settings)
-        if tied is not None:
-            return _said(tied, notes, asked)
+    tied = _tied(asked, recordings)
+    if tied is not None:
+        return _said(tied, notes, asked)
     written = None if misfit is None else misfit.of(arm.robot)
 
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
@@ -222,6 +223,14 @@ class _Asked:
     settings: DiagnosisSettings
     rng: np.random.Generator
     tell: Progress
+
+
+def _tied(asked: _Asked, recordings: Sequence[Recording]) -> Chosen | None:
+    """Look for what ties the arm to another machine, if one is there."""
+    if asked.settings.partner is None:
+        return None
+    asked.tell(0.2, f'ties to {asked.settings.partner.source}')
+    return diagnose_ties(asked.arm, recordings, asked.prepared, asked.settings)
 
 
 def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:

@@ -2,10 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a reader should know of the data is said before any physics."""
 
+from dataclasses import replace
+
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import trajectories
 from armid_ros.diagnosis.data.gate import check_data
+from armid_ros.errors import IdentificationError
+from armid_ros.identification import identify
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
+import numpy as np
 import pytest
 
 from tests.diagnosis.conftest import Bench, URDF
@@ -26,3 +31,34 @@ def test_friction_that_a_description_states_and_a_model_lacks_is_said(stated):
     assert 'elbow' in said
     assert 'shoulder' not in said
     assert not any('<dynamics>' in note for note in notes(bench.arm))
+
+
+def faults(bench, recordings):
+    used = conditioning(recordings, SignalSettings())
+    return check_data(bench.arm, recordings, used, trajectories(recordings, used))[0]
+
+
+def test_a_position_that_jumps_is_named_with_its_joint_and_time(bench):
+    first, *others = bench.recordings()
+    q = first.q.copy()
+    q[500:, 1] += 0.5
+    jumped = replace(first, q=q)
+    (said,) = faults(bench, [jumped, *others])
+    assert f'position of elbow jumps by 0.504 at {first.t[500]:.3f} s' in said
+    assert not faults(bench, [first, *others])
+
+
+@pytest.mark.parametrize('joint', [0, 1])
+def test_friction_that_drives_is_the_opposite_sign(joint):
+    """Weights of the arm tell the sign of most joints; of a light wrist only friction does."""
+    light = URDF.replace('<mass value="1.5"/>', '<mass value="0.001"/>').replace(
+        '<mass value="3.0"/>', '<mass value="0.001"/>'
+    )
+    bench = Bench(urdf=light, viscous=(0.3, 0.2), coulomb=(1.5, 1.3))
+    assert not faults(bench, bench.recordings())
+    turned = np.where(np.arange(2) == joint, -1.0, 1.0)
+    wrong = [replace(one, tau=one.tau * turned) for one in bench.recordings()]
+    (said,) = faults(bench, wrong)
+    assert bench.robot.joints[joint] in said and 'negate it' in said
+    with pytest.raises(IdentificationError, match=f'{bench.robot.joints[joint]}.*negate it'):
+        identify(bench.arm, wrong, rng=np.random.default_rng(0))

@@ -18,11 +18,16 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.rows.checks import check_motion
+from armid_ros.identification.rows.checks import (
+    check_motion,
+    driven_by_friction,
+    wrong_sign,
+)
 from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
+from armid_ros.robots import Robot
 import numpy as np
 
 #: A torque follows the model of its own joint when this much of it is the model's ...
@@ -37,6 +42,8 @@ _UNITS = (
 )
 #: Share of samples at the very extreme of a reading, above which it is clipped.
 _CLIPPED = 0.02
+#: A step of a position at this multiple of the highest velocity is none of the arm.
+_IMPOSSIBLE = 10.0
 #: Share of steps in time that differ from the median by more than half of it.
 _UNEVEN = 0.05
 #: Jitter of stamps that blurs a torque at the end of the band by less than this share of it is
@@ -64,6 +71,11 @@ def check_data(
     slopes, correlation = _compare(_as_it_may_be(arm, data), data)
     faults = [*_time_base(recordings, _band(data)), *_torques(arm, slopes, correlation)]
     faults += _laws(arm, data)
+    faults += [text for one in recordings for text in _jumps(arm.robot, one)]
+    driven = driven_by_friction(
+        arm.robot, [part.at_rows for part in data], [part.torque for part in data]
+    )
+    faults += [wrong_sign(driven)] if driven and not faults else []
     notes = [*_clipped(recordings), *_described_friction(arm)]
     try:
         notes += check_motion(arm.robot, recordings, used)
@@ -95,6 +107,21 @@ def _as_it_may_be(arm: ArmModel, data: Sequence[Trajectory]) -> ArmModel:
         if after < least and other is not None:
             least, best = after, other
     return best
+
+
+def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:
+    """Say where positions first step faster than a joint can move."""
+    time = np.maximum(np.diff(recording.t), recording.period)[:, np.newaxis]
+    known = np.isfinite(robot.velocity_limit) & (robot.velocity_limit > 0.0)
+    limit = np.where(known, _IMPOSSIBLE * robot.velocity_limit, np.inf)
+    at = np.argwhere(np.abs(np.diff(recording.q, axis=0)) > limit * time)
+    if len(at):
+        row, joint = at[0]
+        step = recording.q[row + 1, joint] - recording.q[row, joint]
+        yield (
+            f'in {recording.source or "a recording"} the position of {robot.joints[joint]} jumps '
+            f'by {step:.3g} at {recording.t[row + 1]:.3f} s: leave out what is faulty'
+        )
 
 
 _Change = Callable[[FloatArray], ArmModel | None]

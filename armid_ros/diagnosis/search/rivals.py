@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armid_ros.diagnosis.data.rows import Problem, project
-from armid_ros.diagnosis.search.held_out import lead, Trial
+from armid_ros.diagnosis.data.rows import fold_rows, Problem, project
+from armid_ros.diagnosis.search.held_out import denies, HARDLY, lead, Trial
 from armid_ros.diagnosis.search.round import Beside, cost, Round
 from armid_ros.effects import CATALOGUE
 from armid_ros.motion import FloatArray
@@ -127,3 +127,21 @@ def contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: R
     flat = columns.reshape(-1, big.group.size)
     fit = np.linalg.lstsq(flat, target.ravel(), rcond=1e-6)[0]
     return bool(np.sum((target.ravel() - flat @ fit) ** 2) < thresholds.contained * squares)
+
+
+def denied_by_one(trial: Trial, here: Round) -> bool:
+    """
+    Return whether a recording denies a cause that others show, and that should show in it.
+
+    With recordings from before, the divisions of all recordings tell that more sharply.
+
+    """
+    data = here.evidence.data
+    if here.before is not None or len({part.fold for part in data}) < 2:
+        return False
+    recording = np.concatenate([np.full(len(part.rows), part.fold) for part in data])
+    _, first = np.unique(fold_rows(data), return_index=True)
+    owner = recording[first][trial.piece]
+    made = np.bincount(owner, trial.square)
+    shown = np.flatnonzero(made > HARDLY * made.max())
+    return any(denies(trial.cross[owner == k], trial.square[owner == k]) for k in shown)

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
-from armid_ros.diagnosis.data.rows import fold_rows, Problem, project, Projection
+from armid_ros.diagnosis.data.rows import Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.exchange import changed
-from armid_ros.diagnosis.search.held_out import denies, HARDLY, Trial, tried_beside
+from armid_ros.diagnosis.search.held_out import Trial, tried_beside
 from armid_ros.diagnosis.search.own_noise import explains_itself, made_of_noise, without_echo
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.products import products, with_group
@@ -20,6 +20,7 @@ from armid_ros.diagnosis.search.refine import refine
 from armid_ros.diagnosis.search.rivals import (
     beaten,
     contains,
+    denied_by_one,
     likeliest,
     rarity,
     what_happens_first,
@@ -190,24 +191,6 @@ def acceptable(trial: Trial, here: Round, tried: int) -> bool:
     return surely and worth(trial, here) > 0.0 and possible(trial, here)
 
 
-def _denied_by_one(trial: Trial, here: Round) -> bool:
-    """
-    Return whether a recording denies a cause that others show, and that should show in it.
-
-    With recordings from before, the divisions of all recordings tell that more sharply.
-
-    """
-    data = here.evidence.data
-    if here.before is not None or len({part.fold for part in data}) < 2:
-        return False
-    recording = np.concatenate([np.full(len(part.rows), part.fold) for part in data])
-    _, first = np.unique(fold_rows(data), return_index=True)
-    owner = recording[first][trial.piece]
-    made = np.bincount(owner, trial.square)
-    shown = np.flatnonzero(made > HARDLY * made.max())
-    return any(denies(trial.cross[owner == k], trial.square[owner == k]) for k in shown)
-
-
 def possible(trial: Trial, here: Round) -> bool:
     """Return whether the values are what could be called by the name."""
     effect, arm, kept = trial.group.effect, here.work.arm, list(trial.group.kept)
@@ -325,7 +308,7 @@ def _examined(
     there: list[Trial] = []
     large: list[tuple[Trial, FloatArray]] = []
     for trial in ranking[:_LOOKED_AT]:
-        if not acceptable(trial, here, tried) or _denied_by_one(trial, here):
+        if not acceptable(trial, here, tried) or denied_by_one(trial, here):
             continue
         (change,) = _changes(problem, beside, [trial], [trial], here)
         if change is None or not acceptable(change, here, tried):

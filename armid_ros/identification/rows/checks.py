@@ -12,7 +12,7 @@ from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.identification.rows.signals import Conditioning, segments
 from armid_ros.model import inverse_dynamics
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
@@ -24,6 +24,8 @@ REST_RANGE = 1e-3
 LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
 #: A recording shorter than this holds less than a movement [s].
 SHORTEST = 1.0
+#: Correlation with the direction of motion from which a torque is friction and nothing else.
+_CLEAR = 0.8
 #: Said of torques that are absent.
 SILENT = 'the torque of every joint is constant; is effort filled in?'
 
@@ -137,12 +139,65 @@ def check_torque(
             f'{source}: the arm gives out energy throughout, so the torques have the wrong sign; '
             'effort has to be positive along the URDF joint axis: negate it'
         )
-    for part in problem:
-        for law in laws_of_controllers(robot, part.motion, part.informative):
-            raise IdentificationError(f'{part.source or "recording"}: {law}')
+    _refuse_what_drives(robot, source, problem)
     if silent:
         return (f'torque constant throughout: {", ".join(silent)}',)
     return ()
+
+
+def _refuse_what_drives(robot: Robot, source: str, problem: Sequence[Regression]) -> None:
+    """Refuse friction that drives, and torques that are a law of a controller."""
+    motions, torques = [part.motion for part in problem], [part.tau for part in problem]
+    driven = driven_by_friction(robot, motions, torques)
+    if driven:
+        raise IdentificationError(f'{source}: {wrong_sign(driven)}')
+    for part in problem:
+        for law in laws_of_controllers(robot, part.motion, part.informative):
+            raise IdentificationError(f'{part.source or "recording"}: {law}')
+
+
+def wrong_sign(joints: Sequence[str]) -> str:
+    """Say what is wrong with the torque of joints that friction seems to drive."""
+    return (
+        f'the torque of {", ".join(joints)} is friction that drives, as only the opposite sign '
+        'shows; effort has to be positive along the URDF joint axis: negate it'
+    )
+
+
+def driven_by_friction(
+    robot: Robot, motions: Sequence[Motion], torques: Sequence[FloatArray]
+) -> list[str]:
+    """
+    Return the joints whose torque follows the direction of motion clearly, and the wrong way.
+
+    Weight and inertia are taken out, as described and of the joint alone. What is left of a wrist
+    is friction, and its sign shows nowhere else.
+
+    Parameters
+    ----------
+    robot : Robot
+        The description.
+    motions : sequence of Motion
+        The data.
+    torques : sequence of ndarray, shape (N, n)
+        What was measured [N m].
+
+    """
+    found = []
+    described = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
+    for joint, name in enumerate(robot.joints):
+        q, dq, ddq = (
+            np.concatenate([getattr(motion, which)[:, joint] for motion in motions])
+            for which in ('q', 'dq', 'ddq')
+        )
+        tau = np.concatenate([torque[:, joint] for torque in torques])
+        held = np.column_stack([np.ones(len(q)), np.sin(q), np.cos(q), ddq, described[:, joint]])
+        pair = np.column_stack([np.sign(dq), tau])
+        rest = pair - held @ np.linalg.lstsq(held, pair, rcond=None)[0]
+        size = float(np.sqrt(np.prod(np.sum(rest**2, axis=0))))
+        if size > 0.0 and rest[:, 0] @ rest[:, 1] < -_CLEAR * size:
+            found.append(name)
+    return found
 
 
 def _gives_out_energy(problem: Sequence[Regression]) -> bool:
