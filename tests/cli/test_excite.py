@@ -191,3 +191,12 @@ def test_an_arm_of_one_joint_is_excited(tmp_path, kind, criterion):
 @pytest.mark.filterwarnings('error::RuntimeWarning')
 def test_joints_that_turn_without_end_give_no_warnings(tmp_path):
     excite(example('double_pendulum_continuous'), tmp_path / 'plan')
+
+
+def test_a_recording_is_no_folder_for_a_design(tmp_path):
+    bag = tmp_path / 'monday'
+    bag.mkdir()
+    (bag / 'monday_0.mcap').write_bytes(b'recorded')
+    refused = excite(ROBOT, bag, code=2)
+    assert f'{bag} is a recording; name another --out' in refused.stderr
+    assert [path.name for path in bag.iterdir()] == ['monday_0.mcap']

@@ -125,7 +125,9 @@ class Written:
 
 
 def require_free(folder: Path) -> None:
-    """Raise a RecordingError where there is a bag already, before a design takes its time."""
+    """Raise a RecordingError where a recording is already, before a design takes its time."""
+    if any(folder.glob('*.mcap')) or (folder / 'metadata.yaml').exists():
+        raise RecordingError(f'{folder} is a recording; name another --out')
     if (folder / BAG).exists():
         raise RecordingError(f'{folder / BAG} exists already; name another --out, or delete it')
 
