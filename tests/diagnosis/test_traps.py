@@ -122,10 +122,6 @@ def drag(motion, tau):
     return on_elbow(0.1 * motion.dq[:, 1] * np.abs(motion.dq[:, 1]))
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason='a substitute is named beside a body fitted anew whose links are no bodies',
-)
 def test_a_surrogate_for_a_name_that_is_not_in_the_library_is_provisional(bench):
     library = tuple(name for name in CATALOGUE if name != 'quadratic_friction')
     found = look(bench, bench.recordings(drag), settings=DiagnosisSettings(library=library))
