@@ -100,7 +100,7 @@ RULES = {
     'small names that close a gap stay': Rule('verdict.headline._opens', no),
     'names that other data deny go': Rule('verdict.attribution.Attribution.denied', no),
     'needless names go': Rule('search.explain._pruned', all_names),
-    'a small lead decides nothing': Rule('search.explain.undecided', no),
+    'a small lead decides nothing': Rule('search.forward.undecided', no),
     'the simplest that closes the gap': Rule('search.step.likeliest', first),
     'what contains a cause is no rival': Rule('search.step.contains', no),
     'compared beside what each was': Rule('search.step._compared', as_they_are),

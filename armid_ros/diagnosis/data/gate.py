@@ -72,10 +72,7 @@ def check_data(
     faults = [*_time_base(recordings, _band(data)), *_torques(arm, slopes, correlation)]
     faults += _laws(arm, data)
     faults += [text for one in recordings for text in _jumps(arm.robot, one)]
-    driven = driven_by_friction(
-        arm.robot, [part.at_rows for part in data], [part.torque for part in data]
-    )
-    faults += [wrong_sign(driven)] if driven and not faults else []
+    faults += [] if faults else _signs(arm, recordings, data)
     notes = [*_clipped(recordings), *_described_friction(arm)]
     try:
         notes += check_motion(arm.robot, recordings, used)
@@ -107,6 +104,17 @@ def _as_it_may_be(arm: ArmModel, data: Sequence[Trajectory]) -> ArmModel:
         if after < least and other is not None:
             least, best = after, other
     return best
+
+
+def _signs(
+    arm: ArmModel, recordings: Sequence[Recording], data: Sequence[Trajectory]
+) -> list[str]:
+    """Say whose friction drives; another machine that an arm is tied to may drive it."""
+    if any(one.partner is not None for one in recordings):
+        return []
+    motions, torques = [part.at_rows for part in data], [part.torque for part in data]
+    driven = driven_by_friction(arm.robot, motions, torques)
+    return [wrong_sign(driven)] if driven else []
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:

@@ -160,7 +160,8 @@ def wrong_sign(joints: Sequence[str]) -> str:
     """Say what is wrong with the torque of joints that friction seems to drive."""
     return (
         f'the torque of {", ".join(joints)} is friction that drives, as only the opposite sign '
-        'shows; effort has to be positive along the URDF joint axis: negate it'
+        'shows, or somebody who moves the arm; effort has to be positive along the URDF joint '
+        'axis: negate it'
     )
 
 

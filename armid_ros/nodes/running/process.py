@@ -158,7 +158,7 @@ def _leave(node: ArmidNode | None) -> None:
     was killed. The watchdog is a thread in C: it says where the process hangs, and ends it.
 
     """
-    faulthandler.dump_traceback_later(LEAVING, exit=True)
+    faulthandler.dump_traceback_later(LEAVING, exit=True, file=sys.__stderr__)
     if node is not None:
         node.destroy_node()
     rclpy.try_shutdown()
