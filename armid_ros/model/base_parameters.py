@@ -95,7 +95,8 @@ class BaseParameters:
         """
         grouping = np.zeros((self.rank, len(standard)))
         grouping[:, columns] = self.grouping
-        return BaseParameters(standard, self.parameters, columns[self.independent], grouping)
+        independent = columns[self.independent]
+        return BaseParameters(standard, self.parameters, independent, read_only(grouping))
 
     def values(self, theta: npt.ArrayLike) -> FloatArray:
         """Return the base parameters, shape (r,), of standard parameters, shape (P,)."""

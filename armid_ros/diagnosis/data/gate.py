@@ -71,7 +71,8 @@ def check_data(
     slopes, correlation = _compare(_as_it_may_be(arm, data), data)
     faults = [*_time_base(recordings, _band(data)), *_torques(arm, slopes, correlation)]
     faults += _laws(arm, data)
-    faults += [text for one in recordings for text in _jumps(arm.robot, one)]
+    for recording in recordings:
+        faults += _jumps(arm.robot, recording)
     faults += [] if faults else _signs(arm, recordings, data)
     notes = [*_clipped(recordings), *_described_friction(arm)]
     try:

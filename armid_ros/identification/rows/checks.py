@@ -186,15 +186,11 @@ def driven_by_friction(
     """
     found = []
     described = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
+    tau = np.concatenate(torques)
     for joint, name in enumerate(robot.joints):
-        q, dq, ddq = (
-            np.concatenate([getattr(motion, which)[:, joint] for motion in motions])
-            for which in ('q', 'dq', 'ddq')
-        )
-        tau = np.concatenate([torque[:, joint] for torque in torques])
-        held = np.column_stack([np.ones(len(q)), np.sin(q), np.cos(q), ddq, described[:, joint]])
-        pair = np.column_stack([np.sign(dq), tau])
-        rest = pair - held @ np.linalg.lstsq(held, pair, rcond=None)[0]
+        held, dq = _held(motions, joint)
+        held = np.column_stack([held, described[:, joint]])
+        rest = _rest(np.column_stack([np.sign(dq), tau[:, joint]]), held)
         size = float(np.sqrt(np.prod(np.sum(rest**2, axis=0))))
         if size > 0.0 and rest[:, 0] @ rest[:, 1] < -_CLEAR * size:
             found.append(name)
@@ -213,19 +209,27 @@ def _gives_out_energy(problem: Sequence[Regression]) -> bool:
     activity = sum(float(np.sum(np.abs(part.tau * part.motion.dq))) for part in problem)
     if power >= -0.2 * activity:
         return False
-    for joint in range(problem[0].tau.shape[1]):
-        q, dq, ddq, tau = (
-            np.concatenate([array[:, joint] for array in arrays])
-            for arrays in zip(
-                *((p.motion.q, p.motion.dq, p.motion.ddq, p.tau) for p in problem), strict=True
-            )
-        )
-        held = np.column_stack([np.ones(len(q)), np.sin(q), np.cos(q), ddq])
-        pair = np.column_stack([dq, tau])
-        rest = pair - held @ np.linalg.lstsq(held, pair, rcond=None)[0]
+    tau = np.concatenate([part.tau for part in problem])
+    for joint in range(tau.shape[1]):
+        held, dq = _held([part.motion for part in problem], joint)
+        rest = _rest(np.column_stack([dq, tau[:, joint]]), held)
         if rest[:, 0] @ rest[:, 1] > 0.0:
             return False
     return True
+
+
+def _held(motions: Sequence[Motion], joint: int) -> tuple[FloatArray, FloatArray]:
+    """Return columns of weight and inertia of a joint, shape (N, 4), and its velocity, (N,)."""
+    q, dq, ddq = (
+        np.concatenate([getattr(motion, which)[:, joint] for motion in motions])
+        for which in ('q', 'dq', 'ddq')
+    )
+    return np.column_stack([np.ones(len(q)), np.sin(q), np.cos(q), ddq]), dq
+
+
+def _rest(values: FloatArray, nuisance: FloatArray) -> FloatArray:
+    """Return what least squares by nuisance columns leave of values, shape (N, K)."""
+    return np.asarray(values - nuisance @ np.linalg.lstsq(nuisance, values, rcond=None)[0])
 
 
 def check_positions(robot: Robot, source: str, lowest: FloatArray, highest: FloatArray) -> None:
@@ -262,7 +266,7 @@ def _slope_on_description(
     for joint in range(robot.n_joints):
         nuisance = np.column_stack([np.ones(len(dq)), dq[:, joint], np.sign(dq[:, joint])])
         pair = np.column_stack([predicted[:, joint], measured[:, joint]])
-        rest = pair - nuisance @ np.linalg.lstsq(nuisance, pair, rcond=None)[0]
+        rest = _rest(pair, nuisance)
         product, own = rest[:, 0] @ rest[:, 1], rest[:, 0] @ rest[:, 0]
         if own > 0.0 and rest[:, 1] @ rest[:, 1] > 0.0:
             slope[joint] = product / own
