@@ -37,6 +37,9 @@ class Thresholds:
     misfit_share : float
         Power of a cause over that of the model's own misfit, below which it is small print in that
         joint: a quarter of it names a change in one of five arms to which nothing happened.
+    exchanged : float
+        Share of the divisions of all recordings that may show as much of a change as the days do.
+        Where there are so many of them that one is less than that, smaller changes are told, too.
     headline : float
         Share that a cause takes of a gap beside the misfit that a model had before, below which it
         is small print.
@@ -92,6 +95,7 @@ class Thresholds:
     tie: float = 0.02
     far: float = 0.25
     misfit_share: float = 1.0
+    exchanged: float = 0.01
     headline: float = 0.1
     same_fit: float = 1.5
     uncertain: float = 0.25

@@ -179,6 +179,11 @@ class Effect(ABC):
         joints = cls._default_joints(robot)
         return tuple((joint,) for joint in joints) or ((),)
 
+    @classmethod
+    def as_change(cls) -> type[Effect]:
+        """Return what is looked for between two days: something may have been there before."""
+        return cls
+
     def particulars(self) -> dict[str, Any]:
         """Return what model.yaml holds of it in addition to joints, parameters and shapes."""
         return {}

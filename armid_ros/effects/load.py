@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
@@ -93,6 +93,11 @@ class Payload(_LinkBody):
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         return robot.joints[-1:]
 
+    @classmethod
+    def as_change(cls) -> type[Effect]:
+        """Return a load that may have been put down."""
+        return LoadChange
+
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether it may weigh something, not farther away than the arm is long."""
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
@@ -104,6 +109,26 @@ class Payload(_LinkBody):
         """Return what an arm may carry at the most: as much as it weighs, a little off, (P,)."""
         mass = float(robot.rigid_parameters[:: len(LINK_PARAMETERS)].sum())
         return np.asarray(mass * np.array([1.0] + 3 * [_REACH] + 6 * [_REACH**2]))
+
+
+@dataclass(frozen=True)
+class LoadChange(Payload):
+    """
+    Difference of what a link holds from what it held, which may be nothing now.
+
+    A payload of less than nothing was put down: the model has it in the link that held it.
+
+    """
+
+    quantities = tuple(replace(one, lower=-np.inf) for one in Payload.quantities)
+
+    def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
+        """Return whether what was taken or put down may be called a load."""
+        return super().plausible(np.concatenate([np.abs(values[:1]), values[1:]]), std, arm)
+
+    def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
+        """Return the payload."""
+        return ((Payload(self.joints), values),)
 
 
 @dataclass(frozen=True)

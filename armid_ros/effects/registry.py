@@ -47,6 +47,9 @@ class Kind(Protocol):
     def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
         """Return the sets of joints on which it is one cause."""
 
+    def as_change(self) -> Kind:
+        """Return what is looked for between two days."""
+
 
 class Catalogue(Mapping[str, type[Effect]]):
     """

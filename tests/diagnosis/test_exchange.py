@@ -3,7 +3,7 @@
 """A cause has changed between two days if no other division of the recordings shows more of it."""
 
 from armid_ros.diagnosis import diagnose
-from armid_ros.diagnosis.search.exchange import Rows, stands_out
+from armid_ros.diagnosis.search.exchange import Rows, showing_more
 from armid_ros.effects import make_effect
 from armid_ros.identification import identify
 import numpy as np
@@ -22,7 +22,10 @@ def asked(first, second):
     rows = [*first, *second]
     free = np.concatenate([one.free for one in rows])
     left = np.concatenate([one.left for one in rows])
-    return stands_out(first, second, (free.T @ free, free.T @ left), np.array([1e-9]))
+    more, divisions = showing_more(
+        first, second, (free.T @ free, free.T @ left), np.array([1e-9])
+    )
+    return more == 0
 
 
 @pytest.mark.parametrize('freedom', [1.0, 2.0, 100.0], ids=['wild', 'heavy tails', 'normal'])
@@ -53,7 +56,7 @@ def test_values_that_no_motion_shows_hide_no_change():
     wide = [Rows(one.free, np.hstack([one.own, 1e-12 * one.own]), one.left) for one in days]
     free, left = (np.concatenate([getattr(one, n) for one in days]) for n in ('free', 'left'))
     known = free.T @ free, free.T @ left
-    assert stands_out(wide[:3], wide[3:], known, np.array([1e-9, 0.3]))
+    assert showing_more(wide[:3], wide[3:], known, np.array([1e-9, 0.3])) == (0, 34)
 
 
 def test_what_one_recording_of_the_day_before_had_as_well_is_no_change():

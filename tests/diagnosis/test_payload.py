@@ -5,6 +5,7 @@
 from dataclasses import replace
 
 from armid_ros.diagnosis import diagnose
+from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
@@ -12,16 +13,20 @@ import pytest
 MASS, HEIGHT = 0.6, 0.3
 
 
-@pytest.mark.parametrize('friction', ['known', 'named'])
-@pytest.mark.parametrize('arm', ['bench', 'upright'])
-def test_a_payload_is_named_with_its_mass(request, arm, friction):
-    arm = request.getfixturevalue(arm)
-    robot = arm.robot
+def held_by(robot):
+    """Return what a body that the last link holds adds to torques of a motion."""
     parameters = robot.rigid_parameters.copy()
     inertia = MASS * HEIGHT**2
     parameters[-10:] += [MASS, 0.0, 0.0, MASS * HEIGHT, inertia, 0.0, inertia, 0.0, 0.0, 0.0]
     true = robot.with_inertias(parameters)
-    hidden = arm.recordings(lambda m, tau: inverse_dynamics(true, m) - inverse_dynamics(robot, m))
+    return lambda motion, tau: inverse_dynamics(true, motion) - inverse_dynamics(robot, motion)
+
+
+@pytest.mark.parametrize('friction', ['known', 'named'])
+@pytest.mark.parametrize('arm', ['bench', 'upright'])
+def test_a_payload_is_named_with_its_mass(request, arm, friction):
+    arm = request.getfixturevalue(arm)
+    hidden = arm.recordings(held_by(arm.robot))
     model = arm.arm if friction == 'known' else arm.named_friction()
     found = diagnose(model, hidden, rng=np.random.default_rng(0))
     assert found.verdict in ('named', 'ambiguous'), found.summary
@@ -30,6 +35,22 @@ def test_a_payload_is_named_with_its_mass(request, arm, friction):
     assert payload.values[0] == pytest.approx(MASS, rel=0.05)
     others = {finding.name for finding in found.findings} - {'payload'}
     assert others <= {'viscous_friction', 'coulomb_friction'}
+
+
+@pytest.mark.parametrize('arm', ['bench', 'upright'])
+def test_a_payload_that_was_put_down_is_less_than_nothing(request, arm):
+    arm = request.getfixturevalue(arm)
+    loaded = arm.recordings(held_by(arm.robot))
+    model = identify(arm.arm, loaded, rng=np.random.default_rng(0)).arm
+    found = diagnose(
+        model, arm.recordings(seed=7), baseline=loaded, rng=np.random.default_rng(0)
+    )
+    assert found.verdict in ('named', 'ambiguous'), found.summary
+    (payload,) = found.findings
+    assert (payload.name, payload.joints) == ('payload', ('elbow',))
+    values = dict(zip([p.name for p in payload.parameters], payload.values, strict=True))
+    assert values['payload_mz'] == pytest.approx(-MASS * HEIGHT, rel=0.05)
+    assert 'was put down' in found.summary
 
 
 @pytest.mark.parametrize('side', [1.0, -1.0])

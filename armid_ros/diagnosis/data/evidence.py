@@ -232,13 +232,17 @@ class Evidence:
         correlation = products[1:] / np.maximum(products[0], 1e-300)
         return np.asarray(1.0 + 2.0 * np.sum(correlation**2, axis=0))
 
-    def least_squares(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the squares over the unit that a cause takes of a joint if it matters, (n,)."""
-        share = settings.thresholds.misfit_share
+    def least_squares(self, settings: DiagnosisSettings, misfit_share: float) -> FloatArray:
+        """
+        Return the squares over the unit that a cause takes of a joint if it matters, (n,).
+
+        It takes no less than a share of the misfit.
+
+        """
         wanted = (settings.material * self.torque_rms) ** 2
         total = np.zeros_like(self.count)
         for part, sigma, noise in zip(self.data, self.sigma, self.noise, strict=True):
-            misfit = share * np.maximum(sigma**2 - noise**2, 0.0)
+            misfit = misfit_share * np.maximum(sigma**2 - noise**2, 0.0)
             total += part.informative.sum(axis=0) * np.maximum(wanted, misfit) / sigma**2
         return np.maximum(total, 1e-12)
 

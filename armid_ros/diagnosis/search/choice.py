@@ -151,7 +151,7 @@ def _beside(
     noise = prepared.as_described
     evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
     given = as_given(arm, prepared.data, 2 * settings.thresholds.few_causes, settings.library)
-    found = explain(given, evidence, settings)
+    found = explain(replace(given, since=True), evidence, settings)
     if at_floor(found, settings):
         return Chosen(found, misfit, WRITTEN_MISFIT)
     tell(0.6, 'the model fitted anew')
@@ -202,7 +202,7 @@ def _since(
     assert free.base is not None and free.beside_base is not None
     told = baseline.told(free.arm, free.base)
     beside = told if free.beside is arm else baseline.told(free.beside, free.beside_base)
-    question = replace(free, told=told, beside_told=beside)
+    question = replace(free, told=told, beside_told=beside, since=True)
     more = None
     if unseen:
         unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(unseen)

@@ -6,8 +6,8 @@ Whether a cause differs between two days by more than between any recordings.
 What a model gets wrong of one motion is another thing than what it gets wrong of the next, and of
 hundreds of causes some lie along the difference. Where nothing happened the recordings of both
 days are exchangeable: divided into two groups in another way they show as much of a cause. It has
-changed between the days if no other division shows more of it: a permutation test, which needs no
-distribution of the misfit.
+changed between the days if no other division shows more of it, or of many divisions hardly one: a
+permutation test, which needs no distribution of the misfit.
 
 """
 
@@ -54,9 +54,30 @@ class Rows:
 
 
 def changed(trial: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
-    """Return whether no other division of the recordings shows more of a cause than the days."""
+    """Return whether hardly a division of the recordings shows more of a cause than the days."""
     if here.before is None:
         return True
+    more, divisions = _showing_more(trial, problem, beside, here)
+    return more == 0 or _seldom(more, divisions, here)
+
+
+def surely_changed(trial: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
+    """Return whether so many divisions show less of a cause that a misfit hides no change."""
+    return here.before is not None and _seldom(
+        *_showing_more(trial, problem, beside, here), here
+    )
+
+
+def _seldom(more: int, divisions: int, here: Round) -> bool:
+    """Return whether chance makes the days stand out as they do in few cases of a hundred."""
+    return more + 1 <= here.settings.thresholds.exchanged * (divisions + 1)
+
+
+def _showing_more(
+    trial: Trial, problem: Problem, beside: Beside, here: Round
+) -> tuple[int, int]:
+    """Return how many divisions show more of a cause than the days do, and of how many."""
+    assert here.before is not None
     first, second = _before(trial, beside, here), _today(trial, problem, beside, here)
     later = here.before.later
     if later is not None:
@@ -67,17 +88,17 @@ def changed(trial: Trial, problem: Problem, beside: Beside, here: Round) -> bool
     if later is not None:
         for columns, left in zip(later.free, later.left, strict=True):
             hold, pull = hold + columns.T @ columns, pull + columns.T @ left
-    return stands_out(first, second, (hold, pull), trial.group.precision)
+    return showing_more(first, second, (hold, pull), trial.group.precision)
 
 
-def stands_out(
+def showing_more(
     first: Sequence[Rows],
     second: Sequence[Rows],
     known: tuple[FloatArray, FloatArray],
     precision: FloatArray,
-) -> bool:
+) -> tuple[int, int]:
     """
-    Return whether two groups of recordings differ by more than other groups of them would.
+    Return how many other divisions of recordings differ by more than two groups, and of how many.
 
     Parameters
     ----------
@@ -110,7 +131,8 @@ def stands_out(
 
     days = np.arange(len(rows)) >= len(first)
     least = explained(days) * (1.0 + _ROUNDING)
-    return all(explained(other) <= least for other in _divisions(days))
+    others = [explained(other) for other in _divisions(days)]
+    return sum(other > least for other in others), len(others)
 
 
 def _divisions(days: npt.NDArray[np.bool_]) -> Iterator[npt.NDArray[np.bool_]]:

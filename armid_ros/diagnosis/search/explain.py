@@ -272,7 +272,7 @@ def _friction(
             left.append((effect, where[column], float(theta[column])))
     work = Workspace(memoized_arm(arm), evidence.data)
     gone: list[int] = []
-    alive = dict(enumerate(left))
+    alive, least = dict(enumerate(left)), settings.thresholds.misfit_share
     judged: dict[int, tuple[Trial, float]] = {}
     while alive:
         weakest: tuple[float, int] | None = None
@@ -284,7 +284,7 @@ def _friction(
             good = False
             if trial is not None:
                 here = Round(evidence, work, settings, total)
-                good = _stands(trial, problem, beside, here, whole[1])
+                good = _stands(trial, problem, beside, here, whole[1], least)
                 judged[k] = trial, total
             gain = trial.gain if trial is not None else -np.inf
             if not good and (weakest is None or gain < weakest[0]):
@@ -297,16 +297,18 @@ def _friction(
     result = []
     for k, (effect, _, value) in alive.items():
         trial, total = judged[k]
-        step = Step(trial, (), (trial,), total, whole[1])
+        step = Step(trial, (), (trial,), total, whole[1], least)
         result.append((Named(effect, (0,)), step, np.array([value])))
     return result
 
 
-def _stands(trial: Trial, problem: Problem, beside: Beside, here: Round, tried: int) -> bool:
+def _stands(
+    trial: Trial, problem: Problem, beside: Beside, here: Round, tried: int, misfit_share: float
+) -> bool:
     """Return whether a cause, whose columns come first, passes and matters."""
     own = problem.x[:, :, : trial.group.size]
     gains = trial.joint_gains(problem, own, beside.rows(problem))
-    return acceptable(trial, here, tried) and material(gains, here)
+    return acceptable(trial, here, tried) and material(gains, here, misfit_share)
 
 
 def _pruned(
@@ -332,7 +334,7 @@ def _pruned(
             here = Round(evidence, work, settings, step.total)
             if trial is None:
                 needless.append((-np.inf, k))
-            elif not _stands(trial, problem, beside, here, step.tried):
+            elif not _stands(trial, problem, beside, here, step.tried, step.misfit_share):
                 needless.append((trial.gain, k))
         if not needless:
             return list(fitted.named), steps, fitted

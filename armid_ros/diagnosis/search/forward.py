@@ -155,7 +155,7 @@ class Search:
         question, data, sigma = self.question, self.evidence.data, self.evidence.sigma
         arm, base = question.beside, question.beside_base
         current = fit(arm, named, data, sigma, base, values, question.beside_told)
-        found = candidates(current, data, sigma, self.settings.kinds)
+        found = candidates(current, data, sigma, question.kinds(self.settings.kinds))
         problem, beside = beside_fit(found, current, self.evidence)
         before = self._before(current)
         work = Workspace(memoized_arm(current.arm), data)

@@ -144,7 +144,7 @@ def _there(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
     """Return where an arm has the values of an effect already; None if it has not all of them."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
-        if type(own) is type(effect) and not own.shapes and not own.points:
+        if isinstance(effect, type(own)) and not own.shapes and not own.points:
             names = [(p.name, p.joint) for p in own.parameters(arm.robot)]
             if set(wanted) <= set(names):
                 return position, [names.index(name) for name in wanted]

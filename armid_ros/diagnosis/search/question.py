@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.search.fit import excited, Told
-from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.effects import CATALOGUE, Effect, Kind
 from armid_ros.model import BaseParameters, group_columns
 import numpy as np
 
@@ -39,6 +39,8 @@ class Question:
         Causes that are looked for.
     told, beside_told : Told or None
         What other data tell of what is free.
+    since : bool
+        Whether what has changed is asked, and not what was always there.
 
     """
 
@@ -50,6 +52,11 @@ class Question:
     most: int
     told: Told | None = None
     beside_told: Told | None = None
+    since: bool = False
+
+    def kinds(self, library: Sequence[Kind]) -> tuple[Kind, ...]:
+        """Return what is looked for, of effects that may be named."""
+        return tuple(kind.as_change() for kind in library) if self.since else tuple(library)
 
 
 def as_given(

@@ -11,7 +11,7 @@ from itertools import takewhile
 
 from armid_ros.diagnosis.data.rows import Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.exchange import changed
+from armid_ros.diagnosis.search.exchange import changed, surely_changed
 from armid_ros.diagnosis.search.held_out import Trial, tried_beside
 from armid_ros.diagnosis.search.own_noise import explains_itself, made_of_noise, without_echo
 from armid_ros.diagnosis.search.patch import room
@@ -58,6 +58,9 @@ class Step:
         Held-out squares that shares are of.
     tried : int
         Groups that were tried, every shape for itself.
+    misfit_share : float
+        Share of the misfit that it has to take: nothing where so many divisions of the recordings
+        show less of it that a misfit does not hide it.
 
     """
 
@@ -66,6 +69,7 @@ class Step:
     ranking: tuple[Trial, ...]
     total: float
     tried: int
+    misfit_share: float
 
 
 @dataclass(frozen=True)
@@ -165,7 +169,9 @@ class Look:
         ]
         best = {trial.group.effect.name: trial for trial in reversed(rivals)}
         likely = tuple(sorted(best.values(), key=rarity)[:_RIVALS])
-        return Step(winner, likely, self.ranking, self.survey.total, self.survey.tried)
+        whole = here.settings.thresholds.misfit_share
+        least = 0.0 if surely_changed(winner, problem, beside, here) else whole
+        return Step(winner, likely, self.ranking, self.survey.total, self.survey.tried, least)
 
 
 def look_at(problem: Problem, beside: Beside, groups: Sequence[Group], here: Round) -> Look:
@@ -209,9 +215,9 @@ def _inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
     return np.asarray((trial.values > lower - slack) & (trial.values < upper + slack))
 
 
-def material(gains: FloatArray, here: Round) -> bool:
+def material(gains: FloatArray, here: Round, misfit_share: float) -> bool:
     """Return whether a cause that takes these squares of the joints takes as much as matters."""
-    return bool(np.any(gains >= here.evidence.least_squares(here.settings)))
+    return bool(np.any(gains >= here.evidence.least_squares(here.settings, misfit_share)))
 
 
 def _best_per_key(trials: Sequence[Trial], here: Round) -> list[Trial]:
@@ -302,7 +308,7 @@ def _examined(
     """
     assert here.total is not None
     least = 0.0 if here.before is None else here.settings.thresholds.headline * here.total
-    free = beside.rows(problem)
+    free, whole = beside.rows(problem), here.settings.thresholds.misfit_share
     open_squares = _open_squares(problem, beside, here)
     most = here.settings.thresholds.open_share
     there: list[Trial] = []
@@ -317,7 +323,10 @@ def _examined(
         own = problem.x[:, :, trial.group.columns]
         takes = trial.joint_gains(problem, own, free)
         matters = change.gain >= least or bool(np.any(takes > most * open_squares))
-        if matters and material(_size(change, takes, own, here), here):
+        size = _size(change, takes, own, here)
+        if not (matters and material(size, here, 0.0)):
+            continue
+        if material(size, here, whole) or surely_changed(trial, problem, beside, here):
             large.append((trial, takes))
     best = large[:_COMPARED]
     seen = {id(trial) for trial, _ in best}

@@ -115,11 +115,12 @@ def _explanation(ties: Ties, fitted: Fitted) -> Explanation:
     reference = ties.fitted(())
     survey, rivals = _rivals(ties, reference, fitted)
     view = View.of(fitted, ties.evidence)
+    share = ties.settings.thresholds.misfit_share
     steps = []
     for k in range(len(fitted.named)):
         trial, _, _, total = view.trial_of(k)
         assert trial is not None
-        steps.append(Step(trial, rivals, (trial,), total, survey.tried))
+        steps.append(Step(trial, rivals, (trial,), total, survey.tried, share))
     base: BaseParameters | None = ties.base
     return Explanation(ties.arm, base, fitted, reference, tuple(steps), survey, ties.evidence)
 

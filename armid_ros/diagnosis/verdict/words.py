@@ -158,7 +158,8 @@ def sentence(finding: Finding, robot: Robot) -> str:
         where = ', '.join(_tie(finding, tie.joint, tie.name) for tie in finding.ties)
         return f'{words.capitalize()} at {where} {explains}.'
     if finding.weighs and finding.values:
-        return f'{article} {words} {_weight(finding)} on {finding.joints[0]} {explains}.'
+        down = ' that was put down' if finding.values[0] < -HALF_WIDTH * finding.std[0] else ''
+        return f'{article} {words} {_weight(finding)} on {finding.joints[0]}{down} {explains}.'
     if len(finding.joints) > _JOINTS_SAID:
         return f'{words.capitalize()} in {len(finding.joints)} joints {explains}.'
     where = f' in {", ".join(finding.joints)}' if finding.joints else ''
@@ -175,7 +176,7 @@ def sentence(finding: Finding, robot: Robot) -> str:
 
 def _weight(finding: Finding) -> str:
     """Return the mass of a payload, or that it is not determined."""
-    mass, std = finding.values[0], finding.std[0]
+    mass, std = abs(finding.values[0]), finding.std[0]
     if mass < HALF_WIDTH * std:
         return 'whose mass these data do not determine'
     return f'of {_as_sure(mass, std)} kg'
