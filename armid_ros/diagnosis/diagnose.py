@@ -126,11 +126,11 @@ def diagnose(
         )
         return _with_small_print(result, settings.thresholds.headline)
     tell(0.02, 'filtering')
-    recordings, repairs = without_damage(recordings, settings.signals)
+    recordings, validate, baseline, repairs = _whole(recordings, validate, baseline, settings)
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
     faults, notes = check_data(arm, recordings, used, data)
-    notes += map(str, repairs)
+    notes += repairs
     if faults:
         return _bad(arm, data, faults, notes)
     tell(0.1, 'noise floor')
@@ -159,6 +159,24 @@ def diagnose(
     if not validate or not (said.verdict == 'unknown' or said.harmful):
         return said
     return _what_stands(ask, settings, fallen) or _small_but_all(ask, settings, said) or said
+
+
+def _whole(
+    recordings: Sequence[Recording],
+    validate: Sequence[Recording],
+    baseline: Sequence[Recording],
+    settings: DiagnosisSettings,
+) -> tuple[list[Recording], list[Recording], list[Recording], list[str]]:
+    """Return recordings without damaged samples, and what reading and mending did to them."""
+    notes: list[str] = []
+    mended: list[list[Recording]] = []
+    for part in (recordings, validate, baseline):
+        whole, repairs = without_damage(part, settings.signals) if part else ([], ())
+        mended.append(whole)
+        harmed_ones = [one for one in part if not one.report.unharmed]
+        notes += [f'{one.source}: {one.report.describe()}' for one in harmed_ones]
+        notes += map(str, repairs)
+    return mended[0], mended[1], mended[2], notes
 
 
 #: Says what is found with settings, and which names do not stand on other recordings.

@@ -170,6 +170,10 @@ class TiedKind:
         """Return the joints that have a tie, one by one."""
         return tuple((tie.joint,) for tie in self.ties)
 
+    def as_change(self) -> TiedKind:
+        """Return the same: it has no values from before."""
+        return self
+
     def on(self, robot: Robot, joints: Sequence[str] | None = None) -> Effect:
         """
         Make the effect on the joints named, or on all that have a tie.

@@ -95,6 +95,11 @@ class ReadReport:
         """Whether every message became a sample and nothing is missing."""
         return self == ReadReport(messages=self.messages, samples=self.samples)
 
+    @property
+    def unharmed(self) -> bool:
+        """Whether reading lost and repaired nothing; velocities are not needed."""
+        return replace(self, absent=()).clean
+
     def describe(self) -> str:
         """Return the report as one or a few sentences."""
         sentences = [f'{self.samples} samples from {self.messages} messages']

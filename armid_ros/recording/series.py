@@ -139,7 +139,7 @@ def ordered(states: JointStates, clock: Clock, counts: Counter[str]) -> JointSam
     if not stamped.all():
         counts['unstamped'] += int((~stamped).sum())
         series = series.select(stamped)
-    run = _longest_run(series.stamps)
+    run = longest_run(series.stamps)
     if run is not None:
         counts['restarted'] += len(series) - (run.stop - run.start)
         series = series.select(run)
@@ -253,7 +253,7 @@ def _side_by_side(
     )
 
 
-def _longest_run(stamps: IntArray) -> slice | None:
+def longest_run(stamps: IntArray) -> slice | None:
     """Return the longest stretch between restarts of the clock, None if it never restarted."""
     if len(stamps) < 3:
         return None

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from armid_ros.identification import Fit, Identification, Score, Verification
@@ -157,7 +157,7 @@ def _data_findings(recordings: Sequence[Recording]) -> list[Caution]:
     return [
         Caution(f'{recording.source or "A recording"}: {recording.report.describe()}')
         for recording in recordings
-        if not unharmed(recording)
+        if not recording.report.unharmed
     ]
 
 
@@ -262,11 +262,6 @@ def _verification_findings(verification: Verification | None) -> list[Caution]:
             )
         )
     return findings
-
-
-def unharmed(recording: Recording) -> bool:
-    """Whether reading lost and repaired nothing; velocities are not needed."""
-    return replace(recording.report, absent=()).clean
 
 
 def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:

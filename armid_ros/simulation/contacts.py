@@ -114,10 +114,14 @@ def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFric
     """Part the elements that cannot stick, whose levels are one constant torque, from the rest."""
     if friction is None:
         return DryFriction(np.empty((0, n_joints)), np.empty(0), np.empty(0)), np.zeros(n_joints)
-    if np.any(friction.lower > friction.upper):
+    pushing = np.flatnonzero(friction.lower > friction.upper)
+    if len(pushing):
+        worst = int(pushing[0])
+        joint = int(np.argmax(friction.directions[worst] != 0.0)) + 1
         raise ModelError(
-            'dry friction that pushes: the torque of an element forwards is less than backwards '
-            f'({friction.upper} against {friction.lower}); friction torques have to be positive'
+            f'dry friction of joint {joint} pushes: its torque forwards is less than backwards '
+            f'({friction.upper[worst]:g} against {friction.lower[worst]:g} N m); friction torques '
+            'have to be positive'
         )
     share = np.zeros(len(friction.lower)) if friction.load_share is None else friction.load_share
     constant = (friction.lower == friction.upper) & (share == 0.0)

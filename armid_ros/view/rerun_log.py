@@ -11,7 +11,9 @@ Entities are ``arm/<joint>``, ``torque/<joint>/measured`` and ``predicted``, ``r
 from __future__ import annotations
 
 from collections.abc import Sequence
+import os
 from pathlib import Path
+import sys
 from types import ModuleType
 from typing import Any
 
@@ -52,6 +54,13 @@ def rerun() -> ModuleType:
     return module
 
 
+def _has_screen() -> bool:
+    """Return whether a window can be opened: on Linux a display server has to be named."""
+    if not sys.platform.startswith('linux'):
+        return True
+    return bool(os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY'))
+
+
 def open_stream(name: str, out: Path | None = None) -> Any:
     """
     Open a window, or a file, for what is logged.
@@ -67,8 +76,15 @@ def open_stream(name: str, out: Path | None = None) -> Any:
     -------
     rerun.RecordingStream
 
+    Raises
+    ------
+    ArmidError
+        If there is no screen for a window.
+
     """
     rr = rerun()
+    if out is None and not _has_screen():
+        raise ArmidError('there is no screen for a window; --out run.rrd writes a file instead')
     stream = rr.RecordingStream('armid', recording_id=None)
     stream.send_recording_name(name)
     if out is None:

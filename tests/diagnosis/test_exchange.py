@@ -22,9 +22,7 @@ def asked(first, second):
     rows = [*first, *second]
     free = np.concatenate([one.free for one in rows])
     left = np.concatenate([one.left for one in rows])
-    more, divisions = showing_more(
-        first, second, (free.T @ free, free.T @ left), np.array([1e-9])
-    )
+    more, divisions = showing_more(first, second, (free.T @ free, free.T @ left), np.array([1e-9]))
     return more == 0
 
 
@@ -96,3 +94,27 @@ def test_an_offset_that_differs_from_recording_to_recording(bench, before, after
     new, unseen = with_offsets(bench, 2, after), with_offsets(bench, 3, after)[:1]
     found = diagnose(arm, new, validate=unseen, baseline=old, rng=rng)
     assert [one.name for one in found.findings] == ['torque_offset'] * named, found.summary
+
+
+def worn(bench, seeds, coulomb):
+    """Return recordings of arms that no model describes, with another dry friction each [N m]."""
+
+    def hidden(motion, tau):
+        bumps = 0.5 * np.sin(9.0 * motion.q[:, ::-1] + motion.q)
+        return bumps + np.column_stack([0.0 * motion.t, coulomb * np.sign(motion.dq[:, 1])])
+
+    return [bench.recordings(hidden, seed=seed)[seed % 3] for seed in seeds]
+
+
+@pytest.mark.parametrize('many', [False, True])
+def test_many_recordings_tell_a_change_that_is_smaller_than_the_misfit(bench, many):
+    """With three recordings a day 20 divisions are as good; with six there are hundreds."""
+    count = 6 if many else 3
+    rng = np.random.default_rng(0)
+    old = worn(bench, range(1, count + 1), 0.0)
+    new = worn(bench, range(11, count + 11), 0.4)
+    arm = identify(bench.arm, old, rng=rng).arm
+    found = diagnose(arm, new, baseline=old, rng=rng)
+    assert [(one.name, one.joints) for one in found.findings] == [
+        ('coulomb_friction', ('elbow',))
+    ] * many, found.summary

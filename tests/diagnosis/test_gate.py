@@ -5,6 +5,7 @@
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.data.evidence import trajectories
 from armid_ros.diagnosis.data.gate import check_data
 from armid_ros.errors import IdentificationError
@@ -62,3 +63,16 @@ def test_friction_that_drives_is_the_opposite_sign(joint):
     assert bench.robot.joints[joint] in said and 'negate it' in said
     with pytest.raises(IdentificationError, match=f'{bench.robot.joints[joint]}.*negate it'):
         identify(bench.arm, wrong, rng=np.random.default_rng(0))
+
+
+@pytest.mark.parametrize('part', ['validate', 'baseline'])
+def test_a_damaged_sample_is_mended_in_every_recording_and_said(bench, part):
+    first, *others = bench.recordings(seed=5)
+    tau = first.tau.copy()
+    tau[300, 1] += 80.0
+    report = replace(first.report, messages=len(first), samples=len(first), nan=4)
+    more = {part: [replace(first, tau=tau, report=report), *others]}
+    found = diagnose(bench.arm, bench.recordings(), **more, rng=np.random.default_rng(0))
+    assert found.verdict == 'consistent', found.summary
+    assert any('effort of elbow at' in note for note in found.notes)
+    assert any('4 dropped for values that are not finite' in note for note in found.notes)

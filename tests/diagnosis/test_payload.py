@@ -42,9 +42,7 @@ def test_a_payload_that_was_put_down_is_less_than_nothing(request, arm):
     arm = request.getfixturevalue(arm)
     loaded = arm.recordings(held_by(arm.robot))
     model = identify(arm.arm, loaded, rng=np.random.default_rng(0)).arm
-    found = diagnose(
-        model, arm.recordings(seed=7), baseline=loaded, rng=np.random.default_rng(0)
-    )
+    found = diagnose(model, arm.recordings(seed=7), baseline=loaded, rng=np.random.default_rng(0))
     assert found.verdict in ('named', 'ambiguous'), found.summary
     (payload,) = found.findings
     assert (payload.name, payload.joints) == ('payload', ('elbow',))

@@ -169,3 +169,11 @@ def test_without_rerun_one_line_says_what_to_install(monkeypatch, urdf, recordin
     assert done.exit_code == 2
     assert "pip install 'armid_ros[view]'" in done.output
     assert done.output.count('\n') == 1
+
+
+def test_a_window_without_a_screen_is_refused(monkeypatch):
+    for name in ('DISPLAY', 'WAYLAND_DISPLAY'):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, 'platform', 'linux')
+    with pytest.raises(ar.ArmidError, match='--out'):
+        open_stream('a run')

@@ -63,9 +63,7 @@ def changed(trial: Trial, problem: Problem, beside: Beside, here: Round) -> bool
 
 def surely_changed(trial: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
     """Return whether so many divisions show less of a cause that a misfit hides no change."""
-    return here.before is not None and _seldom(
-        *_showing_more(trial, problem, beside, here), here
-    )
+    return here.before is not None and _seldom(*_showing_more(trial, problem, beside, here), here)
 
 
 def _seldom(more: int, divisions: int, here: Round) -> bool:
@@ -73,9 +71,7 @@ def _seldom(more: int, divisions: int, here: Round) -> bool:
     return more + 1 <= here.settings.thresholds.exchanged * (divisions + 1)
 
 
-def _showing_more(
-    trial: Trial, problem: Problem, beside: Beside, here: Round
-) -> tuple[int, int]:
+def _showing_more(trial: Trial, problem: Problem, beside: Beside, here: Round) -> tuple[int, int]:
     """Return how many divisions show more of a cause than the days do, and of how many."""
     assert here.before is not None
     first, second = _before(trial, beside, here), _today(trial, problem, beside, here)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.recording import ReadReport, Recording, TimeGap
-from armid_ros.recording.series import GAP_PERIODS
+from armid_ros.recording.series import GAP_PERIODS, longest_run
 from armid_ros.recording.tables.plan import TablePlan
 from armid_ros.recording.tables.settings import gear_matrix, per_joint, TIME_UNITS
 from armid_ros.recording.tables.words import QuantityName
@@ -36,9 +36,12 @@ def measured(plan: TablePlan) -> Recording:
     t, start = _times(plan)
     values = {source.quantity: source.values() for source in plan.sources}
     kept, nan = _finite(plan, t, values)
-    order = np.argsort(t[kept], kind='stable')
-    late = int(np.sum(t[kept][1:] < np.maximum.accumulate(t[kept])[:-1]))
-    rows = np.flatnonzero(kept)[order]
+    rows = np.flatnonzero(kept)
+    run = longest_run(np.round(t[rows] * 1e9).astype(np.int64)) or slice(None)
+    restarted = len(rows) - len(rows[run])
+    rows = rows[run]
+    late = int(np.sum(t[rows][1:] < np.maximum.accumulate(t[rows])[:-1]))
+    rows = rows[np.argsort(t[rows], kind='stable')]
     first = np.concatenate([[True], np.diff(t[rows]) > 0.0])
     duplicates = int((~first).sum())
     if duplicates > 0.5 * len(rows):
@@ -57,6 +60,7 @@ def measured(plan: TablePlan) -> Recording:
         samples=len(rows),
         duplicates=duplicates,
         out_of_order=late,
+        restarted=restarted,
         nan=nan,
         gaps=_gaps(time),
         absent=absent,

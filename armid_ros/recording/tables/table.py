@@ -88,6 +88,8 @@ class Table:
         Samples per second, where the file says so and not each row.
     notes : tuple of str
         What reading it met.
+    empty : tuple of str
+        Columns without a number in them.
 
     """
 
@@ -97,6 +99,7 @@ class Table:
     first_line: int | None = None
     rate_hz: float | None = None
     notes: tuple[str, ...] = ()
+    empty: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse tables that are empty or ragged."""
@@ -138,7 +141,8 @@ class Table:
             for key, count in names.items()
         ]
         more = f' and {len(shown) - 40} more' if len(shown) > 40 else ''
-        return ', '.join(shown[:40]) + more
+        empty = f'; without a number: {", ".join(self.empty[:40])}' if self.empty else ''
+        return ', '.join(shown[:40]) + more + empty
 
 
 def normal_unit(text: str) -> str:

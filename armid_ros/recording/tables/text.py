@@ -47,8 +47,10 @@ def read_text(path: Path) -> Table:
         for name, column, unit in zip(names, values.T, unit_cells, strict=True)
         if np.isfinite(column).any()
     )
+    there = {column.name for column in columns}
+    empty = tuple(name for name in names if name not in there)
     described = f'text with {_SEPARATORS[separator]}'
-    return Table(str(path), columns, described, first_line=first + 1, notes=notes)
+    return Table(str(path), columns, described, first_line=first + 1, notes=notes, empty=empty)
 
 
 def _lines(path: Path) -> list[str]:

@@ -10,7 +10,6 @@ from typing import ClassVar
 
 from armid_ros.identification import Fit
 from armid_ros.recording import Recording
-from armid_ros.report.judgement import unharmed
 from armid_ros.report.notation import digits, torque_unit
 from armid_ros.report.page import Section
 from armid_ros.report.repeatability import Repeatability
@@ -72,7 +71,7 @@ class RecordingQuality:
             longest_gap=float(steps.max()),
             clock=recording.clock,
             description=recording.report.describe(),
-            clean=unharmed(recording),
+            clean=recording.report.unharmed,
             repeatability=Repeatability.of(fits) if fits else None,
         )
 

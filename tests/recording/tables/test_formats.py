@@ -296,3 +296,25 @@ def test_a_library_that_is_missing_is_named(motion, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, 'pyarrow.parquet', None)
     with pytest.raises(RecordingError, match=r"pip install 'armid_ros\[convert\]'"):
         open_table(path)
+
+
+def test_a_clock_that_jumps_back_leaves_the_longer_side(tmp_path, motion):
+    """Rows of two runs in one file are not sorted into each other, as those of a bag are not."""
+    t, *rest = motion
+    first = len(t) // 4
+    again = [np.concatenate([x[:first], x]) for x in (t, *rest)]
+    path = tmp_path / 'twice.csv'
+    path.write_text(text(tuple(again)))
+    recording = read_anything(path, joints=JOINTS)
+    assert_holds(recording, motion)
+    assert recording.report.restarted == first
+
+
+def test_a_column_without_a_number_is_said(tmp_path, motion):
+    lines = text(motion).splitlines()
+    path = tmp_path / 'run.csv'
+    rows = [line.split(',') for line in lines[1:]]
+    rows = [','.join([*row[:2], 'nan', *row[3:]]) for row in rows]
+    path.write_text('\n'.join([lines[0], *rows]))
+    with pytest.raises(RecordingError, match='without a number: q2'):
+        read_anything(path, joints=JOINTS)
