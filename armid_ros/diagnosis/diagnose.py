@@ -29,6 +29,7 @@ from armid_ros.diagnosis.search.choice import (
     NOISE,
 )
 from armid_ros.diagnosis.search.explain import Explanation
+from armid_ros.diagnosis.search.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.explain_ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
@@ -126,6 +127,7 @@ def diagnose(
         )
         return _with_small_print(result, settings.thresholds.headline)
     tell(0.02, 'filtering')
+    arm = memoized_arm(arm)
     recordings, validate, baseline, repairs = _whole(recordings, validate, baseline, settings)
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
@@ -298,8 +300,8 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         where=_where(explanation, limits, bool(found)),
         left=locate(arm, evidence, explanation.fitted.residual, limits),
         gap=gap,
-        explanation=explanation,
-        arm=explanation.fitted.arm if found and not worse else arm,
+        explanation=explanation.forgetting(),
+        arm=plain_arm(explanation.fitted.arm if found and not worse else arm),
         data=tuple(data),
         floors=floors,
         not_visible=_not_visible(explanation, settings),
@@ -420,7 +422,7 @@ def _bad(
         left=(),
         gap=None,
         explanation=None,
-        arm=arm,
+        arm=plain_arm(arm),
         data=tuple(data),
         floors=(),
         not_visible=(),

@@ -39,6 +39,7 @@ class Processes:
     def __init__(self, bench):
         self._environment = {
             **os.environ,
+            'PYTHONFAULTHANDLER': '1',
             'ROS_DOMAIN_ID': str(bench.context.get_domain_id()),
             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
             'PYTHONPATH': os.pathsep.join(p for p in sys.path if p),
@@ -60,7 +61,12 @@ class Processes:
     def end(self, process, *signals):
         for number in signals:
             process.send_signal(number)
-        _, errors = process.communicate(timeout=PATIENCE)
+        try:
+            _, errors = process.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGABRT)  # the handler of faults says where it is
+            _, errors = process.communicate(timeout=PATIENCE)
+            pytest.fail(f'does not end:\n{errors}')
         return errors
 
 

@@ -22,7 +22,7 @@ from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.fit import fit, Fitted, Told
 from armid_ros.diagnosis.search.forward import Search, Taken
 from armid_ros.diagnosis.search.held_out import held_out, Trial
-from armid_ros.diagnosis.search.memoized_arm import memoized_arm
+from armid_ros.diagnosis.search.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
@@ -91,9 +91,19 @@ class Explanation:
             self.base,
             [self.fitted.values[k] for k in keep],
             self.told,
+            change=self.fitted.change,
         )
         fitted = widened(fitted, self.evidence, self.told, self.by_chance)
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
+
+    def forgetting(self) -> Explanation:
+        """Return the same with arms that do not hold what they have computed."""
+        return replace(
+            self,
+            given=plain_arm(self.given),
+            fitted=replace(self.fitted, arm=plain_arm(self.fitted.arm)),
+            reference=replace(self.reference, arm=plain_arm(self.reference.arm)),
+        )
 
     @property
     def chi2_per_row(self) -> FloatArray:
@@ -121,7 +131,8 @@ def explain(
     reference = fit(
         question.arm, (), evidence.data, evidence.sigma, question.base, (), question.told
     )
-    named, steps, fitted = _pruned(question, named, steps, values, evidence, settings)
+    change = way.change if question.beside is question.arm else None
+    named, steps, fitted = _pruned(question, named, steps, values, evidence, settings, change)
     by_chance = 0.0 if last is None else last.by_chance
     fitted = widened(fitted, evidence, question.told, by_chance)
     said = {own.effect.name for own in named}
@@ -318,12 +329,14 @@ def _pruned(
     values: Sequence[FloatArray],
     evidence: Evidence,
     settings: DiagnosisSettings,
+    change: FloatArray | None = None,
 ) -> tuple[list[Named], list[Step], Fitted]:
     """Fit all names together, and drop those that the others make needless."""
     data, sigma = evidence.data, evidence.sigma
     named, steps, values = list(named), list(steps), list(values)
+    base, told = question.base, question.told
     while True:
-        fitted = fit(question.arm, named, data, sigma, question.base, values, question.told)
+        fitted = fit(question.arm, named, data, sigma, base, values, told, change=change)
         if not named:
             return named, steps, fitted
         view = View.of(fitted, evidence)
@@ -338,7 +351,7 @@ def _pruned(
                 needless.append((trial.gain, k))
         if not needless:
             return list(fitted.named), steps, fitted
-        gone = min(needless)[1]
+        gone, change = min(needless)[1], fitted.change
         named = [own for k, own in enumerate(fitted.named) if k != gone]
         values = [own for k, own in enumerate(fitted.values) if k != gone]
         steps.pop(gone)

@@ -172,6 +172,7 @@ def fit(
     start: Sequence[FloatArray] = (),
     told: Told | None = None,
     known: Estimate | None = None,
+    change: FloatArray | None = None,
 ) -> Fitted:
     """
     Fit what is free.
@@ -194,10 +195,14 @@ def fit(
         What other data tell of what is free of the arm.
     known : Estimate, optional
         Of the named effects, whose values and shapes stay as they are.
+    change : ndarray, shape (r,), optional
+        What to add to the base parameters to begin with.
 
     """
     values = list(start) or [np.zeros(len(n.effect.parameters(arm.robot))) for n in named]
     state = Patch(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
+    if change is not None and base is not None:
+        state = state.with_change(change, base)
     pull = np.zeros((0, 0)) if base is None else described_precision(base, arm)
     aim = np.zeros(len(pull))
     if told is not None and base is not None:
@@ -238,7 +243,7 @@ def _settled(
     rounds: int,
 ) -> tuple[Patch, list[FloatArray], list[FloatArray]]:
     """
-    Take steps of Gauss and Newton until one changes nothing.
+    Take steps of Gauss and Newton until one changes nothing, or the data do what it expects.
 
     Parameters
     ----------
@@ -272,15 +277,17 @@ def _settled(
     loss = loss_of(state, residual)
     columns = [patch_columns(state, part, base) for part in data]
     for _ in range(rounds):
-        moved, after = state, residual
+        moved, after, expected = state, residual, loss
         for step in _steps(state, columns, residual, rows, (pull, aim)):
             trial = state.moved(step, base)
             left = _residuals(trial, data)
             if loss_of(trial, left) < loss:
                 moved, after = trial, left
+                expected = loss_of(trial, _expected(residual, columns, step))
                 break
         new = loss_of(moved, after)
-        settled = loss - new < 1e-4 * max(abs(new), 1e-12)
+        small = 1e-4 * max(abs(new), 1e-12)
+        settled = loss - new < small or abs(new - expected) < small
         if moved is not state:
             columns = [patch_columns(moved, part, base) for part in data]
         state, residual, loss = moved, after, new
@@ -310,6 +317,17 @@ def _steps(
         return
     flat = [block * state.linear for block in columns]
     yield _step(flat, residual, *rows, pull, aim - pull @ state.change)
+
+
+def _expected(
+    residual: Sequence[FloatArray], columns: Sequence[FloatArray], step: FloatArray
+) -> list[FloatArray]:
+    """Return what a step would leave if torques were linear in all that is free."""
+    size = len(step)
+    return [
+        left - (block.reshape(-1, size) @ step).reshape(left.shape)
+        for left, block in zip(residual, columns, strict=True)
+    ]
 
 
 def _residuals(state: Patch, data: Sequence[Trajectory]) -> list[FloatArray]:

@@ -47,6 +47,8 @@ class Way:
         Values of all parameters of each.
     first, last : Survey or None
         The first look at all causes, and the last one.
+    change : ndarray, shape (r,), or None
+        What was added to what is free of the arm in the last fit.
 
     """
 
@@ -55,6 +57,7 @@ class Way:
     values: list[FloatArray]
     first: Survey | None
     last: Survey | None
+    change: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -120,9 +123,10 @@ class Search:
             taken.append(step)
             if left == 1:
                 named, values = self._and_named(place, step)
-                return Way(named, taken, values, first, place.look.survey)
+                return Way(named, taken, values, first, place.look.survey, place.current.change)
             place = self._after(place, step)
-        return Way(list(place.named), taken, list(place.values), first, place.look.survey)
+        named, values = list(place.named), list(place.values)
+        return Way(named, taken, values, first, place.look.survey, place.current.change)
 
     def _after(self, place: _Place, step: Step) -> _Place:
         """Return the place behind a step."""
@@ -139,7 +143,8 @@ class Search:
                 after = replace(place, before=before, look=look, next={})
                 place.next[way] = replace(after, named=tuple(named), values=tuple(values))
             else:
-                place.next[way] = self._fitted_place(named, values, place.look.survey.total)
+                total, change = place.look.survey.total, place.current.change
+                place.next[way] = self._fitted_place(named, values, total, change)
         return place.next[way]
 
     def _and_named(self, place: _Place, step: Step) -> tuple[list[Named], list[FloatArray]]:
@@ -149,12 +154,17 @@ class Search:
         return [*place.named, Named(group.effect, group.kept)], [*place.values, start]
 
     def _fitted_place(
-        self, named: Sequence[Named], values: Sequence[FloatArray], total: float | None
+        self,
+        named: Sequence[Named],
+        values: Sequence[FloatArray],
+        total: float | None,
+        change: FloatArray | None = None,
     ) -> _Place:
-        """Fit what is named, and look at all causes beside it."""
+        """Fit what is named, from values and a change of the body on, and look beside it."""
         question, data, sigma = self.question, self.evidence.data, self.evidence.sigma
         arm, base = question.beside, question.beside_base
-        current = fit(arm, named, data, sigma, base, values, question.beside_told)
+        told = question.beside_told
+        current = fit(arm, named, data, sigma, base, values, told, change=change)
         found = candidates(current, data, sigma, question.kinds(self.settings.kinds))
         problem, beside = beside_fit(found, current, self.evidence)
         before = self._before(current)

@@ -5,19 +5,55 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 from armid_ros.arm import ArmModel
-from armid_ros.model import LinkFrames
+from armid_ros.model import LinkFrames, regressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
+#: Regressors of more than this are computed whenever they are needed [bytes].
+_MOST = 1_000_000_000
 
-@dataclass(frozen=True)
+
+class Regressors:
+    """
+    Regressors of recorded motions, which are the same for all values of an arm.
+
+    Arms of one description that are asked about one motion differ in their values and in gravity.
+
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[object, ...], tuple[Motion, FloatArray]] = {}
+        self._room = _MOST
+
+    def of(self, arm: ArmModel, motion: Motion) -> FloatArray | None:
+        """Return the regressor of a motion, shape (N, n, 10 n); None where there is no room."""
+        path = (motion.q, motion.dq, motion.ddq)
+        gravity = tuple(np.asarray(arm.body.gravity).tolist())
+        key = *(array.ctypes.data for array in path), len(motion), gravity, arm.quasi_static
+        if key not in self._known:
+            size = 10 * motion.q.nbytes * motion.n_joints
+            if size > self._room:
+                return None
+            self._room -= size
+            self._known[key] = motion, regressor(arm.body, arm.felt(motion))
+        return self._known[key][1]
+
+
+@dataclass(frozen=True, repr=False)
 class _Memoized(ArmModel):
-    """An arm that computes the torques of a motion once, for all effects that ask."""
+    """
+    An arm that computes the torques of a motion once, for all effects that ask.
+
+    Arms that are made of it have its regressors, too.
+
+    """
+
+    regressors: Regressors = field(default_factory=Regressors, compare=False)
 
     @cached_property
     def _known(self) -> dict[tuple[str, int], tuple[Motion, Any]]:
@@ -39,12 +75,28 @@ class _Memoized(ArmModel):
         frames: LinkFrames = self._once('frames', motion, super().link_frames)
         return frames
 
+    def _regressor(self, motion: Motion) -> FloatArray | None:
+        """Return the regressor where links move as was recorded, and there is room for it."""
+        if self.action().displacement is not None:
+            return None
+        return self.regressors.of(self, motion)
+
     def load(self, motion: Motion) -> FloatArray:
         """Return what the rigid body takes, shape (N, n) [N m]."""
-        return np.array(self._once('load', motion, super().load))
+        return np.array(self._once('load', motion, self._load))
+
+    def _load(self, motion: Motion) -> FloatArray:
+        columns = self._regressor(motion)
+        if columns is None:
+            return super().load(motion)
+        flat = columns.reshape(-1, columns.shape[2]) @ self.body.rigid_parameters
+        return np.asarray(flat.reshape(motion.q.shape))
 
     def body_columns(self, motion: Motion) -> FloatArray:
         """Return the regressor of the load along a recorded motion, shape (N, n, 10 n)."""
+        known = self._regressor(motion)
+        if known is not None:
+            return known
         columns: FloatArray = self._once('body', motion, super().body_columns)
         return columns
 
@@ -76,4 +128,11 @@ class _Memoized(ArmModel):
 
 def memoized_arm(arm: ArmModel) -> ArmModel:
     """Return the arm, made to compute the torques of each motion once."""
+    if isinstance(arm, _Memoized):
+        return arm
     return _Memoized(arm.robot, arm.effects, arm.values, arm.quasi_static)
+
+
+def plain_arm(arm: ArmModel) -> ArmModel:
+    """Return the arm without what it has computed."""
+    return ArmModel(arm.robot, arm.effects, arm.values, arm.quasi_static)

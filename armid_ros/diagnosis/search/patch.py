@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
@@ -63,7 +64,7 @@ class Patch:
     values: tuple[FloatArray, ...]
     change: FloatArray
 
-    @property
+    @cached_property
     def model(self) -> ArmModel:
         """Return the arm with what was named."""
         model = self.arm
@@ -71,13 +72,17 @@ class Patch:
             model = with_named(model, own.effect, values)
         return model
 
+    def with_change(self, change: FloatArray, base: BaseParameters) -> Patch:
+        """Return the state with more added to the base parameters, shape (r,)."""
+        theta = self.arm.theta
+        arm = self.arm.with_theta(base.lift(base.values(theta) + change, theta))
+        return Patch(arm, self.named, self.values, self.change + change)
+
     def moved(self, change: FloatArray, base: BaseParameters | None) -> Patch:
         """Return the state after a step of all that is free, within bounds."""
-        arm, start = self.arm, 0
-        if base is not None:
-            theta = arm.theta
-            lifted = base.lift(base.values(theta) + change[: base.rank], theta)
-            arm, start = arm.with_theta(lifted), base.rank
+        start = len(self.change)
+        body = self if base is None else self.with_change(change[:start], base)
+        arm = body.arm
         named, values = [], []
         for own, old in zip(self.named, self.values, strict=True):
             effect, kept = own.effect, list(own.kept)
@@ -95,7 +100,7 @@ class Patch:
                 effect = effect.with_shape(np.clip(shape, low, high))
                 start += count
             named.append(Named(effect, own.kept))
-        return Patch(arm, tuple(named), tuple(values), self.change + change[: len(self.change)])
+        return Patch(arm, tuple(named), tuple(values), body.change)
 
     @property
     def linear(self) -> npt.NDArray[np.bool_]:
