@@ -22,7 +22,7 @@ from pkgutil import resolve_name
 from typing import Any
 from unittest.mock import patch
 
-from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.fit import fit, Start
 import numpy as np
 
 from benchmarks.lived import run, select
@@ -89,7 +89,7 @@ def nowhere(problem: Any, *_: object) -> np.ndarray:
 def all_names(question, named, steps, values, evidence, settings):
     """Fit all names together and drop none."""
     data, sigma = evidence.data, evidence.sigma
-    fitted = fit(question.arm, named, data, sigma, question.base, values, question.told)
+    fitted = fit(question.arm, named, data, sigma, question.base, Start(values), question.told)
     return list(fitted.named), list(steps), fitted
 
 

@@ -96,7 +96,7 @@ class Payload(_LinkBody):
     @classmethod
     def as_change(cls) -> type[Effect]:
         """Return a load that may have been put down."""
-        return LoadChange
+        return PayloadChange
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether it may weigh something, not farther away than the arm is long."""
@@ -112,7 +112,7 @@ class Payload(_LinkBody):
 
 
 @dataclass(frozen=True)
-class LoadChange(Payload):
+class PayloadChange(Payload):
     """
     Difference of what a link holds from what it held, which may be nothing now.
 

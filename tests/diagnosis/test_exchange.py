@@ -22,7 +22,9 @@ def asked(first, second):
     rows = [*first, *second]
     free = np.concatenate([one.free for one in rows])
     left = np.concatenate([one.left for one in rows])
-    more, _divisions = showing_more(first, second, (free.T @ free, free.T @ left), np.array([1e-9]))
+    more, _divisions = showing_more(
+        first, second, (free.T @ free, free.T @ left), np.array([1e-9])
+    )
     return more == 0
 
 

@@ -5,7 +5,7 @@
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories
 from armid_ros.diagnosis.data.rows import Problem, project
 from armid_ros.diagnosis.search.candidates import candidates
-from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.fit import fit, Start
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.round import beside_fit
 from armid_ros.effects import CATALOGUE
@@ -55,7 +55,7 @@ def test_shapes_of_a_name_are_held_by_what_all_data_tell_of_them(bench):
     data = trajectories(bench.recordings(hidden), Conditioning(200.0, 10.0, 11))
     sigma = [np.full(2, 0.01)] * len(data)
     effect = CATALOGUE['stribeck_friction'].on(bench.robot, ('elbow',)).with_shape((0.2, 2.0))
-    fitted = fit(bench.arm, [Named(effect, (0,))], data, sigma, None, [np.array([0.2])])
+    fitted = fit(bench.arm, [Named(effect, (0,))], data, sigma, None, Start([np.array([0.2])]))
     assert fitted.named[0].effect.shape[0] == pytest.approx(0.3, rel=0.2)
     evidence = Evidence(tuple(data), tuple(sigma), tuple(sigma))
     found = candidates(fitted, data, sigma, [CATALOGUE['viscous_friction']])

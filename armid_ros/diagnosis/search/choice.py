@@ -20,7 +20,7 @@ from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.data.rows import weighted_rows
 from armid_ros.diagnosis.search.explain import explain, Explanation
-from armid_ros.diagnosis.search.fit import fit, Told
+from armid_ros.diagnosis.search.fit import fit, Start, Told
 from armid_ros.diagnosis.search.question import as_given, fitted_anew
 from armid_ros.diagnosis.search.round import cost
 from armid_ros.diagnosis.search.step import Step
@@ -277,7 +277,7 @@ def in_model_as_given(found: Explanation) -> Explanation:
         evidence.data,
         evidence.sigma,
         None,
-        fitted.values,
+        Start(fitted.values),
         known=fitted.estimate,
     )
     return replace(found, base=None, told=None, fitted=alone, reference=reference)

@@ -19,7 +19,7 @@ from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import make_problem, Problem
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.fit import fit, Fitted, Told
+from armid_ros.diagnosis.search.fit import fit, Fitted, Start, Told
 from armid_ros.diagnosis.search.forward import Search, Taken
 from armid_ros.diagnosis.search.held_out import held_out, Trial
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm, plain_arm
@@ -89,9 +89,8 @@ class Explanation:
             self.evidence.data,
             self.evidence.sigma,
             self.base,
-            [self.fitted.values[k] for k in keep],
+            Start([self.fitted.values[k] for k in keep], self.fitted.change),
             self.told,
-            change=self.fitted.change,
         )
         fitted = widened(fitted, self.evidence, self.told, self.by_chance)
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
@@ -129,7 +128,7 @@ def explain(
     steps = [*steps, *(step for _, step, _ in kept)]
     values = [*values, *(value for _, _, value in kept)]
     reference = fit(
-        question.arm, (), evidence.data, evidence.sigma, question.base, (), question.told
+        question.arm, (), evidence.data, evidence.sigma, question.base, None, question.told
     )
     change = way.change if question.beside is question.arm else None
     named, steps, fitted = _pruned(question, named, steps, values, evidence, settings, change)
@@ -271,7 +270,9 @@ def _friction(
         return []
     arm, base = question.beside, question.beside_base
     assert base is not None
-    fitted = fit(arm, named, evidence.data, evidence.sigma, base, values, question.beside_told)
+    fitted = fit(
+        arm, named, evidence.data, evidence.sigma, base, Start(values), question.beside_told
+    )
     view = View.of(fitted, evidence)
     where = {int(column): k for k, column in enumerate(base.independent)}
     names = [(p.name, p.joint) for p in arm.parameters]
@@ -336,7 +337,7 @@ def _pruned(
     named, steps, values = list(named), list(steps), list(values)
     base, told = question.base, question.told
     while True:
-        fitted = fit(question.arm, named, data, sigma, base, values, told, change=change)
+        fitted = fit(question.arm, named, data, sigma, base, Start(values, change), told)
         if not named:
             return named, steps, fitted
         view = View.of(fitted, evidence)

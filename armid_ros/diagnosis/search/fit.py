@@ -85,6 +85,24 @@ class Fitted:
 
 
 @dataclass(frozen=True)
+class Start:
+    """
+    Where a fit begins.
+
+    Attributes
+    ----------
+    values : sequence of ndarray
+        Values of the named effects; zero if there are none.
+    change : ndarray, shape (r,), or None
+        What is added to the base parameters.
+
+    """
+
+    values: Sequence[FloatArray] = ()
+    change: FloatArray | None = None
+
+
+@dataclass(frozen=True)
 class Told:
     """
     What other data tell of base parameters.
@@ -169,10 +187,9 @@ def fit(
     data: Sequence[Trajectory],
     sigma: Sequence[FloatArray],
     base: BaseParameters | None,
-    start: Sequence[FloatArray] = (),
+    start: Start | None = None,
     told: Told | None = None,
     known: Estimate | None = None,
-    change: FloatArray | None = None,
 ) -> Fitted:
     """
     Fit what is free.
@@ -189,20 +206,19 @@ def fit(
         Noise of each trajectory [N m].
     base : BaseParameters or None
         What is free of the arm; None keeps it as it is.
-    start : sequence of ndarray
-        Values of the named effects to start from; zero by default.
+    start : Start, optional
+        Where to begin; at the arm as it is by default.
     told : Told, optional
         What other data tell of what is free of the arm.
     known : Estimate, optional
         Of the named effects, whose values and shapes stay as they are.
-    change : ndarray, shape (r,), optional
-        What to add to the base parameters to begin with.
 
     """
-    values = list(start) or [np.zeros(len(n.effect.parameters(arm.robot))) for n in named]
+    start = start or Start()
+    values = list(start.values) or [np.zeros(len(n.effect.parameters(arm.robot))) for n in named]
     state = Patch(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
-    if change is not None and base is not None:
-        state = state.with_change(change, base)
+    if start.change is not None and base is not None:
+        state = state.with_change(start.change, base)
     pull = np.zeros((0, 0)) if base is None else described_precision(base, arm)
     aim = np.zeros(len(pull))
     if told is not None and base is not None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.candidates import Candidates, candidates
-from armid_ros.diagnosis.search.fit import fit, Fitted
+from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.question import Question
@@ -164,7 +164,7 @@ class Search:
         question, data, sigma = self.question, self.evidence.data, self.evidence.sigma
         arm, base = question.beside, question.beside_base
         told = question.beside_told
-        current = fit(arm, named, data, sigma, base, values, told, change=change)
+        current = fit(arm, named, data, sigma, base, Start(values, change), told)
         found = candidates(current, data, sigma, question.kinds(self.settings.kinds))
         problem, beside = beside_fit(found, current, self.evidence)
         before = self._before(current)
@@ -190,7 +190,7 @@ class Search:
             unseen.data,
             unseen.sigma,
             question.beside_base,
-            current.values,
+            Start(current.values),
             told,
             known=current.estimate,
         )

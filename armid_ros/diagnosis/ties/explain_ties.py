@@ -15,7 +15,7 @@ from armid_ros.diagnosis.data.rows import make_problem
 from armid_ros.diagnosis.search.candidates import candidates, Group
 from armid_ros.diagnosis.search.choice import Chosen, NOISE
 from armid_ros.diagnosis.search.explain import explain, Explanation, View
-from armid_ros.diagnosis.search.fit import fit, Fitted
+from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import held_out, Trial
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.question import Question
@@ -101,7 +101,7 @@ def _as_described(found: Explanation, arm: ArmModel, settings: DiagnosisSettings
     """Return the same names in the arm as described, where that explains as much."""
     evidence = found.evidence
     own = found.fitted
-    fitted = fit(arm, own.named, evidence.data, evidence.sigma, None, own.values)
+    fitted = fit(arm, own.named, evidence.data, evidence.sigma, None, Start(own.values))
     reference = fit(arm, (), evidence.data, evidence.sigma, None)
     described = replace(found, base=None, fitted=fitted, reference=reference)
     limits = evidence.limits(fitted.residual, settings)

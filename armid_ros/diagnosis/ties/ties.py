@@ -18,7 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.data.rows import make_problem, project
-from armid_ros.diagnosis.search.fit import fit, Fitted
+from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -121,7 +121,7 @@ class Ties:
     def fitted(self, named: Sequence[Named], start: Sequence[FloatArray] = ()) -> Fitted:
         """Fit the arm with what is named, from values to start from."""
         data, sigma = self.evidence.data, self.evidence.sigma
-        return fit(self.arm, named, data, sigma, self.base, start)
+        return fit(self.arm, named, data, sigma, self.base, Start(start))
 
     def chi2_per_row(self, fitted: Fitted) -> FloatArray:
         """Return the loss of each joint, shape (n,)."""
