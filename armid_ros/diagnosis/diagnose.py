@@ -24,7 +24,7 @@ from armid_ros.diagnosis.search.bodies import as_bodies
 from armid_ros.diagnosis.search.choice import (
     Chosen,
     ESTIMATED,
-    explained,
+    Explainer,
     in_model_as_given,
     NOISE,
 )
@@ -149,8 +149,7 @@ def diagnose(
 
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
 
-    def explain(by: DiagnosisSettings) -> Chosen:
-        return explained(arm, prepared, known, by, rng, tell, written, seen)
+    explain = Explainer(arm, prepared, known, rng, tell, written, seen)
 
     def ask(by: DiagnosisSettings) -> tuple[Diagnosis, frozenset[str]]:
         chosen = own_causes_first(explain, by)

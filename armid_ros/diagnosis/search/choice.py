@@ -12,7 +12,7 @@ where there are recordings from before, no cause is named that a body common to 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
@@ -21,7 +21,7 @@ from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.data.rows import weighted_rows
 from armid_ros.diagnosis.search.explain import explain, Explanation
 from armid_ros.diagnosis.search.fit import fit, Start, Told
-from armid_ros.diagnosis.search.question import as_given, fitted_anew
+from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question
 from armid_ros.diagnosis.search.round import cost
 from armid_ros.diagnosis.search.step import Step
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -68,20 +68,33 @@ class Chosen:
     rest: Explanation | None = None
 
 
-def explained(
-    arm: ArmModel,
-    prepared: Prepared,
-    baseline: Baseline | None,
-    settings: DiagnosisSettings,
-    rng: np.random.Generator,
-    tell: Progress,
-    written: FloatArray | None = None,
-    unseen: Sequence[Trajectory] = (),
-) -> Chosen:
-    """
-    Explain the gap of an arm.
+@dataclass(frozen=True)
+class _Answer:
+    """What was found, and by which names."""
 
-    Parameters
+    what: str
+    settings: DiagnosisSettings
+    explanation: Explanation
+
+    def holds(self, what: str, evidence: Evidence, settings: DiagnosisSettings) -> bool:
+        """Return whether the same would be found by fewer names: those that played no part."""
+        asked, now = set(self.settings.library), set(settings.library)
+        sigma = zip(self.explanation.evidence.sigma, evidence.sigma, strict=True)
+        return (
+            what == self.what
+            and now <= asked
+            and replace(settings, library=self.settings.library) == self.settings
+            and not (asked - now) & self.explanation.considered
+            and all(np.array_equal(mine, other) for mine, other in sigma)
+        )
+
+
+@dataclass(frozen=True)
+class Explainer:
+    """
+    Explains the gap of an arm by what a library has; it may be asked again with less of it.
+
+    Attributes
     ----------
     arm : ArmModel
         The arm.
@@ -89,133 +102,145 @@ def explained(
         The data.
     baseline : Baseline or None
         Recordings in which nothing was wrong.
-    settings : DiagnosisSettings
-        What was asked.
     rng : numpy.random.Generator
         Draws states.
     tell : callable
         Told the share that is done and what is being done.
-    written : ndarray, shape (n,), optional
+    written : ndarray, shape (n,), or None
         Misfit that the model is known to have, where there are no recordings of it [N m].
     unseen : sequence of Trajectory
         More data of the same day, which nothing is fitted to.
 
     """
-    if baseline is not None:
-        return _since(arm, prepared, baseline, settings, rng, tell, unseen)
-    if written is not None:
-        return _beside(arm, prepared, written, settings, rng, tell)
-    few = settings.thresholds.few_causes
-    given = as_given(arm, prepared.data, few, settings.library)
-    told = Evidence(prepared.data, prepared.as_described, prepared.as_described)
-    tell(0.2, 'the model as given')
-    first = explain(given, told, settings)
-    nothing = np.zeros(arm.robot.n_joints)
-    closed = at_floor(first, settings)
-    if closed and not _beside_a_correction(first):
-        return Chosen(first, nothing, NOISE)
-    tell(0.4, 'the model fitted anew')
-    noise = Evidence(prepared.data, tuple(prepared.sigma), tuple(prepared.sigma))
-    anew = _anew(arm, noise, settings, rng)
-    corrected = at_floor(anew, settings)
-    if corrected and len(first.steps) > 1 and not _stands(first, anew):
-        return Chosen(anew, nothing, NOISE)
-    misfit, words = nothing, NOISE
-    if not (closed or corrected):
-        misfit = _left_by(anew)
-        tell(0.7, 'the model as given')
-        sigma = tuple(np.maximum(one, misfit) for one in prepared.as_described)
-        first = explain(given, replace(told, sigma=sigma), settings)
-        words = ESTIMATED
-    if _as_good(first, anew, settings):
-        return Chosen(first, misfit, words)
-    return Chosen(anew, nothing, words)
 
+    arm: ArmModel
+    prepared: Prepared
+    baseline: Baseline | None
+    rng: np.random.Generator
+    tell: Progress
+    written: FloatArray | None = None
+    unseen: Sequence[Trajectory] = ()
+    _answers: list[_Answer] = field(default_factory=list)
 
-def _beside(
-    arm: ArmModel,
-    prepared: Prepared,
-    misfit: FloatArray,
-    settings: DiagnosisSettings,
-    rng: np.random.Generator,
-    tell: Progress,
-) -> Chosen:
-    """
-    Explain what is beyond a misfit that is known in numbers alone.
+    def __call__(self, settings: DiagnosisSettings) -> Chosen:
+        """Explain the gap."""
+        if self.baseline is not None:
+            return self._since(self.baseline, settings)
+        if self.written is not None:
+            return self._beside(self.written, settings)
+        prepared, tell = self.prepared, self.tell
+        few = settings.thresholds.few_causes
+        given = as_given(self.arm, prepared.data, few, settings.library)
+        told = Evidence(prepared.data, prepared.as_described, prepared.as_described)
+        tell(0.2, 'the model as given')
+        first = self._explain('given', given, told, settings)
+        nothing = np.zeros(self.arm.robot.n_joints)
+        closed = at_floor(first, settings)
+        if closed and not _beside_a_correction(first):
+            return Chosen(first, nothing, NOISE)
+        tell(0.4, 'the model fitted anew')
+        anew = self._anew(tuple(prepared.sigma), settings)
+        corrected = at_floor(anew, settings)
+        if corrected and len(first.steps) > 1 and not _stands(first, anew):
+            return Chosen(anew, nothing, NOISE)
+        misfit, words = nothing, NOISE
+        if not (closed or corrected):
+            misfit = _left_by(anew)
+            tell(0.7, 'the model as given')
+            sigma = tuple(np.maximum(one, misfit) for one in prepared.as_described)
+            first = self._explain('given', given, replace(told, sigma=sigma), settings)
+            words = ESTIMATED
+        if _as_good(first, anew, settings):
+            return Chosen(first, misfit, words)
+        return Chosen(anew, nothing, words)
 
-    Without the recordings nobody can say whether a body common to both would do. A body that is
-    fitted anew stays the rival of last resort.
-
-    """
-    tell(0.2, 'what has changed')
-    noise = prepared.as_described
-    evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
-    given = as_given(arm, prepared.data, 2 * settings.thresholds.few_causes, settings.library)
-    found = explain(replace(given, since=True), evidence, settings)
-    if at_floor(found, settings):
-        return Chosen(found, misfit, WRITTEN_MISFIT)
-    tell(0.6, 'the model fitted anew')
-    sigma = tuple(np.maximum(one, misfit) for one in prepared.sigma)
-    anew = _anew(arm, Evidence(prepared.data, sigma, tuple(prepared.sigma)), settings, rng)
-    return Chosen(found if _as_good(found, anew, settings) else anew, misfit, WRITTEN_MISFIT)
-
-
-def _anew(
-    arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings, rng: np.random.Generator
-) -> Explanation:
-    """
-    Explain the data beside a rigid body and known effects that are fitted anew.
-
-    A described value may be off by a share of it. One that is fitted to more than that has
-    changed, and is asked about as a cause.
-
-    """
-    many, library = settings.thresholds.many_causes, settings.library
-    found = explain(fitted_anew(arm, evidence.data, many, library, rng), evidence, settings)
-    rigid, described = len(arm.robot.rigid_parameters), arm.theta
-    change = np.abs(found.fitted.arm.theta[: len(described)] - described)
-    known = (np.arange(len(described)) >= rigid) & (described != 0.0)
-    changed = np.flatnonzero(known & (change > settings.thresholds.described * np.abs(described)))
-    if not len(changed):
+    def _explain(
+        self,
+        what: str,
+        question: Question,
+        evidence: Evidence,
+        settings: DiagnosisSettings,
+        baseline: Baseline | None = None,
+        unseen: Evidence | None = None,
+    ) -> Explanation:
+        """Explain data, unless the answer is known."""
+        for answer in self._answers:
+            if answer.holds(what, evidence, settings):
+                return answer.explanation
+        found = explain(question, evidence, settings, baseline=baseline, unseen=unseen)
+        self._answers.append(_Answer(what, settings, found))
         return found
-    question = fitted_anew(arm, evidence.data, many, library, rng, changed.tolist())
-    return explain(question, evidence, settings)
 
+    def _beside(self, misfit: FloatArray, settings: DiagnosisSettings) -> Chosen:
+        """
+        Explain what is beyond a misfit that is known in numbers alone.
 
-def _since(
-    arm: ArmModel,
-    prepared: Prepared,
-    baseline: Baseline,
-    settings: DiagnosisSettings,
-    rng: np.random.Generator,
-    tell: Progress,
-    unseen: Sequence[Trajectory],
-) -> Chosen:
-    """Explain what has changed since the baseline."""
-    tell(0.2, 'what has changed')
-    noise = prepared.as_described
-    misfit = baseline.misfit * _louder(prepared, baseline)
-    sigma = tuple(np.maximum(one, misfit) for one in noise)
-    evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
-    most = 2 * settings.thresholds.few_causes
-    free = fitted_anew(arm, [*prepared.data, *baseline.data], most, settings.library, rng)
-    assert free.base is not None and free.beside_base is not None
-    told = baseline.told(free.arm, free.base)
-    beside = told if free.beside is arm else baseline.told(free.beside, free.beside_base)
-    question = replace(free, told=told, beside_told=beside, since=True)
-    more = None
-    if unseen:
-        unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(unseen)
-        more = Evidence(tuple(unseen), unit, unit, baseline.varies)
-    found = explain(question, evidence, settings, baseline=baseline, unseen=more)
-    notes: tuple[str, ...] = ()
-    if not found.steps and not at_floor(found, settings):
-        lacking = explain(question, evidence, settings)
-        if _most(lacking, settings) and _may_have_been(lacking, baseline, told, settings):
-            found, notes = lacking, (_EVER,)
-    if not found.steps:
-        return Chosen(found, misfit, OWN_MISFIT)
-    return Chosen(in_model_as_given(found), misfit, OWN_MISFIT, notes, found)
+        Without the recordings nobody can say whether a body common to both would do. A body that
+        is fitted anew stays the rival of last resort.
+
+        """
+        prepared, noise = self.prepared, self.prepared.as_described
+        self.tell(0.2, 'what has changed')
+        evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
+        most = 2 * settings.thresholds.few_causes
+        given = as_given(self.arm, prepared.data, most, settings.library)
+        found = self._explain('given', replace(given, since=True), evidence, settings)
+        if at_floor(found, settings):
+            return Chosen(found, misfit, WRITTEN_MISFIT)
+        self.tell(0.6, 'the model fitted anew')
+        anew = self._anew(tuple(np.maximum(one, misfit) for one in prepared.sigma), settings)
+        chosen = found if _as_good(found, anew, settings) else anew
+        return Chosen(chosen, misfit, WRITTEN_MISFIT)
+
+    def _anew(self, sigma: tuple[FloatArray, ...], settings: DiagnosisSettings) -> Explanation:
+        """
+        Explain the data beside a rigid body and known effects that are fitted anew.
+
+        A described value may be off by a share of it. One that is fitted to more than that has
+        changed, and is asked about as a cause.
+
+        """
+        arm, data, library = self.arm, self.prepared.data, settings.library
+        evidence = Evidence(data, sigma, tuple(self.prepared.sigma))
+        many = settings.thresholds.many_causes
+        question = fitted_anew(arm, data, many, library, self.rng)
+        found = self._explain('anew', question, evidence, settings)
+        rigid, described = len(arm.robot.rigid_parameters), arm.theta
+        change = np.abs(found.fitted.arm.theta[: len(described)] - described)
+        known = (np.arange(len(described)) >= rigid) & (described != 0.0)
+        far = change > settings.thresholds.described * np.abs(described)
+        changed = np.flatnonzero(known & far)
+        if not len(changed):
+            return found
+        question = fitted_anew(arm, data, many, library, self.rng, changed.tolist())
+        return self._explain('anew but for what changed', question, evidence, settings)
+
+    def _since(self, baseline: Baseline, settings: DiagnosisSettings) -> Chosen:
+        """Explain what has changed since the baseline."""
+        arm, prepared, noise = self.arm, self.prepared, self.prepared.as_described
+        self.tell(0.2, 'what has changed')
+        misfit = baseline.misfit * _louder(prepared, baseline)
+        sigma = tuple(np.maximum(one, misfit) for one in noise)
+        evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
+        most, both = 2 * settings.thresholds.few_causes, [*prepared.data, *baseline.data]
+        free = fitted_anew(arm, both, most, settings.library, self.rng)
+        assert free.base is not None and free.beside_base is not None
+        told = baseline.told(free.arm, free.base)
+        beside = told if free.beside is arm else baseline.told(free.beside, free.beside_base)
+        question = replace(free, told=told, beside_told=beside, since=True)
+        more = None
+        if self.unseen:
+            unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(self.unseen)
+            more = Evidence(tuple(self.unseen), unit, unit, baseline.varies)
+        found = self._explain('since', question, evidence, settings, baseline, more)
+        notes: tuple[str, ...] = ()
+        if not found.steps and not at_floor(found, settings):
+            lacking = self._explain('lacking', question, evidence, settings)
+            if _most(lacking, settings) and _may_have_been(lacking, baseline, told, settings):
+                found, notes = lacking, (_EVER,)
+        if not found.steps:
+            return Chosen(found, misfit, OWN_MISFIT)
+        return Chosen(in_model_as_given(found), misfit, OWN_MISFIT, notes, found)
 
 
 def _may_have_been(

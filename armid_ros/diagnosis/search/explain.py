@@ -62,6 +62,8 @@ class Explanation:
         What other data tell of what was free.
     by_chance : float
         Squares that a value of any cause takes of what the names leave.
+    considered : frozenset of str
+        Names without which something else could have been found.
 
     """
 
@@ -75,6 +77,7 @@ class Explanation:
     minor: tuple[Trial, ...] = ()
     told: Told | None = None
     by_chance: float = 0.0
+    considered: frozenset[str] = frozenset()
 
     def without(self, name: int) -> Explanation:
         """Return the explanation without one of its names, the others fitted anew."""
@@ -147,6 +150,7 @@ def explain(
         small,
         question.told,
         by_chance,
+        way.considered,
     )
 
 

@@ -49,6 +49,8 @@ class Way:
         The first look at all causes, and the last one.
     change : ndarray, shape (r,), or None
         What was added to what is free of the arm in the last fit.
+    considered : frozenset of str
+        Names without which the search could have gone another way.
 
     """
 
@@ -58,6 +60,7 @@ class Way:
     first: Survey | None
     last: Survey | None
     change: FloatArray | None = None
+    considered: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -107,11 +110,22 @@ class Search:
         first = self._fitted_place([row[0] for row in start], [row[2] for row in start], None)
         way = self._way(first, steps, 0.0)
         assert way.last is not None
-        width = way.last.most
+        width, considered = way.last.most, self._considered(way)
         here = replace(first.look.here, total=None, before=None, width=width)
         if any(undecided(step.trial, step.ranking, here) for step in way.steps[len(start) :]):
             way = self._way(first, steps, width)
-        return way
+        return replace(way, considered=considered | self._considered(way))
+
+    def _considered(self, way: Way) -> frozenset[str]:
+        """Return what was taken or could have been, and what takes most of the rest."""
+        arm = self.question.arm
+        trials = [trial for step in way.steps for trial in (step.trial, *step.rivals)]
+        trials += [] if way.last is None else way.last.ranking[:1]
+        effects = [trial.group.effect for trial in trials]
+        zeros = [np.zeros(len(effect.parameters(arm.robot))) for effect in effects]
+        words = [e.named_as(values, arm) for e, values in zip(effects, zeros, strict=True)]
+        names = {word.name for said in words for word, _ in said}
+        return frozenset(names | {effect.name for effect in self.question.unknown})
 
     def _way(self, place: _Place, steps: Sequence[Step], width: float) -> Way:
         """Go from a place, where a lead of less than some squares decides nothing."""
