@@ -18,6 +18,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.assess.hypotheses import Exchanged, InDegrees, Reversed
+from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
@@ -30,6 +32,8 @@ from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
+#: Mistakes that are of the data and of nothing that may happen to an arm.
+_OF_DATA = Exchanged | InDegrees | Reversed
 #: A torque follows the model of its own joint when this much of it is the model's ...
 _FOLLOWS = 0.9
 #: Two joints are exchanged when each one's torque is this near to the other's model, and less than
@@ -69,6 +73,9 @@ def check_data(
 
     """
     slopes, correlation = _compare(_as_it_may_be(arm, data), data)
+    mistaken = _mistaken(arm, recordings, used)
+    if mistaken:
+        return mistaken, []
     faults = [*_time_base(recordings, _band(data)), *_torques(arm, slopes, correlation)]
     faults += _laws(arm, data)
     for recording in recordings:
@@ -116,6 +123,19 @@ def _signs(
     motions, torques = [part.at_rows for part in data], [part.torque for part in data]
     driven = driven_by_friction(arm.robot, motions, torques)
     return [wrong_sign(driven)] if driven else []
+
+
+def _mistaken(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> list[str]:
+    """Say what every recording shows to be wrong with it: names, signs or units of joints."""
+    if any(one.partner is not None for one in recordings):
+        return []
+    said: set[tuple[str, ...]] = set()
+    for recording in recordings:
+        mistake = find_mistake(arm.body, recording, used)
+        if mistake is None or not all(isinstance(h, _OF_DATA) for h in mistake.hypotheses):
+            return []
+        said.add(tuple(one.sentence(arm.robot) for one in mistake.hypotheses))
+    return [', or '.join(said.pop())] if len(said) == 1 else []
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:

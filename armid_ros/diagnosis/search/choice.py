@@ -217,9 +217,13 @@ class Explainer:
 
     def _since(self, baseline: Baseline, settings: DiagnosisSettings) -> Chosen:
         """Explain what has changed since the baseline."""
-        arm, prepared, noise = self.arm, self.prepared, self.prepared.as_described
+        arm, prepared = self.arm, self.prepared
         self.tell(0.2, 'what has changed')
         misfit = baseline.misfit * _louder(prepared, baseline)
+        noise = tuple(
+            np.minimum(one, misfit) if floor.period is None else one
+            for one, floor in zip(prepared.as_described, prepared.floors, strict=True)
+        )  # what was assumed is no more than the noise and the misfit of the baseline
         sigma = tuple(np.maximum(one, misfit) for one in noise)
         evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
         most, both = 2 * settings.thresholds.few_causes, [*prepared.data, *baseline.data]

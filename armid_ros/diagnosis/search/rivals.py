@@ -60,9 +60,11 @@ def likeliest(
     """
     Return the simplest of the causes that leave no gap, or the best where each leaves one.
 
-    One cause that explains everything goes before two that do it together.
+    One cause that explains everything goes before two that do it together, and what happens goes
+    before what never does.
 
     """
+    tied = [trial for trial in tied if not _never_happens(trial, here)] or tied
     if len(tied) == 1:
         return tied[0]
     left = project(problem, beside.free, beside.hold).rest(problem.y)

@@ -145,6 +145,8 @@ def _unexplained(minor: Sequence[Finding], robot: Robot) -> str:
 
 def _factor(ratio: float) -> str:
     """Return a ratio with as many digits as tell it from one."""
+    if ratio >= 100.0:
+        return f'{ratio:.0f}'
     return f'{ratio:.1f}' if ratio >= 1.05 else f'{ratio:.2f}'
 
 

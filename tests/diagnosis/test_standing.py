@@ -1,0 +1,63 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A joint that stands still is held by dry friction, or by more than that."""
+
+from armid_ros.diagnosis import diagnose
+from armid_ros.motion import Motion
+from armid_ros.recording import Recording
+import numpy as np
+import pytest
+
+RATE, MOVING, END = 200.0, 8.0, 12.0
+
+
+def coming_to_rest(bench, held, seed=0):
+    """Return recordings of an arm that stops, and whose elbow is held by a torque then [N m]."""
+    rng = np.random.default_rng(seed)
+    result = []
+    for k, speed in enumerate((1.0, 1.5, 2.0)):
+        t = np.arange(round(END * RATE)) / RATE
+        fade = np.where(t < MOVING, np.sin(np.pi * t / MOVING) ** 2, 0.0)
+        phase = 2.0 * np.pi * speed * (0.5 + 0.3 * k) * t
+        q = 0.8 * fade[:, np.newaxis] * np.sin(phase[:, np.newaxis] * [0.37, 0.53] + [k, 2.0])
+        dq = np.gradient(q, 1.0 / RATE, axis=0)
+        ddq = np.gradient(dq, 1.0 / RATE, axis=0)
+        motion = Motion(bench.robot.joints, t, q, dq, ddq)
+        tau = bench.torque(motion) + np.outer(t > MOVING + 0.5, [0.0, held])
+        noise = 0.03 * rng.normal(size=q.shape)
+        angles = q + 2e-5 * rng.normal(size=q.shape)
+        result.append(
+            Recording(joints=bench.robot.joints, t=t, q=angles, tau=tau + noise, source=str(k))
+        )
+    return result
+
+
+@pytest.mark.parametrize('baseline', [False, True])
+@pytest.mark.parametrize('held', [0.28, -0.28])
+def test_what_friction_holds_is_no_gap(bench, held, baseline):
+    before = coming_to_rest(bench, 0.0, seed=1) if baseline else []
+    found = diagnose(
+        bench.arm,
+        coming_to_rest(bench, held),
+        baseline=before,
+        rng=np.random.default_rng(0),
+    )
+    assert found.verdict == 'consistent', found.summary
+
+
+@pytest.mark.parametrize('baseline', [False, True])
+@pytest.mark.parametrize('part', ['recordings', 'validate'])
+def test_more_than_friction_holds_is_said(bench, baseline, part):
+    """An arm that leans on a table stands still, and no row of it tells a model anything."""
+    before = coming_to_rest(bench, 0.0, seed=1) if baseline else []
+    free, held = coming_to_rest(bench, 0.0), coming_to_rest(bench, 9.0, seed=2)
+    found = diagnose(
+        bench.arm,
+        held if part == 'recordings' else free,
+        validate=held if part == 'validate' else [],
+        baseline=before,
+        rng=np.random.default_rng(0),
+    )
+    assert found.verdict == 'unknown', found.summary
+    assert 'the error of elbow' in found.summary
+    assert 'a stop, a brake or a contact' in found.summary
