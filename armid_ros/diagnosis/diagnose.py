@@ -296,7 +296,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
-        summary=' '.join([word.summary, *_unpatched(found, worse)]),
+        summary=' '.join([word.summary, *_unpatched(found, worse), chosen.doubt]).strip(),
         findings=found,
         minor=minor,
         where=_where(explanation, limits, bool(found)),

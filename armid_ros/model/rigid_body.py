@@ -88,9 +88,23 @@ def inverse_dynamics_derivatives(
 
     Notes
     -----
-    Source: Carpentier and Mansard 2018; Pinocchio's computeRNEADerivatives.
+    Source: Carpentier and Mansard 2018; Pinocchio's computeRNEADerivatives. It divides by the
+    masses of links together, which a fit may have made negative: derivatives are linear in the
+    parameters, and those of a ballast that makes all masses positive are taken off again.
 
     """
+    lightest = float(np.min(robot.rigid_parameters[:: len(LINK_PARAMETERS)]))
+    if lightest < 0.0:
+        ballast = np.zeros_like(robot.rigid_parameters)
+        ballast[:: len(LINK_PARAMETERS)] = 1.0 - lightest
+        heavier = robot.with_inertias(robot.rigid_parameters + ballast)
+        pairs = zip(
+            inverse_dynamics_derivatives(heavier, motion),
+            inverse_dynamics_derivatives(robot.with_inertias(ballast), motion),
+            strict=True,
+        )
+        by_q, by_dq, by_ddq = (whole - added for whole, added in pairs)
+        return by_q, by_dq, by_ddq
     model, data = robot.model, _SCRATCH.of(robot)
     n = robot.n_joints
     by_q, by_dq, by_ddq = np.empty((3, len(motion), n, n))

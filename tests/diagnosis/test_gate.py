@@ -76,3 +76,42 @@ def test_a_damaged_sample_is_mended_in_every_recording_and_said(bench, part):
     assert found.verdict == 'consistent', found.summary
     assert any('effort of elbow at' in note for note in found.notes)
     assert any('4 dropped for values that are not finite' in note for note in found.notes)
+
+
+def exchanged(recording):
+    """Return a recording in which shoulder and elbow have the name of each other."""
+    order = [0, 2, 1]
+    return replace(recording, q=recording.q[:, order], tau=recording.tau[:, order])
+
+
+def in_degrees(recording):
+    return replace(recording, q=np.rad2deg(recording.q))
+
+
+@pytest.mark.parametrize(('harm', 'said'), [(exchanged, 'exchanged'), (in_degrees, 'in degrees')])
+def test_names_and_units_of_whole_joints_are_faults_of_the_data(upright, harm, said):
+    recordings = [harm(one) for one in upright.recordings()]
+    found = diagnose(upright.arm, recordings, rng=np.random.default_rng(0))
+    assert found.verdict == 'bad_data'
+    assert said in found.summary
+    assert 'jumps' not in found.summary
+
+
+def test_a_model_of_another_arm_is_doubted(bench):
+    """What such a model leaves of both days is alike, and so nothing has changed."""
+    other = replace(bench.arm, robot=bench.robot.with_gravity([3.0, 0.0, -9.0]))
+    found = diagnose(
+        other,
+        bench.recordings(seed=3),
+        baseline=bench.recordings(seed=4),
+        rng=np.random.default_rng(0),
+    )
+    assert 'is it the model of this arm?' in found.summary
+    found = diagnose(
+        bench.arm,
+        bench.recordings(seed=3),
+        baseline=bench.recordings(seed=4),
+        rng=np.random.default_rng(0),
+    )
+    assert found.verdict == 'consistent'
+    assert 'is it the model' not in found.summary

@@ -4,7 +4,7 @@
 
 from types import SimpleNamespace
 
-from armid_ros.diagnosis.search.rivals import beaten, rarity
+from armid_ros.diagnosis.search.rivals import beaten, likeliest, rarity
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 import numpy as np
@@ -57,3 +57,11 @@ def test_of_two_that_happen_the_lead_decides(bench):
     gains = 10.0 + np.random.default_rng(0).normal(size=36)
     gain, rotor = Told(bench, 'torque_gain', gains), Told(bench, 'rotor_inertia', 0.85 * gains)
     assert beaten(rotor, gain, asked(400.0, object()))
+
+
+def test_what_never_happens_is_taken_only_alone(bench):
+    """A link may say the same with fewer values than a payload, and does not change."""
+    link, payload = Told(bench, 'link_inertia', [9.0]), Told(bench, 'payload', [8.0])
+    here = asked(10.0, object())
+    assert likeliest([link, payload], {}, None, None, here) is payload
+    assert likeliest([link], {}, None, None, here) is link

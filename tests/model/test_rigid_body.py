@@ -1,8 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
 from armid_ros.model import (
     gravity_sensitivity,
     inverse_dynamics,
+    inverse_dynamics_derivatives,
     random_motion,
     regressor,
     rigid_parameter_names,
@@ -26,6 +29,23 @@ def motion(arm):
 def test_regressor_times_parameters_is_inverse_dynamics(arm, motion):
     tau = regressor(arm, motion) @ arm.rigid_parameters
     np.testing.assert_allclose(tau, inverse_dynamics(arm, motion), rtol=1e-9, atol=1e-12)
+
+
+def test_derivatives_are_those_of_bodies_that_no_arm_has_too(arm, motion):
+    """A fit of base parameters may leave links less than nothing, alone and together."""
+    parameters = arm.rigid_parameters.copy()
+    parameters[::10] -= 1.3 * parameters[::10].max()
+    fitted = arm.with_inertias(parameters)
+    by_q, by_dq, by_ddq = inverse_dynamics_derivatives(fitted, motion)
+    step = 1e-6
+    for exact, name in ((by_q, 'q'), (by_dq, 'dq'), (by_ddq, 'ddq')):
+        for joint in range(arm.n_joints):
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = getattr(motion, name) + sign * step * np.eye(arm.n_joints)[joint]
+                ends.append(inverse_dynamics(fitted, replace(motion, **{name: moved})))
+            slope = (ends[0] - ends[1]) / (2.0 * step)
+            np.testing.assert_allclose(exact[:, :, joint], slope, rtol=1e-6, atol=1e-5)
 
 
 def test_torque_is_linear_in_gravity(arm, motion):

@@ -84,6 +84,13 @@ class Baseline:
             worst / np.maximum(others**2, 1e-300),
         )
 
+    @property
+    def error(self) -> float:
+        """Share of the torque that the model leaves, of all joints together."""
+        left = np.concatenate([rows.ravel() for rows in self.residual])
+        torque = np.concatenate([part.torque.ravel() for part in self.data])
+        return float(np.linalg.norm(left) / max(float(np.linalg.norm(torque)), 1e-300))
+
     def told(self, arm: ArmModel, base: BaseParameters) -> Told:
         """
         Return what these recordings tell of what is free of an arm.

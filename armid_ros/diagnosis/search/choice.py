@@ -25,6 +25,7 @@ from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question
 from armid_ros.diagnosis.search.round import cost
 from armid_ros.diagnosis.search.step import Step
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -58,6 +59,8 @@ class Chosen:
         What a reader should know.
     rest : Explanation or None
         The same names beside a body that is common to both days, which tells what they leave.
+    doubt : str
+        Why the model itself may be wrong, a sentence; empty if it need not be.
 
     """
 
@@ -66,6 +69,7 @@ class Chosen:
     floor_in_words: str
     notes: tuple[str, ...] = ()
     rest: Explanation | None = None
+    doubt: str = ''
 
 
 @dataclass(frozen=True)
@@ -242,9 +246,21 @@ class Explainer:
             lacking = self._explain('lacking', question, evidence, settings)
             if _most(lacking, settings) and _may_have_been(lacking, baseline, told, settings):
                 found, notes = lacking, (_EVER,)
+        chosen = Chosen(found, misfit, OWN_MISFIT, notes, doubt=_doubt(baseline))
         if not found.steps:
-            return Chosen(found, misfit, OWN_MISFIT)
-        return Chosen(in_model_as_given(found), misfit, OWN_MISFIT, notes, found)
+            return chosen
+        return replace(chosen, explanation=in_model_as_given(found), rest=found)
+
+
+def _doubt(baseline: Baseline) -> str:
+    """Say that a model is poor on the day on which nothing was wrong."""
+    error = 100.0 * baseline.error
+    if error <= LIMITS.poor:
+        return ''
+    return (
+        f'The model leaves {error:.0f} % of the torque of the baseline itself: is it the model of '
+        'this arm? A change of less is not seen.'
+    )
 
 
 def _may_have_been(
