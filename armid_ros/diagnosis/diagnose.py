@@ -128,21 +128,21 @@ def diagnose(
         )
         return _with_small_print(result, settings.thresholds.headline)
     tell(0.02, 'filtering')
-    arm = memoized_arm(arm)
+    given, arm = arm, memoized_arm(arm)
     recordings, validate, baseline, repairs = _whole(recordings, validate, baseline, settings)
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
     faults, notes = check_data(arm, recordings, used, data)
     notes += repairs
     if faults:
-        return _bad(arm, data, faults, notes)
+        return _bad(given, data, faults, notes)
     tell(0.1, 'noise floor')
     prepared = prepare(arm, recordings, used, data, settings, rng, bool(baseline))
     if any(floor.period is None for floor in prepared.floors):
         notes.append(_ASSUMED)
     before = trajectories(baseline, prepared.used, arm, prepared.allowed)
     known = Baseline.of(arm, before, rng) if baseline else None
-    asked = _Asked(arm, prepared, validate, settings, rng, tell)
+    asked = _Asked(arm, given, prepared, validate, settings, rng, tell)
     tied = _tied(asked, recordings)
     if tied is not None:
         return _said(tied, notes, asked)
@@ -235,9 +235,10 @@ def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
 
 @dataclass(frozen=True)
 class _Asked:
-    """What was asked: see the parameters of `diagnose`."""
+    """What was asked: see the parameters of `diagnose`; `arm` is the one given, memoized."""
 
     arm: ArmModel
+    given: ArmModel
     prepared: Prepared
     validate: Sequence[Recording]
     settings: DiagnosisSettings
@@ -303,7 +304,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         left=locate(arm, evidence, explanation.fitted.residual, limits),
         gap=gap,
         explanation=explanation.forgetting(),
-        arm=plain_arm(explanation.fitted.arm if found and not worse else arm),
+        arm=plain_arm(explanation.fitted.arm) if found and not worse else asked.given,
         data=tuple(data),
         floors=floors,
         not_visible=_not_visible(explanation, settings),
@@ -433,7 +434,7 @@ def _bad(
         left=(),
         gap=None,
         explanation=None,
-        arm=plain_arm(arm),
+        arm=arm,
         data=tuple(data),
         floors=(),
         not_visible=(),

@@ -160,7 +160,7 @@ def test_what_happens_in_one_period_only_is_not_repeatable(bench):
     [
         (lambda tau: tau * [1.0, -1.0], 'opposite sign'),
         (lambda tau: tau * 1000.0, 'N mm'),
-        (lambda tau: tau[:, ::-1], 'right order'),
+        (lambda tau: tau[:, ::-1], 'exchanged'),
     ],
 )
 def test_faults_of_the_data_are_named_before_physics(bench, fault, word):
