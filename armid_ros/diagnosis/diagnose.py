@@ -18,6 +18,7 @@ from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Trajectory
 from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.data.gate import check_data
+from armid_ros.diagnosis.data.mended import mended
 from armid_ros.diagnosis.data.prepare import choose_filters, prepare, Prepared
 from armid_ros.diagnosis.result import Diagnosis
 from armid_ros.diagnosis.search.bodies import as_bodies
@@ -44,7 +45,6 @@ from armid_ros.diagnosis.verdict.headline import (
 from armid_ros.diagnosis.verdict.standing import standing
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating
-from armid_ros.identification.rows.damage import without_damage
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -129,7 +129,7 @@ def diagnose(
         return _with_small_print(result, settings.thresholds.headline)
     tell(0.02, 'filtering')
     given, arm = arm, memoized_arm(arm)
-    recordings, validate, baseline, repairs = _whole(recordings, validate, baseline, settings)
+    recordings, validate, baseline, repairs = mended(recordings, validate, baseline, settings)
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
     faults, notes = check_data(arm, recordings, used, data)
@@ -161,24 +161,6 @@ def diagnose(
     if not validate or not (said.verdict == 'unknown' or said.harmful):
         return said
     return _what_stands(ask, settings, fallen) or _small_but_all(ask, settings, said) or said
-
-
-def _whole(
-    recordings: Sequence[Recording],
-    validate: Sequence[Recording],
-    baseline: Sequence[Recording],
-    settings: DiagnosisSettings,
-) -> tuple[list[Recording], list[Recording], list[Recording], list[str]]:
-    """Return recordings without damaged samples, and what reading and mending did to them."""
-    notes: list[str] = []
-    mended: list[list[Recording]] = []
-    for part in (recordings, validate, baseline):
-        whole, repairs = without_damage(part, settings.signals) if part else ([], ())
-        mended.append(whole)
-        harmed_ones = [one for one in part if not one.report.unharmed]
-        notes += [f'{one.source}: {one.report.describe()}' for one in harmed_ones]
-        notes += map(str, repairs)
-    return mended[0], mended[1], mended[2], notes
 
 
 #: Says what is found with settings, and which names do not stand on other recordings.

@@ -67,7 +67,7 @@ class TorqueGain(TorqueReading):
 
     name = 'torque_gain'
     summary = 'torque readings too large or too small by a share'
-    sign = 'readings are too large by that share'
+    sign = 'readings are 1 plus that times the torque'
     shown_by = 'the same motion with and without a known payload'
     familiar = True
     quantities = (Quantity('gain_error', '', lower=-0.95, typical=(0.005, 0.3)),)

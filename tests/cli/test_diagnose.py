@@ -182,3 +182,16 @@ def test_what_is_no_percentage_is_refused(text, tmp_path):
         'diagnose', 'bag', '--robot', 'r', '--out', tmp_path, '--material', text, code=2
     )
     assert text in result.output
+
+
+def test_a_model_of_another_arm_is_refused(files, tmp_path):
+    """The same names of joints, and another length: every number would be of no arm at all."""
+    urdf, known, bags = files
+    longer = tmp_path / 'longer.urdf'
+    text = urdf.read_text(encoding='utf-8')
+    assert 'xyz="0 0 0.35"' in text
+    longer.write_text(text.replace('xyz="0 0 0.35"', 'xyz="0 0 0.45"'), encoding='utf-8')
+    asked = ('--robot', longer, '--model', known, '--out', tmp_path / 'x')
+    result = armid('diagnose', *bags, *asked, code=2)
+    assert 'joints are elsewhere' in result.output
+    assert not (tmp_path / 'x').exists()

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose
+from armid_ros.diagnosis.data.dead_channels import dead_channels
 from armid_ros.diagnosis.data.evidence import trajectories
 from armid_ros.diagnosis.data.gate import check_data
 from armid_ros.errors import IdentificationError
@@ -115,3 +116,45 @@ def test_a_model_of_another_arm_is_doubted(bench):
     )
     assert found.verdict == 'consistent'
     assert 'is it the model' not in found.summary
+
+
+@pytest.mark.parametrize('since', [0, 1000])
+def test_a_torque_that_stays_the_same_while_its_joint_moves_is_dead(bench, since):
+    def dead(one):
+        tau = one.tau.copy()
+        tau[since:, 0] = tau[since, 0] if since else 0.0
+        return replace(one, tau=tau)
+
+    found = diagnose(
+        bench.arm, [dead(one) for one in bench.recordings()], rng=np.random.default_rng(0)
+    )
+    assert found.verdict == 'bad_data'
+    assert 'the torque of shoulder stays at' in found.summary
+
+
+def test_a_joint_that_nobody_drives_is_not_dead(bench):
+    """Weight and inertia of a free pendulum cancel; a drive at its limit may stay there."""
+    recordings = bench.recordings()
+    used = conditioning(recordings, SignalSettings())
+    limited = [replace(one, tau=np.clip(one.tau, -0.4, 0.4)) for one in recordings]
+    data = trajectories(limited, used)
+    assert not any(list(dead_channels(bench.arm, one, data)) for one in limited)
+    free = [replace(one, tau=one.tau * [1.0, 0.0]) for one in recordings]
+    light = bench.robot.rigid_parameters.copy()
+    light[-10:] = 0.0
+    passive = replace(bench.arm, robot=bench.robot.with_inertias(light))
+    data = trajectories(free, used)
+    assert not any(list(dead_channels(passive, one, data)) for one in free)
+
+
+def test_a_recording_in_two_roles_is_said(bench):
+    recordings = bench.recordings()
+    found = diagnose(
+        bench.arm,
+        recordings,
+        validate=bench.recordings(seed=5)[:1],
+        baseline=recordings[:1],
+        rng=np.random.default_rng(0),
+    )
+    (note,) = [note for note in found.notes if 'two roles' in note]
+    assert recordings[0].source in note

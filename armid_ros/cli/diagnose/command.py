@@ -18,7 +18,9 @@ from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, Finding
 from armid_ros.diagnosis.verdict.document import SCHEMA
 from armid_ros.effects.tied import Partner
+from armid_ros.errors import ArmidError
 from armid_ros.files import json_text
+from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.recording import Recording
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
@@ -186,7 +188,7 @@ def diagnose(
         require_libraries()
     options.hold(out, SCHEMA, robot.robot_source)
     loaded = robot.load(data.bags)
-    arm = ArmModel(loaded) if asked.model is None else load_model(asked.model, loaded)
+    arm = ArmModel(loaded) if asked.model is None else _model_of(asked.model, loaded)
     arm = options.with_effects(arm, asked.effects)
     beside = partner_options.open_partner(partner.partner, partner.ties, loaded, robot.gravity)
     settings = DiagnosisSettings(
@@ -227,6 +229,29 @@ def diagnose(
         return
     show(result)
     _show_extras(out, extras)
+
+
+def _model_of(path: Path, robot: Robot) -> ArmModel:
+    """
+    Read a model of an arm.
+
+    Raises
+    ------
+    ArmidError
+        If the description that it was made with is still there, and is of another arm.
+
+    """
+    arm = load_model(path, robot)
+    try:
+        known = load_model(path).robot
+    except ArmidError:  # it was moved, or comes from a bag
+        return arm
+    if known.joints == robot.joints and kinematics_digest(known) != kinematics_digest(robot):
+        raise ArmidError(
+            f'{path}: was made with a description whose joints are elsewhere than those of '
+            f'{robot.name}; give --robot the one that it names, or identify this arm'
+        )
+    return arm
 
 
 def show(result: Diagnosis) -> None:

@@ -15,6 +15,7 @@ from functools import partial
 from itertools import product
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.dead_channels import dead_channels
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.errors import IdentificationError
@@ -79,7 +80,7 @@ def check_data(
     faults = [*_time_base(recordings, _band(data)), *_torques(arm, slopes, correlation)]
     faults += _laws(arm, data)
     for recording in recordings:
-        faults += _jumps(arm.robot, recording)
+        faults += [*_jumps(arm.robot, recording), *dead_channels(arm, recording, data)]
     faults += [] if faults else _signs(arm, recordings, data)
     notes = [*_clipped(recordings), *_described_friction(arm)]
     try:
