@@ -42,7 +42,7 @@ from armid_ros.diagnosis.verdict.headline import (
     shares_of,
     smallest,
 )
-from armid_ros.diagnosis.verdict.standing import standing
+from armid_ros.diagnosis.verdict.standing import held
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating
 from armid_ros.motion import FloatArray
@@ -142,7 +142,7 @@ def diagnose(
         notes.append(_ASSUMED)
     before = trajectories(baseline, prepared.used, arm, prepared.allowed)
     known = Baseline.of(arm, before, rng) if baseline else None
-    asked = _Asked(arm, given, prepared, validate, settings, rng, tell)
+    asked = _Asked(arm, given, prepared, known, validate, settings, rng, tell)
     tied = _tied(asked, recordings)
     if tied is not None:
         return _said(tied, notes, asked)
@@ -222,6 +222,7 @@ class _Asked:
     arm: ArmModel
     given: ArmModel
     prepared: Prepared
+    before: Baseline | None
     validate: Sequence[Recording]
     settings: DiagnosisSettings
     rng: np.random.Generator
@@ -260,7 +261,8 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         sure, least_sure = _sure(unseen, chosen), settings.thresholds.predicted
         left.append(_left(rest, sure, settings, 'recordings that were not used', least_sure))
     if settings.partner is None:
-        left += _held(rest, [evidence, *([] if unseen is None else [unseen])])
+        parts = [evidence, *([] if unseen is None else [unseen])]
+        left += [held(rest.fitted.arm, part, asked.before, asked.arm) for part in parts]
     total = float(attribute(explanation, None).whole.sum())
     tried = 1 if explanation.survey is None else explanation.survey.tried
     minor = small_print(explanation.minor, max(total, 1e-300), tried, arm)
@@ -375,15 +377,6 @@ def _left(
     else:
         residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
     return Left(_excess(residual, evidence, settings) / more, f'in {where}')
-
-
-def _held(explanation: Explanation, parts: Sequence[Evidence]) -> list[Left]:
-    """Return what acts on joints that stand still, or turn round, beyond friction."""
-    where = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
-    arm = explanation.fitted.arm
-    residual = [[part.residual(arm) for part in evidence.data] for evidence in parts]
-    pairs = zip(parts, residual, strict=True)
-    return [Left(standing(arm, evidence, left), where) for evidence, left in pairs]
 
 
 def _as_it_is(arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings) -> Left:

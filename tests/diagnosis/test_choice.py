@@ -12,6 +12,7 @@ from armid_ros.diagnosis.search.choice import (
     _beside_a_correction,
     _more_freedom,
     _stands,
+    _told_by,
     Explainer,
     freedom,
 )
@@ -101,3 +102,18 @@ def test_names_that_played_no_part_are_not_asked_about_again(bench):
     assert without('torque_ripple') is found
     other = without('viscous_friction')
     assert 'viscous_friction' not in [step.trial.group.effect.name for step in other.steps]
+
+
+@pytest.mark.parametrize(
+    ('repeats', 'recorded', 'wanted'), [(False, 0.01, 1.0), (False, 0.02, 5.0), (True, 0.01, 5.0)]
+)
+def test_assumed_noise_is_no_more_than_what_a_baseline_left(repeats, recorded, wanted):
+    """A fault that is as rough as noise would hide itself; fewer samples have more of it."""
+    before = SimpleNamespace(data=[SimpleNamespace(period_recorded=0.01)] * 3)
+    now = SimpleNamespace(
+        as_described=(np.array([5.0, 0.1]),),
+        floors=(SimpleNamespace(period=4.0 if repeats else None),),
+        data=(SimpleNamespace(period_recorded=recorded),),
+    )
+    (noise,) = _told_by(before, now, np.array([1.0, 1.0]))
+    assert noise.tolist() == [wanted, 0.1]

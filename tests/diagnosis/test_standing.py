@@ -61,3 +61,9 @@ def test_more_than_friction_holds_is_said(bench, baseline, part):
     assert found.verdict == 'unknown', found.summary
     assert 'the error of elbow' in found.summary
     assert 'a stop, a brake or a contact' in found.summary
+
+
+def test_a_brake_that_held_the_arm_on_the_day_before_is_no_change(bench):
+    before, now = (coming_to_rest(bench, 9.0, seed) for seed in (1, 2))
+    found = diagnose(bench.arm, now, baseline=before, rng=np.random.default_rng(0))
+    assert found.verdict == 'consistent', found.summary

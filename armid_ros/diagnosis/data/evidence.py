@@ -68,6 +68,8 @@ class Trajectory:
         Share of each row of which the sign of the velocity is uncertain; infinite at rest.
     allowed : ndarray, shape (n,)
         The largest such share of a row that tells something.
+    period_recorded : float
+        Time between its samples as they were recorded [s].
     sensors : SensorNoise or None
         What their noise does beside another machine; None where there is none.
 
@@ -80,6 +82,7 @@ class Trajectory:
     rows: npt.NDArray[np.intp]
     unsure: FloatArray
     allowed: FloatArray
+    period_recorded: float
     sensors: SensorNoise | None = None
 
     @cached_property
@@ -271,7 +274,7 @@ def trajectories(
     for fold, recording in enumerate(recordings):
         least = _REVERSAL_NOISE * velocity_error(recording, used)
         stretches = segments(recording, used)
-        found = [_trajectory(recording.source, fold, m, used, least) for m in stretches]
+        found = [_trajectory(recording, fold, m, used, least) for m in stretches]
         if not found:
             raise IdentificationError(
                 f'{recording.source}: no stretch is long enough to be filtered at '
@@ -317,7 +320,7 @@ def _thin(used: Conditioning) -> int:
 
 
 def _trajectory(
-    source: str, fold: int, motion: Motion, used: Conditioning, least: FloatArray
+    recording: Recording, fold: int, motion: Motion, used: Conditioning, least: FloatArray
 ) -> Trajectory:
     thin = _thin(used)
     if thin > 1:
@@ -328,7 +331,9 @@ def _trajectory(
         used = Conditioning(used.rate_hz / thin, used.cutoff_hz, used.decimation // thin)
     rows = np.array(decimated_samples(len(motion), used), dtype=np.intp)
     unsure = np.where(_at_rest(motion), np.inf, _unsure(motion, used, least))[rows]
-    return Trajectory(source, fold, motion, used, rows, unsure, np.full(motion.n_joints, UNSURE))
+    allowed = np.full(motion.n_joints, UNSURE)
+    source, period = recording.source, recording.period
+    return Trajectory(source, fold, motion, used, rows, unsure, allowed, period)
 
 
 def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:

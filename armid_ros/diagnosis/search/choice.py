@@ -35,6 +35,8 @@ NOISE, ESTIMATED = 'noise', 'an estimate of the misfit that such a model has'
 OWN_MISFIT = 'the misfit that the model had before'
 WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
 
+#: Data are recorded as often as others if their period is not longer by this factor.
+_AS_OFTEN = 1.2
 #: Said where only what a model lacks explains the gap, and not what has changed.
 _EVER = (
     'the baseline does not tell whether what is named has changed since, or was there and did not '
@@ -224,10 +226,7 @@ class Explainer:
         arm, prepared = self.arm, self.prepared
         self.tell(0.2, 'what has changed')
         misfit = baseline.misfit * _louder(prepared, baseline)
-        noise = tuple(
-            np.minimum(one, misfit) if floor.period is None else one
-            for one, floor in zip(prepared.as_described, prepared.floors, strict=True)
-        )  # what was assumed is no more than the noise and the misfit of the baseline
+        noise = _told_by(baseline, prepared, misfit)
         sigma = tuple(np.maximum(one, misfit) for one in noise)
         evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
         most, both = 2 * settings.thresholds.few_causes, [*prepared.data, *baseline.data]
@@ -250,6 +249,24 @@ class Explainer:
         if not found.steps:
             return chosen
         return replace(chosen, explanation=in_model_as_given(found), rest=found)
+
+
+def _told_by(baseline: Baseline, prepared: Prepared, misfit: FloatArray) -> tuple[FloatArray, ...]:
+    """
+    Return the noise of data: where it is assumed, no more than the baseline left, each (n,).
+
+    That has its noise in it, of data that were recorded as often.
+
+    """
+    usual = np.median([part.period_recorded for part in baseline.data])
+    return tuple(
+        np.minimum(one, misfit)
+        if floor.period is None and part.period_recorded < _AS_OFTEN * usual
+        else one
+        for one, floor, part in zip(
+            prepared.as_described, prepared.floors, prepared.data, strict=True
+        )
+    )
 
 
 def _doubt(baseline: Baseline) -> str:

@@ -13,7 +13,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.verdict.words import Left
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -24,6 +26,35 @@ _HELD = 3.0
 _SURELY = 3.0
 #: What lasts shorter may be chance [s].
 _SHORTEST = 0.2
+#: Factor on what a baseline shows of it: a brake holds an arm on every day.
+_AS_BEFORE = 1.5
+#: Where it is, for a sentence.
+_WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
+
+
+def held(arm: ArmModel, evidence: Evidence, before: Baseline | None, given: ArmModel) -> Left:
+    """
+    Return what acts on joints that stand still or turn round, beyond friction.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The patched arm.
+    evidence : Evidence
+        The data.
+    before : Baseline or None
+        Recordings in which nothing was wrong, of the arm as given: what held it then does still.
+    given : ArmModel
+        That arm.
+
+    """
+    residual = [part.residual(arm) for part in evidence.data]
+    excess = standing(arm, evidence, residual)
+    if before is not None:
+        unit = (before.misfit,) * len(before.data)
+        then = standing(given, Evidence(before.data, unit, unit), before.residual)
+        excess = excess / np.maximum(_AS_BEFORE * then, 1.0)
+    return Left(excess, _WHERE)
 
 
 def standing(arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray]) -> FloatArray:
