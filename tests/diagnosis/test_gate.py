@@ -158,3 +158,13 @@ def test_a_recording_in_two_roles_is_said(bench):
     )
     (note,) = [note for note in found.notes if 'two roles' in note]
     assert recordings[0].source in note
+
+
+def test_a_torque_beyond_the_limit_of_its_drive_is_said(bench):
+    recordings = bench.recordings()
+    used = conditioning(recordings, SignalSettings())
+    strong = [replace(one, tau=9.0 * one.tau) for one in recordings]
+    notes = check_data(bench.arm, strong, used, trajectories(strong, used))[1]
+    assert any('shoulder reaches' in note and 'its limit is 50' in note for note in notes)
+    notes = check_data(bench.arm, recordings, used, trajectories(recordings, used))[1]
+    assert not any('its limit is' in note for note in notes)

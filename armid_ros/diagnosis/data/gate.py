@@ -45,6 +45,8 @@ _UNITS = (
     (1000.0, 'N mm instead of N m'),
     (0.001, 'kN m instead of N m'),
 )
+#: A torque of so many times the limit of its drive is said.
+_BEYOND = 1.5
 #: Share of samples at the very extreme of a reading, above which it is clipped.
 _CLIPPED = 0.02
 #: A step of a position at this multiple of the highest velocity is none of the arm.
@@ -82,7 +84,8 @@ def check_data(
     for recording in recordings:
         faults += [*_jumps(arm.robot, recording), *dead_channels(arm, recording, data)]
     faults += [] if faults else _signs(arm, recordings, data)
-    notes = [*_clipped(recordings), *_described_friction(arm)]
+    notes = [*_clipped(recordings), *_beyond_limits(arm.robot, recordings)]
+    notes += _described_friction(arm)
     try:
         notes += check_motion(arm.robot, recordings, used)
     except IdentificationError as error:
@@ -291,6 +294,20 @@ def _clipped(recordings: Sequence[Recording]) -> list[str]:
                     f'{joint} is at {top:.4g}, its highest value: a limit'
                 )
     return notes
+
+
+def _beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> Iterator[str]:
+    """Say where a torque is beyond what the description lets a drive give."""
+    limit = np.where(robot.torque_limit > 0.0, robot.torque_limit, np.inf)
+    for recording in recordings:
+        if recording.tau is None:
+            continue
+        largest = np.max(np.abs(recording.tau), axis=0)
+        for j in np.flatnonzero(largest > _BEYOND * limit).tolist():
+            yield (
+                f'{recording.source or "recording"}: the torque of {robot.joints[j]} reaches '
+                f'{largest[j]:.4g}, its limit is {limit[j]:.4g}'
+            )
 
 
 def _compare(arm: ArmModel, data: Sequence[Trajectory]) -> tuple[FloatArray, FloatArray]:
