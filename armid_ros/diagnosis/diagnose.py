@@ -42,7 +42,7 @@ from armid_ros.diagnosis.verdict.headline import (
     shares_of,
     smallest,
 )
-from armid_ros.diagnosis.verdict.standing import held
+from armid_ros.diagnosis.verdict.standing import held, places_held
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating
 from armid_ros.motion import FloatArray
@@ -260,9 +260,10 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     if unseen is not None:
         sure, least_sure = _sure(unseen, chosen), settings.thresholds.predicted
         left.append(_left(rest, sure, settings, 'recordings that were not used', least_sure))
+    resting: list[Left] = []
     if settings.partner is None:
         parts = [evidence, *([] if unseen is None else [unseen])]
-        left += [held(rest.fitted.arm, part, asked.before, asked.arm) for part in parts]
+        resting = [held(rest.fitted.arm, part, asked.before, asked.arm) for part in parts]
     total = float(attribute(explanation, None).whole.sum())
     tried = 1 if explanation.survey is None else explanation.survey.tried
     minor = small_print(explanation.minor, max(total, 1e-300), tried, arm)
@@ -270,7 +271,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     word = decide(
         found,
         not_repeating(floors, arm, settings.thresholds, matters) if measured else (),
-        left,
+        [*left, *resting],
         arm,
         NOISE if measured else chosen.floor_in_words,
         None if explanation.base is None else _as_it_is(arm, _sure(evidence, chosen), settings),
@@ -284,7 +285,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         summary=' '.join([word.summary, *_unpatched(found, worse), chosen.doubt]).strip(),
         findings=found,
         minor=minor,
-        where=_where(explanation, limits, bool(found)),
+        where=_where(explanation, limits, bool(found)) or places_held(arm, resting),
         left=locate(arm, evidence, explanation.fitted.residual, limits),
         gap=gap,
         explanation=explanation.forgetting(),

@@ -61,6 +61,7 @@ def test_more_than_friction_holds_is_said(bench, baseline, part):
     assert found.verdict == 'unknown', found.summary
     assert 'the error of elbow' in found.summary
     assert 'a stop, a brake or a contact' in found.summary
+    assert found.where[0].joint == 'elbow'
 
 
 def test_a_brake_that_held_the_arm_on_the_day_before_is_no_change(bench):

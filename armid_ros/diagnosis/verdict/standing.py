@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.diagnosis.verdict.words import Left
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -55,6 +56,17 @@ def held(arm: ArmModel, evidence: Evidence, before: Baseline | None, given: ArmM
         then = standing(given, Evidence(before.data, unit, unit), before.residual)
         excess = excess / np.maximum(_AS_BEFORE * then, 1.0)
     return Left(excess, _WHERE)
+
+
+def places_held(arm: ArmModel, left: Sequence[Left]) -> tuple[Where, ...]:
+    """Say which joints are held, the worst first."""
+    excess = np.max([np.zeros(arm.robot.n_joints), *(one.excess for one in left)], axis=0)
+    beyond = np.where(excess > 1.0, excess, 0.0)
+    order = np.argsort(-beyond)[: np.count_nonzero(beyond)]
+    whole = float(beyond.sum())
+    return tuple(
+        Where(arm.robot.joints[j], float(beyond[j]) / whole, _WHERE, ()) for j in order.tolist()
+    )
 
 
 def standing(arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray]) -> FloatArray:
