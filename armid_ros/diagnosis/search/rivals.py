@@ -16,6 +16,8 @@ import numpy as np
 #: Places in the catalogue that an effect is behind where it is seldom: a delay of one joint, which
 #: is a lag as a rule, and a lag of the whole arm, which is a delay.
 _ELSEWHERE = 1.5
+#: Share by which causes differ whose columns are the same: a lag and a delay, where they begin.
+_ROUNDING = 1e-6
 
 
 def beaten(other: Trial, first: Trial, here: Round) -> bool:
@@ -60,6 +62,8 @@ def likeliest(
     """
     Return the simplest of the causes that leave no gap, or the best where each leaves one.
 
+    Of several that are as good it is the commonest.
+
     One cause that explains everything goes before two that do it together, and what happens goes
     before what never does.
 
@@ -72,7 +76,10 @@ def likeliest(
     count = np.maximum(here.evidence.count, 1.0)
     limits = here.evidence.limits(here.evidence.split(left, problem.weight), here.settings)
     able = [t for t in tied if np.all((squares - gains[id(t)]) / count <= limits)]
-    return simplest(able, here) if able else tied[0]
+    if able:
+        return simplest(able, here)
+    alike = [t for t in tied if t.gain >= (1.0 - _ROUNDING) * tied[0].gain]
+    return min(alike, key=rarity)
 
 
 def simplest(tied: Sequence[Trial], here: Round) -> Trial:
