@@ -33,6 +33,11 @@ def short_excitation():
     return Excitation(random_feasible(ArmModel(robot), limits, 4.0, 2, rng), 1, 1.0)
 
 
+def _hung_up_by_default():
+    """Let SIGHUP end a process also where the tests run under nohup and hand that on."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 class Processes:
     """Nodes as processes on the domain of a bench."""
 
@@ -54,6 +59,7 @@ class Processes:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
+            preexec_fn=_hung_up_by_default,
         )
         self.running.append(process)
         return process
