@@ -63,12 +63,24 @@ def changed(trial: Trial, problem: Problem, beside: Beside, here: Round) -> bool
 
 def surely_changed(trial: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
     """Return whether so many divisions show less of a cause that a misfit hides no change."""
-    return here.before is not None and _seldom(*_showing_more(trial, problem, beside, here), here)
+    if here.before is None or not _seldom(0, _count_divisions(here), here):
+        return False
+    return _seldom(*_showing_more(trial, problem, beside, here), here)
 
 
 def _seldom(more: int, divisions: int, here: Round) -> bool:
     """Return whether chance makes the days stand out as they do in few cases of a hundred."""
     return more + 1 <= here.settings.thresholds.exchanged * (divisions + 1)
+
+
+def _count_divisions(here: Round) -> int:
+    """Return how many other divisions of the recordings are tried."""
+    assert here.before is not None
+    later = here.before.later
+    first = len({part.fold for part in here.before.told.data})
+    second = len({part.fold for part in here.evidence.data})
+    second += 0 if later is None else len(later.left)
+    return sum(1 for _ in _divisions(np.arange(first + second) >= first))
 
 
 def _showing_more(trial: Trial, problem: Problem, beside: Beside, here: Round) -> tuple[int, int]:
