@@ -63,5 +63,5 @@ def test_what_never_happens_is_taken_only_alone(bench):
     """A link may say the same with fewer values than a payload, and does not change."""
     link, payload = Told(bench, 'link_inertia', [9.0]), Told(bench, 'payload', [8.0])
     here = asked(10.0, object())
-    assert likeliest([link, payload], {}, None, None, here) is payload
-    assert likeliest([link], {}, None, None, here) is link
+    assert likeliest([link, payload], {}, here) is payload
+    assert likeliest([link], {}, here) is link

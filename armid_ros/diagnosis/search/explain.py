@@ -28,7 +28,7 @@ from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.resampled import widened
 from armid_ros.diagnosis.search.round import Beside, Round
-from armid_ros.diagnosis.search.step import acceptable, material, Step, Survey
+from armid_ros.diagnosis.search.step import acceptable, material, Step, Survey, there
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -266,8 +266,9 @@ def _friction(
     """
     Return the friction of unknown value that is there, beside what was named.
 
-    All of it was free beside every cause. What takes least goes first, until each that is left
-    takes what a cause has to.
+    All of it was free beside every cause. What takes least goes first, until all that is left is
+    there beyond chance. However little that takes: the values of causes lean on what is left out.
+    What has changed has to matter as well.
 
     """
     if not question.unknown:
@@ -286,45 +287,42 @@ def _friction(
         column = names.index((parameter.name, parameter.joint))
         if column in where:
             left.append((effect, where[column], float(theta[column])))
+    least = settings.thresholds.misfit_share if question.since else None
     work = Workspace(memoized_arm(arm), evidence.data)
     gone: list[int] = []
-    alive, least = dict(enumerate(left)), settings.thresholds.misfit_share
-    judged: dict[int, tuple[Trial, float]] = {}
-    while alive:
-        weakest: tuple[float, int] | None = None
-        judged = {}
+    alive = dict(enumerate(left))
+    while True:
+        steps: dict[int, Step] = {}
+        weak: dict[int, float] = {}
         for k, (effect, column, value) in alive.items():
             group = Group.of(effect, slice(0, 1), (0,), arm.robot)
             trial, problem, beside, power = view.trial(group, [column], [value], gone)
+            if trial is None:
+                weak[k] = -np.inf
+                continue
             total = power if whole[0] is None else whole[0]
-            good = False
-            if trial is not None:
-                here = Round(evidence, work, settings, total)
-                good = _stands(trial, problem, beside, here, whole[1], least)
-                judged[k] = trial, total
-            gain = trial.gain if trial is not None else -np.inf
-            if not good and (weakest is None or gain < weakest[0]):
-                weakest = gain, k
-        if weakest is None:
+            steps[k] = Step(trial, (), (trial,), total, whole[1], least)
+            if not _stands(steps[k], problem, beside, Round(evidence, work, settings, total)):
+                weak[k] = trial.gain
+        if not weak:
             break
-        _, column, value = alive.pop(weakest[1])
+        _, column, value = alive.pop(min(weak, key=lambda k: weak[k]))
         view = view.dropped(column, value)
         gone.append(column)
-    result = []
-    for k, (effect, _, value) in alive.items():
-        trial, total = judged[k]
-        step = Step(trial, (), (trial,), total, whole[1], least)
-        result.append((Named(effect, (0,)), step, np.array([value])))
-    return result
+    return [
+        (Named(effect, (0,)), steps[k], np.array([value]))
+        for k, (effect, _, value) in alive.items()
+    ]
 
 
-def _stands(
-    trial: Trial, problem: Problem, beside: Beside, here: Round, tried: int, misfit_share: float
-) -> bool:
-    """Return whether a cause, whose columns come first, passes and matters."""
+def _stands(step: Step, problem: Problem, beside: Beside, here: Round) -> bool:
+    """Return whether a cause, whose columns come first, is there, and matters if it has to."""
+    trial = step.trial
+    if step.misfit_share is None:
+        return there(trial, here, step.tried)
     own = problem.x[:, :, : trial.group.size]
     gains = trial.joint_gains(problem, own, beside.rows(problem))
-    return acceptable(trial, here, tried) and material(gains, here, misfit_share)
+    return acceptable(trial, here, step.tried) and material(gains, here, step.misfit_share)
 
 
 def _pruned(
@@ -352,7 +350,7 @@ def _pruned(
             here = Round(evidence, work, settings, step.total)
             if trial is None:
                 needless.append((-np.inf, k))
-            elif not _stands(trial, problem, beside, here, step.tried, step.misfit_share):
+            elif not _stands(replace(step, trial=trial), problem, beside, here):
                 needless.append((trial.gain, k))
         if not needless:
             return list(fitted.named), steps, fitted

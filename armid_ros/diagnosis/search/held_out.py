@@ -143,6 +143,24 @@ class Trial:
         """Parts of the data that lose squares."""
         return int(np.sum(np.bincount(self.piece, self.gains) > 0.0))
 
+    def left_out(
+        self, problem: Problem, own: FloatArray, beside: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """
+        Return what the others tell wrong of each piece without the group and with it, each (R, n).
+
+        Parameters are those of `joint_gains`.
+
+        """
+        piece = self.piece[problem.block]
+        alone, rest = np.empty_like(problem.y), np.empty_like(problem.y)
+        for part in range(len(self.held_values)):
+            rows = piece == part
+            alone[rows] = problem.y[rows] - beside[rows] @ self.held_alone[part]
+            predicted = own[rows] @ self.held_values[part] + beside[rows] @ self.held_free[part]
+            rest[rows] = problem.y[rows] - predicted
+        return alone, rest
+
     def joint_gains(self, problem: Problem, own: FloatArray, beside: FloatArray) -> FloatArray:
         """
         Return the squares that go in every joint, shape (n,).
@@ -159,14 +177,8 @@ class Trial:
             Columns that were free.
 
         """
-        piece = self.piece[problem.block]
-        gains = np.zeros(problem.y.shape[1])
-        for part in range(len(self.held_values)):
-            rows = piece == part
-            left = problem.y[rows] - beside[rows] @ self.held_alone[part]
-            torque = own[rows] @ self.held_values[part]
-            torque += beside[rows] @ (self.held_free[part] - self.held_alone[part])
-            gains += np.sum(2.0 * torque * left - torque**2, axis=0)
+        alone, rest = self.left_out(problem, own, beside)
+        gains = np.sum(alone**2 - rest**2, axis=0)
         seen = float(gains.sum())
         return np.asarray(gains * max(self.gain / seen, 1.0) if seen > 0.0 else gains)
 

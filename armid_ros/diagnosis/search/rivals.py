@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from armid_ros.diagnosis.data.rows import fold_rows, Problem, project
 from armid_ros.diagnosis.search.held_out import denies, HARDLY, lead, Trial
@@ -52,13 +52,7 @@ def what_happens_first(
     return list(passing)
 
 
-def likeliest(
-    tied: Sequence[Trial],
-    gains: dict[int, FloatArray],
-    problem: Problem,
-    beside: Beside,
-    here: Round,
-) -> Trial:
+def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -> Trial:
     """
     Return the simplest of the causes that leave no gap, or the best where each leaves one.
 
@@ -71,15 +65,18 @@ def likeliest(
     tied = [trial for trial in tied if not _never_happens(trial, here)] or tied
     if len(tied) == 1:
         return tied[0]
-    left = project(problem, beside.free, beside.hold).rest(problem.y)
-    squares = np.sum(left**2, axis=0)
-    count = np.maximum(here.evidence.count, 1.0)
-    limits = here.evidence.limits(here.evidence.split(left, problem.weight), here.settings)
-    able = [t for t in tied if np.all((squares - gains[id(t)]) / count <= limits)]
+    able = [trial for trial in tied if closing[id(trial)]]
     if able:
         return simplest(able, here)
     alike = [t for t in tied if t.gain >= (1.0 - _ROUNDING) * tied[0].gain]
     return min(alike, key=rarity)
+
+
+def closes(trial: Trial, problem: Problem, beside: FloatArray, here: Round) -> bool:
+    """Return whether a cause beside columns (R, n, f) leaves no gap of data left out."""
+    _, rest = trial.left_out(problem, problem.x[:, :, trial.group.columns], beside)
+    limits = here.evidence.limits(here.evidence.split(rest, problem.weight), here.settings)
+    return bool(np.all(problem.chi2_per_row(rest) <= limits))
 
 
 def simplest(tied: Sequence[Trial], here: Round) -> Trial:

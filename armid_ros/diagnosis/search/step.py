@@ -19,6 +19,7 @@ from armid_ros.diagnosis.search.products import products, with_group
 from armid_ros.diagnosis.search.refine import refine
 from armid_ros.diagnosis.search.rivals import (
     beaten,
+    closes,
     contains,
     denied_by_one,
     likeliest,
@@ -60,7 +61,8 @@ class Step:
         Groups that were tried, every shape for itself.
     misfit_share : float
         Share of the misfit that it has to take: nothing where so many divisions of the recordings
-        show less of it that a misfit does not hide it.
+        show less of it that a misfit does not hide it. None for friction that nobody gave values
+        of, which only has to be there.
 
     """
 
@@ -69,7 +71,7 @@ class Step:
     ranking: tuple[Trial, ...]
     total: float
     tried: int
-    misfit_share: float
+    misfit_share: float | None
 
 
 @dataclass(frozen=True)
@@ -128,8 +130,8 @@ class Look:
         What is free.
     passing : tuple of Trial
         The causes that could be taken, best first.
-    gains : dict of int to ndarray
-        What each of them, by its id, takes of every joint, shape (n,).
+    closing : dict of int to bool
+        Whether each of them, by its id, leaves no gap.
     ranking : tuple of Trial
         The best groups, one per name and joints, best first.
     here : Round
@@ -141,7 +143,7 @@ class Look:
     problem: Problem
     beside: Beside
     passing: tuple[Trial, ...]
-    gains: dict[int, FloatArray]
+    closing: dict[int, bool]
     ranking: tuple[Trial, ...]
     here: Round
 
@@ -160,7 +162,7 @@ class Look:
         first, *others = what_happens_first(self.passing[len(ahead) :], problem, beside, here)
         behind = [trial for trial in others if not beaten(trial, first, here)]
         able = [first, *(trial for trial in behind if changed(trial, problem, beside, here))]
-        winner = likeliest(able, self.gains, problem, beside, here)
+        winner = likeliest(able, self.closing, here)
         tied = [*(trial for trial in ahead if not beaten(first, trial, here)), first, *behind]
         rivals = [
             trial
@@ -185,16 +187,21 @@ def look_at(problem: Problem, beside: Beside, groups: Sequence[Group], here: Rou
     survey = _survey(groups, ranking, total, len(seen))
     ranking, problem = _with_refined_shapes(problem, beside, ranking, here)
     tried = max(len(seen), 1)
-    ranking, there, gains = _examined(ranking, problem, beside, here, tried)
+    ranking, there, closing = _examined(ranking, problem, beside, here, tried)
     survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
-    passing = tuple(_passing(ranking, gains, problem, beside, here, tried))
-    return Look(survey, problem, beside, passing, gains, tuple(ranking), here)
+    passing = tuple(_passing(ranking, closing, problem, beside, here, tried))
+    return Look(survey, problem, beside, passing, closing, tuple(ranking), here)
 
 
 def acceptable(trial: Trial, here: Round, tried: int) -> bool:
     """Return whether a cause is there beyond chance, pays for its freedom, and is possible."""
+    return there(trial, here, tried) and worth(trial, here) > 0.0
+
+
+def there(trial: Trial, here: Round, tried: int) -> bool:
+    """Return whether a cause is there beyond chance, and is possible."""
     surely = trial.p * tried <= here.settings.thresholds.error_rate
-    return surely and worth(trial, here) > 0.0 and possible(trial, here)
+    return surely and possible(trial, here)
 
 
 def possible(trial: Trial, here: Round) -> bool:
@@ -296,9 +303,9 @@ def _with_refined_shapes(
 
 def _examined(
     ranking: Sequence[Trial], problem: Problem, beside: Beside, here: Round, tried: int
-) -> tuple[list[Trial], list[Trial], dict[int, FloatArray]]:
+) -> tuple[list[Trial], list[Trial], dict[int, bool]]:
     """
-    Return the ranking, what is there beyond chance, and what each that matters takes of joints.
+    Return the ranking, what is there beyond chance, and whether each that matters leaves no gap.
 
     Where there are recordings from before, what has to be beyond chance and to matter is the
     change: the values that a cause had in those already are free beside it. Causes are compared
@@ -312,7 +319,7 @@ def _examined(
     open_squares = _open_squares(problem, beside, here)
     most = here.settings.thresholds.open_share
     there: list[Trial] = []
-    large: list[tuple[Trial, FloatArray]] = []
+    large: list[tuple[Trial, bool]] = []
     for trial in ranking[:_LOOKED_AT]:
         if not acceptable(trial, here, tried) or denied_by_one(trial, here):
             continue
@@ -327,18 +334,18 @@ def _examined(
         if not (matters and material(size, here, 0.0)):
             continue
         if material(size, here, whole) or surely_changed(trial, problem, beside, here):
-            large.append((trial, takes))
+            large.append((trial, closes(trial, problem, free, here)))
     best = large[:_COMPARED]
     seen = {id(trial) for trial, _ in best}
     result = [trial for trial in ranking if id(trial) not in seen]
-    gains = {}
+    closing = {}
     compared = _compared(problem, beside, [trial for trial, _ in best], here)
-    for change, (_, takes) in zip(compared, best, strict=True):
-        gains[id(change)] = takes
+    for change, (_, whole_gap) in zip(compared, best, strict=True):
+        closing[id(change)] = whole_gap
         result.append(change)
     result.sort(key=lambda t: -worth(t, here))
     there.sort(key=lambda t: -worth(t, here))
-    return result, there, gains
+    return result, there, closing
 
 
 def _open_squares(problem: Problem, beside: Beside, here: Round) -> FloatArray:
@@ -423,7 +430,7 @@ def _size(change: Trial, takes: FloatArray, own: FloatArray, here: Round) -> Flo
 
 def _passing(
     ranking: Sequence[Trial],
-    gains: dict[int, FloatArray],
+    closing: dict[int, bool],
     problem: Problem,
     beside: Beside,
     here: Round,
@@ -433,7 +440,7 @@ def _passing(
     projection: Projection | None = None
     result: list[Trial] = []
     for trial in ranking:
-        if id(trial) not in gains:
+        if id(trial) not in closing:
             continue
         projection = projection or project(problem, beside.free, beside.hold)
         if made_of_noise(trial, problem, projection, here):
