@@ -147,7 +147,7 @@ class Explainer:
         tell(0.4, 'the model fitted anew')
         anew = self._anew(tuple(prepared.sigma), settings)
         corrected = at_floor(anew, settings)
-        if corrected and len(first.steps) > 1 and not _stands(first, anew):
+        if corrected and len(_causes(first)) > 1 and not _stands(first, anew):
             return Chosen(anew, nothing, NOISE)
         misfit, words = nothing, NOISE
         if not (closed or corrected):
@@ -354,7 +354,13 @@ def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
 
 def _beside_a_correction(first: Explanation) -> bool:
     """Return whether one of several causes corrects the description, or another body may."""
-    return len(first.steps) > 1 and any(_may_correct(step) for step in first.steps)
+    causes = _causes(first)
+    return len(causes) > 1 and any(_may_correct(step) for step in causes)
+
+
+def _causes(first: Explanation) -> list[Step]:
+    """Return the causes that were looked for: no friction that nobody gave values of."""
+    return [step for step in first.steps if step.misfit_share is not None]
 
 
 def _may_correct(step: Step) -> bool:
@@ -375,7 +381,7 @@ def _stands(first: Explanation, anew: Explanation) -> bool:
     open_values = {effect.name for effect, values in given if not np.any(values)}
     return all(
         group.effect.corrects or group.effect.name in open_values or group.key[:2] in there
-        for group in (step.trial.group for step in first.steps[1:])
+        for group in (step.trial.group for step in _causes(first)[1:])
     )
 
 
@@ -388,8 +394,7 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     """
     Return whether causes in the model as given explain as much as a body fitted anew.
 
-    Where that leaves noise, they have to leave as little. Where it leaves a gap itself, it has to
-    take more beside them than its values cost.
+    They leave as little, or less more than its values cost.
 
     """
     evidence = first.evidence
@@ -398,8 +403,6 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     same = settings.thresholds.same_fit * least
     if np.all(after <= np.maximum(evidence.limits(left, settings), same)):
         return True
-    if at_floor(anew, settings):
-        return False
     gap = max(float(evidence.count @ evidence.chi2_per_row(first.reference.residual)), 1e-300)
     price = settings.thresholds.price * _more_freedom(first, anew, settings)
     return float(evidence.count @ (after - least)) <= price * gap
