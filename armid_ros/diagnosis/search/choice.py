@@ -147,7 +147,7 @@ class Explainer:
         tell(0.4, 'the model fitted anew')
         anew = self._anew(tuple(prepared.sigma), settings)
         corrected = at_floor(anew, settings)
-        if corrected and len(_causes(first)) > 1 and not _stands(first, anew):
+        if corrected and _beside_a_correction(first) and not _stands(first, anew):
             return Chosen(anew, nothing, NOISE)
         misfit, words = nothing, NOISE
         if not (closed or corrected):
@@ -354,13 +354,7 @@ def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
 
 def _beside_a_correction(first: Explanation) -> bool:
     """Return whether one of several causes corrects the description, or another body may."""
-    causes = _causes(first)
-    return len(causes) > 1 and any(_may_correct(step) for step in causes)
-
-
-def _causes(first: Explanation) -> list[Step]:
-    """Return the causes that were looked for: no friction that nobody gave values of."""
-    return [step for step in first.steps if step.misfit_share is not None]
+    return len(first.steps) > 1 and any(_may_correct(step) for step in first.steps)
 
 
 def _may_correct(step: Step) -> bool:
@@ -381,7 +375,7 @@ def _stands(first: Explanation, anew: Explanation) -> bool:
     open_values = {effect.name for effect, values in given if not np.any(values)}
     return all(
         group.effect.corrects or group.effect.name in open_values or group.key[:2] in there
-        for group in (step.trial.group for step in _causes(first)[1:])
+        for group in (step.trial.group for step in first.steps[1:])
     )
 
 
