@@ -77,6 +77,10 @@ def test_products_of_blocks_say_what_a_refit_says(bench):
     gains = 2.0 * expected[0] - expected[1]
     assert trial.gain == pytest.approx(gains.sum(), rel=1e-8)
     own, beside = problem.x[:, :, :OWN], problem.x[:, :, OWN:]
+    for measured, rows in zip(
+        trial.left_out(problem, own, beside), (left, left - made), strict=True
+    ):
+        np.testing.assert_allclose(measured, rows, atol=1e-8)
     joints = trial.joint_gains(problem, own, beside)
     np.testing.assert_allclose(joints, gains.sum(axis=0), rtol=1e-8)
     np.testing.assert_allclose(power, np.bincount(owner, np.sum(left**2, axis=1)))

@@ -10,16 +10,21 @@ torques with those of the model, joint by joint, with friction and offset taken 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
-from itertools import product
+from collections.abc import Iterator, Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.dead_channels import dead_channels
 from armid_ros.diagnosis.data.evidence import Trajectory
-from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.assess.hypotheses import Exchanged, InDegrees, Reversed
+from armid_ros.identification.assess.hypotheses import (
+    Exchanged,
+    Hypothesis,
+    InDegrees,
+    InUnit,
+    OtherUnit,
+    Reversed,
+)
 from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.rows.checks import (
     check_motion,
@@ -28,22 +33,21 @@ from armid_ros.identification.rows.checks import (
 )
 from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
 #: Mistakes that are of the data and of nothing that may happen to an arm.
-_OF_DATA = Exchanged | InDegrees | Reversed
-#: A torque follows the model of its own joint when this much of it is the model's ...
-_FOLLOWS = 0.9
-#: Two joints are exchanged when each one's torque is this near to the other's model, and less than
-#: half as far from it as from its own.
-_ALIKE = 0.6
+_OF_DATA = Exchanged | InDegrees | InUnit | Reversed
+#: Torques of so many times what the model takes are in another unit, this near to the factor.
+_NEAR = 1.5
 _UNITS = (
-    (57.2958, 'a gain of 57.3: degrees against radians'),
-    (1000.0, 'N mm instead of N m'),
-    (0.001, 'kN m instead of N m'),
+    (
+        57.2958,
+        'torques are 57.3 times what the model takes, degrees against radians: convert them',
+    ),
+    (1000.0, 'torques are in N mm instead of N m: convert them'),
+    (0.001, 'torques are in kN m instead of N m: convert them'),
 )
 #: A torque of so many times the limit of its drive is said.
 _BEYOND = 1.5
@@ -75,11 +79,10 @@ def check_data(
         What a reader should know.
 
     """
-    slopes, correlation = _compare(_as_it_may_be(arm, data), data)
     mistaken = _mistaken(arm, recordings, used)
     if mistaken:
         return mistaken, []
-    faults = [*_time_base(recordings, _band(data)), *_torques(arm, slopes, correlation)]
+    faults = [*_time_base(recordings, _band(data))]
     faults += _laws(arm, data)
     for recording in recordings:
         faults += [*_jumps(arm.robot, recording), *dead_channels(arm, recording, data)]
@@ -91,31 +94,6 @@ def check_data(
     except IdentificationError as error:
         faults.append(str(error))
     return faults, notes
-
-
-def _as_it_may_be(arm: ArmModel, data: Sequence[Trajectory]) -> ArmModel:
-    """
-    Return an arm under the gravity, or with the load, that explains torques better than a fault.
-
-    An arm that hangs takes the opposite torques of one that stands, but for its inertia, and one
-    that carries a load takes many times the torque in a wrist. Other units or exchanged joints
-    make torques that some gravity or some load explains in part.
-
-    """
-    bare = ArmModel(arm.robot, quasi_static=arm.quasi_static)
-    left = np.concatenate([part.residual(bare) for part in data])
-    torque = left + np.concatenate([part.reduce(bare.torque(part.motion)) for part in data])
-    scale = np.maximum(np.sqrt(np.mean(torque**2, axis=0)), 1e-12)
-    repaired = _repaired(torque / scale, (torque - left) / scale, scale)
-    least, best = min(repaired, 0.5 * float(np.sum((left / scale) ** 2))), bare
-    for columns, changed in _changes(bare, data):
-        flat = (columns / scale[:, np.newaxis]).reshape(-1, columns.shape[2])
-        values = np.linalg.lstsq(flat, (left / scale).ravel(), rcond=1e-6)[0]
-        after = float(np.sum(((left - columns @ values) / scale) ** 2))
-        other = changed(values)
-        if after < least and other is not None:
-            least, best = after, other
-    return best
 
 
 def _signs(
@@ -136,10 +114,19 @@ def _mistaken(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
     said: set[tuple[str, ...]] = set()
     for recording in recordings:
         mistake = find_mistake(arm.body, recording, used)
-        if mistake is None or not all(isinstance(h, _OF_DATA) for h in mistake.hypotheses):
+        if mistake is None:
             return []
-        said.add(tuple(one.sentence(arm.robot) for one in mistake.hypotheses))
-    return [', or '.join(said.pop())] if len(said) == 1 else []
+        said.add(tuple(_fault(one, arm.robot) for one in mistake.hypotheses))
+    same = said.pop() if len(said) == 1 else ('',)
+    return [', or '.join(same)] if all(same) else []
+
+
+def _fault(mistake: Hypothesis, robot: Robot) -> str:
+    """Say what is wrong with data; empty if it is something that may happen to an arm."""
+    if isinstance(mistake, OtherUnit):
+        ratios = [(mistake.factor / factor, said) for factor, said in _UNITS]
+        return next((said for ratio, said in ratios if 1.0 / _NEAR < ratio < _NEAR), '')
+    return mistake.sentence(robot) if isinstance(mistake, _OF_DATA) else ''
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:
@@ -155,43 +142,6 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:
             f'in {recording.source or "a recording"} the position of {robot.joints[joint]} jumps '
             f'by {step:.3g} at {recording.t[row + 1]:.3f} s: leave out what is faulty'
         )
-
-
-_Change = Callable[[FloatArray], ArmModel | None]
-
-
-def _changes(bare: ArmModel, data: Sequence[Trajectory]) -> Iterator[tuple[FloatArray, _Change]]:
-    """Yield columns, and the arm that values of them make; None where no arm is like that."""
-
-    def falling(change: FloatArray) -> ArmModel:
-        return ArmModel(
-            bare.robot.with_gravity(bare.robot.gravity + change), quasi_static=bare.quasi_static
-        )
-
-    yield np.concatenate([p.reduce(bare.gravity_columns(p.motion)) for p in data]), falling
-    for kind in CATALOGUE.values():
-        if kind.comes_and_goes:
-            load = kind.on(bare.robot)
-            rows = [part.columns(bare, load) for part in data]
-            yield np.concatenate(rows), partial(_loaded, bare, load)
-
-
-def _loaded(bare: ArmModel, load: Effect, values: FloatArray) -> ArmModel | None:
-    """Return an arm with a load; None if it could not be one, or is more than an arm carries."""
-    possible = bool(0.0 < values[0] < load.spread(bare.robot)[0])
-    possible = possible and load.plausible(values, np.zeros_like(values), bare)
-    return bare.with_effect(load, values) if possible else None
-
-
-def _repaired(torque: FloatArray, model: FloatArray, scale: FloatArray) -> float:
-    """Return the squares left where each joint has another one's torque, sign or unit, (N, n)."""
-    factors = [1.0, *(factor for factor, _ in _UNITS)]
-    best = np.full(len(scale), np.inf)
-    for joint, other in product(range(len(scale)), repeat=2):
-        taken = model[:, other] * scale[other] / scale[joint]
-        for factor in (sign * size for size in factors for sign in (1.0, -1.0)):
-            best[joint] = min(best[joint], np.sum((torque[:, joint] - factor * taken) ** 2))
-    return float(best.sum())
 
 
 def _band(data: Sequence[Trajectory]) -> float:
@@ -211,35 +161,6 @@ def _time_base(recordings: Sequence[Recording], band_hz: float) -> list[str]:
                 f'{recording.source or "recording"}: {100 * uneven:.0f} % of the time stamps are '
                 'uneven by more than half a period; record with the stamps of the driver'
             )
-    return faults
-
-
-def _torques(arm: ArmModel, slopes: FloatArray, correlation: FloatArray) -> list[str]:
-    joints = arm.robot.joints
-    faults = []
-    own = np.diag(correlation)
-    error = _unlike(slopes, correlation)
-    for j, joint in enumerate(joints):
-        best = int(np.argmin(error[j]))
-        pair = error[j, best], error[best, j]
-        nearer = pair[0] < error[j, j] / 2 and pair[1] < error[best, best] / 2
-        if best != j and max(pair) < _ALIKE and nearer:
-            faults.append(
-                f'the torque of {joint} follows what the model has for {joints[best]}: are the '
-                'joints in the right order?'
-            )
-        elif own[j] < -_FOLLOWS:
-            faults.append(
-                f'the torque of {joint} has the opposite sign of what the model takes; effort has '
-                'to be positive along the URDF joint axis: negate it'
-            )
-        elif own[j] > _FOLLOWS:
-            for factor, unit in _UNITS:
-                if factor / 1.5 < slopes[j, j] < factor * 1.5:
-                    faults.append(
-                        f'the torque of {joint} is {slopes[j, j]:.3g} times what the model '
-                        f'takes, {unit}: convert it'
-                    )
     return faults
 
 
@@ -272,13 +193,6 @@ def _laws(arm: ArmModel, data: Sequence[Trajectory]) -> Iterator[str]:
             yield f'{part.source or "recording"}: {law}'
 
 
-def _unlike(slopes: FloatArray, correlation: FloatArray) -> FloatArray:
-    """Return |tau_i - model_j| / |tau_i| of all joints, shape (n, n); 1 for no likeness."""
-    safe = np.where(slopes == 0.0, np.inf, slopes)
-    square = 1.0 - 2.0 * correlation**2 / safe + (correlation / safe) ** 2
-    return np.asarray(np.sqrt(np.maximum(square, 0.0)))
-
-
 def _clipped(recordings: Sequence[Recording]) -> list[str]:
     notes = []
     for recording in recordings:
@@ -308,35 +222,3 @@ def _beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> Iterator[st
                 f'{recording.source or "recording"}: the torque of {robot.joints[j]} reaches '
                 f'{largest[j]:.4g}, its limit is {limit[j]:.4g}'
             )
-
-
-def _compare(arm: ArmModel, data: Sequence[Trajectory]) -> tuple[FloatArray, FloatArray]:
-    """
-    Regress torques on the model's, with constant, velocity and its sign taken out.
-
-    Returns
-    -------
-    slopes : ndarray, shape (n, n)
-        Measured torque of each joint (row) on the model's of each (column).
-    correlation : ndarray, shape (n, n)
-        The correlations that go with them.
-
-    """
-    n = arm.robot.n_joints
-    slopes, correlation = np.zeros((2, n, n))
-    measured = np.concatenate([part.residual(arm) for part in data])
-    load = np.concatenate([part.reduce(arm.torque(part.motion)) for part in data])
-    measured = measured + load
-    dq = np.concatenate([part.motion.dq[part.rows] for part in data])
-    for i in range(n):
-        nuisance = np.column_stack([np.ones(len(dq)), dq[:, i], np.sign(dq[:, i])])
-        both = np.column_stack([load, measured[:, i]])
-        rest = both - nuisance @ np.linalg.lstsq(nuisance, both, rcond=None)[0]
-        target = rest[:, n]
-        for j in range(n):
-            size = float(rest[:, j] @ rest[:, j])
-            product = float(rest[:, j] @ target)
-            norm = np.sqrt(size * float(target @ target))
-            if norm > 0.0:
-                slopes[i, j], correlation[i, j] = product / size, product / norm
-    return slopes, correlation

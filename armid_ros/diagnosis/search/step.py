@@ -338,12 +338,9 @@ def _examined(
     best = large[:_COMPARED]
     seen = {id(trial) for trial, _ in best}
     result = [trial for trial in ranking if id(trial) not in seen]
-    closing = {}
     compared = _compared(problem, beside, [trial for trial, _ in best], here)
-    for change, (_, whole_gap) in zip(compared, best, strict=True):
-        closing[id(change)] = whole_gap
-        result.append(change)
-    result.sort(key=lambda t: -worth(t, here))
+    closing = {id(change): one[1] for change, one in zip(compared, best, strict=True)}
+    result = sorted([*result, *compared], key=lambda t: -worth(t, here))
     there.sort(key=lambda t: -worth(t, here))
     return result, there, closing
 

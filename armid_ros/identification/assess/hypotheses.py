@@ -30,6 +30,8 @@ DELAYS = (0.01, 0.02, 0.05, 0.1, 0.2)
 #: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
 TURNS = (-135, -90, -45, 45, 90, 135, 180)
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
+#: Units of torque that are mistaken for another [N m].
+UNITS = {'N mm': 1e-3, 'kN m': 1e3}
 #: Free values that are within this of an axis [degrees] are written as that axis.
 _AXIS = 15.0
 
@@ -307,6 +309,25 @@ class OtherUnit(Hypothesis):
 
 
 @dataclass(frozen=True)
+class InUnit(Hypothesis):
+    """The torque of a joint is in another unit; no load makes it a thousand times as large."""
+
+    joint: int
+    unit: str
+
+    def motion(self, motion: Motion) -> Motion:
+        """Convert it."""
+        scale = np.ones(motion.n_joints)
+        scale[self.joint] = UNITS[self.unit]
+        return _changed(motion, 'torque', lambda values: values * scale)
+
+    def sentence(self, robot: Robot) -> str:
+        """Name the joint and the unit."""
+        joint = robot.joints[self.joint]
+        return f'the torque of {joint} seems to be in {self.unit} instead of N m: convert it'
+
+
+@dataclass(frozen=True)
 class Faulty(Hypothesis):
     """
     A few samples are wrong: a torque far out of the rest, a position that jumps.
@@ -346,6 +367,8 @@ def hypotheses(robot: Robot) -> Iterator[Hypothesis]:
     if not np.all(robot.prismatic):
         yield InDegrees()
     for joint in range(robot.n_joints):
+        for unit in UNITS:
+            yield InUnit(joint, unit)
         for quantity in QUANTITIES:
             yield Reversed(joint, quantity)
         if not robot.prismatic[joint]:

@@ -23,6 +23,7 @@ from armid_ros.identification.assess.hypotheses import (
     Faulty,
     hypotheses,
     Hypothesis,
+    InUnit,
     OtherGravity,
     OtherUnit,
     WithoutBody,
@@ -125,7 +126,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     as_recorded = _fitted(robot, slow)(AsRecorded())
     if as_recorded is None or 100.0 * as_recorded[0].whole < LIMITS.poor:
         return None
-    changes = [one for one in tried if not isinstance(one, OtherGravity | OtherUnit)]
+    changes = [one for one in tried if not isinstance(one, InUnit | OtherGravity | OtherUnit)]
     return _best(robot, changes, _fitted(robot, slow), fitted=True)
 
 

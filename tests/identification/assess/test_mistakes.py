@@ -111,6 +111,14 @@ def test_an_axis_that_points_the_other_way(robot, sound, joint):
 
 
 @pytest.mark.parametrize('joint', [0, 1, 2, 3])
+@pytest.mark.parametrize(('unit', 'factor'), [('N mm', 1e3), ('kN m', 1e-3)])
+def test_a_torque_of_one_joint_in_another_unit(robot, sound, joint, unit, factor):
+    wrong = replace(sound, tau=with_column(sound.tau, joint, lambda tau: factor * tau))
+    expected = f'the torque of {robot.joints[joint]} seems to be in {unit} instead of N m'
+    assert expected in mistake_in(robot, wrong)
+
+
+@pytest.mark.parametrize('joint', [0, 1, 2, 3])
 @pytest.mark.parametrize('degrees', [-90.0, 90.0, 180.0])
 def test_a_zero_that_is_off(robot, sound, joint, degrees):
     off = replace(sound, q=with_column(sound.q, joint, lambda q: q + np.deg2rad(degrees)))
