@@ -77,3 +77,24 @@ def test_what_is_not_explained_is_said_with_what_explains_most_of_it(bench):
         '+- 0.020 rad, 5.7 degrees: the joint is at its reading plus that) explains 30 % of the '
         'gap.'
     )
+
+
+def test_names_that_are_one_cause_are_one_sentence(bench):
+    closed = Left(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
+
+    def found(name, share, together=()):
+        effect = CATALOGUE[name].on(bench.robot)
+        parameters = effect.parameters(bench.robot)[:1]
+        shares = share, (share - 0.01, share + 0.01)
+        return Finding(name, (), parameters, (0.3,), (0.01,), *shares, 0.0, together=together)
+
+    tilt = found('base_tilt', 0.9, ('gravity_magnitude',))
+    size = found('gravity_magnitude', 0.9, ('base_tilt',))
+    delay = found('time_delay', 0.001)
+    said = decide([tilt, size, delay], (), [closed], bench.arm, FLOOR).summary
+    assert said == (
+        'A base tilt (tilt x 0.300 +- 0.020 rad, 17.2 degrees) and a gravity magnitude (gravity '
+        'difference 0.300 +- 0.020 m/s^2) together explain 90 % of the gap. A time delay (delay '
+        '0.300 +- 0.020 s) explains less than 1 % of the gap. The rest is '
+        'the misfit that the model had before.'
+    )

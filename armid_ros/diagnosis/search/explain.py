@@ -28,7 +28,7 @@ from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.resampled import widened
 from armid_ros.diagnosis.search.round import Beside, Round
-from armid_ros.diagnosis.search.step import acceptable, material, Step, Survey, there
+from armid_ros.diagnosis.search.step import acceptable, beyond_chance, material, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -319,7 +319,7 @@ def _stands(step: Step, problem: Problem, beside: Beside, here: Round) -> bool:
     """Return whether a cause, whose columns come first, is there, and matters if it has to."""
     trial = step.trial
     if step.misfit_share is None:
-        return there(trial, here, step.tried)
+        return beyond_chance(trial, here, step.tried)
     own = problem.x[:, :, : trial.group.size]
     gains = trial.joint_gains(problem, own, beside.rows(problem))
     return acceptable(trial, here, step.tried) and material(gains, here, step.misfit_share)

@@ -195,10 +195,10 @@ def look_at(problem: Problem, beside: Beside, groups: Sequence[Group], here: Rou
 
 def acceptable(trial: Trial, here: Round, tried: int) -> bool:
     """Return whether a cause is there beyond chance, pays for its freedom, and is possible."""
-    return there(trial, here, tried) and worth(trial, here) > 0.0
+    return beyond_chance(trial, here, tried) and worth(trial, here) > 0.0
 
 
-def there(trial: Trial, here: Round, tried: int) -> bool:
+def beyond_chance(trial: Trial, here: Round, tried: int) -> bool:
     """Return whether a cause is there beyond chance, and is possible."""
     surely = trial.p * tried <= here.settings.thresholds.error_rate
     return surely and possible(trial, here)

@@ -64,6 +64,9 @@ class Finding:
         Where it holds the arm, in the order of its joints, if it ends at another machine.
     weighs : bool
         Whether its first value is a weight that says what it is.
+    together : tuple of str
+        Names that are one cause with it, of which its share is: a gravity of another direction and
+        another size.
 
     """
 
@@ -81,6 +84,7 @@ class Finding:
     sign: str = ''
     ties: tuple[Tie, ...] = ()
     weighs: bool = False
+    together: tuple[str, ...] = ()
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
@@ -150,6 +154,7 @@ def findings(
                 parts[0].effect.sign,
                 _ties([part.effect for part in parts], order),
                 parts[0].effect.weighs,
+                tuple(own for own, where in merged.items() if where == indices and own != name),
             )
         )
     return tuple(sorted(result, key=lambda one: -one.share))

@@ -106,17 +106,18 @@ def decide(
     )
     if not findings:
         if open_gap:
-            text = f'Something is missing: {rest}. {_unexplained(minor, arm.robot)}'
+            text = f'Something is missing: {rest}. {_unexplained(minor)}'
             return Verdict('unknown', text)
         return Verdict('consistent', _consistent(floor_in_words, as_it_is, minor, arm.robot))
-    said = ' '.join(sentence(finding, arm.robot) for finding in findings)
+    said = _sentences(findings)
     if open_gap:
         return Verdict('partial', f'{said} There is more: {rest}.')
     doubtful = [finding for finding in findings if finding.rivals]
     if doubtful:
         first = doubtful[0]
         others = ' or '.join(_elsewhere(rival, first.joints) for rival in first.rivals)
-        text = f'{said} These data cannot tell it from {others}. {first.experiment}'
+        one = 'it' if len(findings) == 1 else f'the {first.name.replace("_", " ")}'
+        text = f'{said} These data cannot tell {one} from {others}. {first.experiment}'
         return Verdict('ambiguous', text)
     return Verdict('named', f'{said} The rest is {floor_in_words}.')
 
@@ -133,14 +134,14 @@ def _consistent(
         f'left is {floor_in_words}. As it is, the error of {robot.joints[worst]} is '
         f'{_factor(np.sqrt(as_it_is.excess[worst]))} times as large as that can be.'
     )
-    return ' '.join([text, *(sentence(one, robot) for one in minor[:1])])
+    return ' '.join([text, *(sentence(one) for one in minor[:1])])
 
 
-def _unexplained(minor: Sequence[Finding], robot: Robot) -> str:
+def _unexplained(minor: Sequence[Finding]) -> str:
     """Say that no cause explains a gap, and what explains most of it where something does."""
     if not minor or minor[0].share < _SAID:
         return 'Nothing in the catalogue explains it.'
-    return f'Nothing in the catalogue closes it. {sentence(minor[0], robot)}'
+    return f'Nothing in the catalogue closes it. {sentence(minor[0])}'
 
 
 def _factor(ratio: float) -> str:
@@ -150,20 +151,47 @@ def _factor(ratio: float) -> str:
     return f'{ratio:.1f}' if ratio >= 1.05 else f'{ratio:.2f}'
 
 
-def sentence(finding: Finding, robot: Robot) -> str:
+def sentence(finding: Finding) -> str:
     """Say what a cause is and how much it explains, as a person would."""
+    return f'{_subject(finding)} explains {_share(finding)} of the gap.'
+
+
+def _sentences(findings: Sequence[Finding]) -> str:
+    """Say what was named; names that are one cause in one sentence."""
+    said: list[str] = []
+    done: set[str] = set()
+    for one in findings:
+        if one.name in done:
+            continue
+        group = [one, *(other for other in findings if other.name in one.together)]
+        done.update(other.name for other in group)
+        if len(group) == 1:
+            said.append(sentence(one))
+            continue
+        first, *others = (_subject(other) for other in group)
+        subjects = ' and '.join([first, *(text[0].lower() + text[1:] for text in others)])
+        said.append(f'{subjects} together explain {_share(one)} of the gap.')
+    return ' '.join(said)
+
+
+def _share(finding: Finding) -> str:
+    """Return the share of a cause in percent."""
+    share = min(max(finding.share, 0.0), 1.0)
+    return f'{100.0 * share:.0f} %' if share >= _SAID else 'less than 1 %'
+
+
+def _subject(finding: Finding) -> str:
+    """Return what a cause is, where, and its values."""
     words = finding.name.replace('_', ' ')
     article = 'An' if words[0] in 'aeiou' else 'A'
-    share = f'{100.0 * min(max(finding.share, 0.0), 1.0):.0f} %'
-    explains = f'explains {share} of the gap'
     if finding.ties:
         where = ', '.join(_tie(finding, tie.joint, tie.name) for tie in finding.ties)
-        return f'{words.capitalize()} at {where} {explains}.'
+        return f'{words.capitalize()} at {where}'
     if finding.weighs and finding.values:
         down = ' that was put down' if finding.values[0] < -HALF_WIDTH * finding.std[0] else ''
-        return f'{article} {words} {_weight(finding)} on {finding.joints[0]}{down} {explains}.'
+        return f'{article} {words} {_weight(finding)} on {finding.joints[0]}{down}'
     if len(finding.joints) > _JOINTS_SAID:
-        return f'{words.capitalize()} in {len(finding.joints)} joints {explains}.'
+        return f'{words.capitalize()} in {len(finding.joints)} joints'
     where = f' in {", ".join(finding.joints)}' if finding.joints else ''
     shown = [
         f'{p.name.replace("_", " ")} {_with_degrees(value, std, p.unit)}'
@@ -173,7 +201,7 @@ def sentence(finding: Finding, robot: Robot) -> str:
         shown = [*shown[:2], f'and {len(shown) - 2} more']
     meant = f': {finding.sign}' if finding.sign else ''
     numbers = f' ({", ".join(shown)}{meant})' if shown else ''
-    return f'{article} {words}{where}{numbers} {explains}.'
+    return f'{article} {words}{where}{numbers}'
 
 
 def _weight(finding: Finding) -> str:
