@@ -82,8 +82,9 @@ class Thresholds:
         which something happened in one of them only: 3.6 at the most in 60 sets of the laboratory
         in which nothing did.
     one_period_on_average : float
-        The same as the mean of three recordings or more: 2.4 at the most in those, and 3.8 where
-        noise lasts for 80 ms; what happens in one period makes 4.8 and more.
+        The same as the mean of three recordings or more: 2.4 at the most in those. Noise that
+        lasts for 80 ms makes up to 3.7, and what happens in one period 3.7 and more: an alarm
+        goes before a contact that is not seen.
     few_causes, many_causes : int
         Causes that are looked for in a model as given, and beside a body that is fitted anew.
 
@@ -111,7 +112,7 @@ class Thresholds:
     smooth_share: float = 0.1
     below_noise: float = 0.8
     one_period: float = 8.0
-    one_period_on_average: float = 4.2
+    one_period_on_average: float = 3.5
     few_causes: int = 4
     many_causes: int = 16
 
