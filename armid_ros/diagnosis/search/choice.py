@@ -147,7 +147,7 @@ class Explainer:
         tell(0.4, 'the model fitted anew')
         anew = self._anew(tuple(prepared.sigma), settings)
         corrected = at_floor(anew, settings)
-        if corrected and _beside_a_correction(first) and not _stands(first, anew):
+        if corrected and len(first.steps) > 1 and not _stands(first, anew):
             return Chosen(anew, nothing, NOISE)
         misfit, words = nothing, NOISE
         if not (closed or corrected):
@@ -388,7 +388,8 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     """
     Return whether causes in the model as given explain as much as a body fitted anew.
 
-    They leave as little, or less more than its values cost.
+    Where that leaves noise, they have to leave as little. Where it leaves a gap itself, it has to
+    take more beside them than its values cost.
 
     """
     evidence = first.evidence
@@ -397,6 +398,8 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     same = settings.thresholds.same_fit * least
     if np.all(after <= np.maximum(evidence.limits(left, settings), same)):
         return True
+    if at_floor(anew, settings):
+        return False
     gap = max(float(evidence.count @ evidence.chi2_per_row(first.reference.residual)), 1e-300)
     price = settings.thresholds.price * _more_freedom(first, anew, settings)
     return float(evidence.count @ (after - least)) <= price * gap
