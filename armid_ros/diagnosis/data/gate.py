@@ -3,8 +3,8 @@
 """
 Data first: time base, units, signs, order of joints, delay and clipped readings.
 
-A fault of the data explains any gap and no physics should be blamed for it. Every test compares
-torques with those of the model, joint by joint, with friction and offset taken out.
+A fault of the data explains any gap and no physics should be blamed for it. Names, signs and units
+are those that identification tells; see `identification.assess.mistakes`.
 
 """
 
@@ -29,6 +29,7 @@ from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
+    TORQUE_UNITS,
     wrong_sign,
 )
 from armid_ros.identification.rows.feedback import laws_of_controllers
@@ -39,16 +40,16 @@ import numpy as np
 
 #: Mistakes that are of the data and of nothing that may happen to an arm.
 _OF_DATA = Exchanged | InDegrees | InUnit | Reversed
-#: Torques of so many times what the model takes are in another unit, this near to the factor.
+#: What torques are that are so many times those of the model, and how near to the factor: masses
+#: of a description are off by less.
+_UNITS = {
+    57.2958: 'torques are 57.3 times what the model takes, degrees against radians: convert them',
+    **{
+        count: f'torques are in {unit} instead of N m: convert them'
+        for unit, count in TORQUE_UNITS.items()
+    },
+}
 _NEAR = 1.5
-_UNITS = (
-    (
-        57.2958,
-        'torques are 57.3 times what the model takes, degrees against radians: convert them',
-    ),
-    (1000.0, 'torques are in N mm instead of N m: convert them'),
-    (0.001, 'torques are in kN m instead of N m: convert them'),
-)
 #: A torque of so many times the limit of its drive is said.
 _BEYOND = 1.5
 #: Share of samples at the very extreme of a reading, above which it is clipped.
@@ -82,8 +83,7 @@ def check_data(
     mistaken = _mistaken(arm, recordings, used)
     if mistaken:
         return mistaken, []
-    faults = [*_time_base(recordings, _band(data))]
-    faults += _laws(arm, data)
+    faults = [*_time_base(recordings, _band(data)), *_laws(arm, data)]
     for recording in recordings:
         faults += [*_jumps(arm.robot, recording), *dead_channels(arm, recording, data)]
     faults += [] if faults else _signs(arm, recordings, data)
@@ -117,14 +117,16 @@ def _mistaken(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
         if mistake is None:
             return []
         said.add(tuple(_fault(one, arm.robot) for one in mistake.hypotheses))
-    same = said.pop() if len(said) == 1 else ('',)
-    return [', or '.join(same)] if all(same) else []
+    if len(said) != 1:
+        return []
+    (sentences,) = said
+    return [', or '.join(sentences)] if all(sentences) else []
 
 
 def _fault(mistake: Hypothesis, robot: Robot) -> str:
     """Say what is wrong with data; empty if it is something that may happen to an arm."""
     if isinstance(mistake, OtherUnit):
-        ratios = [(mistake.factor / factor, said) for factor, said in _UNITS]
+        ratios = [(mistake.factor / factor, said) for factor, said in _UNITS.items()]
         return next((said for ratio, said in ratios if 1.0 / _NEAR < ratio < _NEAR), '')
     return mistake.sentence(robot) if isinstance(mistake, _OF_DATA) else ''
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from itertools import combinations, islice
 
 from armid_ros.diagnosis.data.rows import Problem
-from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.held_out import ROUNDING, Trial
 from armid_ros.diagnosis.search.round import Beside, Round
 from armid_ros.identification.fitting.normal_equations import informative_basis
 from armid_ros.motion import FloatArray
@@ -28,8 +28,8 @@ import numpy.typing as npt
 #: Divisions that are tried; those that exchange fewest recordings first.
 _DIVISIONS = 200
 #: Directions of the columns of a cause of which the rest leaves less than this share of their
-#: squares tell nothing; and a lead of less than this share of what is explained is rounding.
-_UNSEEN, _ROUNDING = 1e-5, 1e-6
+#: squares tell nothing.
+_UNSEEN = 1e-5
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def showing_more(
         return _squares(products, wanted, np.tile(scale, 2))
 
     days = np.arange(len(rows)) >= len(first)
-    least = explained(days) * (1.0 + _ROUNDING)
+    least = explained(days) * (1.0 + ROUNDING)
     others = [explained(other) for other in _divisions(days)]
     return sum(other > least for other in others), len(others)
 

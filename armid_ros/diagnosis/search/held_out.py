@@ -33,6 +33,8 @@ _UNSEEN = 1e-10
 #: Squares over noise of columns that are rounding, whatever the units.
 _NOTHING = 1e-100
 
+#: Squares that differ by less than this share do so by rounding.
+ROUNDING = 1e-6
 #: Recordings hardly show what takes less than this share of the share it takes of others.
 HARDLY = 0.1
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from armid_ros.diagnosis.data.rows import fold_rows, Problem, project
-from armid_ros.diagnosis.search.held_out import denies, HARDLY, lead, Trial
+from armid_ros.diagnosis.search.held_out import denies, HARDLY, lead, ROUNDING, Trial
 from armid_ros.diagnosis.search.round import Beside, cost, Round
 from armid_ros.effects import CATALOGUE
 from armid_ros.motion import FloatArray
@@ -16,8 +16,6 @@ import numpy as np
 #: Places in the catalogue that an effect is behind where it is seldom: a delay of one joint, which
 #: is a lag as a rule, and a lag of the whole arm, which is a delay.
 _ELSEWHERE = 1.5
-#: Share by which causes differ whose columns are the same: a lag and a delay, where they begin.
-_ROUNDING = 1e-6
 
 
 def beaten(other: Trial, first: Trial, here: Round) -> bool:
@@ -68,7 +66,7 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -
     able = [trial for trial in tied if closing[id(trial)]]
     if able:
         return simplest(able, here)
-    alike = [t for t in tied if t.gain >= (1.0 - _ROUNDING) * tied[0].gain]
+    alike = [t for t in tied if t.gain >= (1.0 - ROUNDING) * tied[0].gain]
     return min(alike, key=rarity)
 
 

@@ -319,7 +319,7 @@ def _examined(
     open_squares = _open_squares(problem, beside, here)
     most = here.settings.thresholds.open_share
     there: list[Trial] = []
-    large: list[tuple[Trial, bool]] = []
+    large: list[Trial] = []
     for trial in ranking[:_LOOKED_AT]:
         if not acceptable(trial, here, tried) or denied_by_one(trial, here):
             continue
@@ -334,13 +334,13 @@ def _examined(
         if not (matters and material(size, here, 0.0)):
             continue
         if material(size, here, whole) or surely_changed(trial, problem, beside, here):
-            large.append((trial, closes(trial, problem, free, here)))
+            large.append(trial)
     best = large[:_COMPARED]
-    seen = {id(trial) for trial, _ in best}
-    result = [trial for trial in ranking if id(trial) not in seen]
-    compared = _compared(problem, beside, [trial for trial, _ in best], here)
-    closing = {id(change): one[1] for change, one in zip(compared, best, strict=True)}
-    result = sorted([*result, *compared], key=lambda t: -worth(t, here))
+    others = [trial for trial in ranking if not any(trial is one for one in best)]
+    compared = _compared(problem, beside, best, here)
+    pairs = zip(compared, best, strict=True)
+    closing = {id(change): closes(trial, problem, free, here) for change, trial in pairs}
+    result = sorted([*others, *compared], key=lambda t: -worth(t, here))
     there.sort(key=lambda t: -worth(t, here))
     return result, there, closing
 

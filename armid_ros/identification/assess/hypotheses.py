@@ -18,6 +18,7 @@ from itertools import combinations
 from typing import ClassVar, Literal
 
 from armid_ros.identification.assess.grade_limits import GradeLimits
+from armid_ros.identification.rows.checks import TORQUE_UNITS
 from armid_ros.model import gravity_sensitivity, inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import GRAVITIES, Robot
@@ -30,8 +31,6 @@ DELAYS = (0.01, 0.02, 0.05, 0.1, 0.2)
 #: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
 TURNS = (-135, -90, -45, 45, 90, 135, 180)
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
-#: Units of torque that are mistaken for another [N m].
-UNITS = {'N mm': 1e-3, 'kN m': 1e3}
 #: Free values that are within this of an axis [degrees] are written as that axis.
 _AXIS = 15.0
 
@@ -133,9 +132,7 @@ class Reversed(Hypothesis):
 
     def motion(self, motion: Motion) -> Motion:
         """Turn the sign of the joint."""
-        sign = np.ones(motion.n_joints)
-        sign[self.joint] = -1.0
-        return _changed(motion, self.quantity, lambda values: values * sign)
+        return _scaled(motion, self.joint, self.quantity, -1.0)
 
     def sentence(self, robot: Robot) -> str:
         """Name the joint."""
@@ -317,9 +314,7 @@ class InUnit(Hypothesis):
 
     def motion(self, motion: Motion) -> Motion:
         """Convert it."""
-        scale = np.ones(motion.n_joints)
-        scale[self.joint] = UNITS[self.unit]
-        return _changed(motion, 'torque', lambda values: values * scale)
+        return _scaled(motion, self.joint, 'torque', 1.0 / TORQUE_UNITS[self.unit])
 
     def sentence(self, robot: Robot) -> str:
         """Name the joint and the unit."""
@@ -367,7 +362,7 @@ def hypotheses(robot: Robot) -> Iterator[Hypothesis]:
     if not np.all(robot.prismatic):
         yield InDegrees()
     for joint in range(robot.n_joints):
-        for unit in UNITS:
+        for unit in TORQUE_UNITS:
             yield InUnit(joint, unit)
         for quantity in QUANTITIES:
             yield Reversed(joint, quantity)
@@ -410,6 +405,13 @@ def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str
         if np.allclose(size * direction, value, atol=1e-6):
             return direction, name
     return direction, ','.join(f'{part:.3g}' for part in size * direction + 0.0)
+
+
+def _scaled(motion: Motion, joint: int, quantity: Quantity, factor: float) -> Motion:
+    """Return a motion in which a quantity of one joint is multiplied."""
+    scale = np.ones(motion.n_joints)
+    scale[joint] = factor
+    return _changed(motion, quantity, lambda values: values * scale)
 
 
 def _changed(

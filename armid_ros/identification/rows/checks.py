@@ -26,6 +26,8 @@ LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
 SHORTEST = 1.0
 #: Correlation with the direction of motion from which a torque is friction and nothing else.
 _CLEAR = 0.8
+#: Units of torque that are mistaken for N m, and how many of each one N m is.
+TORQUE_UNITS = {'N mm': 1e3, 'kN m': 1e-3}
 #: Said of torques that are absent.
 SILENT = 'the torque of every joint is constant; is effort filled in?'
 
@@ -128,7 +130,7 @@ def check_torque(
                 f'{source}: torques of {joints} have the opposite sign of what the description '
                 'takes; effort has to be positive along the URDF joint axis: negate it'
             )
-        for unit, factor in (('N mm', 1e3), ('kN m', 1e-3)):
+        for unit, factor in TORQUE_UNITS.items():
             if np.all((factors > 0.5 * factor) & (factors < 2.0 * factor)):
                 raise IdentificationError(
                     f'{source}: torques of {joints} are {factor:g} times what the description '
