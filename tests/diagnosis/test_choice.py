@@ -5,19 +5,22 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from armid_ros.diagnosis.data.evidence import trajectories
+from armid_ros.diagnosis.data.evidence import Evidence, trajectories
 from armid_ros.diagnosis.data.prepare import choose_filters, prepare
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.choice import (
+    _as_good,
     _beside_a_correction,
     _more_freedom,
     _stands,
     _told_by,
+    at_floor,
     Explainer,
     freedom,
 )
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
+from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
 import pytest
 
@@ -117,3 +120,33 @@ def test_assumed_noise_is_no_more_than_what_a_baseline_left(repeats, recorded, w
     )
     (noise,) = _told_by(before, now, np.array([1.0, 1.0]))
     assert noise.tolist() == [wanted, 0.1]
+
+
+@pytest.mark.parametrize('repeats', [True, False])
+def test_only_noise_that_is_measured_excuses_what_a_body_fitted_anew_does_not_leave(
+    bench, repeats
+):
+    used = Conditioning(200.0, 20.0, 5)
+    data = tuple(trajectories(bench.recordings(), used))
+    if not repeats:
+        recordings = [one.select(slice(len(one.t) // 2)) for one in bench.recordings()]
+        data = tuple(trajectories(recordings, used))
+    unit = tuple(np.ones(2) for _ in data)
+    evidence = Evidence(data, unit, unit)
+    draw = np.random.default_rng(0)
+    white = [draw.normal(size=part.torque.shape) for part in data]
+    settings = DiagnosisSettings(material=0.0)
+
+    def leaving(share):
+        fitted = SimpleNamespace(residual=[share * rows for rows in white])
+        return SimpleNamespace(
+            evidence=evidence,
+            fitted=fitted,
+            chi2_per_row=evidence.chi2_per_row(fitted.residual),
+            steps=[],
+            base=None,
+        )
+
+    assert at_floor(leaving(1.0), settings)
+    assert _as_good(leaving(1.0), leaving(0.9), settings)
+    assert _as_good(leaving(1.0), leaving(0.5), settings) == repeats

@@ -11,7 +11,7 @@ from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.held_out import held_out
 from armid_ros.diagnosis.search.own_noise import without_echo
 from armid_ros.diagnosis.search.refine import Workspace
-from armid_ros.diagnosis.search.round import Round
+from armid_ros.diagnosis.search.round import Beside, Round
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
@@ -37,8 +37,10 @@ def tried(bench, seed, level=0.6, lost=0.0, loud=2.0):
     group = Group.of(effect, slice(0, 1), (0,), bench.robot)
     (trial,), _ = held_out(problem, (), [group], np.zeros((0, 0)), np.zeros(0))
     evidence = Evidence(data, noise, noise)
-    here = Round(evidence, Workspace(bench.arm, data), DiagnosisSettings(), 1.0)
-    return trial, without_echo(trial, problem, here)
+    beside = Beside((), np.zeros((0, 0)), np.zeros(0))
+    work = Workspace(bench.arm, data)
+    here = Round(evidence, work, DiagnosisSettings(), problem, beside, 1.0)
+    return trial, without_echo(trial, here)
 
 
 def beyond(tau, level, lost):

@@ -125,3 +125,12 @@ def test_friction_taken_out_of_the_model_of_a_ur10_is_named_in_all_joints(real_d
     found = Machines(real_data, tmp_path).ask(Question('ur10', 'without', 'viscous_friction'))
     assert found.findings[0].name == 'viscous_friction'
     assert len(found.findings[0].joints) == 6
+
+
+def test_a_ripple_of_a_ur10_is_named_and_no_link(real_data, tmp_path):
+    """Nothing repeats in this recording: its noise is assumed, and excuses no wrong body."""
+    machines = Machines(real_data, tmp_path)
+    question = Question('ur10', 'with', 'torque_ripple', 'wrist_2_joint', 3.0)
+    found = machines.ask(question)
+    assert answered(question, found) in ('first', 'named')
+    assert 'link_inertia' not in names(found)

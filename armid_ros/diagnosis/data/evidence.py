@@ -195,6 +195,11 @@ class Evidence:
         cuts = np.cumsum([len(part.rows) for part in self.data])[:-1]
         return np.split(rows, cuts)
 
+    @property
+    def assumed(self) -> bool:
+        """Whether nothing repeats in some of the data, so that their noise is not measured."""
+        return any(part.period is None for part in self.data)
+
     def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
         """
         Return the loss of each joint up to which what is left is no gap, shape (n,).
@@ -209,8 +214,7 @@ class Evidence:
         count = np.maximum(self.count, 2.0)
         free = np.maximum(count / self._lasting(residual), 4.0)
         each = 1.0 - (1.0 - thresholds.confidence) / len(count)
-        assumed = any(part.period is None for part in self.data)
-        noise = stats.f.ppf(each, free, free) * (thresholds.same_fit if assumed else 1.0)
+        noise = stats.f.ppf(each, free, free) * (thresholds.same_fit if self.assumed else 1.0)
         own = self.noise_share
         misfit = np.where(own < 1.0 / thresholds.same_fit, self.as_good(settings), 1.0)
         return np.asarray(np.maximum(noise, misfit) + self.matters(settings))

@@ -388,15 +388,18 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     """
     Return whether causes in the model as given explain as much as a body fitted anew.
 
-    Where that leaves noise, they have to leave as little. Where it leaves a gap itself, it has to
-    take more beside them than its values cost.
+    Where that leaves noise, they have to leave as little; a noise that is assumed excuses nothing
+    that it does not leave. Where it leaves a gap itself, it has to take more beside them than its
+    values cost.
 
     """
     evidence = first.evidence
     left, fitted = first.fitted.residual, anew.fitted.residual
     after, least = evidence.chi2_per_row(left), evidence.chi2_per_row(fitted)
-    same = settings.thresholds.same_fit * least
-    if np.all(after <= np.maximum(evidence.limits(left, settings), same)):
+    alike = settings.thresholds.same_fit * least + evidence.matters(settings)
+    if not evidence.assumed:
+        alike = np.maximum(alike, evidence.limits(left, settings))
+    if np.all(after <= alike):
         return True
     if at_floor(anew, settings):
         return False

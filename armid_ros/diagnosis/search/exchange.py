@@ -16,10 +16,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, islice
+from math import comb
 
-from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.held_out import ROUNDING, Trial
-from armid_ros.diagnosis.search.round import Beside, Round
+from armid_ros.diagnosis.search.round import Round
 from armid_ros.identification.fitting.normal_equations import informative_basis
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -53,19 +53,19 @@ class Rows:
     left: FloatArray
 
 
-def changed(trial: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
+def changed(trial: Trial, here: Round) -> bool:
     """Return whether hardly a division of the recordings shows more of a cause than the days."""
     if here.before is None:
         return True
-    more, divisions = _showing_more(trial, problem, beside, here)
+    more, divisions = _showing_more(trial, here)
     return more == 0 or _seldom(more, divisions, here)
 
 
-def surely_changed(trial: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
+def surely_changed(trial: Trial, here: Round) -> bool:
     """Return whether so many divisions show less of a cause that a misfit hides no change."""
     if here.before is None or not _seldom(0, _count_divisions(here), here):
         return False
-    return _seldom(*_showing_more(trial, problem, beside, here), here)
+    return _seldom(*_showing_more(trial, here), here)
 
 
 def _seldom(more: int, divisions: int, here: Round) -> bool:
@@ -80,19 +80,20 @@ def _count_divisions(here: Round) -> int:
     first = len({part.fold for part in here.before.told.data})
     second = len({part.fold for part in here.evidence.data})
     second += 0 if later is None else len(later.left)
-    return sum(1 for _ in _divisions(np.arange(first + second) >= first))
+    exchanges = comb(first + second, first) - 1 - (first == second)
+    return min(exchanges, _DIVISIONS)
 
 
-def _showing_more(trial: Trial, problem: Problem, beside: Beside, here: Round) -> tuple[int, int]:
+def _showing_more(trial: Trial, here: Round) -> tuple[int, int]:
     """Return how many divisions show more of a cause than the days do, and of how many."""
     assert here.before is not None
-    first, second = _before(trial, beside, here), _today(trial, problem, beside, here)
-    later = here.before.later
+    first, second = _before(trial, here), _today(trial, here)
+    beside, later = here.beside, here.before.later
     if later is not None:
         more = later.own(here.work.arm, trial.group)
         second += [Rows(*rows) for rows in zip(later.free, more, later.left, strict=True)]
-    free = beside.rows(problem).reshape(-1, len(beside.free))
-    hold, pull = beside.hold + free.T @ free, beside.pull + free.T @ problem.y.ravel()
+    free = here.free.reshape(-1, len(beside.free))
+    hold, pull = beside.hold + free.T @ free, beside.pull + free.T @ here.problem.y.ravel()
     if later is not None:
         for columns, left in zip(later.free, later.left, strict=True):
             hold, pull = hold + columns.T @ columns, pull + columns.T @ left
@@ -166,7 +167,7 @@ def _squares(products: FloatArray, aim: FloatArray, scale: FloatArray) -> float:
     return float(np.sum((vectors[:, seen].T @ (aim * scale)) ** 2 / values[seen]))
 
 
-def _before(trial: Trial, beside: Beside, here: Round) -> list[Rows]:
+def _before(trial: Trial, here: Round) -> list[Rows]:
     """Return the recordings from before, in which what was named since does nothing."""
     assert here.before is not None
     told, change = here.before.told, here.before.change
@@ -174,21 +175,20 @@ def _before(trial: Trial, beside: Beside, here: Round) -> list[Rows]:
     own = here.before.baseline.columns(here.work.arm, group.effect, group.kept)
     result, start = [], 0
     for columns, left in told.recordings(change):
-        free = np.zeros((len(left), len(beside.free)))
+        free = np.zeros((len(left), len(here.beside.free)))
         free[:, : columns.shape[1]] = columns
         result.append(Rows(free, own[start : start + len(left)], left))
         start += len(left)
     return result
 
 
-def _today(trial: Trial, problem: Problem, beside: Beside, here: Round) -> list[Rows]:
+def _today(trial: Trial, here: Round) -> list[Rows]:
     """Return the recordings in which a cause is looked for."""
     data = here.evidence.data
     fold = np.concatenate([np.full(len(part.rows), part.fold) for part in data])
     result = []
     for one in np.unique(fold):
         rows = fold == one
-        x, y = problem.x[rows], problem.y[rows].ravel()
-        free = x[:, :, list(beside.free)].reshape(len(y), -1)
-        result.append(Rows(free, x[:, :, trial.group.columns].reshape(len(y), -1), y))
+        free, own, y = here.free[rows], here.own(trial.group)[rows], here.problem.y[rows].ravel()
+        result.append(Rows(free.reshape(len(y), -1), own.reshape(len(y), -1), y))
     return result

@@ -27,8 +27,8 @@ from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.resampled import widened
-from armid_ros.diagnosis.search.round import Beside, Round
-from armid_ros.diagnosis.search.step import acceptable, beyond_chance, material, Step, Survey
+from armid_ros.diagnosis.search.round import acceptable, Beside, beyond_chance, material, Round
+from armid_ros.diagnosis.search.step import Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -266,9 +266,9 @@ def _friction(
     """
     Return the friction of unknown value that is there, beside what was named.
 
-    All of it was free beside every cause. What takes least goes first, until all that is left is
-    there beyond chance. However little that takes: the values of causes lean on what is left out.
-    What has changed has to matter as well.
+    All of it was free beside every cause. What is likeliest to be chance goes first, as what is
+    needless bends what the others take, until all that is left is there beyond it, however little
+    that takes: the values of causes lean on what is left out. What has changed has to matter, too.
 
     """
     if not question.unknown:
@@ -293,20 +293,21 @@ def _friction(
     alive = dict(enumerate(left))
     while True:
         steps: dict[int, Step] = {}
-        weak: dict[int, float] = {}
+        weak: dict[int, tuple[float, float]] = {}
         for k, (effect, column, value) in alive.items():
             group = Group.of(effect, slice(0, 1), (0,), arm.robot)
             trial, problem, beside, power = view.trial(group, [column], [value], gone)
             if trial is None:
-                weak[k] = -np.inf
+                weak[k] = _doubtful(trial)
                 continue
             total = power if whole[0] is None else whole[0]
             steps[k] = Step(trial, (), (trial,), total, whole[1], least)
-            if not _stands(steps[k], problem, beside, Round(evidence, work, settings, total)):
-                weak[k] = trial.gain
+            here = Round(evidence, work, settings, problem, beside, total, whole[1])
+            if not _stands(steps[k], here):
+                weak[k] = _doubtful(trial)
         if not weak:
             break
-        _, column, value = alive.pop(min(weak, key=lambda k: weak[k]))
+        _, column, value = alive.pop(max(weak, key=lambda k: weak[k]))
         view = view.dropped(column, value)
         gone.append(column)
     return [
@@ -315,14 +316,18 @@ def _friction(
     ]
 
 
-def _stands(step: Step, problem: Problem, beside: Beside, here: Round) -> bool:
+def _doubtful(trial: Trial | None) -> tuple[float, float]:
+    """Return an order of causes: likelier to be chance, and taking less; None is not seen."""
+    return (np.inf, np.inf) if trial is None else (trial.p, -trial.gain)
+
+
+def _stands(step: Step, here: Round) -> bool:
     """Return whether a cause, whose columns come first, is there, and matters if it has to."""
     trial = step.trial
     if step.misfit_share is None:
-        return beyond_chance(trial, here, step.tried)
-    own = problem.x[:, :, : trial.group.size]
-    gains = trial.joint_gains(problem, own, beside.rows(problem))
-    return acceptable(trial, here, step.tried) and material(gains, here, step.misfit_share)
+        return beyond_chance(trial, here)
+    gains = trial.joint_gains(here.problem, here.own(trial.group), here.free)
+    return acceptable(trial, here) and material(gains, here, step.misfit_share)
 
 
 def _pruned(
@@ -344,17 +349,17 @@ def _pruned(
             return named, steps, fitted
         view = View.of(fitted, evidence)
         work = Workspace(memoized_arm(question.arm), data)
-        needless: list[tuple[float, int]] = []
+        needless: list[tuple[tuple[float, float], int]] = []
         for k, step in enumerate(steps):
             trial, problem, beside, _ = view.trial_of(k)
-            here = Round(evidence, work, settings, step.total)
+            here = Round(evidence, work, settings, problem, beside, step.total, step.tried)
             if trial is None:
-                needless.append((-np.inf, k))
-            elif not _stands(replace(step, trial=trial), problem, beside, here):
-                needless.append((trial.gain, k))
+                needless.append((_doubtful(trial), k))
+            elif not _stands(replace(step, trial=trial), here):
+                needless.append((_doubtful(trial), k))
         if not needless:
             return list(fitted.named), steps, fitted
-        gone, change = min(needless)[1], fitted.change
+        gone, change = max(needless)[1], fitted.change
         named = [own for k, own in enumerate(fitted.named) if k != gone]
         values = [own for k, own in enumerate(fitted.values) if k != gone]
         steps.pop(gone)

@@ -151,9 +151,10 @@ class Search:
             if group.effect.linear and not group.effect.shapes:
                 arm = place.current.arm
                 before = None if place.before is None else place.before.and_columns(arm, group)
-                problem, beside = place.look.problem, place.look.beside.and_columns(group)
-                here = replace(place.look.here, before=before, known=None)
-                look = look_at(problem, beside, place.found.groups, here)
+                here = place.look.here
+                beside = here.beside.and_columns(group)
+                here = replace(here, beside=beside, before=before, known=None)
+                look = look_at(place.found.groups, here)
                 after = replace(place, before=before, look=look, next={})
                 place.next[way] = replace(after, named=tuple(named), values=tuple(values))
             else:
@@ -183,8 +184,8 @@ class Search:
         problem, beside = beside_fit(found, current, self.evidence)
         before = self._before(current)
         work = Workspace(memoized_arm(current.arm), data)
-        here = Round(self.evidence, work, self.settings, total, before)
-        look = look_at(problem, beside, found.groups, here)
+        here = Round(self.evidence, work, self.settings, problem, beside, total, before=before)
+        look = look_at(found.groups, here)
         if named:
             named, values = current.named, current.values
         return _Place(tuple(named), tuple(values), current, found, before, look)

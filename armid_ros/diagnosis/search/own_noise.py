@@ -6,14 +6,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armid_ros.diagnosis.data.rows import Problem, Projection
 from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.round import Round
 from armid_ros.motion import FloatArray
 import numpy as np
 
 
-def made_of_noise(trial: Trial, problem: Problem, projection: Projection, here: Round) -> bool:
+def made_of_noise(trial: Trial, here: Round) -> bool:
     """
     Return whether a group explains noise of positions with that noise.
 
@@ -22,14 +21,12 @@ def made_of_noise(trial: Trial, problem: Problem, projection: Projection, here: 
 
     """
     effect, kept, work = trial.group.effect, trial.group.kept, here.work
-    left = projection.rest(problem.y)
-    smooth = work.smooth_columns(effect, kept) * problem.weight[:, :, np.newaxis]
-    rough = problem.x[:, :, trial.group.columns]
-    least = here.settings.thresholds.smooth_share * _taken(rough, projection, left)
-    return _taken(smooth, projection, left) < least
+    smooth = work.smooth_columns(effect, kept) * here.problem.weight[:, :, np.newaxis]
+    least = here.settings.thresholds.smooth_share * _taken(here.own(trial.group), here)
+    return _taken(smooth, here) < least
 
 
-def explains_itself(trial: Trial, problem: Problem, projection: Projection, here: Round) -> bool:
+def explains_itself(trial: Trial, here: Round) -> bool:
     """
     Return whether a group leaves less than the noise of the torque that its columns are made of.
 
@@ -37,14 +34,13 @@ def explains_itself(trial: Trial, problem: Problem, projection: Projection, here
     its noise included.
 
     """
-    left = projection.rest(problem.y)
-    own = projection.rest(problem.x[:, :, trial.group.columns])
-    after = problem.chi2_per_row(left - own @ trial.values)
-    before = np.minimum(problem.chi2_per_row(left), here.evidence.noise_share)
+    own = here.projection.rest(here.own(trial.group))
+    after = here.problem.chi2_per_row(here.left - own @ trial.values)
+    before = np.minimum(here.problem.chi2_per_row(here.left), here.evidence.noise_share)
     return bool(np.any(after < here.settings.thresholds.below_noise * before))
 
 
-def without_echo(trial: Trial, problem: Problem, here: Round) -> Trial:
+def without_echo(trial: Trial, here: Round) -> Trial:
     """
     Return a trial without what noise of the torque makes of it; itself if that is nothing.
 
@@ -58,16 +54,16 @@ def without_echo(trial: Trial, problem: Problem, here: Round) -> Trial:
     echo = here.work.torque_echo(trial.group.effect, trial.group.kept, here.evidence.noise)
     if not echo.any():
         return trial
-    rows = np.einsum('rjp,rj->rp', echo, problem.weight**2)
+    rows = np.einsum('rjp,rj->rp', echo, here.problem.weight**2)
     blocks = np.zeros((len(trial.cross), rows.shape[1]))
-    np.add.at(blocks, problem.block, rows)
+    np.add.at(blocks, here.problem.block, rows)
     made = np.sum(blocks * trial.held_values[trial.piece], axis=1)
     return replace(trial, cross=trial.cross - made)
 
 
-def _taken(columns: FloatArray, projection: Projection, left: FloatArray) -> float:
+def _taken(columns: FloatArray, here: Round) -> float:
     """Return the squares that weighted columns (R, n, p) take of what is left."""
     flat = columns.reshape(-1, columns.shape[2])
-    own, aim = projection.products(flat), flat.T @ left.ravel()
+    own, aim = here.projection.products(flat), flat.T @ here.left.ravel()
     values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
     return float(2.0 * values @ aim - values @ own @ values)

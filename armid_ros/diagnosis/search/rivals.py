@@ -6,11 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from armid_ros.diagnosis.data.rows import fold_rows, Problem, project
+from armid_ros.diagnosis.data.rows import fold_rows
 from armid_ros.diagnosis.search.held_out import denies, HARDLY, lead, ROUNDING, Trial
-from armid_ros.diagnosis.search.round import Beside, cost, Round
+from armid_ros.diagnosis.search.round import cost, Round
 from armid_ros.effects import CATALOGUE
-from armid_ros.motion import FloatArray
 import numpy as np
 
 #: Places in the catalogue that an effect is behind where it is seldom: a delay of one joint, which
@@ -37,15 +36,13 @@ def _never_happens(trial: Trial, here: Round) -> bool:
     return here.before is not None and trial.group.effect.corrects
 
 
-def what_happens_first(
-    passing: Sequence[Trial], problem: Problem, beside: Beside, here: Round
-) -> list[Trial]:
+def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
     """Return causes, best first: before one that never happens what happens and says the same."""
     first, *others = passing
     if _never_happens(first, here):
         for other in others:
             happens = not _never_happens(other, here) and not beaten(other, first, here)
-            if happens and contains(first, other, problem, beside, here):
+            if happens and contains(first, other, here):
                 return [other, first, *(trial for trial in others if trial is not other)]
     return list(passing)
 
@@ -70,11 +67,10 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -
     return min(alike, key=rarity)
 
 
-def closes(trial: Trial, problem: Problem, beside: FloatArray, here: Round) -> bool:
-    """Return whether a cause beside columns (R, n, f) leaves no gap of data left out."""
-    _, rest = trial.left_out(problem, problem.x[:, :, trial.group.columns], beside)
-    limits = here.evidence.limits(here.evidence.split(rest, problem.weight), here.settings)
-    return bool(np.all(problem.chi2_per_row(rest) <= limits))
+def closes(trial: Trial, here: Round) -> bool:
+    """Return whether a cause leaves no gap of data left out."""
+    _, rest = trial.left_out(here.problem, here.own(trial.group), here.free)
+    return not here.gaps(rest).any()
 
 
 def simplest(tied: Sequence[Trial], here: Round) -> Trial:
@@ -106,7 +102,7 @@ def rarity(trial: Trial) -> float:
     return place + (_ELSEWHERE if bool(effect.joints) == effect.whole_arm else 0.0)
 
 
-def contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: Round) -> bool:
+def contains(big: Trial, small: Trial, here: Round) -> bool:
     """
     Return whether a cause says the same, or is freer and can make what another one makes.
 
@@ -117,9 +113,8 @@ def contains(big: Trial, small: Trial, problem: Problem, beside: Beside, here: R
     if not big.group.effect.joints and small.group.effect.joints:
         return False
     thresholds = here.settings.thresholds
-    projection = project(problem, beside.free, beside.hold)
-    columns = projection.rest(problem.x[:, :, big.group.columns])
-    target = projection.rest(problem.x[:, :, small.group.columns]) @ small.values
+    columns = here.projection.rest(here.own(big.group))
+    target = here.projection.rest(here.own(small.group)) @ small.values
     squares = float(np.sum(target**2))
     if np.sum((columns @ big.values - target) ** 2) < thresholds.same * squares:
         if here.before is None:

@@ -6,19 +6,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import make_problem, Problem, weighted_rows
+from armid_ros.diagnosis.data.rows import (
+    make_problem,
+    Problem,
+    project,
+    Projection,
+    weighted_rows,
+)
 from armid_ros.diagnosis.search.candidates import Candidates, Group
 from armid_ros.diagnosis.search.fit import Fitted, Told
 from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.products import Products
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 
 
 @dataclass(frozen=True)
@@ -40,10 +49,6 @@ class Beside:
     free: tuple[int, ...]
     hold: FloatArray
     pull: FloatArray
-
-    def rows(self, problem: Problem) -> FloatArray:
-        """Return the columns that are fitted beside, shape (R, n, f)."""
-        return problem.x[:, :, list(self.free)]
 
     def and_columns(self, group: Group) -> Beside:
         """Return the same with the columns of a group."""
@@ -185,8 +190,14 @@ class Round:
         What columns of other shapes are computed from.
     settings : DiagnosisSettings
         Library and thresholds.
+    problem : Problem
+        All columns over the unit, those of the groups first.
+    beside : Beside
+        What is fitted beside every cause.
     total : float or None
         Held-out squares that shares are of; those of this round if None.
+    tried : int
+        Groups that were tried, every shape for itself.
     before : Before or None
         Recordings in which nothing was wrong.
     width : float
@@ -199,10 +210,75 @@ class Round:
     evidence: Evidence
     work: Workspace
     settings: DiagnosisSettings
-    total: float | None
+    problem: Problem
+    beside: Beside
+    total: float | None = None
+    tried: int = 1
     before: Before | None = None
     width: float = 0.0
     known: Products | None = None
+
+    @cached_property
+    def free(self) -> FloatArray:
+        """Columns that are fitted beside every cause, shape (R, n, f)."""
+        return self.problem.x[:, :, list(self.beside.free)]
+
+    @cached_property
+    def projection(self) -> Projection:
+        """What these leave of others."""
+        return project(self.problem, self.beside.free, self.beside.hold)
+
+    @cached_property
+    def left(self) -> FloatArray:
+        """What these leave of the residual, shape (R, n)."""
+        return self.projection.rest(self.problem.y)
+
+    def within(self, width: float) -> Round:
+        """Return the same where a lead of less than some squares decides nothing."""
+        return self if width == self.width else replace(self, width=width)
+
+    def own(self, group: Group) -> FloatArray:
+        """Return the columns of a group, shape (R, n, p)."""
+        return self.problem.x[:, :, group.columns]
+
+    def gaps(self, left: FloatArray) -> npt.NDArray[np.bool_]:
+        """Return in which joints what is left (R, n) is a gap, shape (n,)."""
+        rows = self.evidence.split(left, self.problem.weight)
+        return self.problem.chi2_per_row(left) > self.evidence.limits(rows, self.settings)
+
+
+def acceptable(trial: Trial, here: Round) -> bool:
+    """Return whether a cause is there beyond chance, pays for its freedom, and is possible."""
+    return beyond_chance(trial, here) and worth(trial, here) > 0.0
+
+
+def beyond_chance(trial: Trial, here: Round) -> bool:
+    """Return whether a cause is there beyond chance, and is possible."""
+    surely = trial.p * here.tried <= here.settings.thresholds.error_rate
+    return surely and possible(trial, here)
+
+
+def possible(trial: Trial, here: Round) -> bool:
+    """Return whether the values are what could be called by the name."""
+    effect, arm, kept = trial.group.effect, here.work.arm, list(trial.group.kept)
+    if not inside(trial, here).all():
+        return False
+    values, std = np.zeros((2, len(effect.parameters(arm.robot))))
+    values[kept], std[kept] = trial.values, trial.deviation
+    return effect.plausible(values, std, arm)
+
+
+def inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
+    """Return which values are physically possible, or differ from that by noise, shape (p,)."""
+    kept = list(trial.group.kept)
+    lower, upper = (bound[kept] for bound in room(trial.group.effect, here.work.arm))
+    slack = here.settings.thresholds.beyond_bounds * trial.deviation
+    return np.asarray((trial.values > lower - slack) & (trial.values < upper + slack))
+
+
+def material(gains: FloatArray, here: Round, misfit_share: float) -> bool:
+    """Return whether a cause that takes these squares of the joints takes as much as matters."""
+    return bool(np.any(gains >= here.evidence.least_squares(here.settings, misfit_share)))
 
 
 def worth(trial: Trial, here: Round) -> float:

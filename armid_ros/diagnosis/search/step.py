@@ -9,12 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
-from armid_ros.diagnosis.data.rows import Problem, project, Projection
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.exchange import changed, surely_changed
 from armid_ros.diagnosis.search.held_out import Trial, tried_beside
 from armid_ros.diagnosis.search.own_noise import explains_itself, made_of_noise, without_echo
-from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.products import products, with_group
 from armid_ros.diagnosis.search.refine import refine
 from armid_ros.diagnosis.search.rivals import (
@@ -26,10 +24,9 @@ from armid_ros.diagnosis.search.rivals import (
     rarity,
     what_happens_first,
 )
-from armid_ros.diagnosis.search.round import Beside, Round, worth
+from armid_ros.diagnosis.search.round import acceptable, inside, material, Round, worth
 from armid_ros.motion import FloatArray
 import numpy as np
-import numpy.typing as npt
 
 #: Best groups that are looked at row by row; shapes of this many are refined, of groups that have
 #: this share of the best worth.
@@ -124,10 +121,6 @@ class Look:
     ----------
     survey : Survey
         All groups.
-    problem : Problem
-        With the columns of refined shapes behind the others.
-    beside : Beside
-        What is free.
     passing : tuple of Trial
         The causes that could be taken, best first.
     closing : dict of int to bool
@@ -135,13 +128,11 @@ class Look:
     ranking : tuple of Trial
         The best groups, one per name and joints, best first.
     here : Round
-        What it knows.
+        What it knows; columns of refined shapes are behind the others.
 
     """
 
     survey: Survey
-    problem: Problem
-    beside: Beside
     passing: tuple[Trial, ...]
     closing: dict[int, bool]
     ranking: tuple[Trial, ...]
@@ -155,76 +146,40 @@ class Look:
         A lead of less than `width` squares decides nothing. None if nothing passes.
 
         """
-        problem, beside, here = self.problem, self.beside, replace(self.here, width=width)
-        ahead = list(takewhile(lambda t: not changed(t, problem, beside, here), self.passing))
+        here = self.here.within(width)
+        ahead = list(takewhile(lambda trial: not changed(trial, here), self.passing))
         if len(ahead) == len(self.passing):
             return None
-        first, *others = what_happens_first(self.passing[len(ahead) :], problem, beside, here)
+        first, *others = what_happens_first(self.passing[len(ahead) :], here)
         behind = [trial for trial in others if not beaten(trial, first, here)]
-        able = [first, *(trial for trial in behind if changed(trial, problem, beside, here))]
+        able = [first, *(trial for trial in behind if changed(trial, here))]
         winner = likeliest(able, self.closing, here)
         tied = [*(trial for trial in ahead if not beaten(first, trial, here)), first, *behind]
         rivals = [
-            trial
-            for trial in tied
-            if trial is not winner and not contains(trial, winner, problem, beside, here)
+            trial for trial in tied if trial is not winner and not contains(trial, winner, here)
         ]
         best = {trial.group.effect.name: trial for trial in reversed(rivals)}
         likely = tuple(sorted(best.values(), key=rarity)[:_RIVALS])
         whole = here.settings.thresholds.misfit_share
-        least = 0.0 if surely_changed(winner, problem, beside, here) else whole
+        least = 0.0 if surely_changed(winner, here) else whole
         return Step(winner, likely, self.ranking, self.survey.total, self.survey.tried, least)
 
 
-def look_at(problem: Problem, beside: Beside, groups: Sequence[Group], here: Round) -> Look:
+def look_at(groups: Sequence[Group], here: Round) -> Look:
     """Try every cause beside what is free."""
-    known = products(problem, beside.free, groups)
-    trials, power = tried_beside(known, problem, groups, beside.hold, beside.pull)
+    beside = here.beside
+    known = products(here.problem, beside.free, groups)
+    trials, power = tried_beside(known, here.problem, groups, beside.hold, beside.pull)
     total = float(power.sum()) if here.total is None else here.total
     here = replace(here, total=total, known=known)
     seen = [t for t in trials if t.visible >= here.settings.thresholds.least_visible]
     ranking = _best_per_key(seen, here)
     survey = _survey(groups, ranking, total, len(seen))
-    ranking, problem = _with_refined_shapes(problem, beside, ranking, here)
-    tried = max(len(seen), 1)
-    ranking, there, closing = _examined(ranking, problem, beside, here, tried)
+    ranking, here = _with_refined_shapes(ranking, replace(here, tried=max(len(seen), 1)))
+    ranking, there, closing = _examined(ranking, here)
     survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
-    passing = tuple(_passing(ranking, closing, problem, beside, here, tried))
-    return Look(survey, problem, beside, passing, closing, tuple(ranking), here)
-
-
-def acceptable(trial: Trial, here: Round, tried: int) -> bool:
-    """Return whether a cause is there beyond chance, pays for its freedom, and is possible."""
-    return beyond_chance(trial, here, tried) and worth(trial, here) > 0.0
-
-
-def beyond_chance(trial: Trial, here: Round, tried: int) -> bool:
-    """Return whether a cause is there beyond chance, and is possible."""
-    surely = trial.p * tried <= here.settings.thresholds.error_rate
-    return surely and possible(trial, here)
-
-
-def possible(trial: Trial, here: Round) -> bool:
-    """Return whether the values are what could be called by the name."""
-    effect, arm, kept = trial.group.effect, here.work.arm, list(trial.group.kept)
-    if not _inside(trial, here).all():
-        return False
-    values, std = np.zeros((2, len(effect.parameters(arm.robot))))
-    values[kept], std[kept] = trial.values, trial.deviation
-    return effect.plausible(values, std, arm)
-
-
-def _inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
-    """Return which values are physically possible, or differ from that by noise, shape (p,)."""
-    kept = list(trial.group.kept)
-    lower, upper = (bound[kept] for bound in room(trial.group.effect, here.work.arm))
-    slack = here.settings.thresholds.beyond_bounds * trial.deviation
-    return np.asarray((trial.values > lower - slack) & (trial.values < upper + slack))
-
-
-def material(gains: FloatArray, here: Round, misfit_share: float) -> bool:
-    """Return whether a cause that takes these squares of the joints takes as much as matters."""
-    return bool(np.any(gains >= here.evidence.least_squares(here.settings, misfit_share)))
+    passing = tuple(_passing(ranking, closing, here))
+    return Look(survey, passing, closing, tuple(ranking), here)
 
 
 def _best_per_key(trials: Sequence[Trial], here: Round) -> list[Trial]:
@@ -234,13 +189,13 @@ def _best_per_key(trials: Sequence[Trial], here: Round) -> list[Trial]:
     return list(best.values())
 
 
-def _part(group: Group, inside: Sequence[int], first: int) -> Group:
+def _part(group: Group, possible: Sequence[int], first: int) -> Group:
     """Return a group with some of its values only, whose columns are elsewhere."""
     return replace(
         group,
-        columns=slice(first, first + len(inside)),
-        kept=tuple(group.kept[k] for k in inside),
-        precision=group.precision[list(inside)],
+        columns=slice(first, first + len(possible)),
+        kept=tuple(group.kept[k] for k in possible),
+        precision=group.precision[list(possible)],
     )
 
 
@@ -256,12 +211,10 @@ def _survey(groups: Sequence[Group], ranking: Sequence[Trial], total: float, tri
     )
 
 
-def _with_refined_shapes(
-    problem: Problem, beside: Beside, ranking: list[Trial], here: Round
-) -> tuple[list[Trial], Problem]:
+def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial], Round]:
     """Refine the shapes of the best groups; return them in order, and their columns too."""
+    problem = here.problem
     best = max((worth(t, here) for t in ranking if not t.group.effect.external), default=0.0)
-    projection: Projection | None = None
     refined: list[Trial] = []
     found: list[FloatArray] = []
     first = problem.x.shape[2]
@@ -273,36 +226,34 @@ def _with_refined_shapes(
         if not (promising and trial.gain > 0.0):
             continue
         tried[effect.name] += 1
-        inside = [k for k, good in enumerate(_inside(trial, here)) if good]
-        if 0 < len(inside) < trial.group.size:
-            own = problem.x[:, :, trial.group.columns][:, :, inside]
-            group = _part(trial.group, inside, first)
-            first += len(inside)
+        possible = [k for k, good in enumerate(inside(trial, here)) if good]
+        if 0 < len(possible) < trial.group.size:
+            own = here.own(trial.group)[:, :, possible]
+            group = _part(trial.group, possible, first)
+            first += len(possible)
             found.append(own / np.where(problem.weight > 0.0, problem.weight, 1.0)[:, :, None])
-            bounded = _alone(problem, beside, group, own, here)
+            bounded = _alone(group, own, here)
             if bounded is None:
                 continue
             trial = replace(bounded, group=group)
             refined.append(trial)
         if not effect.shapes:
             continue
-        projection = projection or project(problem, beside.free, beside.hold)
-        left = projection.rest(problem.y)
-        group, columns = refine(problem, projection, trial.group, left, here.work)
+        group, columns = refine(problem, here.projection, trial.group, here.left, here.work)
         span = slice(first, first + columns.shape[2])
         first = span.stop
         found.append(columns)
         weighted = columns * problem.weight[:, :, np.newaxis]
-        better = _alone(problem, beside, group, weighted, here)
+        better = _alone(group, weighted, here)
         own_group = replace(group, columns=span)
         refined += [] if better is None else [replace(better, group=own_group)]
     if found:
-        problem = problem.with_columns(np.concatenate(found, axis=2))
-    return _best_per_key([*ranking, *refined], here), problem
+        here = replace(here, problem=problem.with_columns(np.concatenate(found, axis=2)))
+    return _best_per_key([*ranking, *refined], here), here
 
 
 def _examined(
-    ranking: Sequence[Trial], problem: Problem, beside: Beside, here: Round, tried: int
+    ranking: Sequence[Trial], here: Round
 ) -> tuple[list[Trial], list[Trial], dict[int, bool]]:
     """
     Return the ranking, what is there beyond chance, and whether each that matters leaves no gap.
@@ -315,47 +266,35 @@ def _examined(
     """
     assert here.total is not None
     least = 0.0 if here.before is None else here.settings.thresholds.headline * here.total
-    free, whole = beside.rows(problem), here.settings.thresholds.misfit_share
-    open_squares = _open_squares(problem, beside, here)
-    most = here.settings.thresholds.open_share
+    whole, most = here.settings.thresholds.misfit_share, here.settings.thresholds.open_share
+    open_squares = np.where(here.gaps(here.left), np.sum(here.left**2, axis=0), np.inf)
     there: list[Trial] = []
     large: list[Trial] = []
     for trial in ranking[:_LOOKED_AT]:
-        if not acceptable(trial, here, tried) or denied_by_one(trial, here):
+        if not acceptable(trial, here) or denied_by_one(trial, here):
             continue
-        (change,) = _changes(problem, beside, [trial], [trial], here)
-        if change is None or not acceptable(change, here, tried):
+        (change,) = _changes([trial], here)
+        if change is None or not acceptable(change, here):
             continue
         there.append(change)
-        own = problem.x[:, :, trial.group.columns]
-        takes = trial.joint_gains(problem, own, free)
+        takes = trial.joint_gains(here.problem, here.own(trial.group), here.free)
         matters = change.gain >= least or bool(np.any(takes > most * open_squares))
-        size = _size(change, takes, own, here)
+        size = _size(change, takes, here)
         if not (matters and material(size, here, 0.0)):
             continue
-        if material(size, here, whole) or surely_changed(trial, problem, beside, here):
+        if material(size, here, whole) or surely_changed(trial, here):
             large.append(trial)
     best = large[:_COMPARED]
     others = [trial for trial in ranking if not any(trial is one for one in best)]
-    compared = _compared(problem, beside, best, here)
+    compared = _compared(best, here)
     pairs = zip(compared, best, strict=True)
-    closing = {id(change): closes(trial, problem, free, here) for change, trial in pairs}
+    closing = {id(change): closes(trial, here) for change, trial in pairs}
     result = sorted([*others, *compared], key=lambda t: -worth(t, here))
     there.sort(key=lambda t: -worth(t, here))
     return result, there, closing
 
 
-def _open_squares(problem: Problem, beside: Beside, here: Round) -> FloatArray:
-    """Return the squares of every joint in which a gap is open; infinite where none is, (n,)."""
-    left = project(problem, beside.free, beside.hold).rest(problem.y)
-    limits = here.evidence.limits(here.evidence.split(left, problem.weight), here.settings)
-    open_gap = problem.chi2_per_row(left) > limits
-    return np.where(open_gap, np.sum(left**2, axis=0), np.inf)
-
-
-def _compared(
-    problem: Problem, beside: Beside, trials: Sequence[Trial], here: Round
-) -> list[Trial]:
+def _compared(trials: Sequence[Trial], here: Round) -> list[Trial]:
     """
     Return the changes of causes beside what each of them was before, on the scale of the gap.
 
@@ -365,7 +304,7 @@ def _compared(
     """
     if here.before is None or len(trials) < 2:
         return list(trials)
-    found = _changes(problem, beside, trials, trials, here)
+    found = _changes(trials, here)
     changes = [trial if one is None else one for trial, one in zip(trials, found, strict=True)]
     first = max(range(len(trials)), key=lambda k: changes[k].gain)
     if changes[first].gain <= 0.0:
@@ -374,46 +313,38 @@ def _compared(
     return [replace(one, cross=scale * one.cross, square=scale * one.square) for one in changes]
 
 
-def _alone(
-    problem: Problem, beside: Beside, group: Group, own: FloatArray, here: Round
-) -> Trial | None:
+def _alone(group: Group, own: FloatArray, here: Round) -> Trial | None:
     """Try a group with weighted columns beside what is free."""
     group = replace(group, columns=slice(0, group.size))
     assert here.known is not None
-    known = with_group(here.known, problem, beside.rows(problem), own)
-    trials, _ = tried_beside(known, problem, [group], beside.hold, beside.pull)
+    known = with_group(here.known, here.problem, here.free, own)
+    trials, _ = tried_beside(known, here.problem, [group], here.beside.hold, here.beside.pull)
     return trials[0] if trials else None
 
 
-def _changes(
-    problem: Problem,
-    beside: Beside,
-    trials: Sequence[Trial],
-    before: Sequence[Trial],
-    here: Round,
-) -> list[Trial | None]:
+def _changes(trials: Sequence[Trial], here: Round) -> list[Trial | None]:
     """
     Return the changes of causes since the recordings from before; None where nothing is visible.
 
-    The values that some causes had before, themselves among them, are free beside each.
+    The values that all of them had before are free beside each.
 
     """
     if here.before is None:
         return list(trials)
-    held = here.before.beside([one.group for one in before], here.work.arm, beside)
-    had = [problem.x[:, :, one.group.columns] for one in before]
-    free = np.concatenate([*had, beside.rows(problem)], axis=2)
+    problem = here.problem
+    held = here.before.beside([one.group for one in trials], here.work.arm, here.beside)
+    free = np.concatenate([*(here.own(one.group) for one in trials), here.free], axis=2)
     known = products(replace(problem, x=free), range(free.shape[2]), ())
     result: list[Trial | None] = []
     for trial in trials:
         group = replace(trial.group, columns=slice(0, trial.group.size))
-        whole = with_group(known, problem, free, problem.x[:, :, trial.group.columns])
+        whole = with_group(known, problem, free, here.own(trial.group))
         found, _ = tried_beside(whole, problem, [group], held.hold, held.pull)
         result.append(replace(found[0], group=trial.group) if found else None)
     return result
 
 
-def _size(change: Trial, takes: FloatArray, own: FloatArray, here: Round) -> FloatArray:
+def _size(change: Trial, takes: FloatArray, here: Round) -> FloatArray:
     """
     Return the squares that a change makes in every joint, and no more than the cause takes, (n,).
 
@@ -422,29 +353,19 @@ def _size(change: Trial, takes: FloatArray, own: FloatArray, here: Round) -> Flo
     """
     if here.before is None:
         return takes
-    return np.asarray(np.minimum(takes, np.sum((own @ change.values) ** 2, axis=0)))
+    made = np.sum((here.own(change.group) @ change.values) ** 2, axis=0)
+    return np.asarray(np.minimum(takes, made))
 
 
-def _passing(
-    ranking: Sequence[Trial],
-    closing: dict[int, bool],
-    problem: Problem,
-    beside: Beside,
-    here: Round,
-    tried: int,
-) -> list[Trial]:
+def _passing(ranking: Sequence[Trial], closing: dict[int, bool], here: Round) -> list[Trial]:
     """Return the causes that could be taken, best first."""
-    projection: Projection | None = None
     result: list[Trial] = []
     for trial in ranking:
-        if id(trial) not in closing:
+        if id(trial) not in closing or made_of_noise(trial, here):
             continue
-        projection = projection or project(problem, beside.free, beside.hold)
-        if made_of_noise(trial, problem, projection, here):
+        fair = without_echo(trial, here)
+        if fair is not trial and explains_itself(trial, here):
             continue
-        fair = without_echo(trial, problem, here)
-        if fair is not trial and explains_itself(trial, problem, projection, here):
-            continue
-        if acceptable(fair, here, tried):
+        if acceptable(fair, here):
             result.append(trial)
     return result

@@ -150,8 +150,8 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
     beside = Beside(free, reference.hold, reference.pull)
     trials, power = held_out(problem, free, [group], beside.hold, beside.pull)
     work = Workspace(memoized_arm(reference.arm), data)
-    here = Round(evidence, work, settings, float(power.sum()))
-    look = look_at(problem, beside, found.groups, here)
+    here = Round(evidence, work, settings, problem, beside, float(power.sum()))
+    look = look_at(found.groups, here)
     step, survey = look.step(), look.survey
     survey = replace(survey, ranking=(*trials, *survey.ranking), tried=survey.tried + 1)
     if step is None or not trials:

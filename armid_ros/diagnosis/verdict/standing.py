@@ -73,7 +73,9 @@ def standing(arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray]) 
     """
     Return by how much what is left of rows that tell nothing is beyond friction, squared, (n,).
 
-    Noise and misfit counted in. Zero where it is not, and where no dry friction is known.
+    Noise and misfit counted in; a joint that turns round accelerates most, and what a model gets
+    wrong grows with the torque that it predicts. Zero where it is not, and where no dry friction
+    is known.
 
     """
     friction = arm.action().dry_friction
@@ -81,9 +83,11 @@ def standing(arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray]) 
     if friction is None:
         return np.zeros(joints)
     squares, time = np.zeros((2, joints))
+    usual = np.maximum(evidence.torque_rms, 1e-300)
     for part, left, sigma in zip(evidence.data, residual, evidence.sigma, strict=True):
         held = _HELD * friction.largest(arm.load(part.at_rows))
-        beyond = (np.abs(left) / (held + _SURELY * sigma)) ** 2
+        louder = np.maximum(np.abs(part.torque - left) / usual, 1.0)
+        beyond = (np.abs(left) / (held + _SURELY * sigma * louder)) ** 2
         more = ~part.informative & (held > 0.0) & (beyond > 1.0)
         period = float(part.t[1] - part.t[0])
         time += period * more.sum(axis=0)
