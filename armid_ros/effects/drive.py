@@ -59,6 +59,10 @@ class RotorInertia(Effect):
         return Action(inertia=np.diag(inertia))
 
 
+#: Lowest order of a ripple [1/rev]: gravity and springs are slower.
+_SLOWEST, _EDGE = 1.5, 1.05
+
+
 @dataclass(frozen=True)
 class TorqueRipple(Effect):
     """
@@ -67,7 +71,7 @@ class TorqueRipple(Effect):
     Cogging of a motor with N_c cycles per turn behind a gear of ratio N has n = N N_c per turn of
     the joint; the kinematic error of a strain-wave gear n = 2 N. A line at a fixed order whatever
     the speed: search for it before filters of fixed frequency take it away. Confounded with
-    joint_spring and gravity at orders of 1 and below.
+    joint_spring and gravity at orders of 1 and below, which are not looked at.
     Source: Taghirad and Belanger 1998.
 
     """
@@ -80,7 +84,9 @@ class TorqueRipple(Effect):
         Quantity('ripple_cosine', 'N m', typical=(0.002, 2.0)),
     )
     shapes = (
-        Shape('ripple_order', '1/rev', 0.1, 1e5, 20.0, (4.0, 6.0, 8.0, 12.0, 20.0, 50.0, 100.0)),
+        Shape(
+            'ripple_order', '1/rev', _SLOWEST, 1e5, 20.0, (4.0, 6.0, 8.0, 12.0, 20.0, 50.0, 100.0)
+        ),
     )
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
@@ -91,6 +97,10 @@ class TorqueRipple(Effect):
             for joint in self.indices(robot.joints)
         ]
         return (np.array(orders),)
+
+    def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
+        """Return whether the order is told: at the lowest one, something slower is there."""
+        return bool(np.all(self.shape_values > _EDGE * _SLOWEST))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(A, B) = (sin(n q), cos(n q)) [-], shape (N, n, P)."""

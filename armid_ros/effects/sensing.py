@@ -15,6 +15,9 @@ from armid_ros.effects.smooth import SmoothColumns
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
+#: Times of a drift that are looked at, over the length of a recording.
+_TIMES = (0.03, 0.1, 0.3, 1.0, 3.0)
+
 
 @dataclass(frozen=True)
 class TorqueOffset(Effect):
@@ -108,6 +111,11 @@ class TorqueDrift(TorqueReading):
     shown_by = 'the same static hold, repeated for half an hour'
     quantities = (Quantity('drift', 'N m', typical=(0.01, 5.0)),)
     shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
+
+    def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
+        """Return times that differ on a recording: beyond three of it, a drift is a line."""
+        times = float(np.ptp(motion.t)) * np.array(_TIMES)
+        return (np.tile(times, (len(self.joints), 1)),)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return the torque with the drift, shape (N, n) [N m]."""

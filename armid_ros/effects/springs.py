@@ -40,7 +40,7 @@ class JointSpring(Effect):
     shown_by = 'static holds over the range, with and without a payload'
     familiar = True
     quantities = (
-        Quantity('spring_stiffness', 'N m/rad', typical=(0.05, 50.0)),
+        Quantity('spring_stiffness', 'N m/rad', lower=0.0, typical=(0.05, 50.0)),
         Quantity('spring_preload', 'N m', typical=(0.01, 50.0)),
     )
 
@@ -59,7 +59,7 @@ class JointSpring(Effect):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether there is surely a stiffness; a preload alone is an offset."""
-        return bool(abs(values[0]) > _SURELY * std[0])
+        return bool(values[0] > _SURELY * std[0])
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,14 @@ from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.diagnosis.verdict.words import Left
 from armid_ros.motion import FloatArray
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 #: Dry friction by which a joint at rest may be held: twice that of motion until it breaks away,
 #: and once what a model has of it in a direction of its own choice.
 _HELD = 3.0
 #: Deviations of the unit of the gap that are noise.
 _SURELY = 3.0
-#: What lasts shorter may be chance [s].
+#: What lasts shorter may be chance, or what a filter of positions makes of a jerk [s].
 _SHORTEST = 0.2
 #: Factor on what a baseline shows of it: a brake holds an arm on every day.
 _AS_BEFORE = 1.5
@@ -74,8 +75,9 @@ def standing(arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray]) 
     Return by how much what is left of rows that tell nothing is beyond friction, squared, (n,).
 
     Noise and misfit counted in; a joint that turns round accelerates most, and what a model gets
-    wrong grows with the torque that it predicts. Zero where it is not, and where no dry friction
-    is known.
+    wrong grows with the torque that it predicts. What a filter of positions makes of a jerk is as
+    much below as above in the mean of its own time. Zero where it is not, and where no dry
+    friction is known.
 
     """
     friction = arm.action().dry_friction
@@ -87,9 +89,11 @@ def standing(arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray]) 
     for part, left, sigma in zip(evidence.data, residual, evidence.sigma, strict=True):
         held = _HELD * friction.largest(arm.load(part.at_rows))
         louder = np.maximum(np.abs(part.torque - left) / usual, 1.0)
-        beyond = (np.abs(left) / (held + _SURELY * sigma * louder)) ** 2
-        more = ~part.informative & (held > 0.0) & (beyond > 1.0)
         period = float(part.t[1] - part.t[0])
+        shortest = max(_SHORTEST, 1.0 / part.used.cutoff_hz)
+        lasting = uniform_filter1d(left, max(round(shortest / period), 1), axis=0)
+        beyond = (lasting / (held + _SURELY * sigma * louder)) ** 2
+        more = ~part.informative & (held > 0.0) & (beyond > 1.0)
         time += period * more.sum(axis=0)
         squares += period * np.sum(beyond, axis=0, where=more)
     return np.where(time > _SHORTEST, squares / np.maximum(time, 1e-300), 0.0)
