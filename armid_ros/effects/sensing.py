@@ -114,7 +114,7 @@ class TorqueDrift(TorqueReading):
 
     def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
         """Return times that differ on a recording: beyond three of it, a drift is a line."""
-        times = float(np.ptp(motion.t)) * np.array(_TIMES)
+        times = np.maximum(float(np.ptp(motion.t)) * np.array(_TIMES), self.shapes[0].lower)
         return (np.tile(times, (len(self.joints), 1)),)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:

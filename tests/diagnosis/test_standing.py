@@ -2,7 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A joint that stands still is held by dry friction, or by more than that."""
 
+from types import SimpleNamespace
+
 from armid_ros.diagnosis import diagnose
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.verdict.standing import standing
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 import numpy as np
@@ -68,3 +72,34 @@ def test_a_brake_that_held_the_arm_on_the_day_before_is_no_change(bench):
     before, now = (coming_to_rest(bench, 9.0, seed) for seed in (1, 2))
     found = diagnose(bench.arm, now, baseline=before, rng=np.random.default_rng(0))
     assert found.verdict == 'consistent', found.summary
+
+
+def excess_of(bench, left, torque, informative):
+    """Return by how much the elbow is held beyond friction, in rows of 20 ms."""
+    part = SimpleNamespace(
+        t=0.02 * np.arange(len(left)),
+        torque=np.column_stack([np.ones(len(left)), torque]),
+        informative=np.column_stack([np.ones(len(left), dtype=bool), informative]),
+        at_rows=bench.motion(1.0, 6.0, 0).select(slice(len(left))),
+        used=SimpleNamespace(cutoff_hz=5.0),
+    )
+    evidence = Evidence((part,), (np.full(2, 0.05),), (np.full(2, 0.05),))
+    return standing(bench.arm, evidence, [np.column_stack([np.zeros(len(left)), left])])[1]
+
+
+def test_waves_that_a_filter_makes_of_a_jerk_are_no_stop(bench):
+    rows = np.arange(100)
+    turning = (rows > 40) & (rows < 70)
+    wave = 4.0 * np.sin(2.0 * np.pi * 5.0 * 0.02 * rows)
+    lasting = np.where(turning, 4.0, 0.0)
+    assert excess_of(bench, wave, np.ones(100), ~turning) == 0.0
+    assert excess_of(bench, lasting, np.ones(100), ~turning) > 2.0
+
+
+def test_what_a_model_gets_wrong_may_grow_with_the_torque_that_it_predicts(bench):
+    """Where a joint turns round it accelerates most; the torque of a stop is not predicted."""
+    turning = (np.arange(100) > 40) & (np.arange(100) < 70)
+    left = np.where(turning, 4.0, 0.0)
+    loud = np.where(turning, 60.0, 1.0)
+    assert excess_of(bench, left, loud, ~turning) == 0.0
+    assert excess_of(bench, left, 1.0 + left, ~turning) > 2.0

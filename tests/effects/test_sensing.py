@@ -172,3 +172,14 @@ def test_noise_of_positions_does_not_make_a_delay_too_small(robot, sines):
     )
     assert np.sum(true * raw) / np.sum(raw**2) < 0.7
     assert np.sum(true * found) / np.sum(found**2) == pytest.approx(1.0, abs=0.05)
+
+
+def test_times_of_a_drift_go_with_the_length_of_a_recording(robot, sines):
+    drift = make_effect('torque_drift@elbow_pitch', robot)
+    motion = sines()
+    for factor in (1.0, 100.0):
+        longer = replace(motion, t=factor * motion.t)
+        (grid,) = drift.shape_grids(longer, ArmModel(robot))
+        assert grid.shape == (1, 5)
+        assert grid.max() == pytest.approx(3.0 * np.ptp(longer.t))
+        assert grid.min() >= drift.shapes[0].lower

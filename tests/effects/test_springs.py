@@ -185,3 +185,16 @@ def test_two_chains_that_move_alike_do_not_pull_each_other(robot, motion):
     np.testing.assert_allclose(
         arm.torque(motion) - ArmModel(robot).torque(motion), expected, atol=1e-9
     )
+
+
+def test_a_spring_pulls_back_and_a_ripple_is_faster_than_gravity(robot):
+    """What pushes away, or repeats once a turn, is a mass that is other than described."""
+    arm, sure = ArmModel(robot), np.array([0.1, 0.1])
+    spring = make_effect('joint_spring@elbow_pitch', robot)
+    assert spring.plausible(np.array([2.0, -1.0]), sure, arm)
+    assert not spring.plausible(np.array([-2.0, -1.0]), sure, arm)
+    assert spring.bounds()[0].tolist() == [0.0, -np.inf]
+    ripple = make_effect('torque_ripple@elbow_pitch', robot)
+    slowest = ripple.shapes[0].lower
+    assert ripple.with_shape(8.0).plausible(np.ones(2), sure, arm)
+    assert not ripple.with_shape(slowest).plausible(np.ones(2), sure, arm)
