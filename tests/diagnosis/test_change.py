@@ -63,3 +63,20 @@ def test_friction_that_has_become_less_is_named(bench, with_baseline):
     (first, *others) = found.findings
     assert (first.name, first.joints, others) == ('coulomb_friction', ('elbow',), [])
     assert first.values[0] == pytest.approx(-0.2, abs=4.0 * first.std[0])
+
+
+def test_a_change_may_be_less_by_what_the_model_had_wrong_before(bench):
+    """The model lacks a ripple of which 0.05 N m were there; 0.3 N m are found of 0.25 more."""
+
+    def day(size, seed):
+        return bench.recordings(lambda m, tau: size * np.sin(8.0 * m.q) * [0.0, 1.0], seed)
+
+    found, fresh = (
+        diagnose(bench.arm, day(0.3, 0), baseline=day(before, 5), rng=np.random.default_rng(0))
+        for before in (0.05, 0.0)
+    )
+    for one in (found, fresh):
+        assert one.findings[0].name == 'torque_ripple'
+        assert one.findings[0].values[0] == pytest.approx(0.3, abs=0.03)
+    assert 0.02 < found.findings[0].std[0] < 0.07
+    assert fresh.findings[0].std[0] < 0.02

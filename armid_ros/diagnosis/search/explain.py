@@ -64,6 +64,8 @@ class Explanation:
         Squares that a value of any cause takes of what the names leave.
     considered : frozenset of str
         Names without which something else could have been found.
+    baseline : Baseline or None
+        Recordings since which the names have changed.
 
     """
 
@@ -78,6 +80,7 @@ class Explanation:
     told: Told | None = None
     by_chance: float = 0.0
     considered: frozenset[str] = frozenset()
+    baseline: Baseline | None = None
 
     def without(self, name: int) -> Explanation:
         """Return the explanation without one of its names, the others fitted anew."""
@@ -95,7 +98,7 @@ class Explanation:
             Start([self.fitted.values[k] for k in keep], self.fitted.change),
             self.told,
         )
-        fitted = widened(fitted, self.evidence, self.told, self.by_chance)
+        fitted = widened(fitted, self.evidence, self.told, self.by_chance, self.baseline)
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
     def forgetting(self) -> Explanation:
@@ -136,7 +139,7 @@ def explain(
     change = way.change if question.beside is question.arm else None
     named, steps, fitted = _pruned(question, named, steps, values, evidence, settings, change)
     by_chance = 0.0 if last is None else last.by_chance
-    fitted = widened(fitted, evidence, question.told, by_chance)
+    fitted = widened(fitted, evidence, question.told, by_chance, baseline)
     said = {own.effect.name for own in named}
     small = tuple(trial for trial in minor if trial.group.effect.name not in said)
     return Explanation(
@@ -151,6 +154,7 @@ def explain(
         question.told,
         by_chance,
         way.considered,
+        baseline,
     )
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import fold_rows, make_problem
 from armid_ros.diagnosis.search.fit import Fitted, Told
@@ -29,12 +30,18 @@ from scipy import stats
 _LEVEL = 0.975
 
 
-def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float) -> Fitted:
+def widened(
+    fitted: Fitted,
+    evidence: Evidence,
+    told: Told | None,
+    chance: float,
+    baseline: Baseline | None = None,
+) -> Fitted:
     """
     Widen deviations to what the values vary by when parts of the data are left out (jackknife).
 
     Few parts tell a spread badly: deviations are such that twice them has 95 % of Student's
-    distribution.
+    distribution. A change is off as well by what the model had wrong along the name before.
 
     Parameters
     ----------
@@ -47,6 +54,8 @@ def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float
     chance : float
         Squares over the unit that a value of any cause takes of what the names leave; noise alone
         gives one.
+    baseline : Baseline or None
+        Recordings since which the names have changed, those that `told` is of.
 
     """
     size = len(fitted.estimate.values)
@@ -60,6 +69,8 @@ def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float
     few = float(stats.t.ppf(_LEVEL, freedom) / stats.norm.ppf(_LEVEL))
     basis = informative_basis(own.sum(axis=0) + fitted.hold)
     along = max(chance - 1.0, 0.0) * np.sum(basis[-size:] ** 2, axis=1)
+    if told is not None and baseline is not None:
+        along += _seen_before(fitted, told, baseline) ** 2
     spread = np.sqrt(few**2 * variance + along)
     factor = np.maximum(spread / np.maximum(fitted.estimate.std, 1e-300), 1.0)
     covariance = fitted.estimate.covariance * np.outer(factor, factor)
@@ -97,3 +108,24 @@ def _left_out(
         before.append(informative_solution(less_own, less_aim)[-size:])
     if len(before) > 1:
         yield np.array(before)
+
+
+def _seen_before(fitted: Fitted, told: Told, baseline: Baseline) -> FloatArray:
+    """
+    Return the values that names seem to have had before, what is free fitted beside them, (p,).
+
+    None is taken to have been larger than it is now; what shapes were is not asked.
+
+    """
+    result = np.zeros(len(fitted.estimate.values))
+    left = told.left - told.columns @ fitted.change
+    for own, values, (places, _) in zip(fitted.named, fitted.values, fitted.places, strict=True):
+        kept = list(own.kept)
+        pair = np.column_stack([baseline.columns(fitted.arm, own.effect, kept), left])
+        aims = (told.columns.T @ pair).T
+        pair -= told.columns @ np.array([informative_solution(told.precision, a) for a in aims]).T
+        size = np.maximum(np.abs(values[kept]), 1e-300)
+        scaled = pair[:, :-1] * size
+        precision = scaled.T @ scaled + np.eye(len(kept))
+        result[list(places)] = size * np.linalg.solve(precision, scaled.T @ pair[:, -1])
+    return result
