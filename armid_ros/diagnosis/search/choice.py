@@ -22,6 +22,7 @@ from armid_ros.diagnosis.data.rows import weighted_rows
 from armid_ros.diagnosis.search.explain import explain, Explanation
 from armid_ros.diagnosis.search.fit import fit, Start, Told
 from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question
+from armid_ros.diagnosis.search.resampled import as_change
 from armid_ros.diagnosis.search.round import cost
 from armid_ros.diagnosis.search.step import Step
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -332,6 +333,8 @@ def _torque_rms(data: Sequence[Trajectory]) -> FloatArray:
 def in_model_as_given(found: Explanation) -> Explanation:
     """Return what the names explain beside a rigid body that stays as it is."""
     arm, evidence, fitted = found.given, found.evidence, found.fitted
+    if found.told is not None and found.baseline is not None:
+        fitted = as_change(fitted, found.told, found.baseline)
     reference = fit(arm, (), evidence.data, evidence.sigma, None)
     alone = fit(
         arm,

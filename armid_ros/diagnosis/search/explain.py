@@ -98,7 +98,7 @@ class Explanation:
             Start([self.fitted.values[k] for k in keep], self.fitted.change),
             self.told,
         )
-        fitted = widened(fitted, self.evidence, self.told, self.by_chance, self.baseline)
+        fitted = widened(fitted, self.evidence, self.told, self.by_chance)
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
     def forgetting(self) -> Explanation:
@@ -139,7 +139,7 @@ def explain(
     change = way.change if question.beside is question.arm else None
     named, steps, fitted = _pruned(question, named, steps, values, evidence, settings, change)
     by_chance = 0.0 if last is None else last.by_chance
-    fitted = widened(fitted, evidence, question.told, by_chance, baseline)
+    fitted = widened(fitted, evidence, question.told, by_chance)
     said = {own.effect.name for own in named}
     small = tuple(trial for trial in minor if trial.group.effect.name not in said)
     return Explanation(

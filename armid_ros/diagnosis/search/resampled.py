@@ -30,18 +30,12 @@ from scipy import stats
 _LEVEL = 0.975
 
 
-def widened(
-    fitted: Fitted,
-    evidence: Evidence,
-    told: Told | None,
-    chance: float,
-    baseline: Baseline | None = None,
-) -> Fitted:
+def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float) -> Fitted:
     """
     Widen deviations to what the values vary by when parts of the data are left out (jackknife).
 
     Few parts tell a spread badly: deviations are such that twice them has 95 % of Student's
-    distribution. A change is off as well by what the model had wrong along the name before.
+    distribution.
 
     Parameters
     ----------
@@ -54,8 +48,6 @@ def widened(
     chance : float
         Squares over the unit that a value of any cause takes of what the names leave; noise alone
         gives one.
-    baseline : Baseline or None
-        Recordings since which the names have changed, those that `told` is of.
 
     """
     size = len(fitted.estimate.values)
@@ -69,10 +61,33 @@ def widened(
     few = float(stats.t.ppf(_LEVEL, freedom) / stats.norm.ppf(_LEVEL))
     basis = informative_basis(own.sum(axis=0) + fitted.hold)
     along = max(chance - 1.0, 0.0) * np.sum(basis[-size:] ** 2, axis=1)
-    if told is not None and baseline is not None:
-        along += _seen_before(fitted, told, baseline) ** 2
-    spread = np.sqrt(few**2 * variance + along)
-    factor = np.maximum(spread / np.maximum(fitted.estimate.std, 1e-300), 1.0)
+    return _with_deviation(fitted, np.sqrt(few**2 * variance + along))
+
+
+def as_change(fitted: Fitted, told: Told, baseline: Baseline) -> Fitted:
+    """
+    Widen deviations by what the model had wrong along each name before.
+
+    The values are those of now, of which a part may have been there. That something has changed is
+    another question, which the recordings of both days answer.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        The arm with all names.
+    told : Told
+        What recordings from before tell of what is free.
+    baseline : Baseline
+        Those recordings.
+
+    """
+    before = _seen_before(fitted, told, baseline)
+    return _with_deviation(fitted, np.hypot(fitted.estimate.std, before))
+
+
+def _with_deviation(fitted: Fitted, deviation: FloatArray) -> Fitted:
+    """Return the same with deviations of the values (p,) that are no less than before."""
+    factor = np.maximum(deviation / np.maximum(fitted.estimate.std, 1e-300), 1.0)
     covariance = fitted.estimate.covariance * np.outer(factor, factor)
     return replace(fitted, estimate=replace(fitted.estimate, covariance=covariance))
 
