@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from armid_ros.arm import ArmModel
+from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.mistakes import find_mistake, Mistake
 from armid_ros.identification.identify import Fit, Identification, Score
@@ -77,6 +78,7 @@ def grade(
     """
     reasons = [
         *_mistakes(result, description, [*recordings, *held_out]),
+        *_dead(result, description, validation, [*recordings, *held_out]),
         *_errors(result, validation),
         *_clocks([*recordings, *held_out]),
     ]
@@ -108,6 +110,20 @@ def _mistakes(
         error = 100.0 * float(worst.before.joints[worst.joint])
         certain = error > LIMITS.unusable and not worst.hypotheses[0].disputable
         yield _Reason('unusable' if certain else 'poor', _sentence(text))
+
+
+def _dead(
+    result: Identification,
+    description: ArmModel,
+    validation: Mapping[str, Sequence[Fit]],
+    recordings: Sequence[Recording],
+) -> Iterator[_Reason]:
+    """Say which torques nobody measured; a fit of them is close, and of no arm."""
+    fits = [*result.training, *(fit for part in validation.values() for fit in part)]
+    for recording in recordings:
+        motions = [fit.motion for fit in fits if fit.source == recording.source]
+        for text in dead_channels(description, recording, motions):
+            yield _Reason('unusable', _sentence(text))
 
 
 def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[_Reason]:

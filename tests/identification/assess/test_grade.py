@@ -133,6 +133,20 @@ def test_torques_that_come_late_are_not_good(structure, run):
     assert 'about 100 ms later than the position' in found.reasons[0]
 
 
+@pytest.mark.parametrize('since', [0, 1000])
+def test_a_dead_channel_of_torque_is_unusable(structure, run, other, since):
+    """The fit explains a torque that is not there by links that weigh nothing."""
+    tau = run.tau.copy()
+    tau[since:, 3] = 0.0
+    dead = replace(run, tau=tau)
+    found, _ = graded(structure, [dead])
+    assert found.word == 'unusable'
+    joint = structure.robot.joints[3]
+    assert f'In run the torque of {joint} stays at 0 from {since / RATE:.3f} s' in found.reasons[0]
+    found, _ = graded(structure, [other], [dead])
+    assert found.word == 'unusable'
+
+
 def test_currents_for_torques_are_asked_about(structure, run):
     """A free fit is as good in any unit; it may be the masses of the description."""
     found, _ = graded(structure, [replace(run, tau=0.1 * run.tau)])
