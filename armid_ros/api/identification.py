@@ -40,7 +40,7 @@ from armid_ros.identification import (
 )
 from armid_ros.identification import identify as run
 from armid_ros.identification.estimators.names import Estimator
-from armid_ros.recording import Recording
+from armid_ros.recording import Recording, require_once
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
@@ -279,6 +279,8 @@ def identify(
     ------
     IdentificationError
         If the data cannot identify anything; the message says why and what to do.
+    RecordingError
+        If a recording is given twice, or held out and fitted.
 
     Examples
     --------
@@ -292,6 +294,7 @@ def identify(
     training, held_out = with_sources_apart(
         recordings_of(recordings, model.robot), recordings_of(validate, model.robot)
     )
+    require_once(training, held_out)
     known = PhysicalSettings() if physical is True else physical or None
     settings = IdentificationSettings(method, SignalSettings(cutoff, decimation), known)
     result = run(model, training, settings, rng=generator(rng))

@@ -42,7 +42,7 @@ from armid_ros.identification.estimators.side_by_side import (
     MethodScore,
 )
 from armid_ros.identification.output import SCHEMA
-from armid_ros.recording import Recording
+from armid_ros.recording import Recording, require_once
 from armid_ros.report import identification_report
 from armid_ros.report.identification_report import Assessment
 from armid_ros.robots import Robot
@@ -283,6 +283,7 @@ def _work(
     rng = np.random.default_rng(seed)
     recordings = options.read(data.bags, arm.robot, data.topic)
     held_out = options.read(data.validate, arm.robot, data.topic)
+    require_once(recordings, held_out)
     tick(0.0, 'identifying')
     result = run(arm, recordings, settings, rng=rng, progress=tick)
     validation = {r.source: result.predict([r]) for r in held_out}

@@ -30,6 +30,7 @@ from armid_ros.recording.trajectory import (
     read_waypoints,
     write_joint_trajectory,
 )
+from armid_ros.recording.twice import given_twice, require_once
 from armid_ros.recording.writer import BagWriter
 
 __all__ = [
@@ -39,6 +40,8 @@ __all__ = [
     'TimeGap',
     'PartnerMotion',
     'recorded_together',
+    'given_twice',
+    'require_once',
     'read_recording',
     'read_robot_description',
     'write_recording',

@@ -35,6 +35,13 @@ def test_identify_writes_model_numbers_and_page(bags, tmp_path):
     assert (out / 'report.html').stat().st_size > 10_000
 
 
+@pytest.mark.parametrize('again', [(), ('--validate',)])
+def test_a_recording_is_fitted_once_and_not_held_out_as_well(bags, tmp_path, again):
+    arguments = ('identify', bags[0], *again, bags[0], '--robot', ROBOT, '--out', tmp_path / 'o')
+    said = armid(*arguments, code=2).stderr
+    assert f'given twice, or in two roles: {bags[0]}; give each recording once' in said
+
+
 def test_identify_prints_json_and_nothing_else(bags, tmp_path):
     result = armid('identify', bags[0], '--robot', ROBOT, '--out', tmp_path / 'o', '--json')
     assert json.loads(result.stdout)['robot'] == ROBOT
