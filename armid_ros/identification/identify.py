@@ -22,7 +22,12 @@ from armid_ros.identification.fitting.quasi_static import free_directions, with_
 from armid_ros.identification.physical.fit_among_bodies import PhysicalSettings
 from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
 from armid_ros.identification.physical.physical_fit import fit_to_bodies
-from armid_ros.identification.rows.checks import check_length, check_motion, check_torque
+from armid_ros.identification.rows.checks import (
+    beyond_limits,
+    check_length,
+    check_motion,
+    check_torque,
+)
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.regression import predictions, Regression, regressions
 from armid_ros.identification.rows.signals import Conditioning, conditioning, SignalSettings
@@ -256,6 +261,7 @@ def identify(
     recordings, damage = without_damage(recordings, settings.signals)
     used = conditioning(list(recordings), settings.signals)
     notes = tuple(map(str, damage)) + check_motion(arm.robot, recordings)
+    notes += beyond_limits(arm.robot, recordings)
     theory = arm.base_parameters(rng)
     # inertia of a motion that is taken as slow: as described, unless bodies are fitted to weight
     described = arm.quasi_static and settings.physical is None

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from armid_ros.identification.rows.checks import beyond_limits
 from armid_ros.inspection.band import effort_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
 from armid_ros.inspection.sampling import Sampling
@@ -139,7 +140,8 @@ def inspect(
         found.insert(0, Remark('bad', f'identify refuses it: {trial.refused}'))
     elif trial is not None:
         found += _of_fit(trial)
-        found += [Remark('note', note) for note in trial.notes]
+        said = {remark.text for remark in found}
+        found += [Remark('note', note) for note in trial.notes if note not in said]
     if robot is not None:
         found += [Remark('note', note) for note in robot.notes]
     order = ('bad', 'doubt', 'note')
@@ -191,6 +193,8 @@ def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
 def _of_units(
     recording: Recording, joints: tuple[JointFacts, ...], robot: Robot | None
 ) -> Iterator[Remark]:
+    if robot is not None:
+        yield from (Remark('doubt', text) for text in beyond_limits(robot, [recording]))
     turned = [
         joint
         for k, joint in enumerate(joints)

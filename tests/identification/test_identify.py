@@ -124,6 +124,19 @@ class TestRefusals:
         self.refused(structure, replace(recording, q=np.rad2deg(recording.q)), 'degrees')
 
 
+def test_a_position_beyond_its_limit_is_said_and_not_refused(structure, recording):
+    robot = structure.robot
+    lower = robot.lower.copy()
+    lower[0] = recording.q[:, 0].min() + 0.2
+    narrow = replace(structure, robot=replace(robot, lower=lower))
+    (said,) = (note for note in run(narrow, recording).notes if 'limits of the desc' in note)
+    reached = f'{robot.joints[0]} reaches {lower[0] - 0.2:.4g} of {lower[0]:.4g} rad'
+    assert reached in said
+    slack = replace(robot, lower=np.minimum(robot.lower, recording.q.min(axis=0) + 1e-3))
+    beyond = run(replace(structure, robot=slack), recording).notes
+    assert not any('limits of the desc' in note for note in beyond)
+
+
 def test_payload_is_found_against_a_known_arm(arm, motion):
     """Two identifications of one arm, without and with 0.3 kg: the difference is the payload."""
     robot = arm.robot

@@ -27,6 +27,7 @@ def clean(robot):
     rng = np.random.default_rng(0)
     t = np.arange(2000) / 100.0
     q, dq, ddq = np.zeros((3, len(t), 6))
+    q[:, 3] = 0.6  # the elbow bends one way
     for harmonic, size in ((1, 0.5), (3, 0.25), (7, 0.08)):
         w = 2 * np.pi * harmonic / PERIOD
         angle = w * t[:, None] + rng.uniform(0, 2 * np.pi, 6)
@@ -141,6 +142,14 @@ def test_what_is_wrong_is_said_without_a_robot(spoil, said, clean):
 def test_units_of_efforts_are_seen_against_the_description(factor, said, clean, robot):
     wrong = replace(clean, tau=factor * clean.tau)
     assert any(said in remark for remark in remarks(wrong, robot))
+
+
+def test_a_joint_beyond_its_limit_is_doubted_with_both_numbers(clean, robot):
+    elbow = clean.q[:, 3].max()
+    shifted = replace(clean, q=clean.q + (robot.upper[3] + 0.3 - elbow) * np.eye(6)[3])
+    (said,) = (remark for remark in remarks(shifted, robot) if 'limits' in remark)
+    assert said.startswith('doubt: beyond the limits of the description: elbow_pitch reaches ')
+    assert f'{robot.upper[3] + 0.3:.4g} of {robot.upper[3]:.4g} rad' in said
 
 
 def test_noisy_positions_are_answered_with_a_lower_cutoff(clean, robot):

@@ -22,6 +22,9 @@ REST_RANGE = 1e-3
 #: Positions further out of the limits than this are not in the unit of the description: two turns
 #: of a joint that a controller has let spin [rad], or [m].
 LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
+#: Positions beyond a limit by less than this share of the range say nothing: a stop gives way,
+#: and an encoder has noise.
+_LIMIT_SLACK = 0.01
 #: A recording shorter than this holds less than a movement [s].
 SHORTEST = 1.0
 #: Correlation with the direction of motion from which a torque is friction and nothing else.
@@ -254,6 +257,26 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
         f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its limits are '
         f'{robot.lower[worst]:.4g} to {robot.upper[worst]:.4g}; positions have to be in rad '
         'or m, with the zero of the description'
+    )
+
+
+def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Say which joints go beyond the limits of the description, with position and limit."""
+    slack = _LIMIT_SLACK * (robot.upper - robot.lower)
+    found = []
+    for way, limits, ends in (
+        (-1.0, robot.lower, np.min([one.q.min(axis=0) for one in recordings], axis=0)),
+        (1.0, robot.upper, np.max([one.q.max(axis=0) for one in recordings], axis=0)),
+    ):
+        found += [
+            f'{robot.joints[j]} reaches {ends[j]:.4g} of {limits[j]:.4g} {robot.position_units[j]}'
+            for j in np.flatnonzero(way * (ends - limits) > slack)
+        ]
+    if not found:
+        return ()
+    return (
+        f'beyond the limits of the description: {", ".join(found)}; are scale and zero of the '
+        'positions right, and the limits?',
     )
 
 
