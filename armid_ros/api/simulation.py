@@ -18,7 +18,6 @@ from armid_ros.excitation import (
     Excitation,
     load_excitation,
     save_excitation,
-    used_shares,
     whole_period,
 )
 from armid_ros.files import write_file
@@ -112,8 +111,7 @@ class ExcitationResult(Shown):
 
     def summary(self) -> Summary:
         """Return how much of its limits every joint uses."""
-        motion = self.trajectory.motion(100.0)
-        shares = used_shares(self.core.limits, motion, self.arm.joint_torque(motion))
+        shares = self.core.limits_used(self.arm)
         joints = self.arm.robot.joints
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))

@@ -13,7 +13,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.limits import Limits, SPEED_CLASSES
+from armid_ros.excitation.limits import Limits, SPEED_CLASSES, used_shares
 from armid_ros.excitation.placing import placed
 from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.schedule import Excitation
@@ -80,6 +80,24 @@ class Design:
     limits: Limits
     settings: DesignSettings
     stopped: str = ''
+
+    def limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
+        """
+        Say how much of every limit the excitation uses, which the ways there and back do not keep.
+
+        Parameters
+        ----------
+        arm : ArmModel
+            Prior model, for the torque.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (n,)
+            See `used_shares`.
+
+        """
+        motion = self.excitation.motion(self.settings.rate)
+        return used_shares(self.limits, motion, arm.joint_torque(motion))
 
 
 def design(

@@ -227,11 +227,14 @@ def used_shares(limits: Limits, motion: Motion, torque: FloatArray) -> dict[str,
     Returns
     -------
     dict of str to ndarray, shape (n,)
-        'position': share of the range that is passed through; 'velocity', 'acceleration' and
-        'torque': largest absolute value over the limit. 0 where there is no limit.
+        'position': largest distance from the middle of the range over half of it; 'velocity',
+        'acceleration' and 'torque': largest absolute value over the limit. 0 where there is no
+        limit.
 
     """
-    shares = {'position': np.ptp(motion.q, axis=0) / (limits.upper - limits.lower)}
+    half = 0.5 * (limits.upper - limits.lower)
+    middle = np.subtract(limits.upper, half, out=np.zeros_like(half), where=np.isfinite(half))
+    shares = {'position': np.abs(motion.q - middle).max(axis=0) / half}
     for name, values, bound in (
         ('velocity', motion.dq, limits.velocity),
         ('acceleration', motion.ddq, limits.acceleration),

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
@@ -15,17 +15,17 @@ from armid_ros.excitation import (
     Fitness,
     fitness,
     Floor,
+    Limits,
     Obstacle,
     obstacles_alone,
     Run,
     SPEED_CLASSES,
     TARGETS,
-    used_shares,
     with_obstacles,
 )
 from armid_ros.excitation.fitness import FIT, UNFIT
 from armid_ros.excitation.geometry.heights import vertical
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, digits, pretty, robot_label, torque_unit
 from armid_ros.report.page import Page, Section
@@ -112,8 +112,8 @@ def excitation_report(
         checked = fitness(motion, limits, collision, floor, obstacles)
     else:
         checked = planned.fitness
-    torque = arm.joint_torque(motion)
-    motion = replace(motion, tau=torque)
+    motion = replace(motion, tau=arm.joint_torque(motion))
+    shares = design.limits_used(arm)
     bodies = {'links from each other': collision}
     if obstacles:
         bodies['arm from its environment'] = obstacles_alone(collision, obstacles)
@@ -125,7 +125,7 @@ def excitation_report(
     whole = with_obstacles(collision, obstacles)
     instants = excitation.run_in + np.arange(_POSES) * excitation.trajectory.period / _POSES
     sections: list[Section] = [
-        _verdict(design, motion, checked, collision.notes),
+        _verdict(design, shares, checked, collision.notes),
         Asked(_asked(design, arm, robot, obstacles, after, run)),
         ArmPoses(
             draw_silhouettes(
@@ -137,7 +137,7 @@ def excitation_report(
             ', '.join(obstacle.name for obstacle in obstacles),
         ),
         Foreseen(design),
-        PlannedMotion(limits, motion, used_shares(limits, motion, torque)),
+        PlannedMotion(limits, motion, shares),
         PlannedClearance(motion.t, curves, design.settings.clearance, collision.notes),
         Harmonics(excitation.trajectory),
         Origin(provenance or Provenance()),
@@ -150,7 +150,7 @@ def excitation_report(
 
 
 def _verdict(
-    design: Design, motion: Motion, checked: Fitness, notes: Sequence[str]
+    design: Design, shares: Mapping[str, FloatArray], checked: Fitness, notes: Sequence[str]
 ) -> VerdictSection:
     """Say how much is seen, what is known worst, and that nothing is hit."""
     information, settings = design.information, design.settings
@@ -168,7 +168,7 @@ def _verdict(
             f'Known worst will be {full_label(names[worst])}: ± {digits(float(std[worst]))} '
             f'{pretty(names[worst].unit)}.'
         )
-    sentences.insert(0, _kept(design, motion, checked))
+    sentences.insert(0, _kept(shares, design.limits, checked))
     beware = []
     if unseen:
         beware.append(f'Not seen at all: {", ".join(unseen)}.')
@@ -194,12 +194,10 @@ def _verdict(
     return VerdictSection('blind' if unseen else checked.word, tone, sentences, beware)
 
 
-def _kept(design: Design, motion: Motion, checked: Fitness) -> str:
+def _kept(shares: Mapping[str, FloatArray], limits: Limits, checked: Fitness) -> str:
     """Say that limits and clearance are kept, where it is tightest, and what was not checked."""
-    assert motion.tau is not None
-    shares = used_shares(design.limits, motion, motion.tau)
     name, share = max(shares.items(), key=lambda item: float(item[1].max()))
-    joint = design.limits.joints[int(share.argmax())]
+    joint = limits.joints[int(share.argmax())]
     text = f'It keeps every limit, nearest is the {name} of {joint} at {100.0 * share.max():.0f} %'
     nearest = checked.nearest
     if nearest is not None:

@@ -66,6 +66,9 @@ def test_speed_classes_come_in_folders_each_as_it_is_alone(tmp_path):
     assert max(slow['limits_used']['velocity']) <= 1.0
     for name in ('excitation.yaml', 'excitation.csv', 'excitation.json', 'report.html'):
         assert (tmp_path / 'all' / 'slow' / name).is_file()
+    page = (tmp_path / 'all' / 'slow' / 'report.html').read_text()
+    nearest = max(max(shares) for shares in slow['limits_used'].values())
+    assert f'at {100.0 * nearest:.0f} %' in page
     alone = armid('excite', *arguments, '--speed', '0.6', '--out', tmp_path / 'one').stdout
     assert json.loads(alone)['cost'] == medium['cost']
     again = armid('excite', *arguments, '--speed', '0.6', '--out', tmp_path / 'one', code=2)

@@ -6,7 +6,13 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import check_limits, FourierTrajectory, Limits, require_within
+from armid_ros.excitation import (
+    check_limits,
+    FourierTrajectory,
+    Limits,
+    require_within,
+    used_shares,
+)
 from armid_ros.excitation.feasibility import trajectory_faults
 from armid_ros.robots import robot_from_urdf
 import numpy as np
@@ -51,6 +57,15 @@ def test_violation_names_joint_limit_time_and_value(limits, swing, change, limit
     assert violation.time == pytest.approx(time, abs=0.1)
     with pytest.raises(TrajectoryError, match=f'joint elbow: {limit}'):
         require_within(tighter, swing.one_period(200))
+
+
+def test_a_position_uses_its_limits_by_the_distance_from_the_middle(limits, swing):
+    """A short way beside one end of the range is near a limit; one without an end uses none."""
+    motion = swing.one_period(200)  # the joints stay within 1 rad
+    beside = replace(limits, lower=np.array([-9.0, -np.inf]), upper=np.array([1.0, np.inf]))
+    shares = used_shares(beside, motion, 0.0 * motion.q)
+    np.testing.assert_allclose(shares['position'], [1.0, 0.0], atol=1e-3)
+    assert not any(fault.joint == 'shoulder' for fault in check_limits(beside, motion))
 
 
 def test_torque_is_compared_with_its_limit(limits, swing, two_link):

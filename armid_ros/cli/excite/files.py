@@ -22,7 +22,6 @@ from armid_ros.excitation import (
     Run,
     save_excitation,
     TransferPlanner,
-    used_shares,
     with_obstacles,
 )
 from armid_ros.files import json_text, write_file
@@ -194,8 +193,7 @@ def _write_page(
 
 def _document(plan: ExcitationPlan, result: Design, run: Run, checked: Fitness) -> dict[str, Any]:
     information, settings = result.information, result.settings
-    motion = result.excitation.motion(WAYPOINT_RATE)
-    shares = used_shares(result.limits, motion, plan.arm.joint_torque(motion))
+    used = result.limits_used(plan.arm)
     nearest, floor = checked.nearest, plan.workspace.floor
     return {
         'schema': SCHEMA,
@@ -224,7 +222,7 @@ def _document(plan: ExcitationPlan, result: Design, run: Run, checked: Fitness) 
         'log_det': _finite(information.log_det),
         'rank': int(np.count_nonzero(np.isfinite(information.std))),
         'clearance': None if nearest is None else nearest.distance,
-        'limits_used': {name: share.tolist() for name, share in shares.items()},
+        'limits_used': {name: share.tolist() for name, share in used.items()},
         'parameters': [
             {'name': name.name, 'joint': name.joint, 'std': _finite(std), 'unit': name.unit}
             for name, std in zip(information.parameters, information.std, strict=True)

@@ -30,7 +30,7 @@ class PlannedMotion(Section):
     motion : Motion
         The run, with the torque that the prior model says.
     shares : mapping of str to ndarray, shape (n,)
-        See `used_shares`.
+        Of the excitation alone; see `used_shares`.
 
     """
 
