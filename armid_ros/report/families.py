@@ -8,26 +8,23 @@ from armid_ros.estimate import ParameterName
 from armid_ros.report.notation import pretty
 
 
-def parameter_families(names: tuple[ParameterName, ...]) -> dict[str, list[int]]:
+def parameter_families(names: tuple[ParameterName, ...]) -> dict[tuple[str, str], list[int]]:
     """
     Sort parameters into kinds that share an axis.
 
     Returns
     -------
-    dict of str to list of int
-        Heading, and the positions of its parameters: the rigid ones by their unit, those of the
-        effects by name; all of a kind have one unit.
+    dict of (str, str) to list of int
+        Heading and unit, and the positions of its parameters: the rigid ones by their unit, those
+        of the effects by name and unit, which joints that slide and that turn do not share.
 
     """
-    families: dict[str, list[int]] = {}
+    families: dict[tuple[str, str], list[int]] = {}
     kinds = {'kg m^2': 'Inertias', 'kg m': 'First moments', 'kg': 'Masses'}
     for position, name in enumerate(names):
         kind = kinds.get(name.unit) if name.rigid else None
         title = kind or name.name.replace('_', ' ').capitalize()
-        known = families.get(title)
-        if known and names[known[0]].unit != name.unit:
-            title = f'{title} [{pretty(name.unit)}]'  # a joint that slides among joints that turn
-        families.setdefault(title, []).append(position)
+        families.setdefault((title, pretty(name.unit)), []).append(position)
     return families
 
 

@@ -18,7 +18,6 @@ from armid_ros.report.figures.style import (
     PREDICTED,
     RESIDUAL,
 )
-from armid_ros.report.notation import pretty
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
@@ -60,8 +59,8 @@ def parameter_figure(
         for row, number in enumerate(column):
             axes = figure.add_subplot(inner[row])
             members = families[names[number]]
-            unit = pretty(estimate.parameters[members[0]].unit)
-            plain(axes, names[number], xlabel=unit)
+            kind, unit = names[number]
+            plain(axes, kind, xlabel=unit)
             _draw(axes, estimate, target, members)
             axes.grid(False, axis='y')
     assert axes is not None

@@ -11,7 +11,7 @@ from typing import ClassVar
 from armid_ros.identification.assess.comparison import Comparison, ParameterChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.report.families import parameter_families
-from armid_ros.report.notation import measured, pretty
+from armid_ros.report.notation import measured
 from armid_ros.report.page import Section
 
 
@@ -87,8 +87,8 @@ class Changes(Section):
         """Heading, unit, how many changed, and rows of each kind."""
         names = tuple(change.parameter for change in self.comparison.changes)
         families = []
-        for title, members in parameter_families(names).items():
+        for (title, unit), members in parameter_families(names).items():
             rows = [ChangeRow(self.comparison.changes[k]) for k in members]
             count = sum(row.change.changed for row in rows)
-            families.append((title, pretty(names[members[0]].unit), count, rows))
+            families.append((title, unit, count, rows))
         return families

@@ -48,7 +48,7 @@ class Correlations(Section):
         """Kinds of parameters in the order of the picture, and their share of its width [%]."""
         names = self.estimate.parameters
         kinds = parameter_families(names)
-        return [(kind, 100.0 * len(members) / len(names)) for kind, members in kinds.items()]
+        return [(kind, 100.0 * len(members) / len(names)) for (kind, _), members in kinds.items()]
 
     @property
     def labels(self) -> list[str]:

@@ -121,7 +121,7 @@ class ParameterSection(Section):
         names, values = self.estimate.parameters, self.estimate.values
         reach = HALF_WIDTH * self.estimate.std
         families = []
-        for title, members in parameter_families(names).items():
+        for (title, unit), members in parameter_families(names).items():
             rows = [
                 ParameterRow(
                     names[k].name,
@@ -134,7 +134,7 @@ class ParameterSection(Section):
                 )
                 for k in members
             ]
-            families.append((title, rows[0].unit, rows))
+            families.append((title, unit, rows))
         return families
 
     @property

@@ -150,11 +150,11 @@ class Foreseen(Section):
         return [
             (
                 title,
-                pretty(names[members[0]].unit),
+                unit,
                 names[members[0]].rigid,
                 self._rows(members),
             )
-            for title, members in parameter_families(names).items()
+            for (title, unit), members in parameter_families(names).items()
         ]
 
     def _rows(self, members: Sequence[int]) -> list[tuple[str, str, str, str, str, float]]:
