@@ -66,6 +66,9 @@ def test_the_blocks_of_a_page_run_one_after_the_other(page, at_desk):
         check=False,
     )
     assert done.returncode == 0, f'{name_of(page)}: {done.stdout[-2000:]}{done.stderr[-2000:]}'
+    for name in re.findall(r'`(\w+/\w+\.html)`', page.read_text(encoding='utf-8')):
+        made = at_desk / name
+        assert made.is_file() or not made.parent.is_dir(), f'{name_of(page)}: no {name}'
 
 
 def options():
