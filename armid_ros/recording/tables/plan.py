@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 import textwrap
 
@@ -25,6 +25,8 @@ _FACTORS |= {'mrad': 1e-3, 'kN m': 1e3, 'rpm': 2 * np.pi / 60, 'mm': 1e-3, 'mm/s
 _TURNS = ('deg', 'deg/s', 'rpm', 'mrad')
 #: Sampling periods that are recognised from the numbers alone [s].
 _STEP = (2e-5, 0.5)
+#: Positions further from zero are hardly in rad or m.
+_FAR = 4.5 * np.pi
 
 
 @dataclass(frozen=True)
@@ -192,7 +194,7 @@ def plan(
         rate,
         tuple(_scaled(source, settings, names, sliding) for source in sources),
         settings,
-        tuple(_doubts(sources, settings)),
+        tuple(_doubts(sources, settings, sliding)),
     )
 
 
@@ -272,7 +274,9 @@ def _short(values: FloatArray) -> str:
     return texts[0] if len(set(texts)) == 1 else ', '.join(texts)
 
 
-def _doubts(sources: Sequence[QuantitySource], settings: ColumnSettings) -> list[str]:
+def _doubts(
+    sources: Sequence[QuantitySource], settings: ColumnSettings, slides: npt.NDArray[np.bool_]
+) -> list[str]:
     doubts = []
     for source in sources:
         text = source.chosen.pattern.lower()
@@ -282,13 +286,26 @@ def _doubts(sources: Sequence[QuantitySource], settings: ColumnSettings) -> list
                 f"efforts '{source.chosen.pattern}' seem to be currents; --current-gain makes "
                 'them N m'
             )
-        largest = float(np.nanmax(np.abs(source.values())))
-        if source.quantity == 'position' and not settings.degrees and largest > 4.5 * np.pi:
-            if not settings.gear and not settings.position_scale and source.unit == 'rad':
-                doubts.append(
-                    f'positions reach {largest:.4g}: --degrees, or motor angles (--gear)?'
-                )
+        if source.quantity == 'position' and source.unit == 'rad':
+            doubts += _far(np.fmax.reduce(np.abs(source.values())), settings, slides)
     return doubts
+
+
+def _far(
+    reach: FloatArray, settings: ColumnSettings, slides: npt.NDArray[np.bool_]
+) -> Iterator[str]:
+    """Doubt the unit of positions, given how far each joint is from zero, shape (n,)."""
+    if settings.gear or settings.position_scale:
+        return
+    far = reach > _FAR
+    if np.any(far & ~slides) and not settings.degrees:
+        largest = reach[far & ~slides].max()
+        yield f'positions reach {largest:.4g}: --degrees, or motor angles (--gear)?'
+    if np.any(far & slides):
+        turned = 'pi/180' if settings.degrees else '1'
+        scale = ','.join('0.001' if one else turned for one in slides)
+        largest = reach[far & slides].max()
+        yield f'positions that slide reach {largest:.4g} m: --position-scale {scale} if in mm?'
 
 
 def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, str, float | None]:

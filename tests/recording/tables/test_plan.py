@@ -99,6 +99,14 @@ def test_elements_of_a_state_vector_are_told_apart_by_their_endings():
         np.testing.assert_allclose(recording.tau[-1], [3, 6])
 
 
+def test_large_ways_of_a_joint_that_slides_are_doubted_apart():
+    columns = table(q1=np.linspace(0, 1, 50), q2=np.linspace(0, 180, 50))
+    (note,) = plan(columns, ColumnSettings(), JOINTS, [False, True]).notes
+    assert 'reach 180 m: --position-scale 1,0.001' in note
+    scaled = ColumnSettings(position_scale=(1.0, 0.001))
+    assert not plan(columns, scaled, JOINTS, [False, True]).notes
+
+
 def test_large_angles_are_doubted():
     columns = table(q1=np.linspace(0, 90, 50), q2=np.linspace(0, 45, 50))
     assert any('--degrees' in note for note in plan(columns, ColumnSettings(), JOINTS).notes)
