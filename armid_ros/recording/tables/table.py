@@ -134,7 +134,11 @@ class Table:
         """Return the names of the columns, elements of arrays in short, for a message."""
         names: dict[str, int] = {}
         for column in self.columns:
-            key = f'{column.array}[..]' if column.name.endswith(']') else column.name
+            key = (
+                f'{column.array.removeprefix("[]")}[..]'
+                if column.name.endswith(']')
+                else column.name
+            )
             names[key] = names.get(key, 0) + 1
         shown = [
             f'{key[:-4]}[0..{count - 1}]' if key.endswith('[..]') else key
@@ -142,7 +146,11 @@ class Table:
         ]
         more = f' and {len(shown) - 40} more' if len(shown) > 40 else ''
         empty = f'; without a number: {", ".join(self.empty[:40])}' if self.empty else ''
-        return ', '.join(shown[:40]) + more + empty
+        bare = self.first_line is not None and any(c.array == '[]' for c in self.columns)
+        header = (
+            f'; a header line with names is missing above line {self.first_line}' if bare else ''
+        )
+        return ', '.join(shown[:40]) + more + empty + header
 
 
 def normal_unit(text: str) -> str:

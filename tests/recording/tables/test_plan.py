@@ -8,6 +8,7 @@ from armid_ros.recording.tables import (
     measured,
     name_in_file,
     numbers,
+    open_table,
     plan,
     renamed,
     Table,
@@ -52,6 +53,16 @@ def test_spans_name_columns_of_a_larger_array():
     np.testing.assert_allclose(recording.q[-1], [2, 3])
     np.testing.assert_allclose(recording.tau[-1], [8, 9])
     assert recording.dq is None
+
+
+def test_a_header_that_is_missing_is_said(tmp_path):
+    path = tmp_path / 'run.csv'
+    np.savetxt(path, np.arange(20.0).reshape(5, 4), delimiter=',')
+    with pytest.raises(RecordingError) as refused:
+        plan(open_table(path), ColumnSettings(), JOINTS)
+    assert str(refused.value).endswith(
+        'Its columns are [0..3]; a header line with names is missing above line 1'
+    )
 
 
 def test_what_was_guessed_is_said_with_what_else_fits():
