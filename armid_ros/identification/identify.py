@@ -27,6 +27,7 @@ from armid_ros.identification.rows.checks import (
     check_length,
     check_motion,
     check_torque,
+    too_short_to_tell,
 )
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.regression import predictions, Regression, regressions
@@ -261,7 +262,7 @@ def identify(
     recordings, damage = without_damage(recordings, settings.signals)
     used = conditioning(list(recordings), settings.signals)
     notes = tuple(map(str, damage)) + check_motion(arm.robot, recordings)
-    notes += beyond_limits(arm.robot, recordings)
+    notes += beyond_limits(arm.robot, recordings) + too_short_to_tell(recordings)
     theory = arm.base_parameters(rng)
     # inertia of a motion that is taken as slow: as described, unless bodies are fitted to weight
     described = arm.quasi_static and settings.physical is None

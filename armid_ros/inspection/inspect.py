@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from armid_ros.identification.rows.checks import beyond_limits
+from armid_ros.identification.rows.checks import beyond_limits, too_short_to_tell
 from armid_ros.inspection.band import effort_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
 from armid_ros.inspection.sampling import Sampling
@@ -25,8 +25,6 @@ _TURNS = 4.0 * np.pi
 _DEGREE = np.pi / 180.0
 #: Steps between samples that vary by more than this share blur what is differentiated.
 _JITTER = 0.2
-#: A recording shorter than this shows few of the parameters [s].
-_SHORT = 5.0
 #: A fit that leaves more than this share of the efforts explains little [%].
 POOR = 20.0
 
@@ -180,8 +178,7 @@ def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
             f'steps between samples vary by {100 * sampling.jitter:.0f} %; velocities and '
             'accelerations from the positions are blurred by that',
         )
-    if sampling.duration < _SHORT:
-        yield Remark('doubt', f'{sampling.duration:.2g} s is short; record 20 s or more')
+    yield from (Remark('doubt', text) for text in too_short_to_tell([recording]))
     if sampling.period is None:
         yield Remark(
             'note',

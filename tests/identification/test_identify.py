@@ -137,6 +137,15 @@ def test_a_position_beyond_its_limit_is_said_and_not_refused(structure, recordin
     assert not any('limits of the desc' in note for note in beyond)
 
 
+def test_a_short_recording_is_said_and_not_refused(structure, recording):
+    rate = 1.0 / recording.period
+    short, long = (recording.select(slice(0, round(t * rate))) for t in (3.0, 6.0))
+    assert '3 s is short; record 20 s or more' in run(structure, short).notes
+    assert not any('is short' in note for note in run(structure, long).notes)
+    halves = [long.select(slice(0, len(long) // 2)), long.select(slice(len(long) // 2, None))]
+    assert not any('is short' in note for note in run(structure, *halves).notes)
+
+
 def test_payload_is_found_against_a_known_arm(arm, motion):
     """Two identifications of one arm, without and with 0.3 kg: the difference is the payload."""
     robot = arm.robot

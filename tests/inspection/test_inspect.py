@@ -144,6 +144,10 @@ def test_units_of_efforts_are_seen_against_the_description(factor, said, clean, 
     assert any(said in remark for remark in remarks(wrong, robot))
 
 
+def test_what_identification_says_as_well_is_said_once(clean, robot):
+    assert sum('3 s is short' in remark for remark in remarks(short(clean), robot)) == 1
+
+
 def test_a_joint_beyond_its_limit_is_doubted_with_both_numbers(clean, robot):
     elbow = clean.q[:, 3].max()
     shifted = replace(clean, q=clean.q + (robot.upper[3] + 0.3 - elbow) * np.eye(6)[3])

@@ -27,6 +27,8 @@ LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
 _LIMIT_SLACK = 0.01
 #: A recording shorter than this holds less than a movement [s].
 SHORTEST = 1.0
+#: Recordings shorter than this in all show few of the parameters [s].
+_SHORT = 5.0
 #: Correlation with the direction of motion from which a torque is friction and nothing else.
 _CLEAR = 0.8
 #: Units of torque that are mistaken for N m, and how many of each one N m is.
@@ -67,6 +69,12 @@ def check_motion(
             raise _too_short(recording)
     ranges = np.max([np.ptp(recording.q, axis=0) for recording in recordings], axis=0)
     return resting(robot, recordings[0].source, ranges)
+
+
+def too_short_to_tell(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Say that recordings are short, all together."""
+    duration = sum(recording.duration for recording in recordings)
+    return (f'{duration:.2g} s is short; record 20 s or more',) if duration < _SHORT else ()
 
 
 def check_length(recordings: Sequence[Recording], problem: Sequence[Regression]) -> None:
