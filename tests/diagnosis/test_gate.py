@@ -5,12 +5,13 @@
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import diagnose
-from armid_ros.diagnosis.data.dead_channels import dead_channels
+from armid_ros.diagnosis import diagnose, DiagnosisSettings
 from armid_ros.diagnosis.data.evidence import trajectories
 from armid_ros.diagnosis.data.gate import check_data
+from armid_ros.diagnosis.data.mended import mended
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify
+from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np
 import pytest
@@ -137,13 +138,13 @@ def test_a_joint_that_nobody_drives_is_not_dead(bench):
     recordings = bench.recordings()
     used = conditioning(recordings, SignalSettings())
     limited = [replace(one, tau=np.clip(one.tau, -0.4, 0.4)) for one in recordings]
-    data = trajectories(limited, used)
+    data = [part.at_rows for part in trajectories(limited, used)]
     assert not any(list(dead_channels(bench.arm, one, data)) for one in limited)
     free = [replace(one, tau=one.tau * [1.0, 0.0]) for one in recordings]
     light = bench.robot.rigid_parameters.copy()
     light[-10:] = 0.0
     passive = replace(bench.arm, robot=bench.robot.with_inertias(light))
-    data = trajectories(free, used)
+    data = [part.at_rows for part in trajectories(free, used)]
     assert not any(list(dead_channels(passive, one, data)) for one in free)
 
 
@@ -158,6 +159,15 @@ def test_a_recording_in_two_roles_is_said(bench):
     )
     (note,) = [note for note in found.notes if 'two roles' in note]
     assert recordings[0].source in note
+
+
+def test_the_same_motion_with_other_torques_is_another_recording(bench):
+    """As of two simulated runs of one trajectory."""
+    recordings = bench.recordings()
+    again = replace(recordings[0], source='again', tau=bench.recordings(noise=2.0)[0].tau)
+    settings = DiagnosisSettings()
+    *_, notes = mended(recordings, [again], [], settings)
+    assert not any('two roles' in note for note in notes)
 
 
 def test_a_torque_beyond_the_limit_of_its_drive_is_said(bench):

@@ -13,10 +13,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.dead_channels import dead_channels
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.assess.hypotheses import (
     Exchanged,
     Hypothesis,
@@ -85,7 +85,8 @@ def check_data(
         return mistaken, []
     faults = [*_time_base(recordings, _band(data)), *_laws(arm, data)]
     for recording in recordings:
-        faults += [*_jumps(arm.robot, recording), *dead_channels(arm, recording, data)]
+        motions = [part.at_rows for part in data if part.source == recording.source]
+        faults += [*_jumps(arm.robot, recording), *dead_channels(arm, recording, motions)]
     faults += [] if faults else _signs(arm, recordings, data)
     notes = [*_clipped(recordings), *_beyond_limits(arm.robot, recordings)]
     notes += _described_friction(arm)

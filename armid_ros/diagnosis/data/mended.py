@@ -8,8 +8,7 @@ from collections.abc import Sequence
 
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.rows.damage import without_damage
-from armid_ros.recording import Recording
-import numpy as np
+from armid_ros.recording import given_twice, Recording
 
 
 def mended(
@@ -27,9 +26,5 @@ def mended(
         harmed_ones = [one for one in part if not one.report.unharmed]
         notes += [f'{one.source}: {one.report.describe()}' for one in harmed_ones]
         notes += map(str, repairs)
-    used = [one for part in (recordings, baseline) for one in part]
-    twice = [a.source for k, a in enumerate(used) for b in used[:k] if np.array_equal(a.q, b.q)]
-    twice += [a.source for a in validate for b in used if np.array_equal(a.q, b.q)]
-    if twice:
-        notes.append(f'given twice, in two roles: {", ".join(dict.fromkeys(twice))}')
+    notes += filter(None, [given_twice([*recordings, *baseline], validate)])
     return whole[0], whole[1], whole[2], notes
