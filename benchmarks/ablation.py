@@ -6,7 +6,7 @@ What each rule of the diagnosis earns: the score as it is, and without the rule.
     python -m benchmarks.ablation [KIND] [--cases FIRST:LAST] [--only RULE ...] [--processes N]
 
 KIND is one of benchmarks.lived that is there to choose by. What was measured, and what became of
-each rule, is in docs/diagnosis.md.
+each rule, is in docs/reference/rates.md.
 
 """
 
@@ -93,7 +93,7 @@ def all_names(question, named, steps, values, evidence, settings):
     return list(fitted.named), list(steps), fitted
 
 
-#: By the names of the table in docs/diagnosis.md.
+#: By the names of the table in docs/reference/rates.md.
 RULES = {
     'own causes before a person': Rule('verdict.headline._as_good', no),
     'names that may be nothing go': Rule('verdict.headline.may_be_nothing', no),

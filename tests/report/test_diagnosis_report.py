@@ -103,6 +103,15 @@ def test_the_share_has_its_interval_wherever_it_is_said(found, html):
     assert f'floor, {digits(float(found.gap.floor[1]))} N m, is {found.baseline}' in body
 
 
+def test_what_was_added_to_the_model_is_said(found, recordings, html):
+    assert 'model.yaml is the model with quadratic friction' in html
+    assert 'The model stays as it was given.' not in html
+    worse = replace(found, harmful=True)
+    assert 'The model stays as it was given.' in diagnosis_report(
+        worse, DiagnosedRecordings(recordings), robot='two_links'
+    )
+
+
 def test_nothing_is_named_and_nothing_patched_where_nothing_is(quiet):
     assert '>consistent<' in quiet
     assert 'Nothing is named.' in quiet

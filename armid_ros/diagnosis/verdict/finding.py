@@ -278,4 +278,5 @@ def _separating(name: str, rival: str, joints: Sequence[str]) -> str:
     """Say which experiment separates two names."""
     where = f' of {", ".join(joints)}' if joints else ''
     shown = dict.fromkeys(CATALOGUE.get(one, Effect).shown_by for one in (name, rival))
-    return f'To separate {name} from {rival}{where}: {", and ".join(shown)}.'
+    names = f'{name} from {rival}'.replace('_', ' ')
+    return f'To separate {names}{where}: {"; or ".join(shown)}.'

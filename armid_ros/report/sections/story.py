@@ -108,15 +108,13 @@ class Story(Section):
 
     def _patch(self) -> list[str]:
         diagnosis = self.diagnosis
-        patched = diagnosis.explanation is not None and (
-            diagnosis.arm is diagnosis.explanation.fitted.arm
-        )
+        patched = not diagnosis.harmful
         added = [finding.name.replace('_', ' ') for finding in diagnosis.findings if patched]
         if self._maps:
             added.append(f'what was learned of {", ".join(one.joint for one in self._maps)}')
         if not added:
             return ['The model stays as it was given.']
-        fitted = diagnosis.refitted and (patched or not diagnosis.findings)
+        fitted = diagnosis.refitted and patched
         more = ', with its rigid body and friction fitted anew' if fitted else ''
         return [f'model.yaml is the model with {" and ".join(added)}{more}.']
 
