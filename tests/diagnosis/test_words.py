@@ -10,6 +10,7 @@ from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating
 from armid_ros.effects import CATALOGUE
 import numpy as np
+import pytest
 
 FLOOR = 'the misfit that the model had before'
 
@@ -51,21 +52,26 @@ def test_what_does_not_repeat_has_to_matter(bench):
     assert word(0.3).word == 'consistent'
 
 
-def test_what_is_not_explained_is_said_with_what_explains_most_of_it(bench):
-    gap = Left(4.0 * np.ones(bench.robot.n_joints), 'in the recordings')
+def small_finding(bench, share):
+    """Return an encoder offset that takes a share of the gap."""
     effect = CATALOGUE['encoder_offset'].on(bench.robot, ('elbow',))
     names = effect.parameters(bench.robot)
-    small = Finding(
+    return Finding(
         'encoder_offset',
         ('elbow',),
         names,
         (0.1,),
         (0.01,),
-        0.3,
+        share,
         (0.2, 0.4),
         0.0,
         sign=effect.sign,
     )
+
+
+def test_what_is_not_explained_is_said_with_what_explains_most_of_it(bench):
+    gap = Left(4.0 * np.ones(bench.robot.n_joints), 'in the recordings')
+    small = small_finding(bench, 0.3)
 
     def text(minor):
         return decide((), (), [gap], bench.arm, FLOOR, None, minor).summary
@@ -98,3 +104,12 @@ def test_names_that_are_one_cause_are_one_sentence(bench):
         '0.300 +- 0.020 s) explains less than 1 % of the gap. The rest is '
         'the misfit that the model had before.'
     )
+
+
+@pytest.mark.parametrize(('share', 'mentioned'), [(0.3, True), (0.001, False)])
+def test_small_print_of_no_size_is_not_read_out(bench, share, mentioned):
+    off = Left(4.0 * np.ones(bench.robot.n_joints), 'in the recordings')
+    closed = Left(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
+    minor = (small_finding(bench, share),)
+    summary = decide((), (), [closed], bench.arm, FLOOR, off, minor).summary
+    assert ('encoder offset' in summary) == mentioned

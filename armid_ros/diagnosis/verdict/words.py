@@ -134,7 +134,7 @@ def _consistent(
         f'left is {floor_in_words}. As it is, the error of {robot.joints[worst]} is '
         f'{_factor(np.sqrt(as_it_is.excess[worst]))} times as large as that can be.'
     )
-    return ' '.join([text, *(sentence(one) for one in minor[:1])])
+    return ' '.join([text, *(sentence(one) for one in minor[:1] if one.share >= _SAID)])
 
 
 def _unexplained(minor: Sequence[Finding]) -> str:
