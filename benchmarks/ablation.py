@@ -76,14 +76,14 @@ def as_fitted(fitted: Any, *_: object) -> Any:
     return fitted
 
 
-def as_they_are(*arguments: Any) -> list[Any]:
-    """Return causes as they were tried beside the others, (problem, beside, causes, round)."""
-    return list(arguments[2])
+def as_they_are(trials: Sequence[Any], *_: object) -> list[Any]:
+    """Return causes as they were tried beside the others."""
+    return list(trials)
 
 
-def nowhere(problem: Any, *_: object) -> np.ndarray:
+def nowhere(here: Any) -> np.ndarray:
     """Return squares of an open gap in no joint."""
-    return np.full(problem.y.shape[1], np.inf)
+    return np.full(here.problem.y.shape[1], np.inf)
 
 
 def all_names(question, named, steps, values, evidence, settings):

@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Deviations of values that follow what a model gets wrong of a motion."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Named
-from armid_ros.diagnosis.search.resampled import widened
+from armid_ros.diagnosis.search.resampled import as_change, widened
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning
@@ -62,3 +65,14 @@ def test_nothing_named_is_nothing_to_widen(bench):
     sigma = tuple(np.full(2, 0.03) for _ in data)
     fitted = fit(bench.arm, (), data, sigma, None)
     assert widened(fitted, Evidence(data, sigma, sigma), None, 9.0) is fitted
+
+
+def test_a_value_that_no_data_tell_stays_untold_where_others_are_changes(bench):
+    fitted, _ = coulomb_of(bench, lambda m, tau: on_elbow(0.2 * np.sign(m.dq[:, 1])))
+    untold = replace(fitted, estimate=replace(fitted.estimate, covariance=np.array([[np.inf]])))
+    told = SimpleNamespace(columns=np.ones((4, 1)), left=np.zeros(4), precision=np.array([[4.0]]))
+    baseline = SimpleNamespace(
+        columns=lambda arm, effect, kept: np.array([[1.0, 2.0, 3.0, 5.0]]).T
+    )
+    free = replace(untold, change=np.zeros(1))
+    assert as_change(free, told, baseline).estimate.std[0] == np.inf

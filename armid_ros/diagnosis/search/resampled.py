@@ -82,7 +82,8 @@ def as_change(fitted: Fitted, told: Told, baseline: Baseline) -> Fitted:
 
     """
     before = _seen_before(fitted, told, baseline)
-    return _with_deviation(fitted, np.hypot(fitted.estimate.std, before))
+    std = fitted.estimate.std
+    return _with_deviation(fitted, np.hypot(np.where(np.isfinite(std), std, 0.0), before))
 
 
 def _with_deviation(fitted: Fitted, deviation: FloatArray) -> Fitted:

@@ -267,7 +267,7 @@ def _examined(
     assert here.total is not None
     least = 0.0 if here.before is None else here.settings.thresholds.headline * here.total
     whole, most = here.settings.thresholds.misfit_share, here.settings.thresholds.open_share
-    open_squares = np.where(here.gaps(here.left), np.sum(here.left**2, axis=0), np.inf)
+    open_squares = _open_squares(here)
     there: list[Trial] = []
     large: list[Trial] = []
     for trial in ranking[:_LOOKED_AT]:
@@ -292,6 +292,11 @@ def _examined(
     result = sorted([*others, *compared], key=lambda t: -worth(t, here))
     there.sort(key=lambda t: -worth(t, here))
     return result, there, closing
+
+
+def _open_squares(here: Round) -> FloatArray:
+    """Return the squares of every joint in which a gap is open; infinite where none is, (n,)."""
+    return np.where(here.gaps(here.left), np.sum(here.left**2, axis=0), np.inf)
 
 
 def _compared(trials: Sequence[Trial], here: Round) -> list[Trial]:
