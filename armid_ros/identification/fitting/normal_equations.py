@@ -44,12 +44,12 @@ def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     ----------
     products : ndarray, shape (p, p)
         Products of columns with each other; positive semi-definite.
-    aim : ndarray, shape (p,)
+    aim : ndarray, shape (p,) or (p, k)
         Products of the columns with what they are to make.
 
     Returns
     -------
-    ndarray, shape (p,)
+    ndarray, shape (p,) or (p, k)
 
     """
     basis = informative_basis(products)
