@@ -416,8 +416,7 @@ class ArmModel:
         along = friction.directions.T
         load = self.load(self.link_motion(motion))
         gain = friction.load_share * np.sign(load @ along) * np.sign(motion.dq @ along)
-        changes = np.einsum('nm,jm,njp->nmp', gain, along, columns)
-        return np.asarray(columns + np.einsum('im,nmp->nip', along, changes))
+        return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
     def felt(self, motion: Motion) -> Motion:
         """Return what the rigid body feels of a motion of the links: all, or its weight alone."""

@@ -146,7 +146,10 @@ class ActuatorSaturation(TorqueReading):
         Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
         Quantity('clipped_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
     )
-    shapes = (Shape('saturation_torque', 'N m', 1e-6, 1e6, 10.0, (0.3, 1.0, 3.0, 10.0, 30.0)),)
+    #: Near the highest torque that is measured; far below it, it would be the torque.
+    shapes = (
+        Shape('saturation_torque', 'N m', 1e-6, 1e6, 10.0, (0.3, 1.0, 3.0, 10.0, 30.0), near=0.08),
+    )
 
     def _default_shape(self, robot: Robot) -> FloatArray:
         limits = robot.torque_limit[self.indices(robot.joints)][:, np.newaxis]

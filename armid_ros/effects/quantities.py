@@ -77,6 +77,8 @@ class Shape:
         Value of an effect that was given none.
     grid : tuple of float
         Where a search starts from; values between which the best one is refined.
+    near : float or None
+        Share of a start from the data by which it may be wrong; None where a start is a guess.
 
     """
 
@@ -86,6 +88,7 @@ class Shape:
     upper: float
     default: float
     grid: tuple[float, ...]
+    near: float | None = None
 
 
 def joint_unit(unit: str, joint: str, robot: Robot) -> str:

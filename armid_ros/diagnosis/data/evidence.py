@@ -295,15 +295,14 @@ def trajectories(
 
 def thinnable(used: Conditioning) -> Conditioning:
     """
-    Return a conditioning, or one of smaller decimation by which motions can be thinned out first.
+    Return a conditioning of which the motion can be thinned out as far as columns allow.
 
-    Columns are computed at a rate that divides that of the recording and of which rows are a
-    whole part: of a prime decimation that is the rate of the recording, however high it is.
+    They are computed at a rate that divides that of the recording and of which rows are a whole
+    part: at most an eighth more rows are kept.
 
     """
-    while 2 * _thin(used) <= _widest(used):
-        used = replace(used, decimation=used.decimation - 1)
-    return used
+    widest = _widest(used)
+    return replace(used, decimation=used.decimation - used.decimation % widest)
 
 
 def _widest(used: Conditioning) -> int:

@@ -295,7 +295,7 @@ def _may_have_been(
     for step in found.steps:
         group, values = step.trial.group, step.trial.values
         own = baseline.columns(found.given, group.effect, group.kept)
-        hidden = np.linalg.lstsq(told.columns, own, rcond=1e-10)[0] @ values
+        hidden = told.nearest(own) @ values
         then = (own @ values - told.columns @ hidden).reshape(-1, found.given.robot.n_joints)
         rows = [part.columns(found.given, group.effect)[:, :, list(group.kept)] for part in data]
         pairs = zip(rows, found.reference.columns, strict=True)

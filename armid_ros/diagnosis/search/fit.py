@@ -142,6 +142,10 @@ class Told:
         """Products of the columns with what is left, shape (r,)."""
         return np.asarray(self.columns.T @ self.left)
 
+    def nearest(self, columns: FloatArray) -> FloatArray:
+        """Return the changes of what is free that come nearest to columns (S, p), shape (r, p)."""
+        return informative_solution(self.precision, self.columns.T @ columns)
+
     def recordings(self, change: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
         """Yield the columns of each recording, (S, r), and what a change leaves of it, (S,)."""
         for fold in sorted({part.fold for part in self.data}):

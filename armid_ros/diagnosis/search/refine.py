@@ -17,12 +17,8 @@ from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Shapes that the data give a good start of, and how far from it a search goes: of a peak of a
-#: spectrum [1/rev], of a level near the highest torque (far below it, it would be the torque).
-_NEAR = {'ripple_order': 1.0, 'saturation_torque': 0.08}
-#: How far from a peak of the spectrum its side lobes are looked at [1/rad], and what is too slow
-#: for a ripple: gravity and springs are.
-_LOBES, _LOWEST_ORDER = 3.0, 3.0
+#: How far from a peak of a spectrum its side lobes are looked at, and how sharp it is [1/rev].
+_LOBES, _PEAK = 3.0, 0.2
 #: Rounds and evaluations per shape of a refinement.
 _GOLDEN, _ROUNDS = 7, 2
 
@@ -109,19 +105,7 @@ def _line_search(
 ) -> FloatArray:
     """Search one shape around where it is, by golden sections of its logarithm if positive."""
     value = float(shape[index])
-    positive = kind.lower > 0.0 and value > 0.0 and kind.name not in _NEAR
-    if kind.name in _NEAR:
-        reach = _NEAR[kind.name] if kind.unit == '1/rev' else _NEAR[kind.name] * abs(value)
-        low, high = max(kind.lower, value - reach), min(kind.upper, value + reach)
-    elif positive:
-        ratio = max([b / a for a, b in pairwise(sorted(kind.grid)) if a > 0.0] or [3.0])
-        ratio = min(ratio, 3.5)
-        low = np.log(max(kind.lower, value / ratio))
-        high = np.log(min(kind.upper, value * ratio))
-    else:
-        apart = max([b - a for a, b in pairwise(sorted(kind.grid))] or [0.0])
-        reach = max(0.15 * abs(value), apart, 1e-3)
-        low, high = max(kind.lower, value - reach), min(kind.upper, value + reach)
+    positive = kind.lower > 0.0 and value > 0.0 and kind.near is None and kind.unit != '1/rev'
 
     def at(x: float) -> FloatArray:
         moved = shape.copy()
@@ -130,8 +114,18 @@ def _line_search(
 
     if kind.unit == '1/rev':  # side lobes beside the peak are almost as high
         scan = value + np.linspace(-_LOBES, _LOBES, 25)
-        value = max(scan[scan > min(value, _LOWEST_ORDER)].tolist(), key=lambda x: gain(at(x)))
-        low, high = value - 0.2, value + 0.2
+        value = max(scan[scan > kind.lower].tolist(), key=lambda x: gain(at(x)))
+        low, high = value - _PEAK, value + _PEAK
+    elif positive:
+        ratio = max([b / a for a, b in pairwise(sorted(kind.grid)) if a > 0.0] or [3.0])
+        ratio = min(ratio, 3.5)
+        low = np.log(max(kind.lower, value / ratio))
+        high = np.log(min(kind.upper, value * ratio))
+    else:
+        apart = max([b - a for a, b in pairwise(sorted(kind.grid))] or [0.0])
+        near = kind.near or max(0.15, apart / max(abs(value), 1e-300))
+        reach = max(near * abs(value), 1e-3)
+        low, high = max(kind.lower, value - reach), min(kind.upper, value + reach)
     golden = (np.sqrt(5.0) - 1.0) / 2.0
     a, b = high - golden * (high - low), low + golden * (high - low)
     fa, fb = gain(at(a)), gain(at(b))

@@ -138,7 +138,7 @@ def _seen_before(fitted: Fitted, told: Told, baseline: Baseline) -> FloatArray:
     for own, values, (places, _) in zip(fitted.named, fitted.values, fitted.places, strict=True):
         kept = list(own.kept)
         pair = np.column_stack([baseline.columns(fitted.arm, own.effect, kept), left])
-        pair -= told.columns @ informative_solution(told.precision, told.columns.T @ pair)
+        pair -= told.columns @ told.nearest(pair)
         size = np.maximum(np.abs(values[kept]), 1e-300)
         scaled = pair[:, :-1] * size
         precision = scaled.T @ scaled + np.eye(len(kept))
