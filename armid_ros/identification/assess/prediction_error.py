@@ -92,8 +92,7 @@ def described_error(motion: Motion, fixed: FloatArray, columns: FloatArray) -> P
         values = _shared_values(own, rest, shared, fitted)
         error = rest - shared @ values
         for joint, mine in enumerate(own):
-            coefficients = np.linalg.lstsq(mine[fitted], error[fitted, joint], rcond=None)[0]
-            left[~fitted, joint] = error[~fitted, joint] - mine[~fitted] @ coefficients
+            left[~fitted, joint] = _left(mine, error[:, joint], fitted)
     everything = np.ones(len(motion), dtype=bool)
     return _error(left, scale, _shared_values(own, rest, shared, everything))
 
@@ -114,17 +113,25 @@ def fitted_error(robot: Robot, motion: Motion) -> PredictionError:
     columns /= np.where(size > 0.0, size, 1.0)
     left = np.empty_like(rest)
     for fitted in _folds(len(motion)):
-        values = _softly(columns[fitted], rest[fitted])
-        left[~fitted] = rest[~fitted] - columns[~fitted] @ values
+        left[~fitted] = _left(columns, rest, fitted)
     return _error(left, scale, np.empty(0))
 
 
-def _softly(columns: FloatArray, rest: FloatArray) -> FloatArray:
-    """Fit, where every value costs as much as a residual at the floor does."""
-    stacked = columns.reshape(-1, columns.shape[2])
-    normal = stacked.T @ stacked
-    normal[np.diag_indices_from(normal)] += LIMITS.floor**2
-    return np.asarray(np.linalg.solve(normal, stacked.T @ rest.ravel()))
+def _left(columns: FloatArray, rest: FloatArray, fitted: npt.NDArray[np.bool_]) -> FloatArray:
+    """
+    Return what a fit to some rows, values held as by a residual at the floor, leaves of others.
+
+    A row whose prediction is less sure than a measurement of it (leverage above one, Hoaglin and
+    Welsch 1978) stays as described: a joint that is jogged alone may rest in all that was fitted.
+
+    """
+    size = columns.shape[-1]
+    own, others = columns[fitted].reshape(-1, size), columns[~fitted]
+    normal = own.T @ own + LIMITS.floor**2 * np.eye(size)
+    values = np.linalg.solve(normal, own.T @ rest[fitted].ravel())
+    spread = np.linalg.solve(normal, others.reshape(-1, size).T).T.reshape(others.shape)
+    told = np.sum(others * spread, axis=-1) <= 1.0
+    return np.asarray(rest[~fitted] - np.where(told, others @ values, 0.0))
 
 
 def _shared_values(
@@ -145,7 +152,8 @@ def _shared_values(
 
 def _own_columns(motion: Motion, joint: int) -> FloatArray:
     dq, ddq = motion.dq[:, joint], motion.ddq[:, joint]
-    return np.column_stack([np.ones(len(dq)), dq, np.sign(dq), ddq])
+    columns = np.column_stack([np.ones(len(dq)), dq, np.sign(dq), ddq])
+    return columns / _scale(columns)
 
 
 def _folds(count: int) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
@@ -153,9 +161,9 @@ def _folds(count: int) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     return even, ~even
 
 
-def _scale(tau: FloatArray) -> FloatArray:
-    """Return the root mean square of every joint's torque; one where there is none."""
-    size = np.sqrt(np.mean(tau**2, axis=0))
+def _scale(columns: FloatArray) -> FloatArray:
+    """Return the root mean square of every column; one where there is none."""
+    size = np.sqrt(np.mean(columns**2, axis=0))
     return np.where(size > 0.0, size, 1.0)
 
 

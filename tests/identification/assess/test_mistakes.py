@@ -92,6 +92,27 @@ def test_recordings_of_arms_drawn_at_random_have_none(name, seed):
     assert mistake_in(robot, recording_of(robot, seed)) == ''
 
 
+@pytest.mark.parametrize('alone', [0, 1, 2, 3])
+@pytest.mark.parametrize('seed', range(3))
+def test_a_joint_that_rests_in_all_that_was_fitted_has_none(robot, alone, seed):
+    links = robot.rigid_parameters * np.random.default_rng(seed).uniform(0.9, 1.1)
+    arm = ArmModel(robot.with_inertias(links))
+    for name, value in FRICTION.items():
+        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
+    motion = multisine(robot.joints, 40.0, RATE, seed=seed, base_hz=0.12)
+    moving = np.clip((motion.t - 20.0) / 4.0, 0.0, 1.0)
+    step = 0.8 * (10.0 * moving**3 - 15.0 * moving**4 + 6.0 * moving**5)
+    q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
+    q[:, alone] = step
+    dq[:, alone] = np.gradient(step, motion.t)
+    ddq[:, alone] = np.gradient(dq[:, alone], motion.t)
+    exact = recorded(arm, replace(motion, q=q, dq=dq, ddq=ddq), seed, position_noise=2e-5)
+    noise = 0.02 * np.sqrt(np.mean(exact.tau**2, axis=0))
+    rng = np.random.default_rng(seed)
+    noisy = exact.tau + noise * rng.normal(size=exact.tau.shape)
+    assert mistake_in(robot, replace(exact, tau=noisy)) == ''
+
+
 @pytest.mark.parametrize('joint', [0, 1, 2, 3])
 def test_a_position_of_the_opposite_sign(robot, sound, joint):
     turned = replace(sound, q=with_column(sound.q, joint, np.negative))
