@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import Quantity
-from armid_ros.model import LINK_PARAMETERS
+from armid_ros.model import joint_axis, LINK_PARAMETERS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -104,6 +104,24 @@ class Payload(_LinkBody):
         length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH
         heaviest = float(values[0] + _SURELY * std[0])
         return bool(heaviest > 0.0 and np.linalg.norm(values[1:4]) < length * heaviest)
+
+    def is_correction(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
+        """
+        Return whether no body can have such values.
+
+        About the joint its inertia is no less than that of its mass in one point, at its centre.
+        Nothing is said where values stand for others that the motion does not tell from them.
+
+        """
+        axis = joint_axis(arm.robot, self.indices(arm.robot.joints)[0])[1]
+        x, y, z = axis
+        share = np.array([x * x, 2.0 * x * y, y * y, 2.0 * x * z, 2.0 * y * z, z * z])
+        if not np.all(std[4:][share != 0.0] > 0.0) or not axis.any():
+            return False
+        aside = np.linalg.norm(np.cross(axis, values[1:4])) - _SURELY * np.linalg.norm(std[1:4])
+        most = share @ values[4:] + _SURELY * np.abs(share) @ std[4:]
+        heaviest = np.maximum(values[0] + _SURELY * std[0], 0.0)
+        return bool(most * heaviest < np.maximum(aside, 0.0) ** 2)
 
     def spread(self, robot: Robot) -> FloatArray:
         """Return what an arm may carry at the most: as much as it weighs, a little off, (P,)."""

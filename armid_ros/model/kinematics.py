@@ -132,7 +132,7 @@ class LinkFrames:
         lines, turns = np.zeros((2, robot.n_joints, 3, len(q)))
         for link in sorted({above for end in ends for above in _ancestors(robot, end)}):
             placement = robot.model.jointPlacements[link + 1]
-            slide, turn = _axis(robot, link)
+            slide, turn = joint_axis(robot, link)
             origin = placement.translation[:, np.newaxis] + np.outer(
                 placement.rotation @ slide, q[:, link]
             )
@@ -206,7 +206,7 @@ def _ancestors(robot: Robot, link: int) -> list[int]:
     return [int(joint) - 1 for joint in robot.model.supports[link + 1] if joint > 0]
 
 
-def _axis(robot: Robot, link: int) -> tuple[FloatArray, FloatArray]:
+def joint_axis(robot: Robot, link: int) -> tuple[FloatArray, FloatArray]:
     """Return what a joint does to its link per unit: translation and rotation, each (3,)."""
     joint = robot.model.joints[link + 1]
     data = joint.createData()

@@ -31,7 +31,8 @@ def explanation(bench, *names, rivals=()):
     def trial(name):
         effect = CATALOGUE[name].on(bench.robot, ('elbow',))
         group = Group.of(effect, slice(0, 1), (0,), bench.robot)
-        return SimpleNamespace(group=group, freedom=1.0)
+        told = {'values': np.array([1.0]), 'deviation': np.array([0.1])}
+        return SimpleNamespace(group=group, freedom=1.0, **told)
 
     steps = [SimpleNamespace(trial=trial(name), rivals=[]) for name in names]
     if steps:
@@ -49,6 +50,13 @@ def test_a_cause_that_a_full_correction_explains_does_not_stand(bench):
 def test_a_cause_beside_a_full_correction_stands(bench):
     first = explanation(bench, 'link_inertia', 'torque_offset', 'link_inertia')
     assert _stands(first, explanation(bench, 'torque_offset'))
+
+
+def test_one_body_that_changed_stands_in_whatever_order_it_is_found(bench):
+    names = ['viscous_friction', 'payload']
+    for order in (names, names[::-1]):
+        assert _stands(explanation(bench, *order), explanation(bench, 'viscous_friction'))
+        assert not _stands(explanation(bench, *order), explanation(bench))
 
 
 def test_friction_without_values_is_part_of_the_correction(bench):

@@ -3,10 +3,12 @@
 """Sentences say what the evidence bears out, and no more."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.floor import NoiseFloor
+from armid_ros.diagnosis.search.step import Step
 from armid_ros.diagnosis.settings import Thresholds
-from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.diagnosis.verdict.finding import _separating, _without_later, Finding, Rival
 from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating
 from armid_ros.effects import CATALOGUE
 import numpy as np
@@ -113,3 +115,41 @@ def test_small_print_of_no_size_is_not_read_out(bench, share, mentioned):
     minor = (small_finding(bench, share),)
     summary = decide((), (), [closed], bench.arm, FLOOR, off, minor).summary
     assert ('encoder offset' in summary) == mentioned
+
+
+@pytest.mark.parametrize(
+    ('rivals', 'said'),
+    [
+        ((Rival('link_inertia', ('elbow',)),), 'it from link inertia.'),
+        ((Rival('link_inertia', ('shoulder',)),), 'it from link inertia of shoulder.'),
+        (
+            (Rival('link_inertia', ('elbow',)), Rival('payload', ('shoulder',))),
+            'it from link inertia of elbow or payload of shoulder.',
+        ),
+    ],
+)
+def test_what_could_stand_in_another_joint_is_said_with_it(bench, rivals, said):
+    closed = Left(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
+    effect = CATALOGUE['torque_offset'].on(bench.robot, ('elbow',))
+    numbers = (effect.parameters(bench.robot), (1.0,), (0.1,), 0.9, (0.8, 0.95), 0.0)
+    found = Finding('torque_offset', ('elbow',), *numbers, rivals=rivals)
+    assert f'cannot tell {said}' in decide([found], (), [closed], bench.arm, FLOOR).summary
+
+
+def test_an_experiment_names_the_joints_of_both():
+    same = _separating('payload', ['elbow'], Rival('link_inertia', ('elbow',)))
+    assert same.startswith('To separate payload from link inertia of elbow: ')
+    other = _separating('torque_offset', ['elbow'], Rival('link_inertia', ('wrist',)))
+    assert other.startswith('To separate torque offset of elbow from link inertia of wrist: ')
+
+
+def test_what_stands_in_for_a_later_name_is_no_rival_of_an_earlier_one():
+    def trial(*key):
+        return SimpleNamespace(group=SimpleNamespace(key=(*key, ())))
+
+    link, lag = trial('link_inertia', ('elbow',)), trial('torque_lag', ())
+    first = Step(trial('viscous_friction', ('elbow',)), (link, lag), (), 1.0, 1, None)
+    second = Step(trial('payload', ('elbow',)), (link,), (), 1.0, 1, None)
+    earlier, later = _without_later([first, second])
+    assert earlier.rivals == (lag,)
+    assert later.rivals == (link,)

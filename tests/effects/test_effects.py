@@ -7,6 +7,7 @@ from armid_ros.effects import make_effect
 from armid_ros.model import inverse_dynamics
 from armid_ros.robots import load_robot
 import numpy as np
+import pinocchio as pin
 import pytest
 
 
@@ -77,3 +78,18 @@ def test_payload_is_swallowed_by_free_link_parameters(robot):
     rng = np.random.default_rng(0)
     with_payload = arm.with_effect(make_effect('payload', robot))
     assert with_payload.base_parameters(rng).rank == arm.base_parameters(rng).rank
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_a_body_may_be_a_payload_and_one_lighter_about_its_axis_than_a_point_may_not(seed):
+    rng = np.random.default_rng(seed)
+    robot = load_robot('humanoid_arm')
+    effect, arm = make_effect('payload', robot), ArmModel(robot)
+    centre, thin = rng.uniform(0.05, 0.2, 3), rng.normal(size=(3, 3))
+    inertia = pin.Inertia(rng.uniform(0.5, 5.0), centre, 1e-3 * thin @ thin.T)
+    values = inertia.toDynamicParameters()
+    std = np.full(10, 1e-6)
+    assert not effect.is_correction(values, std, arm)
+    nothing = np.concatenate([values[:4], 0.1 * values[4:]])
+    assert effect.is_correction(nothing, std, arm)
+    assert not effect.is_correction(nothing, np.abs(values), arm)

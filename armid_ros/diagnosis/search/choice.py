@@ -21,6 +21,7 @@ from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.data.rows import weighted_rows
 from armid_ros.diagnosis.search.explain import explain, Explanation
 from armid_ros.diagnosis.search.fit import fit, Start, Told
+from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question
 from armid_ros.diagnosis.search.resampled import as_change
 from armid_ros.diagnosis.search.round import cost
@@ -369,17 +370,27 @@ def _stands(first: Explanation, anew: Explanation) -> bool:
     """
     Return whether causes are causes beside a full correction of the description as well.
 
-    Where they are not, and that explains the data, it is off in more than one of its values.
-    Effects that nobody gave values of are part of the correction.
+    Where more than one is not, corrections among them, and that explains the data, it is off in
+    more than one of its values: one body that has changed is in any correction. Effects that
+    nobody gave values of are part of it.
 
     """
     there = {step.trial.group.key[:2] for step in anew.steps}
     given = zip(first.given.effects, first.given.values, strict=True)
     open_values = {effect.name for effect, values in given if not np.any(values)}
-    return all(
-        group.effect.corrects or group.effect.name in open_values or group.key[:2] in there
-        for group in (step.trial.group for step in first.steps[1:])
-    )
+    wrong = any(_is_correction(step.trial, first.given) for step in first.steps)
+    groups = [step.trial.group for step in first.steps if not step.trial.group.effect.corrects]
+    keys = {group.key[:2] for group in groups if group.effect.name not in open_values}
+    return len(keys - there) + wrong < 2
+
+
+def _is_correction(trial: Trial, arm: ArmModel) -> bool:
+    """Return whether a cause says that the description is wrong."""
+    effect = trial.group.effect
+    values, std = np.zeros((2, len(effect.parameters(arm.robot))))
+    kept = list(trial.group.kept)
+    values[kept], std[kept] = trial.values, trial.deviation
+    return effect.is_correction(values, std, arm)
 
 
 def _left_by(explanation: Explanation) -> FloatArray:
@@ -392,23 +403,25 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     Return whether causes in the model as given explain as much as a body fitted anew.
 
     Where that leaves noise, they have to leave as little; a noise that is assumed excuses nothing
-    that it does not leave. Where it leaves a gap itself, it has to take more beside them than its
-    values cost.
+    that it does not leave, nor do more values of causes than a body that is wrong anyway needs.
+    Where it leaves a gap itself, it has to take more beside them than its values cost.
 
     """
     evidence = first.evidence
     left, fitted = first.fitted.residual, anew.fitted.residual
     after, least = evidence.chi2_per_row(left), evidence.chi2_per_row(fitted)
-    alike = settings.thresholds.same_fit * least + evidence.matters(settings)
-    if not evidence.assumed:
-        alike = np.maximum(alike, evidence.limits(left, settings))
+    more = _more_freedom(first, anew, settings)
+    alike = settings.thresholds.same_fit * least
+    if more >= 0.0:
+        alike = alike + evidence.matters(settings)
+        if not evidence.assumed:
+            alike = np.maximum(alike, evidence.limits(left, settings))
     if np.all(after <= alike):
         return True
     if at_floor(anew, settings):
         return False
     gap = max(float(evidence.count @ evidence.chi2_per_row(first.reference.residual)), 1e-300)
-    price = settings.thresholds.price * _more_freedom(first, anew, settings)
-    return float(evidence.count @ (after - least)) <= price * gap
+    return float(evidence.count @ (after - least)) <= settings.thresholds.price * more * gap
 
 
 def _more_freedom(first: Explanation, anew: Explanation, settings: DiagnosisSettings) -> float:

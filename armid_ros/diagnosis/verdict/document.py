@@ -149,7 +149,7 @@ def _candidate(trial: Trial, total: float, tried: int) -> dict[str, Any]:
     return {
         'name': trial.group.effect.said_as,
         'joints': list(trial.group.effect.joints),
-        'share': trial.gain / max(total, 1e-300),
+        'share': min(trial.gain / max(total, 1e-300), 1.0),
         'held_out_gain': trial.gain,
         'replicated_in': trial.replicated,
         'visible_fraction': trial.visible,

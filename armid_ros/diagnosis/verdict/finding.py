@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explain import Explanation
@@ -119,6 +119,7 @@ def findings(
 ) -> tuple[Finding, ...]:
     """Say what was found: effects of one name together, those that take most of the gap first."""
     said = _in_words(explanation, arm)
+    taken = _without_later(explanation.steps)
     merged: dict[str, list[int]] = {}
     for index, parts in enumerate(said):
         for part in parts:
@@ -126,7 +127,7 @@ def findings(
     result = []
     for name, indices in merged.items():
         parts = [part for k in indices for part in said[k] if part.effect.name == name]
-        steps = [explanation.steps[k] for k in indices]
+        steps = [taken[k] for k in indices]
         joints = _joints([part.effect.joints for part in parts], arm)
         order = [joint for joint in arm.robot.joints if joint in joints]
         rows = [
@@ -149,7 +150,7 @@ def findings(
                 attribution.interval(indices, rng),
                 max(min(1.0, step.trial.p * step.tried) for step in steps),
                 rivals,
-                _separating(name, rivals[0].name, order) if rivals else '',
+                _separating(name, order, rivals[0]) if rivals else '',
                 float(attribution.taken[indices].sum()),
                 parts[0].effect.sign,
                 _ties([part.effect for part in parts], order),
@@ -250,6 +251,22 @@ def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
     return tuple(ties[joint] for joint in joints if joint in ties)
 
 
+def _without_later(steps: Sequence[Step]) -> list[Step]:
+    """
+    Return steps without rivals that stand in for another name, which was taken later.
+
+    What they take is what that name takes, and was open when the first one was asked for.
+
+    """
+    result: list[Step] = []
+    later: set[tuple[str, tuple[str, ...]]] = set()
+    for step in reversed(steps):
+        rivals = tuple(trial for trial in step.rivals if trial.group.key[:2] not in later)
+        result.append(replace(step, rivals=rivals))
+        later.update(trial.group.key[:2] for trial in (step.trial, *step.rivals))
+    return result[::-1]
+
+
 def _rivals(steps: Sequence[Step], named: set[str], arm: ArmModel) -> tuple[Rival, ...]:
     """Return the other names that are possible, the likeliest first, and where."""
     best: dict[str, list[Trial]] = {}
@@ -274,9 +291,10 @@ def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]
     return tuple(joint for joint in arm.robot.joints if joint in joints)
 
 
-def _separating(name: str, rival: str, joints: Sequence[str]) -> str:
-    """Say which experiment separates two names."""
-    where = f' of {", ".join(joints)}' if joints else ''
-    shown = dict.fromkeys(CATALOGUE.get(one, Effect).shown_by for one in (name, rival))
-    names = f'{name} from {rival}'.replace('_', ' ')
-    return f'To separate {names}{where}: {"; or ".join(shown)}.'
+def _separating(name: str, joints: Sequence[str], rival: Rival) -> str:
+    """Say which experiment separates a name in some joints from another one."""
+    shown = dict.fromkeys(CATALOGUE.get(one, Effect).shown_by for one in (name, rival.name))
+    own, other = (f' of {", ".join(where)}' if where else '' for where in (joints, rival.joints))
+    own = '' if own == other else own
+    names = f'{name}{own} from {rival.name}{other}'.replace('_', ' ')
+    return f'To separate {names}: {"; or ".join(shown)}.'

@@ -30,8 +30,11 @@ _SURELY = 3.0
 _SHORTEST = 0.2
 #: Factor on what a baseline shows of it: a brake holds an arm on every day.
 _AS_BEFORE = 1.5
-#: Where it is, for a sentence.
+#: Where it is, for a table, and the end of a sentence.
 _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
+_BESIDE = (
+    'with friction, where it stands still or turns round: a stop, a brake or a contact does that'
+)
 
 
 def held(arm: ArmModel, evidence: Evidence, before: Baseline | None, given: ArmModel) -> Left:
@@ -56,7 +59,7 @@ def held(arm: ArmModel, evidence: Evidence, before: Baseline | None, given: ArmM
         unit = (before.misfit,) * len(before.data)
         then = standing(given, Evidence(before.data, unit, unit), before.residual)
         excess = excess / np.maximum(_AS_BEFORE * then, 1.0)
-    return Left(excess, _WHERE)
+    return Left(excess, _BESIDE)
 
 
 def places_held(arm: ArmModel, left: Sequence[Left]) -> tuple[Where, ...]:

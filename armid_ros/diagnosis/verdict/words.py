@@ -11,7 +11,7 @@ from typing import Literal
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
-from armid_ros.diagnosis.verdict.finding import Finding, Rival
+from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -115,7 +115,7 @@ def decide(
     doubtful = [finding for finding in findings if finding.rivals]
     if doubtful:
         first = doubtful[0]
-        others = ' or '.join(_elsewhere(rival, first.joints) for rival in first.rivals)
+        others = _others(first)
         one = 'it' if len(findings) == 1 else f'the {first.name.replace("_", " ")}'
         text = f'{said} These data cannot tell {one} from {others}. {first.experiment}'
         return Verdict('ambiguous', text)
@@ -271,10 +271,14 @@ def _tie(finding: Finding, joint: str, segment: str) -> str:
     return f'{segment} ({", ".join(shown)})'
 
 
-def _elsewhere(rival: Rival, joints: Sequence[str]) -> str:
-    """Return a name, and the joints where they are others than those."""
-    there = '' if set(rival.joints) == set(joints) else f' of {", ".join(rival.joints)}'
-    return rival.name.replace('_', ' ') + (there if rival.joints else '')
+def _others(finding: Finding) -> str:
+    """Return what could stand in the place of a name, with joints where any are others."""
+    there = any(set(rival.joints) != set(finding.joints) for rival in finding.rivals)
+    return ' or '.join(
+        rival.name.replace('_', ' ')
+        + (f' of {", ".join(rival.joints)}' if there and rival.joints else '')
+        for rival in finding.rivals
+    )
 
 
 def _as_sure(value: float, std: float) -> str:
