@@ -25,8 +25,8 @@ import numpy as np
 import pytest
 
 
-def explanation(bench, *names, rivals=()):
-    """Return an explanation by names in the elbow, with rivals of the first one."""
+def explanation(bench, *names, rivals=(), shown=()):
+    """Return an explanation by names in the elbow, with rivals of the first, of what is shown."""
 
     def trial(name):
         effect = CATALOGUE[name].on(bench.robot, ('elbow',))
@@ -37,7 +37,8 @@ def explanation(bench, *names, rivals=()):
     steps = [SimpleNamespace(trial=trial(name), rivals=[]) for name in names]
     if steps:
         steps[0].rivals = [trial(name) for name in rivals]
-    return SimpleNamespace(steps=steps, given=bench.arm, base=None)
+    survey = SimpleNamespace(ranking=[trial(name) for name in shown])
+    return SimpleNamespace(steps=steps, given=bench.arm, base=None, survey=survey)
 
 
 def test_a_cause_that_a_full_correction_explains_does_not_stand(bench):
@@ -57,6 +58,13 @@ def test_one_body_that_changed_stands_in_whatever_order_it_is_found(bench):
     for order in (names, names[::-1]):
         assert _stands(explanation(bench, *order), explanation(bench, 'viscous_friction'))
         assert not _stands(explanation(bench, *order), explanation(bench))
+
+
+@pytest.mark.parametrize('shown', [(), ('interface_slack',)])
+def test_only_what_a_fitted_body_hides_may_be_missing_beside_it(bench, shown):
+    first = explanation(bench, 'quadratic_friction', 'interface_slack')
+    anew = explanation(bench, 'quadratic_friction', shown=('quadratic_friction', *shown))
+    assert _stands(first, anew) == (not shown)
 
 
 def test_friction_without_values_is_part_of_the_correction(bench):

@@ -370,18 +370,20 @@ def _stands(first: Explanation, anew: Explanation) -> bool:
     """
     Return whether causes are causes beside a full correction of the description as well.
 
-    Where more than one is not, corrections among them, and that explains the data, it is off in
-    more than one of its values: one body that has changed is in any correction. Effects that
-    nobody gave values of are part of it.
+    Where one is not that a fitted body shows, or more than one that it hides, corrections among
+    them, and that explains the data, the description is off in more than one of its values. One
+    body that has changed is in any correction, and effects that nobody gave values of are.
 
     """
+    assert anew.survey is not None
     there = {step.trial.group.key[:2] for step in anew.steps}
     given = zip(first.given.effects, first.given.values, strict=True)
     open_values = {effect.name for effect, values in given if not np.any(values)}
-    wrong = any(_is_correction(step.trial, first.given) for step in first.steps)
     groups = [step.trial.group for step in first.steps if not step.trial.group.effect.corrects]
-    keys = {group.key[:2] for group in groups if group.effect.name not in open_values}
-    return len(keys - there) + wrong < 2
+    gone = {group.key[:2] for group in groups if group.effect.name not in open_values} - there
+    wrong = any(_is_correction(step.trial, first.given) for step in first.steps)
+    seen = {trial.group.key[:2] for trial in anew.survey.ranking}
+    return gone.isdisjoint(seen) and len(gone) + wrong < 2
 
 
 def _is_correction(trial: Trial, arm: ArmModel) -> bool:
