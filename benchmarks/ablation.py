@@ -86,10 +86,10 @@ def nowhere(here: Any) -> np.ndarray:
     return np.full(here.problem.y.shape[1], np.inf)
 
 
-def all_names(question, named, steps, values, evidence, settings):
+def all_names(question, named, steps, values, evidence, settings, change=None):
     """Fit all names together and drop none."""
-    data, sigma = evidence.data, evidence.sigma
-    fitted = fit(question.arm, named, data, sigma, question.base, Start(values), question.told)
+    data, start = evidence.data, Start(values, change)
+    fitted = fit(question.arm, named, data, evidence.sigma, question.base, start, question.told)
     return list(fitted.named), list(steps), fitted
 
 

@@ -1,10 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What each number that decides a name is worth: the score with it 30 % smaller and larger.
+What each number of the diagnosis is worth: the score with it 30 % smaller and larger.
 
 The sample is hard: causes near what can be seen, ties, what the diagnosis gets wrong, and arms to
-which nothing happened. Where nothing changes in it, a number could be any within 30 %.
+which nothing happened. Where nothing changes in it, a number could be any within 30 %. Asked are
+the thresholds and the numbers of the modules that decide; a number of a module is named by its
+file and its name.
 
     python -m benchmarks.thresholds [--only NAME ...] [--cases KEY ...] [--processes N]
 
@@ -15,16 +17,24 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass, fields, replace
+from importlib import import_module
 import multiprocessing
 import os
+from pathlib import Path
+import sys
+from typing import Any
+from unittest.mock import patch
 
+import armid_ros.diagnosis
 from armid_ros.diagnosis import DiagnosisSettings
 from armid_ros.diagnosis.settings import Thresholds
 
 from benchmarks.lived import known_arm
 from benchmarks.lived_scoring import LivedJudged, LivedTruth, nameable
 from benchmarks.two_days import ask, identification_of
+from docsite.numbers import constants
 from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.cases import lived_case
 
@@ -38,19 +48,60 @@ SAMPLE = (
 #: By how much every number is changed.
 CHANGES = (0.7, 1.3)
 
+_PACKAGE_NAME, _ROOT = 'armid_ros.diagnosis', 'armid_ros.'
+_PACKAGE = Path(armid_ros.diagnosis.__file__).parent
+#: Parts of it whose numbers decide; those of sentences, ties and the next run decide no name.
+_DECIDING = ('diagnose.py', 'data', 'search', 'verdict/gap.py', 'verdict/standing.py')
+#: From here up to one a number is a level, of which what is beyond is changed.
+_LEVEL = 0.9
+
 #: Name of a number, and the factor on it.
 Change = tuple[str, float]
 
 
+def of_modules() -> list[str]:
+    """Return the numbers of the modules that decide, each by its file and its name."""
+    return [
+        f'{path.relative_to(_PACKAGE).as_posix()} {name}'
+        for folder in _DECIDING
+        for path in _files(folder)
+        for names, _, _ in constants(path.read_text(encoding='utf-8'))
+        for name in names.split(', ')
+    ]
+
+
+def _files(place: str) -> list[Path]:
+    path = _PACKAGE / place
+    return [path] if path.suffix else sorted(path.rglob('*.py'))
+
+
 def varied(names: Sequence[str], factor: float) -> DiagnosisSettings:
-    """Return settings with some numbers changed; counts are rounded."""
-    usual, values = Thresholds(), {}
-    for name in names:
-        value = getattr(usual, name)
-        values[name] = round(value * factor) if isinstance(value, int) else value * factor
-    if 'confidence' in values:
-        values['confidence'] = 1.0 - (1.0 - usual.confidence) * factor
+    """Return settings with some thresholds changed."""
+    usual, known = Thresholds(), {field.name for field in fields(Thresholds)}
+    values = {name: scaled(getattr(usual, name), factor) for name in names if name in known}
     return DiagnosisSettings(thresholds=replace(usual, **values))
+
+
+def scaled(value: Any, factor: float) -> Any:
+    """Return a number with a factor; counts are rounded, of a level what is beyond is scaled."""
+    if isinstance(value, tuple):
+        return tuple(scaled(one, factor) for one in value)
+    if isinstance(value, int):
+        return round(value * factor)
+    return 1.0 - (1.0 - value) * factor if _LEVEL <= value < 1.0 else value * factor
+
+
+@contextmanager
+def changed(names: Sequence[str], factor: float) -> Iterator[None]:
+    """Diagnose with numbers of modules changed, wherever they were imported."""
+    with ExitStack() as stack:
+        for path, name in (key.split() for key in names if ' ' in key):
+            home = import_module(f'{_PACKAGE_NAME}.{path.removesuffix(".py").replace("/", ".")}')
+            value = getattr(home, name)
+            for module in [one for key, one in sys.modules.items() if key.startswith(_ROOT)]:
+                if module is home or (not name.startswith('_') and name in vars(module)):
+                    stack.enter_context(patch.object(module, name, scaled(value, factor)))
+        yield
 
 
 @dataclass(frozen=True)
@@ -84,9 +135,10 @@ def answers(key: str, names: Sequence[str]) -> Asked:
     arm = identification_of(robot_of(case), day_1).arm if day_1 else known_arm(case)
     truth = LivedTruth.of(case, (0.0, 0.0), robot_of(case).gravity)
 
-    def said(changed: Sequence[str], factor: float) -> LivedJudged:
-        settings = varied(changed, factor)
-        answer = ask(arm, day_2, validate=[held_out], baseline=day_1, settings=settings)
+    def said(names: Sequence[str], factor: float) -> LivedJudged:
+        settings = varied(names, factor)
+        with changed(names, factor):
+            answer = ask(arm, day_2, validate=[held_out], baseline=day_1, settings=settings)
         return LivedJudged(truth, answer)
 
     usual = said((), 1.0)
@@ -157,12 +209,14 @@ def main() -> None:
     """Print what each case answers, and one line for each number and change."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks.thresholds')
     parser.add_argument('--cases', nargs='+', default=SAMPLE, metavar='KEY', help='other cases')
-    parser.add_argument('--only', nargs='+', default=[], metavar='NAME', help='some numbers')
+    parser.add_argument(
+        '--only', nargs='+', default=[], metavar='NAME', help='some numbers, each as it is printed'
+    )
     parser.add_argument('--processes', type=int, default=2)
     options = parser.parse_args()
     for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
         os.environ.setdefault(variable, '1')
-    known = [field.name for field in fields(Thresholds)]
+    known = [*(field.name for field in fields(Thresholds)), *of_modules()]
     names = [name for name in known if not options.only or name in options.only]
     of_cases: list[Asked] = []
     context = multiprocessing.get_context('spawn')
@@ -170,14 +224,14 @@ def main() -> None:
         for asked in pool.map(answers, options.cases, [names] * len(options.cases)):
             of_cases.append(asked)
             print(f'# {one_case(asked)}', flush=True)
-    print(f'{"as it is":22s} {1.0:4.1f}  {counts([one.usual for one in of_cases])}')
+    print(f'{"as it is":42s} {1.0:4.1f}  {counts([one.usual for one in of_cases])}')
     for change in ((name, factor) for name in names for factor in CHANGES):
         other = sum(change in one.others for one in of_cases)
         said = 'no answer changes'
         if other:
             score = counts([one.with_change(change) for one in of_cases])
             said = f'{score}; {other} {"answer changes" if other == 1 else "answers change"}'
-        print(f'{change[0]:22s} {change[1]:4.1f}  {said}')
+        print(f'{change[0]:42s} {change[1]:4.1f}  {said}')
 
 
 if __name__ == '__main__':

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 import inspect
 from pathlib import Path
@@ -16,7 +16,7 @@ from armid_ros.diagnosis.settings import Thresholds
 from docsite.markdown import cell, table
 
 _ENTRY = re.compile(r'^(?P<names>\w+(?:, \w+)*) : (?P<type>.+)$')
-_MEASURED = re.compile(r'^(?P<name>[\w ]+?) +(?P<factor>\d\.\d)  (?P<score>.+)$')
+_MEASURED = re.compile(r'^(?P<name>[\w ./]+?) +(?P<factor>\d\.\d)  (?P<score>.+)$')
 
 
 def numbers_page(package: Path, sensitivity: str) -> str:
@@ -42,20 +42,14 @@ def numbers_page(package: Path, sensitivity: str) -> str:
             f'`{field.name}`',
             f'{field.default:g}',
             cell(meaning.get(field.name, '')),
-            cell(measured.get((field.name, '0.7'), 'not measured')),
-            cell(measured.get((field.name, '1.3'), 'not measured')),
+            *_sensitivity(measured, [field.name]),
         )
         for field in fields(Thresholds)
         if isinstance(field.default, int | float)
     ]
     others = [
-        (f'`{name}`', cell(value), cell(why), f'`{path.relative_to(package).as_posix()}`')
-        for path in sorted(package.rglob('*.py'))
-        for name, value, why in _constants(path.read_text(encoding='utf-8'))
-    ]
-    others += [
-        (f'`{name}`', cell(value), cell(why), f'`{path}`')
-        for path, name, value, why in _borrowed(package)
+        (f'`{name}`', cell(value), cell(why), f'`{path}`', *_sensitivity(measured, keys))
+        for path, name, value, why, keys in _others(package)
     ]
     return '\n'.join(
         [
@@ -74,12 +68,35 @@ def numbers_page(package: Path, sensitivity: str) -> str:
             f'## {len(others)} of data, numerics and words',
             '',
             'What a row is, when data are at fault, how finely shapes are searched, what a '
-            'sentence says. Their sensitivity is not measured.',
+            'sentence says. Those of sentences, of the next run and of other packages are not '
+            'measured.',
             '',
-            *table(('number', 'value', 'what it is, and why', 'where'), others),
+            *table(
+                ('number', 'value', 'what it is, and why', 'where', '30 % smaller', '30 % larger'),
+                others,
+            ),
             '',
         ]
     )
+
+
+def _sensitivity(measured: Mapping[tuple[str, str], str], keys: Sequence[str]) -> list[str]:
+    """Return the cells of what was printed for numbers 30 % smaller and larger."""
+    cells = []
+    for factor in ('0.7', '1.3'):
+        scores = [measured.get((key, factor), 'not measured') for key in keys]
+        cells.append(cell('; '.join(dict.fromkeys(scores))))
+    return cells
+
+
+def _others(package: Path) -> Iterator[tuple[str, str, str, str, list[str]]]:
+    """Yield files, names, values, comments and keys of numbers that are no thresholds."""
+    for path in sorted(package.rglob('*.py')):
+        place = path.relative_to(package).as_posix()
+        for name, value, why in constants(path.read_text(encoding='utf-8')):
+            yield place, name, value, why, [f'{place} {one}' for one in name.split(', ')]
+    for place, name, value, why in _borrowed(package):
+        yield place, name, value, why, [name]
 
 
 def _meanings(docstring: str) -> dict[str, str]:
@@ -96,7 +113,7 @@ def _meanings(docstring: str) -> dict[str, str]:
     return found
 
 
-def _constants(source: str) -> Iterator[tuple[str, str, str]]:
+def constants(source: str) -> Iterator[tuple[str, str, str]]:
     """Yield names, values and the comment above of constants of a module that are numbers."""
     lines = source.splitlines()
     for node in ast.parse(source).body:
@@ -119,7 +136,7 @@ def _borrowed(package: Path) -> Iterator[tuple[str, str, str, str]]:
     for module, names in sorted(wanted.items()):
         path = package.parents[1].joinpath(*module.split('.')).with_suffix('.py')
         if path.is_file() and package not in path.parents:
-            for name, value, why in _constants(path.read_text(encoding='utf-8')):
+            for name, value, why in constants(path.read_text(encoding='utf-8')):
                 if name in names:
                     yield path.relative_to(package.parents[1]).as_posix(), name, value, why
 

@@ -4,12 +4,24 @@
 
 from dataclasses import fields
 
+from armid_ros.diagnosis.data import evidence, rows
+from armid_ros.diagnosis.search import held_out, rivals, step
 from armid_ros.diagnosis.settings import Thresholds
 import numpy as np
 import pytest
 
 from benchmarks.lived_scoring import LivedJudged, LivedTruth
-from benchmarks.thresholds import Asked, counts, deciding, one_case, SAMPLE, varied
+from benchmarks.thresholds import (
+    Asked,
+    changed,
+    counts,
+    deciding,
+    of_modules,
+    one_case,
+    SAMPLE,
+    scaled,
+    varied,
+)
 from benchmarks.two_days import Answer, Named
 
 NAMES = [field.name for field in fields(Thresholds)]
@@ -36,9 +48,32 @@ SILENT = LivedJudged(TRUTH, Answer('consistent'))
 @pytest.mark.parametrize('name', NAMES)
 @pytest.mark.parametrize('factor', [0.7, 1.3])
 def test_one_number_is_changed_and_no_other(name, factor):
-    changed, usual = varied([name], factor).thresholds, Thresholds()
-    assert [other for other in NAMES if getattr(changed, other) != getattr(usual, other)] == [name]
-    assert 0.0 < changed.confidence < 1.0
+    other, usual = varied([name], factor).thresholds, Thresholds()
+    assert [one for one in NAMES if getattr(other, one) != getattr(usual, one)] == [name]
+    assert 0.0 < other.confidence < 1.0
+
+
+def test_a_number_of_a_module_is_changed_wherever_it_was_imported_and_back_again():
+    usual = held_out.HARDLY
+    with changed(['search/held_out.py HARDLY', 'price', 'search/step.py _COMPARED'], 0.7):
+        assert held_out.HARDLY == rivals.HARDLY == pytest.approx(0.7 * usual)
+        assert step._COMPARED == round(0.7 * 8)
+    assert held_out.HARDLY == rivals.HARDLY == usual
+    assert step._COMPARED == 8
+
+
+def test_numbers_of_modules_are_all_found_once():
+    found = of_modules()
+    assert len(found) == len(set(found)) > 40
+    assert {'data/rows.py BLOCKS', 'data/evidence.py _REST_SPEED'} <= set(found)
+    with changed(found, 1.3):
+        assert rows.BLOCKS == 8
+        assert evidence._REST_SPEED == pytest.approx(0.026)
+
+
+def test_a_level_is_moved_by_what_is_beyond_it():
+    assert scaled(0.975, 0.7) == pytest.approx(0.9825)
+    assert scaled((1.0, -2), 0.5) == (0.5, -1)
 
 
 @pytest.mark.parametrize('guilty', [set(), {'price'}, {'price', 'many_causes'}, set(NAMES)])
