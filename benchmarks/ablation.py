@@ -102,7 +102,7 @@ RULES = {
     'needless names go': Rule('search.explain._pruned', all_names),
     'a small lead decides nothing': Rule('search.forward.undecided', no),
     'the simplest that closes the gap': Rule('search.step.likeliest', first),
-    'what contains a cause is no rival': Rule('search.step.contains', no),
+    'what contains a cause is no rival': Rule('search.step.says_no_more', no),
     'compared beside what each was': Rule('search.step._compared', as_they_are),
     'most of one joint matters': Rule('search.step._open_squares', nowhere),
     'small changes do not matter': Rule('search.step.material', yes),

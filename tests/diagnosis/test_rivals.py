@@ -4,7 +4,7 @@
 
 from types import SimpleNamespace
 
-from armid_ros.diagnosis.search.rivals import beaten, likeliest, rarity
+from armid_ros.diagnosis.search.rivals import beaten, likeliest, rarity, says_no_more
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 import numpy as np
@@ -32,7 +32,8 @@ def test_the_common_goes_first(bench, first, second):
 class Told:
     """A cause with what it takes of each of some blocks."""
 
-    def __init__(self, bench, name, gains):
+    def __init__(self, bench, name, gains, freedom=1.0):
+        self.freedom = freedom
         self.group = trial(bench, name, ('elbow',)).group
         self.gains = np.asarray(gains, dtype=float)
         self.gain = float(self.gains.sum())
@@ -65,3 +66,19 @@ def test_what_never_happens_is_taken_only_alone(bench):
     here = asked(10.0, object())
     assert likeliest([link, payload], {}, here) is payload
     assert likeliest([link], {}, here) is link
+
+
+@pytest.mark.parametrize(
+    ('ahead', 'noise', 'wanted'),
+    [(0.1, 0.1, False), (0.02, 0.1, True), (0.1, 10.0, True), (-0.1, 0.1, True)],
+)
+def test_a_body_that_contains_an_offset_is_a_rival_where_it_surely_says_more(
+    bench, monkeypatch, ahead, noise, wanted
+):
+    """A load on a link is a constant torque of a small range, and other torque besides."""
+    monkeypatch.setattr('armid_ros.diagnosis.search.rivals.contains', lambda *_: True)
+    gains = np.full(36, 10.0)
+    more = noise * np.random.default_rng(0).normal(size=36)
+    offset = Told(bench, 'torque_offset', gains)
+    body = Told(bench, 'link_inertia', (1.0 + ahead) * gains + more - more.mean(), freedom=10.0)
+    assert says_no_more(body, offset, asked(360.0, None)) == wanted

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from armid_ros.diagnosis.data.rows import fold_rows
 from armid_ros.diagnosis.search.held_out import denies, HARDLY, lead, ROUNDING, Trial
-from armid_ros.diagnosis.search.round import cost, Round
+from armid_ros.diagnosis.search.round import cost, Round, worth
 from armid_ros.effects import CATALOGUE
 import numpy as np
 
@@ -126,6 +126,15 @@ def contains(big: Trial, small: Trial, here: Round) -> bool:
     flat = columns.reshape(-1, big.group.size)
     fit = np.linalg.lstsq(flat, target.ravel(), rcond=1e-6)[0]
     return bool(np.sum((target.ravel() - flat @ fit) ** 2) < thresholds.contained * squares)
+
+
+def says_no_more(big: Trial, small: Trial, here: Round) -> bool:
+    """Return whether a cause contains another one and, its freedom paid for, explains no more."""
+    if not contains(big, small, here):
+        return False
+    thresholds = here.settings.thresholds
+    more, (_, z) = worth(big, here) - worth(small, here), lead(big, small)
+    return more <= 0.5 * thresholds.tie or z < thresholds.rival_z
 
 
 def denied_by_one(trial: Trial, here: Round) -> bool:

@@ -18,10 +18,10 @@ from armid_ros.diagnosis.search.refine import refine
 from armid_ros.diagnosis.search.rivals import (
     beaten,
     closes,
-    contains,
     denied_by_one,
     likeliest,
     rarity,
+    says_no_more,
     what_happens_first,
 )
 from armid_ros.diagnosis.search.round import acceptable, inside, material, Round, worth
@@ -156,7 +156,9 @@ class Look:
         winner = likeliest(able, self.closing, here)
         tied = [*(trial for trial in ahead if not beaten(first, trial, here)), first, *behind]
         rivals = [
-            trial for trial in tied if trial is not winner and not contains(trial, winner, here)
+            trial
+            for trial in tied
+            if trial is not winner and not says_no_more(trial, winner, here)
         ]
         best = {trial.group.effect.name: trial for trial in reversed(rivals)}
         likely = tuple(sorted(best.values(), key=rarity)[:_RIVALS])
