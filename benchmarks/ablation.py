@@ -99,7 +99,7 @@ RULES = {
     'names that may be nothing go': Rule('verdict.headline.may_be_nothing', no),
     'small names that close a gap stay': Rule('verdict.headline._opens', no),
     'names that other data deny go': Rule('verdict.attribution.Attribution.denied', no),
-    'needless names go': Rule('search.explain._pruned', all_names),
+    'needless names go': Rule('search.explain.pruned', all_names),
     'a small lead decides nothing': Rule('search.forward.undecided', no),
     'the simplest that closes the gap': Rule('search.step.likeliest', first),
     'what contains a cause is no rival': Rule('search.step.says_no_more', no),

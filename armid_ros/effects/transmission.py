@@ -26,8 +26,6 @@ from scipy.integrate import cumulative_trapezoid
 
 #: Inertia about a joint that is taken as some, of a link whose description gives none [kg m^2].
 _LIGHTEST = 1e-9
-#: Samples of a flight through a gap that are computed at first: most are over sooner.
-_LOOK_AHEAD = 32
 
 
 @dataclass(frozen=True)
@@ -123,26 +121,23 @@ def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
     """Return where between two stops something is that an acceleration pulls, shape (N,)."""
     speed = cumulative_trapezoid(pull, t, initial=0.0)
     way = cumulative_trapezoid(speed, t, initial=0.0)
-    side = 1.0 if pull[0] >= 0.0 else -1.0
-    backwards, forwards = (np.append(np.flatnonzero(p < 0.0), len(t)) for p in (pull, -pull))
-    place, start = np.empty(len(t)), 0
-    while start < len(t):
+    times, speeds, ways = t.tolist(), speed.tolist(), way.tolist()
+    count, half = len(t), 0.5 * width
+    backwards, forwards = (np.append(np.flatnonzero(p < 0.0), count) for p in (pull, -pull))
+    place, start = np.empty(count), 0
+    side = half if pull[0] >= 0.0 else -half
+    while start < count:
         away = backwards if side > 0.0 else forwards
         leave = int(away[np.searchsorted(away, start)])
-        place[start:leave] = 0.5 * side * width
-        if leave == len(t):
+        place[start:leave] = side
+        for start in range(leave, count):
+            flown = ways[start] - ways[leave] - speeds[leave] * (times[start] - times[leave])
+            if abs(side + flown) > half:
+                side = half if side + flown > 0.0 else -half
+                break
+            place[start] = side + flown
+        else:
             break
-        ahead, flight = _LOOK_AHEAD, np.empty(0)
-        while not np.any(np.abs(flight) > 0.5 * width) and leave + len(flight) < len(t):
-            seen = slice(leave, leave + ahead)
-            flown = way[seen] - way[leave] - speed[leave] * (t[seen] - t[leave])
-            flight, ahead = 0.5 * side * width + flown, 2 * ahead
-        landed = np.flatnonzero(np.abs(flight) > 0.5 * width)
-        length = max(int(landed[0]), 1) if len(landed) else len(flight)
-        place[leave : leave + length] = flight[:length]
-        start = leave + length
-        if start < len(t):
-            side = float(np.sign(flight[length]))
     return place
 
 

@@ -52,3 +52,16 @@ def test_a_search_for_no_cause_takes_none(bench, search):
     question = as_given(bench.arm, search.evidence.data, 0, LIBRARY)
     way = forward.Search(question, search.evidence, search.settings).forward()
     assert taken(way) == [] and way.first is None
+
+
+def test_a_shape_that_was_taken_is_no_cause_in_another_shape(bench):
+    def hidden(motion, tau):
+        return np.array([0.0, 0.6]) * np.sin(5.0 * motion.q + 0.4)
+
+    data = tuple(cut(bench.recordings(hidden)))
+    sigma = (np.full(2, TORQUE_NOISE),) * len(data)
+    settings = DiagnosisSettings(library=('torque_ripple', 'torque_offset'))
+    question = as_given(bench.arm, data, 4, settings.library)
+    way = forward.Search(question, Evidence(data, sigma, sigma), settings).forward()
+    assert taken(way) == [('torque_ripple', ('elbow',))]
+    assert ('torque_ripple', ('elbow',)) not in [one.group.key[:2] for one in way.last.ranking]

@@ -17,18 +17,19 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import make_problem, Problem
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start, Told
 from armid_ros.diagnosis.search.forward import Search, Taken
-from armid_ros.diagnosis.search.held_out import held_out, Trial
+from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.search.patch import Named
+from armid_ros.diagnosis.search.prune import doubtful, pruned, stands
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.resampled import widened
-from armid_ros.diagnosis.search.round import acceptable, Beside, beyond_chance, material, Round
+from armid_ros.diagnosis.search.round import Round
 from armid_ros.diagnosis.search.step import Step, Survey
+from armid_ros.diagnosis.search.view import View
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -137,7 +138,7 @@ def explain(
         question.arm, (), evidence.data, evidence.sigma, question.base, None, question.told
     )
     change = way.change if question.beside is question.arm else None
-    named, steps, fitted = _pruned(question, named, steps, values, evidence, settings, change)
+    named, steps, fitted = pruned(question, named, steps, values, evidence, settings, change)
     by_chance = 0.0 if last is None else last.by_chance
     fitted = widened(fitted, evidence, question.told, by_chance)
     said = {own.effect.name for own in named}
@@ -156,107 +157,6 @@ def explain(
         way.considered,
         baseline,
     )
-
-
-@dataclass(frozen=True)
-class View:
-    """
-    A fitted arm as a linear problem, from which names and free values can be taken away again.
-
-    Attributes
-    ----------
-    problem : Problem
-        All columns that were free, those of the base parameters first.
-    fitted : Fitted
-        The arm.
-
-    """
-
-    problem: Problem
-    fitted: Fitted
-
-    @classmethod
-    def of(cls, fitted: Fitted, evidence: Evidence) -> View:
-        """Make the problem of a fitted arm."""
-        problem = make_problem(
-            evidence.data, evidence.sigma, fitted.residual, list(fitted.columns)
-        )
-        return cls(problem, fitted)
-
-    @property
-    def first(self) -> int:
-        """The first column of a name."""
-        return int(self.problem.x.shape[2]) - len(self.fitted.estimate.values)
-
-    def columns(self, name: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Return the columns of the values of a name, and those of its shapes."""
-        values, shapes = self.fitted.places[name]
-        return tuple(self.first + k for k in values), tuple(self.first + k for k in shapes)
-
-    def value(self, column: int) -> float:
-        """Return the value of a column of a name."""
-        return float(self.fitted.estimate.values[column - self.first])
-
-    def without(
-        self, columns: Sequence[int], values: Sequence[float], gone: Sequence[int] = ()
-    ) -> tuple[Problem, tuple[int, ...], FloatArray, FloatArray]:
-        """
-        Return the problem as if some columns had a value of zero.
-
-        Parameters
-        ----------
-        columns : sequence of int
-            Columns to be put first, and their values given back to the residual.
-        values : sequence of float
-            Their values.
-        gone : sequence of int
-            Columns that are not there at all; their values were zero.
-
-        Returns
-        -------
-        problem : Problem
-        free : tuple of int
-            The other columns.
-        hold, pull : ndarray
-            How these are held.
-
-        """
-        size = self.problem.x.shape[2]
-        away = {*columns, *gone}
-        others = [c for c in range(size) if c not in away]
-        x = self.problem.x
-        y = self.problem.y + x[:, :, list(columns)] @ np.asarray(values, dtype=float)
-        moved = replace(self.problem, x=x[:, :, [*columns, *others]], y=y)
-        hold = self.fitted.hold[np.ix_(others, others)]
-        free = tuple(range(len(columns), len(columns) + len(others)))
-        return moved, free, hold, self.fitted.pull[others]
-
-    def dropped(self, column: int, value: float) -> View:
-        """Return the view as if a column had a value of zero."""
-        y = self.problem.y + self.problem.x[:, :, column] * value
-        return replace(self, problem=replace(self.problem, y=y))
-
-    def trial(
-        self,
-        group: Group,
-        columns: Sequence[int],
-        values: Sequence[float],
-        gone: Sequence[int] = (),
-    ) -> tuple[Trial | None, Problem, Beside, float]:
-        """Judge what is there already as if it were asked for now."""
-        problem, free, hold, pull = self.without(columns, values, gone)
-        moved = replace(group, columns=slice(0, len(columns)))
-        trials, power = held_out(problem, free, [moved], hold, pull)
-        beside = Beside(free, hold, pull)
-        return (trials[0] if trials else None), problem, beside, float(power.sum())
-
-    def trial_of(self, name: int) -> tuple[Trial | None, Problem, Beside, float]:
-        """Judge a name as if it were asked for now, beside the others."""
-        own = self.fitted.named[name]
-        columns, shapes = self.columns(name)
-        span = slice(0, len(columns))
-        group = Group.of(own.effect, span, own.kept, self.fitted.arm.robot)
-        return self.trial(group, columns, [self.value(c) for c in columns], shapes)
 
 
 def _friction(
@@ -302,13 +202,13 @@ def _friction(
             group = Group.of(effect, slice(0, 1), (0,), arm.robot)
             trial, problem, beside, power = view.trial(group, [column], [value], gone)
             if trial is None:
-                weak[k] = _doubtful(trial)
+                weak[k] = doubtful(trial)
                 continue
             total = power if whole[0] is None else whole[0]
             steps[k] = Step(trial, (), (trial,), total, whole[1], least)
             here = Round(evidence, work, settings, problem, beside, total, whole[1])
-            if not _stands(steps[k], here):
-                weak[k] = _doubtful(trial)
+            if not stands(steps[k], here):
+                weak[k] = doubtful(trial)
         if not weak:
             break
         _, column, value = alive.pop(max(weak, key=lambda k: weak[k]))
@@ -318,52 +218,3 @@ def _friction(
         (Named(effect, (0,)), steps[k], np.array([value]))
         for k, (effect, _, value) in alive.items()
     ]
-
-
-def _doubtful(trial: Trial | None) -> tuple[float, float]:
-    """Return an order of causes: likelier to be chance, and taking less; None is not seen."""
-    return (np.inf, np.inf) if trial is None else (trial.p, -trial.gain)
-
-
-def _stands(step: Step, here: Round) -> bool:
-    """Return whether a cause, whose columns come first, is there, and matters if it has to."""
-    trial = step.trial
-    if step.misfit_share is None:
-        return beyond_chance(trial, here)
-    gains = trial.joint_gains(here.problem, here.own(trial.group), here.free)
-    return acceptable(trial, here) and material(gains, here, step.misfit_share)
-
-
-def _pruned(
-    question: Question,
-    named: Sequence[Named],
-    steps: Sequence[Step],
-    values: Sequence[FloatArray],
-    evidence: Evidence,
-    settings: DiagnosisSettings,
-    change: FloatArray | None = None,
-) -> tuple[list[Named], list[Step], Fitted]:
-    """Fit all names together, and drop those that the others make needless."""
-    data, sigma = evidence.data, evidence.sigma
-    named, steps, values = list(named), list(steps), list(values)
-    base, told = question.base, question.told
-    while True:
-        fitted = fit(question.arm, named, data, sigma, base, Start(values, change), told)
-        if not named:
-            return named, steps, fitted
-        view = View.of(fitted, evidence)
-        work = Workspace(memoized_arm(question.arm), data)
-        needless: list[tuple[tuple[float, float], int]] = []
-        for k, step in enumerate(steps):
-            trial, problem, beside, _ = view.trial_of(k)
-            here = Round(evidence, work, settings, problem, beside, step.total, step.tried)
-            if trial is None:
-                needless.append((_doubtful(trial), k))
-            elif not _stands(replace(step, trial=trial), here):
-                needless.append((_doubtful(trial), k))
-        if not needless:
-            return list(fitted.named), steps, fitted
-        gone, change = max(needless)[1], fitted.change
-        named = [own for k, own in enumerate(fitted.named) if k != gone]
-        values = [own for k, own in enumerate(fitted.values) if k != gone]
-        steps.pop(gone)

@@ -148,14 +148,16 @@ class Search:
         way = group.key, group.effect.shape
         if way not in place.next:
             named, values = self._and_named(place, step)
-            if group.effect.linear and not group.effect.shapes:
+            if group.effect.linear:
                 arm = place.current.arm
                 before = None if place.before is None else place.before.and_columns(arm, group)
                 here = place.look.here
                 beside = here.beside.and_columns(group)
                 here = replace(here, beside=beside, before=before, known=None)
-                look = look_at(place.found.groups, here)
-                after = replace(place, before=before, look=look, next={})
+                others = tuple(one for one in place.found.groups if one.key != group.key)
+                found = replace(place.found, groups=others)
+                look = look_at(others, here)
+                after = replace(place, found=found, before=before, look=look, next={})
                 place.next[way] = replace(after, named=tuple(named), values=tuple(values))
             else:
                 total, change = place.look.survey.total, place.current.change

@@ -14,7 +14,7 @@ from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.data.rows import make_problem
 from armid_ros.diagnosis.search.candidates import candidates, Group
 from armid_ros.diagnosis.search.choice import Chosen, NOISE
-from armid_ros.diagnosis.search.explain import explain, Explanation, View
+from armid_ros.diagnosis.search.explain import explain, Explanation
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import held_out, Trial
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
@@ -22,6 +22,7 @@ from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.round import Beside, Round
 from armid_ros.diagnosis.search.step import look_at, Step, Survey
+from armid_ros.diagnosis.search.view import View
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
 from armid_ros.diagnosis.ties.ties import Ties

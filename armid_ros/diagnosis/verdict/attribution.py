@@ -17,8 +17,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import block_squares
 from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.explain import Explanation, View
+from armid_ros.diagnosis.search.explain import Explanation
 from armid_ros.diagnosis.search.held_out import denies, held_out
+from armid_ros.diagnosis.search.view import View
 from armid_ros.motion import FloatArray
 import numpy as np
 
