@@ -86,11 +86,12 @@ def nowhere(here: Any) -> np.ndarray:
     return np.full(here.problem.y.shape[1], np.inf)
 
 
-def all_names(question, named, steps, values, evidence, settings, change=None):
+def all_names(question, taken, evidence, settings, change=None):
     """Fit all names together and drop none."""
-    data, start = evidence.data, Start(values, change)
-    fitted = fit(question.arm, named, data, evidence.sigma, question.base, start, question.told)
-    return list(fitted.named), list(steps), fitted
+    named, start = [one.named for one in taken], Start([one.values for one in taken], change)
+    data, sigma = evidence.data, evidence.sigma
+    fitted = fit(question.arm, named, data, sigma, question.base, start, question.told)
+    return tuple(one.step for one in taken), fitted
 
 
 #: By the names of the table in docs/reference/rates.md.

@@ -84,8 +84,12 @@ def _sensitivity(measured: Mapping[tuple[str, str], str], keys: Sequence[str]) -
     """Return the cells of what was printed for numbers 30 % smaller and larger."""
     cells = []
     for factor in ('0.7', '1.3'):
-        scores = [measured.get((key, factor), 'not measured') for key in keys]
-        cells.append(cell('; '.join(dict.fromkeys(scores))))
+        scores = {key: cell(measured.get((key, factor), 'not measured')) for key in keys}
+        alike = len(set(scores.values())) == 1
+        said = [
+            score if alike else f'`{key.split()[-1]}`: {score}' for key, score in scores.items()
+        ]
+        cells.append('; '.join(dict.fromkeys(said)))
     return cells
 
 

@@ -28,7 +28,7 @@ def search(bench):
 
 
 def taken(way):
-    return [(own.effect.name, own.effect.joints) for own in way.named]
+    return [(own.effect.name, own.effect.joints) for own in (one.named for one in way.taken)]
 
 
 @pytest.mark.parametrize('undecided', [False, True])

@@ -6,6 +6,7 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search import forward, prune
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.question import as_given
+from armid_ros.diagnosis.search.step import Taken
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 import numpy as np
@@ -30,38 +31,39 @@ def prune_by(bench, monkeypatch):
     evidence, settings = Evidence(data, sigma, sigma), DiagnosisSettings(library=LIBRARY)
     question = as_given(bench.arm, data, 4, LIBRARY)
     way = forward.Search(question, evidence, settings).forward()
-    assert [own.effect.name for own in way.named] == ['viscous_friction', 'joint_spring']
+    assert [one.named.effect.name for one in way.taken] == ['viscous_friction', 'joint_spring']
 
     def pruned(*order, also=()):
         needless = iter(order)
         monkeypatch.setattr(prune, '_needless', lambda *_: next(needless))
+        step = way.taken[0].step
         more = [Named(CATALOGUE[name].on(bench.robot, ('elbow',)), (0,)) for name in also]
-        named, steps = [*way.named, *more], [*way.steps, *way.steps[: len(more)]]
-        values = [*way.values, *(np.ones(1) for _ in more)]
-        return prune.pruned(question, named, steps, values, evidence, settings)
+        taken = [*way.taken, *(Taken(own, step, np.ones(1)) for own in more)]
+        return prune.pruned(question, taken, evidence, settings)
 
     return pruned
 
 
 @pytest.mark.parametrize('dropped', [0, 1])
 def test_a_name_that_is_needed_after_all_comes_back(prune_by, dropped):
-    named, steps, fitted = prune_by(dropped, None, None)
-    values = {own.effect.name: value for own, value in zip(named, fitted.values, strict=True)}
+    steps, fitted = prune_by(dropped, None, None)
+    names = [own.effect.name for own in fitted.named]
+    values = dict(zip(names, fitted.values, strict=True))
     assert values['viscous_friction'] == pytest.approx([VISCOUS], rel=0.01)
     assert values['joint_spring'][0] == pytest.approx(STIFFNESS, rel=0.01)
-    assert [step.trial.group.effect.name for step in steps] == [own.effect.name for own in named]
+    assert [step.trial.group.effect.name for step in steps] == names
 
 
 def test_names_come_back_best_first(prune_by):
-    named, _, _ = prune_by(0, 0, None, None, None)
-    assert [own.effect.name for own in named] == ['viscous_friction', 'joint_spring']
+    _, fitted = prune_by(0, 0, None, None, None)
+    assert [own.effect.name for own in fitted.named] == ['viscous_friction', 'joint_spring']
 
 
 def test_a_name_comes_back_once(prune_by):
-    named, _, _ = prune_by(0, None, 1, None)
-    assert [own.effect.name for own in named] == ['joint_spring']
+    _, fitted = prune_by(0, None, 1, None)
+    assert [own.effect.name for own in fitted.named] == ['joint_spring']
 
 
 def test_what_nothing_needs_stays_away(prune_by):
-    named, _, _ = prune_by(2, None, also=('torque_offset',))
-    assert [own.effect.name for own in named] == ['viscous_friction', 'joint_spring']
+    _, fitted = prune_by(2, None, also=('torque_offset',))
+    assert [own.effect.name for own in fitted.named] == ['viscous_friction', 'joint_spring']

@@ -21,9 +21,9 @@ def rows(page):
 
 def test_each_has_a_value_and_a_reason():
     page = numbers_page(PACKAGE, MEASURED)
-    told = {row[0].strip('`'): row for row in rows(page)}
-    assert {field.name for field in fields(Thresholds)} <= set(told)
-    assert not [name for name, row in told.items() if not (row[1] and row[2])]
+    told = rows(page)
+    assert {field.name for field in fields(Thresholds)} <= {row[0].strip('`') for row in told}
+    assert not [row for row in told if not (row[1] and row[2])]
 
 
 def test_what_decides_is_few():
@@ -33,6 +33,13 @@ def test_what_decides_is_few():
 def test_what_was_measured_stands_beside_it():
     (price,) = (row for row in rows(numbers_page(PACKAGE, MEASURED)) if row[0] == '`price`')
     assert price[3:] == ['8 of 10 first', 'not measured']
+
+
+def test_numbers_of_one_line_are_told_apart_where_they_differ(tmp_path):
+    (tmp_path / 'module.py').write_text('#: Why.\n_ONE, _TWO = 1.0, 2.0\n')
+    measured = 'module.py _ONE   0.7  all\nmodule.py _TWO   0.7  none\n'
+    (row,) = (row for row in rows(numbers_page(tmp_path, measured)) if row[0] == '`_ONE, _TWO`')
+    assert row[4:] == ['`_ONE`: all; `_TWO`: none', 'not measured']
 
 
 def test_a_number_without_a_comment_is_noticed(tmp_path):

@@ -49,6 +49,7 @@ _UNITS = {
         for unit, count in TORQUE_UNITS.items()
     },
 }
+#: A factor of torques is that of a unit if it is within this factor of it.
 _NEAR = 1.5
 #: A torque of so many times the limit of its drive is said.
 _BEYOND = 1.5

@@ -19,7 +19,7 @@ from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start, Told
-from armid_ros.diagnosis.search.forward import Search, Taken
+from armid_ros.diagnosis.search.forward import Search
 from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.search.patch import Named
@@ -28,7 +28,7 @@ from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.resampled import widened
 from armid_ros.diagnosis.search.round import Round
-from armid_ros.diagnosis.search.step import Step, Survey
+from armid_ros.diagnosis.search.step import Step, Survey, Taken
 from armid_ros.diagnosis.search.view import View
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.model import BaseParameters
@@ -127,28 +127,25 @@ def explain(
 ) -> Explanation:
     """Take causes as long as any passes, then name the friction that matters, and prune."""
     way = Search(question, evidence, settings, baseline, unseen).forward(start)
-    named, steps, values, survey, last = way.named, way.steps, way.values, way.first, way.last
+    survey, last = way.first, way.last
     minor = () if last is None else last.there
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
-    kept = _friction(question, named, values, evidence, settings, whole)
-    named = [*named, *(own for own, _, _ in kept)]
-    steps = [*steps, *(step for _, step, _ in kept)]
-    values = [*values, *(value for _, _, value in kept)]
+    taken = [*way.taken, *_friction(question, way.taken, evidence, settings, whole)]
     reference = fit(
         question.arm, (), evidence.data, evidence.sigma, question.base, None, question.told
     )
     change = way.change if question.beside is question.arm else None
-    named, steps, fitted = pruned(question, named, steps, values, evidence, settings, change)
+    steps, fitted = pruned(question, taken, evidence, settings, change)
     by_chance = 0.0 if last is None else last.by_chance
     fitted = widened(fitted, evidence, question.told, by_chance)
-    said = {own.effect.name for own in named}
+    said = {own.effect.name for own in fitted.named}
     small = tuple(trial for trial in minor if trial.group.effect.name not in said)
     return Explanation(
         question.arm,
         question.base,
         fitted,
         reference,
-        tuple(steps),
+        steps,
         survey,
         evidence,
         small,
@@ -161,8 +158,7 @@ def explain(
 
 def _friction(
     question: Question,
-    named: Sequence[Named],
-    values: Sequence[FloatArray],
+    taken: Sequence[Taken],
     evidence: Evidence,
     settings: DiagnosisSettings,
     whole: tuple[float | None, int],
@@ -179,9 +175,8 @@ def _friction(
         return []
     arm, base = question.beside, question.beside_base
     assert base is not None
-    fitted = fit(
-        arm, named, evidence.data, evidence.sigma, base, Start(values), question.beside_told
-    )
+    named, start = [one.named for one in taken], Start([one.values for one in taken])
+    fitted = fit(arm, named, evidence.data, evidence.sigma, base, start, question.beside_told)
     view = View.of(fitted, evidence)
     where = {int(column): k for k, column in enumerate(base.independent)}
     names = [(p.name, p.joint) for p in arm.parameters]
@@ -215,6 +210,6 @@ def _friction(
         view = view.dropped(column, value)
         gone.append(column)
     return [
-        (Named(effect, (0,)), steps[k], np.array([value]))
+        Taken(Named(effect, (0,)), steps[k], np.array([value]))
         for k, (effect, _, value) in alive.items()
     ]

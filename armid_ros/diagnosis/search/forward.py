@@ -23,13 +23,10 @@ from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.rivals import undecided
 from armid_ros.diagnosis.search.round import Before, beside_fit, Later, Round
-from armid_ros.diagnosis.search.step import Look, look_at, Step, Survey
+from armid_ros.diagnosis.search.step import Look, look_at, Step, Survey, Taken
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
-
-#: A name with its step and the values it starts from, one for each of its parameters.
-Taken = tuple[Named, Step, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -39,12 +36,8 @@ class Way:
 
     Attributes
     ----------
-    named : list of Named
+    taken : tuple of Taken
         The causes.
-    steps : list of Step
-        How each was taken.
-    values : list of ndarray
-        Values of all parameters of each.
     first, last : Survey or None
         The first look at all causes, and the last one.
     change : ndarray, shape (r,), or None
@@ -54,9 +47,7 @@ class Way:
 
     """
 
-    named: list[Named]
-    steps: list[Step]
-    values: list[FloatArray]
+    taken: tuple[Taken, ...]
     first: Survey | None
     last: Survey | None
     change: FloatArray | None = None
@@ -104,22 +95,24 @@ class Search:
 
     def forward(self, start: Sequence[Taken] = ()) -> Way:
         """Take causes beside those to start with as long as any passes."""
-        steps = [row[1] for row in start]
         if not self.question.most:
-            return Way([row[0] for row in start], steps, [row[2] for row in start], None, None)
-        first = self._fitted_place([row[0] for row in start], [row[2] for row in start], None)
+            return Way(tuple(start), None, None)
+        steps = [one.step for one in start]
+        named, values = [one.named for one in start], [one.values for one in start]
+        first = self._fitted_place(named, values, None)
         way = self._way(first, steps, 0.0)
         assert way.last is not None
         width, considered = way.last.most, self._considered(way)
         here = replace(first.look.here, total=None, before=None, width=width)
-        if any(undecided(step.trial, step.ranking, here) for step in way.steps[len(start) :]):
+        found = [one.step for one in way.taken[len(start) :]]
+        if any(undecided(step.trial, step.ranking, here) for step in found):
             way = self._way(first, steps, width)
         return replace(way, considered=considered | self._considered(way))
 
     def _considered(self, way: Way) -> frozenset[str]:
         """Return what was taken or could have been, and what takes most of the rest."""
         arm = self.question.arm
-        trials = [trial for step in way.steps for trial in (step.trial, *step.rivals)]
+        trials = [trial for one in way.taken for trial in (one.step.trial, *one.step.rivals)]
         trials += [] if way.last is None else way.last.ranking[:1]
         effects = [trial.group.effect for trial in trials]
         zeros = [np.zeros(len(effect.parameters(arm.robot))) for effect in effects]
@@ -130,17 +123,20 @@ class Search:
     def _way(self, place: _Place, steps: Sequence[Step], width: float) -> Way:
         """Go from a place, where a lead of less than some squares decides nothing."""
         first, taken = place.look.survey, list(steps)
+        named, values = list(place.named), list(place.values)
         for left in range(self.question.most, 0, -1):
             step = place.look.step(width)
             if step is None:
                 break
             taken.append(step)
-            if left == 1:
-                named, values = self._and_named(place, step)
-                return Way(named, taken, values, first, place.look.survey, place.current.change)
-            place = self._after(place, step)
-        named, values = list(place.named), list(place.values)
-        return Way(named, taken, values, first, place.look.survey, place.current.change)
+            named, values = self._and_named(place, step)
+            if left > 1:
+                place = self._after(place, step)
+                named, values = list(place.named), list(place.values)
+        rows = zip(named, taken, values, strict=True)
+        return Way(
+            tuple(Taken(*row) for row in rows), first, place.look.survey, place.current.change
+        )
 
     def _after(self, place: _Place, step: Step) -> _Place:
         """Return the place behind a step."""

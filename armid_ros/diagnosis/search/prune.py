@@ -5,17 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
-from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.round import acceptable, beyond_chance, material, Round
-from armid_ros.diagnosis.search.step import Step
+from armid_ros.diagnosis.search.step import Step, Taken
 from armid_ros.diagnosis.search.view import View
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -36,52 +35,55 @@ def stands(step: Step, here: Round) -> bool:
     return acceptable(trial, here) and material(gains, here, step.misfit_share)
 
 
-@dataclass(frozen=True)
-class _Dropped:
-    """A name that the others made needless."""
-
-    named: Named
-    step: Step
-
-
 def pruned(
     question: Question,
-    named: Sequence[Named],
-    steps: Sequence[Step],
-    values: Sequence[FloatArray],
+    taken: Sequence[Taken],
     evidence: Evidence,
     settings: DiagnosisSettings,
     change: FloatArray | None = None,
-) -> tuple[list[Named], list[Step], Fitted]:
+) -> tuple[tuple[Step, ...], Fitted]:
     """
     Fit all names together, and drop those that the others make needless.
 
     What made a name needless may be dropped after it: each is asked once more beside those that
     stay.
 
+    Returns
+    -------
+    steps : tuple of Step
+        Those of the names that stay.
+    fitted : Fitted
+        The arm with these names.
+
     """
-    data, sigma = evidence.data, evidence.sigma
-    named, steps, values = list(named), list(steps), list(values)
-    base, told = question.base, question.told
-    work = Workspace(memoized_arm(question.arm), data)
-    dropped: list[_Dropped] = []
+    work = Workspace(memoized_arm(question.arm), evidence.data)
+    alive, dropped = list(taken), list[Taken]()
     back: list[Step] = []
     while True:
-        fitted = fit(question.arm, named, data, sigma, base, Start(values, change), told)
-        named, values, change = list(fitted.named), list(fitted.values), fitted.change
+        fitted = fit(
+            question.arm,
+            [one.named for one in alive],
+            evidence.data,
+            evidence.sigma,
+            question.base,
+            Start([one.values for one in alive], change),
+            question.told,
+        )
+        steps, change = tuple(one.step for one in alive), fitted.change
+        rows = zip(fitted.named, steps, fitted.values, strict=True)
+        alive = [Taken(*row) for row in rows]
         needless = _needless(fitted, steps, evidence, settings, work)
         if needless is not None:
-            values.pop(needless)
-            gone = _Dropped(named.pop(needless), steps.pop(needless))
+            gone = alive.pop(needless)
             if not any(gone.step is step for step in back):
                 dropped.append(gone)
             continue
         needed = _needed_after_all(fitted, dropped, evidence, settings, work)
         if needed is None:
-            return named, steps, fitted
-        own, value = dropped.pop(needed[0]), needed[1]
-        back.append(own.step)
-        named, steps, values = [*named, own.named], [*steps, own.step], [*values, value]
+            return steps, fitted
+        again = dropped.pop(needed[0])._replace(values=needed[1])
+        back.append(again.step)
+        alive.append(again)
 
 
 def _needless(
@@ -92,6 +94,8 @@ def _needless(
     work: Workspace,
 ) -> int | None:
     """Return the name that is likeliest to be chance beside the others; None if all stand."""
+    if not steps:
+        return None
     weak: list[tuple[tuple[float, float], int]] = []
     view = View.of(fitted, evidence)
     for k, step in enumerate(steps):
@@ -104,7 +108,7 @@ def _needless(
 
 def _needed_after_all(
     fitted: Fitted,
-    dropped: Sequence[_Dropped],
+    dropped: Sequence[Taken],
     evidence: Evidence,
     settings: DiagnosisSettings,
     work: Workspace,
@@ -112,17 +116,16 @@ def _needed_after_all(
     """Return which dropped name takes most beside those that stay, and its values."""
     if not dropped:
         return None
-    view = View.of(fitted, evidence, [own.named for own in dropped])
+    view = View.of(fitted, evidence, [one.named for one in dropped])
     found: dict[int, Trial] = {}
-    for k, own in enumerate(dropped):
+    for k, one in enumerate(dropped):
         trial, problem, beside, _ = view.trial_of_more(k)
-        here = Round(evidence, work, settings, problem, beside, own.step.total, own.step.tried)
-        if trial is not None and stands(replace(own.step, trial=trial), here):
+        here = Round(evidence, work, settings, problem, beside, one.step.total, one.step.tried)
+        if trial is not None and stands(replace(one.step, trial=trial), here):
             found[k] = trial
     if not found:
         return None
     most = max(found, key=lambda k: found[k].gain)
-    effect, kept = dropped[most].named.effect, dropped[most].named.kept
-    values = np.zeros(len(effect.parameters(fitted.arm.robot)))
-    values[list(kept)] = found[most].values
+    values = np.zeros_like(dropped[most].values)
+    values[list(dropped[most].named.kept)] = found[most].values
     return most, values

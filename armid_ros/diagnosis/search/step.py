@@ -8,11 +8,13 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
+from typing import NamedTuple
 
 from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.exchange import changed, surely_changed
 from armid_ros.diagnosis.search.held_out import Trial, tried_beside
 from armid_ros.diagnosis.search.own_noise import explains_itself, made_of_noise, without_echo
+from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.products import products, with_group
 from armid_ros.diagnosis.search.refine import refine
 from armid_ros.diagnosis.search.rivals import (
@@ -69,6 +71,14 @@ class Step:
     total: float
     tried: int
     misfit_share: float | None
+
+
+class Taken(NamedTuple):
+    """A name with its step, and the values of all its parameters."""
+
+    named: Named
+    step: Step
+    values: FloatArray
 
 
 @dataclass(frozen=True)

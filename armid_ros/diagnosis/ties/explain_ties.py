@@ -21,7 +21,7 @@ from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.round import Beside, Round
-from armid_ros.diagnosis.search.step import look_at, Step, Survey
+from armid_ros.diagnosis.search.step import look_at, Step, Survey, Taken
 from armid_ros.diagnosis.search.view import View
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
@@ -61,7 +61,8 @@ def diagnose_ties(
     if _open(found, settings):
         most = settings.thresholds.many_causes
         question = Question(arm, prepared.base, arm, prepared.base, (), most)
-        known = list(zip(fitted.named, found.steps, fitted.values, strict=True))
+        rows = zip(fitted.named, found.steps, fitted.values, strict=True)
+        known = [Taken(*row) for row in rows]
         more = explain(question, found.evidence, settings, known)
         fitted = ties.surely(more.fitted.named)
         if not any(isinstance(own.effect, Tied) for own in fitted.named):
