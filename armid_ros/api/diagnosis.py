@@ -27,7 +27,7 @@ from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
 from armid_ros.files import write_file
 from armid_ros.identification import SignalSettings
-from armid_ros.recording import Recording
+from armid_ros.recording import Recording, require_once
 from armid_ros.report.notation import with_interval
 from armid_ros.residual import (
     learn_residual,
@@ -248,6 +248,7 @@ def diagnose(
     looked_at, held_out, before = with_sources_apart(
         *(recordings_of(group, model.robot) for group in (recordings, validate, baseline))
     )
+    require_once([*looked_at, *before], held_out)
     more: dict[str, Any] = {'baseline': before} if before else {}
     settings = DiagnosisSettings(signals=SignalSettings(cutoff, decimation))
     result = run(

@@ -139,13 +139,20 @@ def test_an_extra_that_fails_costs_no_result(files, tmp_path, monkeypatch):
 
     monkeypatch.setattr('armid_ros.cli.diagnose.files.next_run', broken)
     monkeypatch.setattr('armid_ros.cli.diagnose.files.simulate_held_out', broken)
-    result = armid(
-        'diagnose', *bags, '--robot', urdf, '--model', model, '--validate', bags[0], '--out', out
-    )
+    asked = ('--robot', urdf, '--model', model, '--validate', bags[-1])
+    result = armid('diagnose', *bags[:-1], *asked, '--out', out)
     assert result.output.count('no motion at all') == 2
     document = json.loads((out / 'diagnosis.json').read_text())
     assert document['effects']
     assert (document['next_run'], document['forward']) == (None, [])
+
+
+@pytest.mark.parametrize('role', ['--validate', '--baseline'])
+def test_a_recording_has_one_role(files, tmp_path, role):
+    urdf, model, bags = files
+    asked = ('--robot', urdf, '--model', model, role, bags[0], '--out', tmp_path / 'o')
+    said = armid('diagnose', *bags, *asked, code=2).stderr
+    assert f'given twice, or in two roles: {bags[0]}; give each recording once' in said
 
 
 def test_a_baseline_of_the_same_day_leaves_nothing_to_name(files, tmp_path):

@@ -22,7 +22,7 @@ from armid_ros.errors import ArmidError
 from armid_ros.files import json_text
 from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.identifiability import excludes_zero
-from armid_ros.recording import Recording
+from armid_ros.recording import Recording, require_once
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import percent, probability, with_interval
 from armid_ros.residual import require_libraries, TABLE_FILE
@@ -78,6 +78,7 @@ class DiagnosisData:
             options.read(paths, robot, self.topic)
             for paths in (self.bags, self.validate, self.baseline)
         )
+        require_once([*recordings, *before], held_out)
         options.tell_damage(*recordings, *held_out, *before)
         if partner is not None:
             how = options.read_settings()

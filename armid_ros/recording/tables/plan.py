@@ -260,10 +260,13 @@ def _scaled(
         given = per_joint(settings.position_scale, joints, 'the scale of positions')
         return replace(source, factor=given, unit=f'units of the file times {_short(given)}')
     if settings.degrees and source.unit not in _TURNS:
-        unit = 'deg' if source.quantity == 'position' else 'deg/s'
-        return replace(source, factor=np.where(slides, 1.0, np.pi / 180), unit=unit)
+        source = replace(source, factor=np.full(len(slides), np.pi / 180), unit='deg')
     if source.quantity == 'velocity' and source.unit == 'deg':
-        return replace(source, unit='deg/s')
+        source = replace(source, unit='deg/s')
+    if source.unit in _TURNS and slides.any():
+        way = 'm' if source.quantity == 'position' else 'm/s'
+        unit = f'{source.unit}, of joints that slide in {way}'
+        return replace(source, factor=np.where(slides, 1.0, source.factor), unit=unit)
     if slides.all() and source.unit in ('rad', 'rad/s'):
         return replace(source, unit=source.unit.replace('rad', 'm'))
     return source

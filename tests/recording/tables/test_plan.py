@@ -110,6 +110,15 @@ def test_elements_of_a_state_vector_are_told_apart_by_their_endings():
         np.testing.assert_allclose(recording.tau[-1], [3, 6])
 
 
+@pytest.mark.parametrize('names', [('q_deg_1', 'q_deg_2'), ('q1[deg]', 'q2[deg]')])
+def test_a_unit_of_turns_in_the_header_is_none_of_a_joint_that_slides(names):
+    columns = ramps(*names)
+    settled = plan(columns, ColumnSettings(), JOINTS, [False, True])
+    recording = measured(settled)
+    np.testing.assert_allclose(recording.q[-1], [np.radians(1.0), 2.0])
+    assert 'of joints that slide in m' in settled.sources[0].unit
+
+
 def test_large_ways_of_a_joint_that_slides_are_doubted_apart():
     columns = table(q1=np.linspace(0, 1, 50), q2=np.linspace(0, 180, 50))
     (note,) = plan(columns, ColumnSettings(), JOINTS, [False, True]).notes
