@@ -276,13 +276,13 @@ def _ended(
             under_way[tasks.last.key] = tasks
             ended.add(tasks.last)
         future = next(ended)
+        outcome = _fetched(future)
         if future.status in _BROKEN:
             return False
         tasks = under_way.pop(future.key)
-        known = tasks.arm.refused
-        if future.status == 'finished':
-            outcome: ArmOutcome = future.result()
-            outcomes.append(replace(outcome, refused=(*known, *outcome.refused)))
+        if outcome is not None:
+            refused = (*tasks.arm.refused, *outcome.refused)
+            outcomes.append(replace(outcome, refused=refused))
             continue
         left, failed = _without_failed(tasks, client, jobs[job_of[tasks.arm.arm].digest])
         for one in failed:
@@ -293,6 +293,16 @@ def _ended(
             problem = 'no bag of it can be used' if failed else _said(future.exception())
             outcomes.append(ArmOutcome(left.arm, refused=left.refused, problem=problem))
     return True
+
+
+def _fetched(future: Future) -> ArmOutcome | None:
+    """Return what became of an arm; None where its tasks failed, which its future then says."""
+    try:
+        outcome: ArmOutcome = future.result()
+    except Exception:
+        # Also of an arm that had finished, where its worker ended and it could not be redone.
+        return None
+    return outcome
 
 
 def _submitted(client: Client, arm: _Waiting, job: Future, tally: Tally) -> _UnderWay:

@@ -3,6 +3,7 @@
 """Workers killed, bags damaged, stores that fail, schedulers lost: every bag ends somewhere."""
 
 from dataclasses import replace
+from functools import partial
 import os
 from pathlib import Path
 import shutil
@@ -188,6 +189,45 @@ def test_a_bag_that_ends_its_workers_is_given_up_and_the_others_are_used(bags, t
     assert (outcome.done, refused.failed) == (8, True)
     assert refused.bag.url.endswith('arm_0001/2026-01-02')
     assert 'workers ended' in refused.reason
+
+
+class Deadly:
+    """An outcome that ends the worker from which it is fetched."""
+
+    def __reduce__(self):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def arm_the_end(folder):
+    """Let the end of one arm be lost twice: as it is fetched, and as it is done again."""
+    from armid_ros.fleet import run
+
+    whole = run.finish
+
+    def trapped(arm, *of):
+        outcome = whole(arm, *of)
+        for step in ('fetched', 'again') if arm == 'arm_0001' else ():
+            try:
+                (folder / step).touch(exist_ok=False)
+            except FileExistsError:
+                continue
+            if step == 'fetched':
+                return Deadly()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return outcome
+
+    run.finish = trapped
+
+
+def test_an_arm_whose_result_is_lost_with_its_worker_is_done_again(bags, tmp_path):
+    out = tmp_path / 'out'
+    everything = find_bags([f'{bags}/*/*'])
+    with dask.config.set({'distributed.scheduler.allowed-failures': 0}):
+        with connected(None, 2) as client:
+            client.register_worker_callbacks(partial(arm_the_end, tmp_path))
+            outcome = identified(client, everything, URDF, str(out), FIXED)
+    assert (tmp_path / 'again').exists()
+    assert (outcome.done, outcome.refused) == (9, ())
 
 
 def test_a_worker_that_is_given_up_is_started_anew():
