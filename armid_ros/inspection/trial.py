@@ -13,6 +13,7 @@ from armid_ros.identification import (
     identify,
     Score,
 )
+from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -86,7 +87,7 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         condition_number=result.condition_number,
         cutoff_hz=result.used.cutoff_hz,
         scale=_scale(robot, motions),
-        notes=result.notes,
+        notes=(*result.notes, *(one.text for one in held_elsewhere(robot, [recording], motions))),
     )
 
 

@@ -19,7 +19,7 @@ from armid_ros.recording.mcap.recover import recover, RecoveryReport
 from armid_ros.recording.partner_motion import PartnerMotion
 from armid_ros.recording.qos import LATCHED, QosProfile
 from armid_ros.recording.reader import read_recording
-from armid_ros.recording.recording import ReadReport, Recording, TimeGap
+from armid_ros.recording.recording import PositionRange, ReadReport, Recording, TimeGap
 from armid_ros.recording.settings import ReadSettings
 from armid_ros.recording.source import RawMessage, Topic
 from armid_ros.recording.string_message import read_robot_description, string_cdr
@@ -38,6 +38,7 @@ __all__ = [
     'ReadReport',
     'ReadSettings',
     'TimeGap',
+    'PositionRange',
     'PartnerMotion',
     'recorded_together',
     'given_twice',

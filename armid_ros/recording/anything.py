@@ -21,6 +21,7 @@ from armid_ros.recording.tables import (
     name_in_file,
     open_table,
     plan,
+    renamed,
     TablePlan,
 )
 
@@ -79,7 +80,10 @@ def read_anything(
         if is_ros1(path)
         else read_recording(path, joints=called, topic=topic, settings=settings)
     )
-    return replace(recording, joints=tuple(joints))
+    others = tuple(
+        replace(other, joint=renamed(other.joint, columns.rename)) for other in recording.others
+    )
+    return replace(recording, joints=tuple(joints), others=others)
 
 
 def _read_ros1(path: Path, joints: Sequence[str], topic: str | None) -> Recording:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from armid_ros.errors import RecordingError
@@ -14,7 +15,13 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.decoder import JointStateDecoder, JointStates
 from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.recording import Clock, ReadReport, Recording, TimeGap
+from armid_ros.recording.recording import (
+    Clock,
+    PositionRange,
+    ReadReport,
+    Recording,
+    TimeGap,
+)
 from armid_ros.recording.series import (
     choose_clock,
     clock_problem,
@@ -50,7 +57,8 @@ def read_recording(
         A rosbag2 directory (MCAP or SQLite, split, compressed, with or without metadata.yaml), or
         a file .mcap or .db3. A file cut off by a crash is read as far as it goes.
     joints : sequence of str
-        The joints wanted, in this order; others in the messages (a gripper's) are passed over.
+        The joints wanted, in this order; of others in the messages (a gripper's) the range of the
+        positions is kept.
     topic : str, optional
         Topic of sensor_msgs/JointState; by default the only one, or the only one that names all
         the joints, or of several such the only one called 'joint_states'.
@@ -138,7 +146,9 @@ def assemble(
         damage=damage,
         **counts,
     )
-    return _recording(path, topic, joints, int(stamps[0]), t, (q, dq, tau), clock, report)
+    recording = _recording(path, topic, joints, int(stamps[0]), t, (q, dq, tau), clock, report)
+    others = tuple(PositionRange(name, *ends) for name, ends in decoder.others.items())
+    return replace(recording, others=others)
 
 
 def _recording(

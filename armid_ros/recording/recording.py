@@ -35,6 +35,25 @@ class TimeGap:
 
 
 @dataclass(frozen=True)
+class PositionRange:
+    """
+    Where a joint was that was recorded beside those asked for.
+
+    Attributes
+    ----------
+    joint : str
+        Its name.
+    lowest, highest : float
+        Positions [rad or m].
+
+    """
+
+    joint: str
+    lowest: float
+    highest: float
+
+
+@dataclass(frozen=True)
 class ReadReport:
     """
     What reading a recording met on the way, by count.
@@ -156,6 +175,8 @@ class Recording:
         What was repaired or dropped on the way.
     partner : PartnerMotion or None
         Another machine that was recorded with the arm.
+    others : tuple of PositionRange
+        Joints in the same messages or columns that were not asked for.
 
     Examples
     --------
@@ -184,6 +205,7 @@ class Recording:
     clock: Clock = 'header'
     report: ReadReport = field(default_factory=ReadReport)
     partner: PartnerMotion | None = None
+    others: tuple[PositionRange, ...] = ()
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check their shapes."""

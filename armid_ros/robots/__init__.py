@@ -11,10 +11,10 @@ Robots: what a URDF says of an arm, and the robots that come with the package.
 
 from armid_ros.robots.collision import Clearance, collision_model, CollisionModel
 from armid_ros.robots.gravity import GRAVITIES, parse_gravity
-from armid_ros.robots.load import load_robot, robot_from_urdf
+from armid_ros.robots.load import described_at, load_robot, robot_from_urdf
 from armid_ros.robots.mounting import Mounting, read_mounting
 from armid_ros.robots.robot import PARAMETERS_PER_BODY, Robot
-from armid_ros.robots.selection import driven_in_words
+from armid_ros.robots.selection import driven_in_words, held_joints, HeldJoint
 from armid_ros.robots.shipped import shipped_robots
 
 __all__ = [
@@ -22,6 +22,9 @@ __all__ = [
     'robot_from_urdf',
     'shipped_robots',
     'driven_in_words',
+    'held_joints',
+    'HeldJoint',
+    'described_at',
     'Robot',
     'PARAMETERS_PER_BODY',
     'parse_gravity',

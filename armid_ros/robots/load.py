@@ -128,7 +128,7 @@ def robot_from_urdf(
     with reading(source, RobotError):
         description = parse_description(parse_xml(text, source), source)
         driven = driven_joints(description, joints, source)
-        model, locked = _kinematic_model(description, driven, source)
+        model, locked = _kinematic_model(description, driven, source, {})
     model.gravity = pin.Motion(parse_gravity(gravity), np.zeros(3))
     by_name = {joint.name: joint for joint in driven}
     driven = tuple(by_name[name] for name in list(model.names)[1:])
@@ -169,13 +169,35 @@ def _xacro_arguments(source: str | Path) -> tuple[str | Path, dict[str, str]]:
     return first, arguments
 
 
+def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
+    """
+    Return the robot of the description with joints that are not driven where they are.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its inertias are passed over for those of its description; its gravity is kept.
+    positions : mapping of str to float
+        Of joints that are not driven [rad or m]; what mimics one of them follows it, and those
+        that are not named are where ``load_robot`` has them.
+
+    """
+    description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
+    driven = [description.by_name[joint] for joint in robot.joints]
+    model, _ = _kinematic_model(description, driven, robot.name, positions)
+    return replace(robot, model=model).with_gravity(robot.gravity)
+
+
 def _kinematic_model(
-    description: Description, driven: Sequence[Joint], source: str
+    description: Description,
+    driven: Sequence[Joint],
+    source: str,
+    known: Mapping[str, float],
 ) -> tuple[pin.Model, tuple[str, ...]]:
     """Build the model of the driven joints; also say where the others are locked."""
     moving = {joint.name for joint in driven}
     positions = {
-        joint.name: standing_position(description, joint)
+        joint.name: standing_position(description, joint, known)
         for joint in description.movable()
         if joint.name not in moving
     }

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from armid_ros.errors import RobotError
 from armid_ros.robots.description import Description, Joint, parse_description, parse_xml
@@ -17,6 +18,33 @@ GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
 _NAMED = 8
 #: Branches of fewer joints are no arms: a head, a trunk.
 SHORTEST_ARM = 3
+
+
+@dataclass(frozen=True)
+class HeldJoint:
+    """
+    A joint that could move and is not driven.
+
+    Attributes
+    ----------
+    name : str
+        In the description.
+    position : float
+        Where the model holds it [rad or m].
+    unit : str
+        'rad' or 'm'.
+    follows : str
+        The joint that it mimics; empty for one of its own.
+    carries : tuple of str
+        The driven joints that it moves.
+
+    """
+
+    name: str
+    position: float
+    unit: str
+    follows: str
+    carries: tuple[str, ...]
 
 
 def driven_joints(
@@ -95,11 +123,10 @@ def _driven_before(joint: Joint, after: dict[str, list[Joint]]) -> set[str]:
 def driven_in_words(robot: Robot) -> tuple[str, ...]:
     """Say which joints that could move are not driven, and whether those of several arms are."""
     description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
-    locked = []
-    for joint in description.movable():
-        if joint.name not in robot.joints:
-            follows = f' (follows {joint.mimic.joint})' if joint.mimic else ''
-            locked.append(joint.name + follows)
+    locked = [
+        f'{joint.name} (follows {joint.follows})' if joint.follows else joint.name
+        for joint in held_joints(robot)
+    ]
     arms = several_arms(description, [description.by_name[name] for name in robot.joints])
     if not locked:
         return arms
@@ -108,11 +135,28 @@ def driven_in_words(robot: Robot) -> tuple[str, ...]:
     return (f'not driven, and locked: {named}{more}; --joints A,B,... chooses others', *arms)
 
 
-def standing_position(description: Description, joint: Joint) -> float:
-    """Position [rad or m] at which a joint that is not driven stands: 0 or what is nearest."""
+def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
+    """Return the joints of the description that could move and are not driven."""
+    description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
+    carriers = {name: _carriers(description, [description.by_name[name]]) for name in robot.joints}
+    return tuple(
+        HeldJoint(
+            joint.name,
+            standing_position(description, joint, {}),
+            'm' if joint.kind == 'prismatic' else 'rad',
+            joint.mimic.joint if joint.mimic else '',
+            tuple(name for name in robot.joints if joint.name in carriers[name]),
+        )
+        for joint in description.movable()
+        if joint.name not in robot.joints
+    )
+
+
+def standing_position(description: Description, joint: Joint, known: Mapping[str, float]) -> float:
+    """Return where a joint stands that is not driven [rad or m]: if not known, 0 or next to it."""
     multiplier, offset = 1.0, 0.0
     followed = {joint.name}
-    while joint.mimic:
+    while joint.mimic and joint.name not in known:
         offset += multiplier * joint.mimic.offset
         multiplier *= joint.mimic.multiplier
         leader = description.by_name.get(joint.mimic.joint)
@@ -122,7 +166,8 @@ def standing_position(description: Description, joint: Joint) -> float:
             raise RobotError(f"joint '{leader.name}' mimics itself, by way of others or not")
         followed.add(leader.name)
         joint = leader
-    return multiplier * min(max(0.0, joint.lower), joint.upper) + offset
+    position = known.get(joint.name, min(max(0.0, joint.lower), joint.upper))
+    return multiplier * position + offset
 
 
 def _by_name(description: Description, names: Sequence[str], source: str) -> tuple[Joint, ...]:

@@ -29,6 +29,34 @@ def test_joints_not_asked_for_are_passed_over(
     assert_same(read_recording(bag, joints=wide), swinging, joints=wide)
 
 
+def test_where_joints_are_that_were_not_asked_for_is_kept(
+    swinging, stamps, write_bag, messages_of
+):
+    bag = write_bag(messages_of(swinging, stamps, ['wrist', 'shoulder', 'elbow']))
+    others = read_recording(bag, joints=['elbow']).others
+    assert [other.joint for other in others] == ['wrist', 'shoulder']
+    for other in others:
+        q = swinging.q[:, swinging.joints.index(other.joint)]
+        assert (other.lowest, other.highest) == (q.min(), q.max())
+    assert read_recording(bag, joints=JOINTS).others == ()
+
+
+def test_joints_with_messages_of_their_own_are_kept_as_far_as_they_have_positions(write_bag):
+    stamps = 10**9 + 10_000_000 * np.arange(50)
+    arm = np.sin(stamps[:, np.newaxis] * 1e-9)
+    finger = np.where(np.arange(50) % 2, np.nan, np.linspace(0.0, 0.04, 50))[:, None]
+    messages = [
+        ('/joint_states', cdr, stamp)
+        for names, q in ((('elbow',), arm), (('finger',), finger))
+        for cdr, stamp in zip(joint_state_cdr(names, stamps, q), stamps.tolist(), strict=True)
+    ]
+    silent = joint_state_cdr(('elbow', 'camera'), stamps + 1, arm.repeat(2, axis=1) * np.nan)
+    messages += [('/joint_states', cdr, 10**9 + 1) for cdr in silent[:1]]
+    (other,) = read_recording(write_bag(messages), joints=['elbow']).others
+    assert (other.joint, other.lowest) == ('finger', 0.0)
+    assert other.highest == pytest.approx(0.04 * 48 / 49)
+
+
 def test_an_order_that_changes_from_message_to_message_is_followed(
     swinging, stamps, write_bag, messages_of, assert_same
 ):

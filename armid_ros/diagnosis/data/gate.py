@@ -17,6 +17,7 @@ from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.dead_channels import dead_channels
+from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.hypotheses import (
     Exchanged,
     Hypothesis,
@@ -26,6 +27,7 @@ from armid_ros.identification.assess.hypotheses import (
     Reversed,
 )
 from armid_ros.identification.assess.mistakes import find_mistake
+from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
@@ -91,6 +93,9 @@ def check_data(
     faults += [] if faults else _signs(arm, recordings, data)
     notes = [*_clipped(recordings), *_beyond_limits(arm.robot, recordings)]
     notes += _described_friction(arm)
+    measured = [part.at_rows.with_torque(part.torque) for part in data]
+    for held in held_elsewhere(arm.robot, recordings, measured):
+        (faults if 100.0 * held.share > LIMITS.poor else notes).append(held.text)
     try:
         notes += check_motion(arm.robot, recordings, used)
     except IdentificationError as error:

@@ -18,6 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.mistakes import find_mistake, Mistake
+from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.identify import Fit, Identification, Score
 from armid_ros.recording import Recording
 
@@ -79,6 +80,7 @@ def grade(
     reasons = [
         *_mistakes(result, description, [*recordings, *held_out]),
         *_dead(result, description, validation, [*recordings, *held_out]),
+        *_elsewhere(result, description, validation, [*recordings, *held_out]),
         *_errors(result, validation),
         *_clocks([*recordings, *held_out]),
     ]
@@ -167,6 +169,20 @@ def _halves(result: Identification) -> _Reason:
             f'not determine {result.base.rank} parameters; record longer, or move more'
         )
     return _Reason(word, _sentence(text))
+
+
+def _elsewhere(
+    result: Identification,
+    description: ArmModel,
+    validation: Mapping[str, Sequence[Fit]],
+    recordings: Sequence[Recording],
+) -> Iterator[_Reason]:
+    """Say which joints move, or stand elsewhere, without being driven."""
+    fits = [*result.training, *(fit for part in validation.values() for fit in part)]
+    motions = [fit.motion for fit in fits]
+    for found in held_elsewhere(description.robot, recordings, motions):
+        word: Word = 'poor' if 100.0 * found.share > LIMITS.poor else 'good'
+        yield _Reason(word, _sentence(found.text))
 
 
 def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:

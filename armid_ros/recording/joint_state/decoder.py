@@ -72,6 +72,8 @@ class JointStateDecoder:
         What was wrong with the first of them.
     names_seen : tuple of str
         All joint names met, in order of appearance.
+    others : mapping of str to (float, float)
+        Lowest and highest position of the joints that were not asked for [rad or m].
 
     """
 
@@ -91,6 +93,7 @@ class JointStateDecoder:
         self._room = _Room(expected)
         self._plans: dict[int, list[_Plan]] = {}
         self._names: dict[str, None] = {}
+        self.others: dict[str, tuple[float, float]] = {}
         self.messages = 0
         self.malformed = 0
         self.first_problem = ''
@@ -131,16 +134,24 @@ class JointStateDecoder:
             rows = raw.view(plan.dtype)
             fits = plan.layout.fits(rows)
             if fits.all():
-                yield from plan.read(rows, numbers, receive, self._room)
+                yield from self._read(plan, rows, numbers, receive)
                 return
-            yield from plan.read(rows[fits], numbers[fits], receive[fits], self._room)
+            yield from self._read(plan, rows[fits], numbers[fits], receive[fits])
             raw, numbers, receive = raw[~fits], numbers[~fits], receive[~fits]
         for at in range(len(raw)):
             plan = self._plan_for(raw[at : at + 1])
             if plan is not None:
                 rows = raw[at : at + 1].view(plan.dtype)
-                one = numbers[at : at + 1], receive[at : at + 1]
-                yield from plan.read(rows, *one, self._room)
+                yield from self._read(plan, rows, numbers[at : at + 1], receive[at : at + 1])
+
+    def _read(
+        self, plan: _Plan, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
+    ) -> Iterator[JointStates]:
+        """Yield what was asked for of messages, and keep where the other joints are."""
+        for joint, lowest, highest in plan.ranges_of_others(rows):
+            known = self.others.get(joint, (lowest, highest))
+            self.others[joint] = (min(known[0], lowest), max(known[1], highest))
+        yield from plan.read(rows, numbers, receive, self._room)
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
         """Return how to read a message; None, and the message counted, if there is no way."""
@@ -189,6 +200,8 @@ class _Plan:
     dtype: np.dtype[np.void]
     joints: tuple[str, ...]
     columns: slice | list[int]
+    others: tuple[str, ...]
+    columns_of_others: list[int]
 
     @classmethod
     def make(cls, layout: JointStateLayout, length: int, wanted: Sequence[str]) -> _Plan:
@@ -202,6 +215,7 @@ class _Plan:
                 )
         joints = tuple(name for name in wanted if name in layout.names)
         columns = [layout.names.index(name) for name in joints]
+        others = [k for k, name in enumerate(layout.names) if name not in joints]
         first = columns[0] if columns else 0
         contiguous = columns == list(range(first, first + len(columns)))
         return cls(
@@ -209,7 +223,18 @@ class _Plan:
             layout.dtype(length),
             joints,
             slice(first, first + len(columns)) if contiguous else columns,
+            tuple(layout.names[k] for k in others),
+            others,
         )
+
+    def ranges_of_others(self, rows: npt.NDArray[np.void]) -> Iterator[tuple[str, float, float]]:
+        """Yield name, lowest and highest position of the joints that were not asked for."""
+        if not (self.others and self.layout.counts[0] and len(rows)):
+            return
+        positions = rows[_FIELDS[0]][:, self.columns_of_others]
+        lowest, highest = np.fmin.reduce(positions), np.fmax.reduce(positions)
+        for k in np.flatnonzero(np.isfinite(lowest) & np.isfinite(highest)).tolist():
+            yield self.others[k], float(lowest[k]), float(highest[k])
 
     def read(
         self, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray, room: _Room

@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.recording import ReadReport, Recording, TimeGap
+from armid_ros.recording.recording import PositionRange, ReadReport, Recording, TimeGap
 from armid_ros.recording.series import GAP_PERIODS, longest_run
+from armid_ros.recording.tables.patterns import not_chosen
 from armid_ros.recording.tables.plan import TablePlan
 from armid_ros.recording.tables.settings import gear_matrix, per_joint, TIME_UNITS
 from armid_ros.recording.tables.words import QuantityName
@@ -76,6 +77,7 @@ def measured(plan: TablePlan) -> Recording:
         source=table.source,
         topic='the table',
         report=report,
+        others=tuple(_others(plan)),
     )
 
 
@@ -133,6 +135,17 @@ def _joint_side(
     if settings.zero:
         q = q + per_joint(settings.zero, plan.joints, 'the zero of positions')
     return q, dq, tau
+
+
+def _others(plan: TablePlan) -> Iterator[PositionRange]:
+    """Yield where joints are that were not asked for, as far as their unit is known."""
+    source, settings = plan.source('position'), plan.settings
+    if source is None or settings.gear or settings.zero or len(set(source.factor)) != 1:
+        return
+    for joint, column in not_chosen(plan.table, source.chosen, settings.rename).items():
+        values = column.values[np.isfinite(column.values)] * source.factor[0]
+        if len(values):
+            yield PositionRange(joint, float(values.min()), float(values.max()))
 
 
 def _gaps(t: FloatArray) -> tuple[TimeGap, ...]:

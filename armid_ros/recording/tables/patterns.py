@@ -106,6 +106,17 @@ def choose(
     )
 
 
+def not_chosen(
+    table: Table, chosen: ChosenColumns, rename: Sequence[tuple[str, str]] = ()
+) -> dict[str, TableColumn]:
+    """Return the columns that are called as those chosen are, by the names of their joints."""
+    return {
+        renamed(label, rename): column
+        for column, label in _matching(table, chosen.pattern).items()
+        if column not in chosen.columns
+    }
+
+
 def _matching(table: Table, pattern: str) -> dict[TableColumn, str]:
     """Return the columns that fit, in order, each with what stands for its joint."""
     exact = table.column(pattern)

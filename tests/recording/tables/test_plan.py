@@ -200,3 +200,18 @@ def test_what_does_not_fit_is_refused_with_what_there_is(said, message):
 def test_settings_without_meaning_are_refused(settings):
     with pytest.raises(RecordingError):
         ColumnSettings(**settings)
+
+
+def test_where_columns_are_that_were_not_asked_for_is_kept_in_the_unit_of_the_others():
+    columns = ramps('shoulder_pos', 'elbow_pos', 'wrist_pos', 'temperature')
+    asked = ColumnSettings(position='{}_pos', degrees=True, rename=(('wrist', 'hand'),))
+    (other,) = measured(plan(columns, asked, JOINTS)).others
+    assert (other.joint, other.lowest) == ('hand', 0.0)
+    assert other.highest == pytest.approx(np.deg2rad(3.0))
+
+
+def test_nothing_is_said_of_other_joints_where_their_unit_or_zero_is_not_known():
+    columns = ramps('shoulder_pos', 'elbow_pos', 'wrist_pos')
+    for said in ({'zero': (0.1, 0.2)}, {'position_scale': (1.0, 2.0)}):
+        settings = ColumnSettings(position='{}_pos', **said)
+        assert measured(plan(columns, settings, JOINTS)).others == ()

@@ -1,0 +1,116 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Joints that are recorded where the model does not have them.
+
+A joint that is not driven is held. Where it moves, or stands elsewhere and carries driven joints,
+the arm is another one than the model; how much that matters is what its position makes of the
+described torque along the recorded motion, beside the torque that was measured.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.rows.checks import REST_RANGE
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import PositionRange, Recording
+from armid_ros.robots import described_at, held_joints, HeldJoint, Robot
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """
+    A joint that is not where the model holds it.
+
+    Attributes
+    ----------
+    text : str
+        Joint, positions, what they make of the torque and what to do, without a full stop.
+    share : float
+        Norm of the largest change of the described torque of one driven joint over that of its
+        measured torque.
+
+    """
+
+    text: str
+    share: float
+
+
+def held_elsewhere(
+    robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
+) -> Iterator[Elsewhere]:
+    """
+    Yield the joints that are not driven and were elsewhere, as far as it matters.
+
+    Parameters
+    ----------
+    robot : Robot
+        Whose description it is.
+    recordings : sequence of Recording
+        With the range of joints that were not asked for.
+    motions : sequence of Motion
+        Of the driven joints, with their torque.
+
+    """
+    for joint in held_joints(robot):
+        found = _range(joint.name, recordings)
+        if found is None:
+            continue
+        moves = found.highest - found.lowest > REST_RANGE
+        if not (moves or joint.carries):
+            continue  # a part of the body that carries it, in whatever position
+        places = [found.lowest, found.highest, *([joint.position] if joint.carries else [])]
+        shares = _changes(robot, joint.name, places, motions)
+        worst = int(np.argmax(shares))
+        if shares[worst] > LIMITS.floor or (moves and joint.carries):
+            what = f'{100.0 * shares[worst]:.0f} % of the torque of {robot.joints[worst]}'
+            yield Elsewhere(_text(joint, found, moves, what), float(shares[worst]))
+
+
+def _range(joint: str, recordings: Sequence[Recording]) -> PositionRange | None:
+    found = [other for one in recordings for other in one.others if other.joint == joint]
+    if not found:
+        return None
+    lowest, highest = min(one.lowest for one in found), max(one.highest for one in found)
+    return PositionRange(joint, lowest, highest)
+
+
+def _changes(
+    robot: Robot, joint: str, places: Sequence[float], motions: Sequence[Motion]
+) -> FloatArray:
+    """Return the largest change of the described torque between places, shape (n,), as shares."""
+    measured = np.concatenate([motion.tau for motion in motions if motion.tau is not None])
+    described = [_torque(described_at(robot, {joint: place}), motions) for place in places]
+    changes = [np.linalg.norm(a - b, axis=0) for a, b in combinations(described, 2)]
+    whole = np.linalg.norm(measured, axis=0)
+    largest = np.max(changes, axis=0)
+    shares: FloatArray = np.divide(largest, whole, out=np.zeros_like(whole), where=whole > 0.0)
+    return shares
+
+
+def _torque(robot: Robot, motions: Sequence[Motion]) -> FloatArray:
+    return np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
+
+
+def _text(joint: HeldJoint, found: PositionRange, moves: bool, change: str) -> str:
+    name, unit = joint.name, joint.unit
+    if not moves:
+        return (
+            f'joint {name} is not driven and stands at {found.lowest:.3g} {unit}, where '
+            f'the model has it at {joint.position:.3g} {unit}, which makes {change}; '
+            'make it fixed there in the description, or drive it (--joints)'
+        )
+    carries = f', and carries {", ".join(joint.carries)}' if joint.carries else ''
+    remedy = 'leave out where it moves' if joint.follows else 'drive it as well (--joints)'
+    return (
+        f'joint {name} is not driven, but moves from {found.lowest:.3g} to {found.highest:.3g} '
+        f'{unit}{carries}; the model has it at {joint.position:.3g} {unit}; where it is makes '
+        f'up to {change}; {remedy}'
+    )
