@@ -25,7 +25,8 @@ unexport LD_LIBRARY_PATH
 endif
 
 PIP := $(BIN)/python -m pip install -qq
-LOCKED := $(PIP) --require-hashes --no-build-isolation
+# The lock is complete; resolving anew, pip takes the newest of what is asked for with an extra.
+LOCKED := $(PIP) --require-hashes --no-deps --no-build-isolation
 TREE := $(shell find armid_ros scripts launch config resource -name __pycache__ -prune \
 	-o -print 2>/dev/null)
 MESSAGES := $(shell find msg_schemas -name __pycache__ -prune -o -type f -print)

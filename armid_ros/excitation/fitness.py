@@ -14,7 +14,7 @@ from armid_ros.excitation.geometry.heights import lowest_point, LowestPoint
 from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.run import Run
 from armid_ros.motion import Motion
-from armid_ros.robots import CollisionModel, Robot
+from armid_ros.robots import CollisionModel, continuous_joints, Robot
 import numpy as np
 
 FIT, PARTLY, UNFIT = 'fit to run', 'not checked in all', 'not to be run'
@@ -124,10 +124,17 @@ def not_checked(
         elif floor.source == 'environment':
             found.append('the floor (the environment has no plane)')
     found += _bodies_not_checked(collision)
-    for name, values in (('velocity', limits.velocity), ('torque', limits.torque)):
-        free = [j for j, value in zip(limits.joints, values, strict=True) if np.isinf(value)]
-        if free:
-            found.append(f'the {name} of {_listed(free)} (no limit)')
+    endless = continuous_joints(collision.robot)
+    free = {
+        'position': np.isinf(limits.lower) | np.isinf(limits.upper),
+        'velocity': np.isinf(limits.velocity),
+        'torque': np.isinf(limits.torque),
+    }
+    for name, where in free.items():
+        joints = [joint for joint, one in zip(limits.joints, where, strict=True) if one]
+        joints = [joint for joint in joints if name != 'position' or joint not in endless]
+        if joints:
+            found.append(f'the {name} of {_listed(joints)} (no limit)')
     massless = _massless(collision.robot)
     if massless:
         found.append(f'the weight of {_listed(massless)} (no inertia)')

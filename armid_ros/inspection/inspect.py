@@ -138,6 +138,7 @@ def inspect(
         found.insert(0, Remark('bad', f'identify refuses it: {trial.refused}'))
     elif trial is not None:
         found += _of_fit(trial)
+        found += [Remark('doubt', text) for text in trial.elsewhere]
         said = {remark.text for remark in found}
         found += [Remark('note', note) for note in trial.notes if note not in said]
     if robot is not None:

@@ -44,6 +44,8 @@ class TrialFit:
         Efforts over what the description takes, joint by joint; NaN where it does not follow.
     notes : tuple of str
         What the identification says.
+    elsewhere : tuple of str
+        Joints that moved, or stood elsewhere, without being driven.
 
     """
 
@@ -55,6 +57,7 @@ class TrialFit:
     cutoff_hz: float | None = None
     scale: FloatArray | None = None
     notes: tuple[str, ...] = ()
+    elsewhere: tuple[str, ...] = ()
 
 
 def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> TrialFit:
@@ -87,7 +90,8 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         condition_number=result.condition_number,
         cutoff_hz=result.used.cutoff_hz,
         scale=_scale(robot, motions),
-        notes=(*result.notes, *(one.text for one in held_elsewhere(robot, [recording], motions))),
+        notes=result.notes,
+        elsewhere=tuple(one.text for one in held_elsewhere(robot, [recording], motions)),
     )
 
 

@@ -14,7 +14,12 @@ from armid_ros.robots.gravity import GRAVITIES, parse_gravity
 from armid_ros.robots.load import described_at, load_robot, robot_from_urdf
 from armid_ros.robots.mounting import Mounting, read_mounting
 from armid_ros.robots.robot import PARAMETERS_PER_BODY, Robot
-from armid_ros.robots.selection import driven_in_words, held_joints, HeldJoint
+from armid_ros.robots.selection import (
+    continuous_joints,
+    driven_in_words,
+    held_joints,
+    HeldJoint,
+)
 from armid_ros.robots.shipped import shipped_robots
 
 __all__ = [
@@ -22,6 +27,7 @@ __all__ = [
     'robot_from_urdf',
     'shipped_robots',
     'driven_in_words',
+    'continuous_joints',
     'held_joints',
     'HeldJoint',
     'described_at',

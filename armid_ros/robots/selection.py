@@ -135,6 +135,14 @@ def driven_in_words(robot: Robot) -> tuple[str, ...]:
     return (f'not driven, and locked: {named}{more}; --joints A,B,... chooses others', *arms)
 
 
+def continuous_joints(robot: Robot) -> tuple[str, ...]:
+    """Return the driven joints that are described as turning without end."""
+    description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
+    return tuple(
+        joint for joint in robot.joints if description.by_name[joint].kind == 'continuous'
+    )
+
+
 def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
     """Return the joints of the description that could move and are not driven."""
     description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)

@@ -51,6 +51,10 @@ CASES = {
     ),
     'collision': ({'text': without('collision')}, r'bodies of upper \(no collision body\)'),
     'inertia': ({'text': without('inertial')}, r'the weight of upper \(no inertia\)'),
+    'position': (
+        {'text': urdf(*JOINTS).replace('lower="-2.5" upper="2.5"', '', 1)},
+        r'the position of shoulder \(no limit\)',
+    ),
     'velocity': (
         {'velocity': np.array([np.inf, 1.0])},
         r'the velocity of shoulder \(no limit\)',
@@ -61,6 +65,11 @@ CASES = {
 
 def test_of_a_whole_description_everything_is_checked():
     assert unchecked() == ()
+
+
+def test_a_joint_that_is_described_as_turning_without_end_needs_no_limit():
+    endless = urdf(*JOINTS).replace('type="revolute"', 'type="continuous"', 1)
+    assert unchecked(endless) == ()
 
 
 @pytest.mark.parametrize('case', CASES)

@@ -8,7 +8,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.inspection import inspect, Sampling
 from armid_ros.motion import Motion
-from armid_ros.recording import Recording
+from armid_ros.recording import PositionRange, Recording
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -154,6 +154,15 @@ def test_a_joint_beyond_its_limit_is_doubted_with_both_numbers(clean, robot):
     (said,) = (remark for remark in remarks(shifted, robot) if 'limits' in remark)
     assert said.startswith('doubt: beyond the limits of the description: elbow_pitch reaches ')
     assert f'{robot.upper[3] + 0.3:.4g} of {robot.upper[3]:.4g} rad' in said
+
+
+def test_a_joint_that_moves_without_being_driven_is_doubted(clean):
+    left = load_robot('humanoid_arm', joints=clean.joints[:-1])
+    q, tau = clean.q[:, :-1], clean.tau[:, :-1]
+    others = (PositionRange(clean.joints[-1], -0.5, 0.6),)
+    part = replace(clean, joints=left.joints, q=q, dq=None, tau=tau, others=others)
+    moves = f'doubt: joint {clean.joints[-1]} is not driven, but moves from -0.5 to 0.6 rad'
+    assert any(text.startswith(moves) for text in remarks(part, left))
 
 
 def test_noisy_positions_are_answered_with_a_lower_cutoff(clean, robot):
