@@ -105,7 +105,7 @@ def _outlasts(recording: Recording, used: Conditioning | None) -> bool:
 def _too_short(recording: Recording) -> IdentificationError:
     return IdentificationError(
         f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
-        f'too short; record a movement of several seconds'
+        'too short; record a movement of several seconds, or of a table see --time-unit and --rate'
     )
 
 

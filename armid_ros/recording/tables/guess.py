@@ -42,6 +42,31 @@ class Guess:
     score: float
 
 
+@dataclass(frozen=True)
+class Incomplete:
+    """
+    A family of columns that may be a quantity, but for some joints.
+
+    Attributes
+    ----------
+    quantity : {'position', 'velocity', 'effort'}
+        What it may be.
+    pattern : str
+        Its columns.
+    lacking : tuple of str
+        The joints for which there is none, or none with numbers.
+
+    """
+
+    quantity: QuantityName
+    pattern: str
+    lacking: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Say what is lacking."""
+        return f"'{self.pattern}' has no column of numbers for {', '.join(self.lacking)}"
+
+
 def guess(
     table: Table,
     quantity: QuantityName,
@@ -74,6 +99,23 @@ def guess(
     return list(best.values())
 
 
+def incomplete(
+    table: Table,
+    quantity: QuantityName,
+    joints: Sequence[str],
+    rename: Sequence[tuple[str, str]] = (),
+) -> Incomplete | None:
+    """Return the family that has the most joints by name, where none has all; None without any."""
+    best: Incomplete | None = None
+    for pattern, members in _groups(table, joints, rename).items():
+        names = [renamed(label, rename) for label in members]
+        lacking = tuple(joint for joint in joints if joint not in names)
+        fewer = len(lacking) < (len(joints) if best is None else len(best.lacking))
+        if fewer and _score(pattern, quantity) > 0.0:
+            best = Incomplete(quantity, pattern, lacking)
+    return best
+
+
 def guess_time(table: Table) -> TableColumn | None:
     """Return the column of time: named so, and increasing."""
     scores = {}
@@ -91,16 +133,23 @@ def _families(
     table: Table, joints: Sequence[str] | None, rename: Sequence[tuple[str, str]]
 ) -> list[ChosenColumns]:
     """Return the columns that are alike but for what stands for a joint."""
-    groups: dict[str, dict[str, TableColumn]] = {}
-    for column in table.columns:
-        for pattern, label in _readings(column, joints, rename):
-            groups.setdefault(pattern, {})[label] = column
     families = []
-    for pattern, members in groups.items():
+    for pattern, members in _groups(table, joints, rename).items():
         chosen = _in_order(pattern, members, joints, rename)
         if chosen is not None:
             families.append(chosen)
     return families
+
+
+def _groups(
+    table: Table, joints: Sequence[str] | None, rename: Sequence[tuple[str, str]]
+) -> dict[str, dict[str, TableColumn]]:
+    """Return the columns by what they have in common and by what stands for a joint."""
+    groups: dict[str, dict[str, TableColumn]] = {}
+    for column in table.columns:
+        for pattern, label in _readings(column, joints, rename):
+            groups.setdefault(pattern, {})[label] = column
+    return groups
 
 
 def _readings(

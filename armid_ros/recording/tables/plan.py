@@ -10,7 +10,7 @@ import textwrap
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.tables.guess import guess, guess_time
+from armid_ros.recording.tables.guess import guess, guess_time, Incomplete, incomplete
 from armid_ros.recording.tables.patterns import choose, ChosenColumns
 from armid_ros.recording.tables.settings import ColumnSettings, per_joint, TIME_UNITS
 from armid_ros.recording.tables.table import Table, TableColumn
@@ -88,6 +88,8 @@ class TablePlan:
         What was said.
     notes : tuple of str
         What a person should look at.
+    incomplete : tuple of Incomplete
+        What has columns for some of the joints only, and is not read.
 
     """
 
@@ -100,6 +102,7 @@ class TablePlan:
     sources: tuple[QuantitySource, ...]
     settings: ColumnSettings
     notes: tuple[str, ...] = ()
+    incomplete: tuple[Incomplete, ...] = ()
 
     @property
     def guessed(self) -> bool:
@@ -132,7 +135,8 @@ class TablePlan:
                 lines.append(f'            also fits: {", ".join(source.rivals)}')
         for quantity in _OTHERS:
             if self.source(quantity) is None:
-                lines.append(f'  {quantity:9s} none')
+                why = [f': {one}' for one in self.incomplete if one.quantity == quantity]
+                lines.append(f'  {quantity:9s} none{"".join(why)}')
         lines.append(f'  joints    {", ".join(self.joints)}')
         lines += [f'  note: {note}' for note in (*table.notes, *self.notes)]
         return lines[:1] + [_wrapped(line) for line in lines[1:]]
@@ -170,20 +174,18 @@ def plan(
     """
     position = _source(table, 'position', settings, joints)
     if position is None:
-        of_joints = f' of {", ".join(joints)}' if joints else ''
-        raise RecordingError(
-            f'{table.source}: no columns seem to be positions{of_joints}; name them, as in '
-            f"--position 'q{{}}' or --position a,b,c. Its columns are {table.listed()}"
-        )
+        raise RecordingError(_without_positions(table, settings, joints))
     names = tuple(joints) if joints else position.chosen.joints(settings.rename)
     sliding = np.zeros(len(names), np.bool_) if slides is None else np.asarray(slides, np.bool_)
-    sources = [position]
+    sources, lacking = [position], []
     for quantity in _OTHERS:
         found = _source(table, quantity, settings, names)
         if found is None and joints is None:
             found = _as_many(table, quantity, settings, position)
         if found is not None:
             sources.append(found)
+        elif getattr(settings, quantity) is None:
+            lacking.append(incomplete(table, quantity, names, settings.rename))
     time, unit, rate = _time(table, settings)
     return TablePlan(
         table,
@@ -195,6 +197,24 @@ def plan(
         tuple(_scaled(source, settings, names, sliding) for source in sources),
         settings,
         tuple(_doubts(sources, settings, sliding)),
+        tuple(one for one in lacking if one is not None),
+    )
+
+
+def _without_positions(
+    table: Table, settings: ColumnSettings, joints: Sequence[str] | None
+) -> str:
+    """Say that there are no positions, or of which joints there are none."""
+    known = incomplete(table, 'position', joints or (), settings.rename)
+    if known is not None and settings.position is None:
+        return (
+            f'{table.source}: of positions {known}; name their columns with --position or '
+            f'--rename, or leave joints out with --joints. Its columns are {table.listed()}'
+        )
+    of_joints = f' of {", ".join(joints)}' if joints else ''
+    return (
+        f'{table.source}: no columns seem to be positions{of_joints}; name them, as in '
+        f"--position 'q{{}}' or --position a,b,c. Its columns are {table.listed()}"
     )
 
 

@@ -215,3 +215,17 @@ def test_nothing_is_said_of_other_joints_where_their_unit_or_zero_is_not_known()
     for said in ({'zero': (0.1, 0.2)}, {'position_scale': (1.0, 2.0)}):
         settings = ColumnSettings(position='{}_pos', **said)
         assert measured(plan(columns, settings, JOINTS)).others == ()
+
+
+def test_joints_without_a_column_are_named_where_others_have_one():
+    found = plan(ramps('shoulder_pos', 'elbow_pos', 'shoulder_tau'), ColumnSettings(), JOINTS)
+    said = "effort    none: '{}_tau' has no column of numbers for elbow"
+    assert said in '\n'.join(found.lines())
+    assert measured(found).report.absent == ('velocity', 'effort of elbow')
+    none = plan(ramps('shoulder_pos', 'elbow_pos'), ColumnSettings(), JOINTS)
+    assert measured(none).report.absent == ('velocity', 'effort')
+
+
+def test_a_joint_without_positions_is_named_with_what_to_do():
+    with pytest.raises(RecordingError, match=r'has no column of numbers for elbow;.*--joints'):
+        plan(ramps('shoulder_pos', 'shoulder_tau', 'elbow_tau'), ColumnSettings(), JOINTS)
