@@ -69,7 +69,8 @@ def places_held(arm: ArmModel, left: Sequence[Left]) -> tuple[Where, ...]:
     order = np.argsort(-beyond)[: np.count_nonzero(beyond)]
     whole = float(beyond.sum())
     return tuple(
-        Where(arm.robot.joints[j], float(beyond[j]) / whole, _WHERE, ()) for j in order.tolist()
+        Where(arm.robot.joints[j], float(beyond[j]) / whole, _WHERE, (), arm.robot.torque_units[j])
+        for j in order.tolist()
     )
 
 

@@ -28,7 +28,7 @@ class Axis:
     name, unit : str
         The quantity.
     centres, means : ndarray, shape (B,)
-        Middle of each bin, and the mean residual in it [N m].
+        Middle of each bin, and the mean residual in it [N m or N].
     share : float
         Share of the residual's power that the means hold.
 
@@ -56,6 +56,8 @@ class Where:
         In words, over which quantity the residual changes.
     axes : tuple of Axis
         All quantities, the telling ones first.
+    unit : str
+        Of the residual.
 
     """
 
@@ -63,6 +65,7 @@ class Where:
     share_of_gap: float
     signature: str
     axes: tuple[Axis, ...]
+    unit: str
 
 
 def locate(
@@ -78,7 +81,7 @@ def locate(
     evidence : Evidence
         Motion, and the unit of the gap.
     residual : sequence of ndarray, shape (M, n)
-        What is left [N m].
+        What is left [N m or N].
     limits : ndarray, shape (n,)
         Joints below this loss have no gap.
 
@@ -96,28 +99,35 @@ def locate(
             break
         use = told[:, joint]
         axes = []
-        for index, (name, unit, _) in enumerate(rows[0]):
-            values = np.concatenate([row[index][2][:, joint] for row in rows])
-            axes.append(_axis(name, unit, values[use], left[use, joint]))
+        way, torque = arm.robot.position_units[joint], arm.robot.torque_units[joint]
+        units = {
+            'velocity': f'{way}/s',
+            'position': way,
+            'acceleration': f'{way}/s^2',
+            'time': 's',
+        }
+        for name in rows[0]:
+            values = np.concatenate([row[name][:, joint] for row in rows])
+            axes.append(_axis(name, units.get(name, torque), values[use], left[use, joint]))
         axes.sort(key=lambda axis: -axis.share)
         name = arm.robot.joints[joint]
         share = float(beyond[joint] / total)
-        result.append(Where(name, share, _in_words(axes), tuple(axes)))
+        result.append(Where(name, share, _in_words(axes), tuple(axes), torque))
     return tuple(result)
 
 
-def _quantities(arm: ArmModel, part: Trajectory) -> list[tuple[str, str, FloatArray]]:
+def _quantities(arm: ArmModel, part: Trajectory) -> dict[str, FloatArray]:
     motion = part.at_rows
     load = arm.load(arm.link_motion(motion))
     time = np.repeat(motion.t[:, np.newaxis], motion.n_joints, axis=1)
-    return [
-        ('velocity', 'rad/s', motion.dq),
-        ('position', 'rad', motion.q),
-        ('load', 'N m', load),
-        ('load against motion', 'N m', np.abs(load) * np.sign(motion.dq)),
-        ('acceleration', 'rad/s^2', motion.ddq),
-        ('time', 's', time),
-    ]
+    return {
+        'velocity': motion.dq,
+        'position': motion.q,
+        'load': load,
+        'load against motion': np.abs(load) * np.sign(motion.dq),
+        'acceleration': motion.ddq,
+        'time': time,
+    }
 
 
 def _axis(name: str, unit: str, x: FloatArray, left: FloatArray) -> Axis:

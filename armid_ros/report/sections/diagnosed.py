@@ -127,7 +127,7 @@ class EvidenceSection(Section):
                     axis.centres,
                     [Series('mean residual', axis.means, 'before', 'trend')],
                     f'{axis.name} [{axis.unit}]',
-                    'residual [N m]',
+                    f'residual [{place.unit}]',
                     height=170,
                     symmetric=True,
                     legend=False,

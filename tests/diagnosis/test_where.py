@@ -1,0 +1,40 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A residual is described by the joint and the quantity it follows, in the units of the joint."""
+
+from armid_ros.diagnosis.data.evidence import Evidence, trajectories
+from armid_ros.diagnosis.verdict.where import locate
+from armid_ros.identification.rows.signals import Conditioning
+import numpy as np
+import pytest
+
+from .conftest import Bench, URDF
+
+SLIDES = URDF.replace('type="revolute"', 'type="prismatic"', 1)
+
+
+@pytest.mark.parametrize(
+    'urdf, joint, units',
+    [
+        (SLIDES, 0, ('m/s', 'm', 'N', 'N', 'm/s^2', 's')),
+        (SLIDES, 1, ('rad/s', 'rad', 'N m', 'N m', 'rad/s^2', 's')),
+        (URDF, 0, ('rad/s', 'rad', 'N m', 'N m', 'rad/s^2', 's')),
+    ],
+)
+def test_a_spring_is_in_proportion_to_position_in_the_units_of_its_joint(urdf, joint, units):
+    bench = Bench(urdf)
+    data = trajectories(bench.recordings(), Conditioning(200.0, 10.0, 11))
+    residual = [np.zeros_like(part.torque) for part in data]
+    for part, left in zip(data, residual, strict=True):
+        left[:, joint] = 30.0 * part.at_rows.q[:, joint]
+    noise = tuple(np.full(2, 0.1) for _ in data)
+    (found,) = locate(bench.arm, Evidence(data, noise, noise), residual, np.ones(2))
+    assert found.joint == bench.robot.joints[joint]
+    assert found.unit == units[2]
+    assert found.share_of_gap == pytest.approx(1.0)
+    assert found.signature.startswith('in proportion to position')
+    order = ('velocity', 'position', 'load', 'load against motion', 'acceleration', 'time')
+    by_name = {axis.name: axis.unit for axis in found.axes}
+    assert tuple(by_name[name] for name in order) == units
+    position = found.axes[0]
+    np.testing.assert_allclose(position.means, 30.0 * position.centres, rtol=1e-6, atol=1e-9)
