@@ -9,7 +9,7 @@ from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.search.step import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import _separating, _without_later, Finding, Rival
-from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating
+from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating, sentence
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
@@ -153,3 +153,21 @@ def test_what_stands_in_for_a_later_name_is_no_rival_of_an_earlier_one():
     earlier, later = _without_later([first, second])
     assert earlier.rivals == (lag,)
     assert later.rivals == (link,)
+
+
+def test_a_parameter_of_several_joints_is_called_by_its_name_once(bench):
+    effect = CATALOGUE['viscous_friction'].on(bench.robot, ('shoulder', 'elbow'))
+    found = Finding(
+        'viscous_friction',
+        effect.joints,
+        effect.parameters(bench.robot),
+        (0.3, 0.2),
+        (0.01, 0.01),
+        0.9,
+        (0.8, 1.0),
+        0.0,
+    )
+    values = '(viscous coefficient 0.300 +- 0.020 N m s/rad, 0.200 +- 0.020 N m s/rad)'
+    assert sentence(found) == (
+        f'A viscous friction in shoulder, elbow {values} explains 90 % of the gap.'
+    )

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -193,15 +193,21 @@ def _subject(finding: Finding) -> str:
     if len(finding.joints) > _JOINTS_SAID:
         return f'{words.capitalize()} in {len(finding.joints)} joints'
     where = f' in {", ".join(finding.joints)}' if finding.joints else ''
-    shown = [
-        f'{p.name.replace("_", " ")} {_with_degrees(value, std, p.unit)}'
-        for p, value, std in zip(finding.parameters, finding.values, finding.std, strict=True)
-    ]
+    shown = list(_values(finding))
     if len(shown) > 3:
         shown = [*shown[:2], f'and {len(shown) - 2} more']
     meant = f': {finding.sign}' if finding.sign else ''
     numbers = f' ({", ".join(shown)}{meant})' if shown else ''
     return f'{article} {words}{where}{numbers}'
+
+
+def _values(finding: Finding) -> Iterator[str]:
+    """Yield the values of a cause, with a name where it is another one than before."""
+    before = ''
+    for p, value, std in zip(finding.parameters, finding.values, finding.std, strict=True):
+        name = '' if p.name == before else f'{p.name.replace("_", " ")} '
+        yield f'{name}{_with_degrees(value, std, p.unit)}'
+        before = p.name
 
 
 def _weight(finding: Finding) -> str:
