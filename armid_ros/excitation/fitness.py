@@ -124,15 +124,14 @@ def not_checked(
         elif floor.source == 'environment':
             found.append('the floor (the environment has no plane)')
     found += _bodies_not_checked(collision)
-    endless = continuous_joints(collision.robot)
+    endless = np.isin(limits.joints, continuous_joints(collision.robot))
     free = {
-        'position': np.isinf(limits.lower) | np.isinf(limits.upper),
+        'position': (np.isinf(limits.lower) | np.isinf(limits.upper)) & ~endless,
         'velocity': np.isinf(limits.velocity),
         'torque': np.isinf(limits.torque),
     }
     for name, where in free.items():
         joints = [joint for joint, one in zip(limits.joints, where, strict=True) if one]
-        joints = [joint for joint in joints if name != 'position' or joint not in endless]
         if joints:
             found.append(f'the {name} of {_listed(joints)} (no limit)')
     massless = _massless(collision.robot)

@@ -11,7 +11,7 @@ from pathlib import Path
 from armid_ros.errors import RobotError
 from armid_ros.files import read_text
 from armid_ros.motion import FloatArray, read_only
-from armid_ros.robots.description import parse_description, parse_xml
+from armid_ros.robots.description import parse_xml
 from armid_ros.robots.geometry import collision_geometry
 from armid_ros.robots.robot import Robot
 import numpy as np
@@ -155,7 +155,7 @@ def collision_model(robot: Robot, *, srdf: str | Path | None = None) -> Collisio
     """
     geometry, missing = collision_geometry(robot)
     disabled = _disabled_pairs(robot, Path(srdf) if srdf is not None else _find_srdf(robot))
-    description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
+    description = robot.description
     joined = {frozenset((joint.parent, joint.child)) for joint in description.joints}
     bodies = list(geometry.geometryObjects)
     for (i, first), (j, second) in combinations(enumerate(bodies), 2):

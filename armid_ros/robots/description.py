@@ -84,6 +84,11 @@ class Joint:
         """Whether it has a degree of freedom."""
         return self.kind in MOVABLE
 
+    @property
+    def unit(self) -> str:
+        """Return the unit of its position: 'rad' or 'm'."""
+        return 'm' if self.kind == 'prismatic' else 'rad'
+
 
 @dataclass(frozen=True)
 class Description:

@@ -182,7 +182,7 @@ def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
         that are not named are where ``load_robot`` has them.
 
     """
-    description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
+    description = robot.description
     driven = [description.by_name[joint] for joint in robot.joints]
     model, _ = _kinematic_model(description, driven, robot.name, positions)
     return replace(robot, model=model).with_gravity(robot.gravity)
@@ -205,11 +205,8 @@ def _kinematic_model(
         model = pin.buildModelFromXML(_kinematic_urdf(description, positions))
     except (RuntimeError, ValueError) as error:
         raise RobotError(f'{source}: {" ".join(str(error).split())}') from error
-    units = {
-        joint.name: 'm' if joint.kind == 'prismatic' else 'rad' for joint in description.joints
-    }
     notes = tuple(
-        f"joint '{name}': not driven, locked at {position:g} {units[name]}"
+        f"joint '{name}': not driven, locked at {position:g} {description.by_name[name].unit}"
         for name, position in positions.items()
     )
     return model, notes

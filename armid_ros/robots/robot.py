@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray, read_only
+from armid_ros.robots.description import Description, parse_description, parse_xml
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -120,6 +122,11 @@ class Robot:
     def n_joints(self) -> int:
         """Return the number of driven joints n."""
         return len(self.joints)
+
+    @cached_property
+    def description(self) -> Description:
+        """Links and joints of the URDF, driven or not."""
+        return parse_description(parse_xml(self.urdf, self.name), self.name)
 
     @property
     def gravity(self) -> FloatArray:

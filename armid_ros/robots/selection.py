@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from armid_ros.errors import RobotError
-from armid_ros.robots.description import Description, Joint, parse_description, parse_xml
+from armid_ros.robots.description import Description, Joint
 from armid_ros.robots.robot import Robot
 
 #: Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70.
@@ -122,7 +122,7 @@ def _driven_before(joint: Joint, after: dict[str, list[Joint]]) -> set[str]:
 
 def driven_in_words(robot: Robot) -> tuple[str, ...]:
     """Say which joints that could move are not driven, and whether those of several arms are."""
-    description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
+    description = robot.description
     locked = [
         f'{joint.name} (follows {joint.follows})' if joint.follows else joint.name
         for joint in held_joints(robot)
@@ -137,7 +137,7 @@ def driven_in_words(robot: Robot) -> tuple[str, ...]:
 
 def continuous_joints(robot: Robot) -> tuple[str, ...]:
     """Return the driven joints that are described as turning without end."""
-    description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
+    description = robot.description
     return tuple(
         joint for joint in robot.joints if description.by_name[joint].kind == 'continuous'
     )
@@ -145,13 +145,13 @@ def continuous_joints(robot: Robot) -> tuple[str, ...]:
 
 def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
     """Return the joints of the description that could move and are not driven."""
-    description = parse_description(parse_xml(robot.urdf, robot.name), robot.name)
+    description = robot.description
     carriers = {name: _carriers(description, [description.by_name[name]]) for name in robot.joints}
     return tuple(
         HeldJoint(
             joint.name,
             standing_position(description, joint, {}),
-            'm' if joint.kind == 'prismatic' else 'rad',
+            joint.unit,
             joint.mimic.joint if joint.mimic else '',
             tuple(name for name in robot.joints if joint.name in carriers[name]),
         )

@@ -17,7 +17,6 @@ from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.dead_channels import dead_channels
-from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.hypotheses import (
     Exchanged,
     Hypothesis,
@@ -95,7 +94,7 @@ def check_data(
     notes += _described_friction(arm)
     measured = [part.at_rows.with_torque(part.torque) for part in data]
     for held in held_elsewhere(arm.robot, recordings, measured):
-        (faults if 100.0 * held.share > LIMITS.poor else notes).append(held.text)
+        (faults if held.spoils else notes).append(held.text)
     try:
         notes += check_motion(arm.robot, recordings, used)
     except IdentificationError as error:

@@ -121,11 +121,16 @@ def _dead(
     recordings: Sequence[Recording],
 ) -> Iterator[_Reason]:
     """Say which torques nobody measured; a fit of them is close, and of no arm."""
-    fits = [*result.training, *(fit for part in validation.values() for fit in part)]
+    fits = _fits(result, validation)
     for recording in recordings:
         motions = [fit.motion for fit in fits if fit.source == recording.source]
         for text in dead_channels(description, recording, motions):
             yield _Reason('unusable', _sentence(text))
+
+
+def _fits(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> list[Fit]:
+    """Return what was fitted and what was held out."""
+    return [*result.training, *(fit for part in validation.values() for fit in part)]
 
 
 def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[_Reason]:
@@ -178,11 +183,9 @@ def _elsewhere(
     recordings: Sequence[Recording],
 ) -> Iterator[_Reason]:
     """Say which joints move, or stand elsewhere, without being driven."""
-    fits = [*result.training, *(fit for part in validation.values() for fit in part)]
-    motions = [fit.motion for fit in fits]
+    motions = [fit.motion for fit in _fits(result, validation)]
     for found in held_elsewhere(description.robot, recordings, motions):
-        word: Word = 'poor' if 100.0 * found.share > LIMITS.poor else 'good'
-        yield _Reason(word, _sentence(found.text))
+        yield _Reason('poor' if found.spoils else 'good', _sentence(found.text))
 
 
 def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:

@@ -42,6 +42,11 @@ class Elsewhere:
     text: str
     share: float
 
+    @property
+    def spoils(self) -> bool:
+        """Whether a model with such an error would be poor."""
+        return 100.0 * self.share > LIMITS.poor
+
 
 def held_elsewhere(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]

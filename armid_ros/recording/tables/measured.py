@@ -55,10 +55,6 @@ def measured(plan: TablePlan) -> Recording:
         raise RecordingError(f'{table.source}: {len(rows)} rows with numbers are left')
     q, dq, tau = _joint_side(plan, {name: array[rows] for name, array in values.items()})
     time = t[rows] - t[rows[0]]
-    lacking = {one.quantity: f' of {", ".join(one.lacking)}' for one in plan.incomplete}
-    values_of: tuple[tuple[QuantityName, FloatArray | None], ...]
-    values_of = (('velocity', dq), ('effort', tau))
-    absent = tuple(name + lacking.get(name, '') for name, array in values_of if array is None)
     report = ReadReport(
         messages=len(table),
         samples=len(rows),
@@ -67,7 +63,7 @@ def measured(plan: TablePlan) -> Recording:
         restarted=restarted,
         nan=nan,
         gaps=_gaps(time),
-        absent=absent,
+        absent=plan.absent,
         damage='; '.join(note for note in table.notes if 'cut off' in note),
     )
     return Recording(

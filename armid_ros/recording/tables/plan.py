@@ -113,6 +113,12 @@ class TablePlan:
         """Return where a quantity comes from; None where it does not."""
         return next((one for one in self.sources if one.quantity == quantity), None)
 
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Return what is not read, in words: 'effort of wrist'."""
+        of = {one.quantity: f' of {", ".join(one.lacking)}' for one in self.incomplete}
+        return tuple(name + of.get(name, '') for name in _OTHERS if self.source(name) is None)
+
     def lines(self) -> list[str]:
         """Return the plan for a person, in lines."""
         table = self.table
