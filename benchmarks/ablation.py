@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
 from functools import partial
 import os
@@ -38,21 +38,23 @@ class Rule:
 
     Attributes
     ----------
-    place : str
+    places : tuple of str
         Where it is looked up when it is asked, below armid_ros.diagnosis.
     without : callable
         What answers in its place if there is no such rule.
 
     """
 
-    place: str
+    places: tuple[str, ...]
     without: Callable[..., Any]
 
     @contextmanager
     def left_out(self) -> Iterator[None]:
         """Diagnose without the rule."""
-        owner, _, name = f'armid_ros.diagnosis.{self.place}'.rpartition('.')
-        with patch.object(resolve_name(owner), name, self.without):
+        with ExitStack() as stack:
+            for place in self.places:
+                owner, _, name = f'armid_ros.diagnosis.{place}'.rpartition('.')
+                stack.enter_context(patch.object(resolve_name(owner), name, self.without))
             yield
 
 
@@ -90,26 +92,28 @@ def all_names(question, taken, evidence, settings, change=None):
     """Fit all names together and drop none."""
     named, start = [one.named for one in taken], Start([one.values for one in taken], change)
     data, sigma = evidence.data, evidence.sigma
-    fitted = fit(question.arm, named, data, sigma, question.base, start, question.told)
+    fitted = fit(question.arm, named, data, sigma, question.base, start, question.prior)
     return tuple(one.step for one in taken), fitted
 
 
 #: By the names of the table in docs/reference/rates.md.
 RULES = {
-    'own causes before a person': Rule('verdict.headline._as_good', no),
-    'names that may be nothing go': Rule('verdict.headline.may_be_nothing', no),
-    'small names that close a gap stay': Rule('verdict.headline._opens', no),
-    'names that other data deny go': Rule('verdict.attribution.Attribution.denied', no),
-    'needless names go': Rule('search.explain.pruned', all_names),
-    'a small lead decides nothing': Rule('search.forward.undecided', no),
-    'the simplest that closes the gap': Rule('search.step.likeliest', first),
-    'what contains a cause is no rival': Rule('search.step.says_no_more', no),
-    'compared beside what each was': Rule('search.step._compared', as_they_are),
-    'most of one joint matters': Rule('search.step._open_squares', nowhere),
-    'small changes do not matter': Rule('search.step.material', yes),
-    'noise explains no noise': Rule('search.step.made_of_noise', no),
-    'the body stays as given': Rule('search.choice._as_good', no),
-    'deviations from part to part': Rule('search.explain.widened', as_fitted),
+    'own causes before a person': Rule(('verdict.headline._as_good',), no),
+    'names that may be nothing go': Rule(('verdict.headline.may_be_nothing',), no),
+    'small names that close a gap stay': Rule(('verdict.headline._opens',), no),
+    'names that other data deny go': Rule(('verdict.attribution.Attribution.denied',), no),
+    'needless names go': Rule(('search.explain.pruned',), all_names),
+    'a small lead decides nothing': Rule(('search.explain.undecided',), no),
+    'the simplest that closes the gap': Rule(('search.look.likeliest',), first),
+    'what contains a cause is no rival': Rule(('search.look.says_no_more',), no),
+    'compared beside what each was': Rule(('search.look._compared',), as_they_are),
+    'most of one joint matters': Rule(('search.look._open_squares',), nowhere),
+    'small changes do not matter': Rule(('search.look.material',), yes),
+    'noise explains no noise': Rule(('search.look.made_of_noise',), no),
+    'the body stays as given': Rule(('search.choice._as_good',), no),
+    'deviations from part to part': Rule(
+        ('search.explain.widened', 'search.explanation.widened'), as_fitted
+    ),
 }
 
 

@@ -17,8 +17,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import trajectories
 from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.data.rows import make_problem, project
-from armid_ros.diagnosis.search.candidates import candidates, Group
+from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.fit import excited, fit
+from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -27,7 +28,7 @@ import scipy.linalg
 
 #: Columns of which what is free leaves less than this share add nothing.
 _LEAST_VISIBLE = 0.02
-#: Directions of a group with less than this share of its squares are left at zero.
+#: Directions of a candidate with less than this share of its squares are left at zero.
 _DEPENDENT = 1e-9
 
 
@@ -36,9 +37,9 @@ def bic_selection(
     recordings: Sequence[Recording],
     settings: DiagnosisSettings,
     rng: np.random.Generator,
-) -> list[Group]:
+) -> list[Candidate]:
     """
-    Return the groups that lower the criterion, in the order in which they do.
+    Return the candidates that lower the criterion, in the order in which they do.
 
     Parameters
     ----------
@@ -70,33 +71,33 @@ def bic_selection(
     rows = int(problem.used.sum())
     flat = problem.x.reshape(-1, size)
     whole = np.einsum('ij,ij->j', flat, flat)
-    chosen: list[Group] = []
+    chosen: list[Candidate] = []
     while True:
         projection = project(problem, free)
         left = projection.rest(problem.y).ravel()
         rest = projection.products(np.column_stack([flat, problem.y.ravel()]))
         rest[-1, -1] = left @ left
-        best, group = _best(rest, whole, found.groups, rows)
-        if group is None or best >= 0.0:
+        best, candidate = _best(rest, whole, found.candidates, rows)
+        if candidate is None or best >= 0.0:
             return chosen
-        chosen.append(group)
-        free += range(group.columns.start, group.columns.stop)
+        chosen.append(candidate)
+        free += range(candidate.columns.start, candidate.columns.stop)
 
 
 def _best(
-    rest: FloatArray, whole: FloatArray, groups: Sequence[Group], rows: int
-) -> tuple[float, Group | None]:
-    """Return the largest change of the criterion, and the group that makes it."""
+    rest: FloatArray, whole: FloatArray, candidates: Sequence[Candidate], rows: int
+) -> tuple[float, Candidate | None]:
+    """Return the largest change of the criterion, and the candidate that makes it."""
     best, chosen = 0.0, None
     squares = float(rest[-1, -1])
-    for group in groups:
-        span = group.columns
+    for candidate in candidates:
+        span = candidate.columns
         own, aim = rest[span, span], rest[span, -1]
         if np.trace(own) < _LEAST_VISIBLE**2 * whole[span].sum() or np.trace(own) <= 0.0:
             continue
         values = scipy.linalg.lstsq(own, aim, cond=_DEPENDENT)[0]
         after = max(squares - float(values @ aim), 1e-300)
-        change = rows * np.log(after / squares) + group.size * np.log(rows)
+        change = rows * np.log(after / squares) + candidate.size * np.log(rows)
         if change < best:
-            best, chosen = change, group
+            best, chosen = change, candidate
     return best, chosen

@@ -18,24 +18,23 @@ from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Trajectory
 from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.data.gate import check_data
-from armid_ros.diagnosis.data.mended import mended
-from armid_ros.diagnosis.data.prepare import choose_filters, prepare, Prepared
+from armid_ros.diagnosis.data.prepare import choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.result import Diagnosis
 from armid_ros.diagnosis.search.bodies import as_bodies
-from armid_ros.diagnosis.search.choice import (
+from armid_ros.diagnosis.search.choice import Explainer
+from armid_ros.diagnosis.search.explanation import (
     Chosen,
     ESTIMATED,
-    Explainer,
+    Explanation,
     in_model_as_given,
     NOISE,
 )
-from armid_ros.diagnosis.search.explain import Explanation
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.explain_ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, findings, small_print
-from armid_ros.diagnosis.verdict.gap import harmed, measure_gap
+from armid_ros.diagnosis.verdict.gap import harmed, Left, measure_gap
 from armid_ros.diagnosis.verdict.headline import (
     headline,
     own_causes_first,
@@ -44,12 +43,12 @@ from armid_ros.diagnosis.verdict.headline import (
 )
 from armid_ros.diagnosis.verdict.standing import held, places_held
 from armid_ros.diagnosis.verdict.where import locate, Where
-from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating
+from armid_ros.diagnosis.verdict.words import decide, not_repeating
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Told the share that is done and what is being done.
+#: Called with the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
 #: How often it is asked again without names that do not stand.
@@ -100,7 +99,7 @@ def diagnose(
     rng : numpy.random.Generator
         Draws the states over which base parameters are found, and resamplings of the data.
     progress : callable, optional
-        Told the share that is done and what is being done.
+        Called with the share that is done and what is being done.
 
     Returns
     -------
@@ -174,7 +173,7 @@ def _fallen(chosen: Chosen, said: Diagnosis) -> frozenset[str]:
     A person who makes it worse may push otherwise in other recordings.
 
     """
-    taken = {step.trial.group.effect for step in chosen.explanation.steps}
+    taken = {step.trial.candidate.effect for step in chosen.explanation.steps}
     stands = {one.name for one in said.findings}
     return frozenset(
         effect.name
@@ -317,12 +316,12 @@ def _as_stated(
 ) -> tuple[Explanation, Attribution, list[str]]:
     """Return names in the model as given, or beside a body common to both days, and a note."""
     as_described = in_model_as_given(rest)
-    told = shares_of(as_described, unseen)[0]
+    alone = shares_of(as_described, unseen)[0]
     names, least = range(len(as_described.steps)), settings.thresholds.headline
-    if told.share(names) >= least:
-        small = smallest(as_described, told, settings, least) if len(names) > 1 else None
+    if alone.share(names) >= least:
+        small = smallest(as_described, alone, settings, least) if len(names) > 1 else None
         if small is None:
-            return as_described, told, []
+            return as_described, alone, []
         fewer = rest.without(small)
         return _as_stated(fewer, shares_of(fewer, unseen)[0], unseen, arm, settings)
     bodily, remarks = as_bodies(rest, arm)

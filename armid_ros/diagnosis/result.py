@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.floor import NoiseFloor
-from armid_ros.diagnosis.search.explain import Explanation
+from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.diagnosis.verdict.gap import Gap
 from armid_ros.diagnosis.verdict.where import Where

@@ -12,11 +12,11 @@ from benchmarks.ablation import counts, RULES
 @pytest.mark.parametrize('name', RULES)
 def test_a_rule_is_left_out_for_a_while(name):
     rule = RULES[name]
-    place = f'armid_ros.diagnosis.{rule.place}'
-    before = resolve_name(place)
+    places = [f'armid_ros.diagnosis.{place}' for place in rule.places]
+    before = [resolve_name(place) for place in places]
     with rule.left_out():
-        assert resolve_name(place) is rule.without
-    assert resolve_name(place) is before
+        assert all(resolve_name(place) is rule.without for place in places)
+    assert [resolve_name(place) for place in places] == before
 
 
 def test_where_nothing_was_asked_nothing_is_counted():

@@ -5,7 +5,7 @@
 from dataclasses import fields
 
 from armid_ros.diagnosis.data import evidence, rows
-from armid_ros.diagnosis.search import held_out, rivals, step
+from armid_ros.diagnosis.search import acceptance, look, trial
 from armid_ros.diagnosis.settings import Thresholds
 import numpy as np
 import pytest
@@ -54,12 +54,12 @@ def test_one_number_is_changed_and_no_other(name, factor):
 
 
 def test_a_number_of_a_module_is_changed_wherever_it_was_imported_and_back_again():
-    usual = held_out.HARDLY
-    with changed(['search/held_out.py HARDLY', 'price', 'search/step.py _COMPARED'], 0.7):
-        assert held_out.HARDLY == rivals.HARDLY == pytest.approx(0.7 * usual)
-        assert step._COMPARED == round(0.7 * 8)
-    assert held_out.HARDLY == rivals.HARDLY == usual
-    assert step._COMPARED == 8
+    usual = trial.HARDLY
+    with changed(['search/trial.py HARDLY', 'price', 'search/look.py _COMPARED'], 0.7):
+        assert trial.HARDLY == acceptance.HARDLY == pytest.approx(0.7 * usual)
+        assert look._COMPARED == round(0.7 * 8)
+    assert trial.HARDLY == acceptance.HARDLY == usual
+    assert look._COMPARED == 8
 
 
 def test_numbers_of_modules_are_all_found_once():

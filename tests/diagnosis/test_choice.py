@@ -7,17 +7,16 @@ from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories
 from armid_ros.diagnosis.data.prepare import choose_filters, prepare
-from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.choice import (
     _as_good,
     _beside_a_correction,
     _more_freedom,
     _stands,
     _told_by,
-    at_floor,
     Explainer,
-    freedom,
 )
+from armid_ros.diagnosis.search.explanation import at_floor, freedom
+from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
@@ -30,9 +29,9 @@ def explanation(bench, *names, rivals=(), shown=()):
 
     def trial(name):
         effect = CATALOGUE[name].on(bench.robot, ('elbow',))
-        group = Group.of(effect, slice(0, 1), (0,), bench.robot)
+        candidate = Candidate.of(effect, slice(0, 1), (0,), bench.robot)
         told = {'values': np.array([1.0]), 'deviation': np.array([0.1])}
-        return SimpleNamespace(group=group, freedom=1.0, **told)
+        return SimpleNamespace(candidate=candidate, freedom=1.0, **told)
 
     steps = [SimpleNamespace(trial=trial(name), rivals=[]) for name in names]
     if steps:
@@ -117,10 +116,10 @@ def test_names_that_played_no_part_are_not_asked_about_again(bench):
         return explain(replace(settings, library=fewer)).explanation
 
     found = explain(settings).explanation
-    assert [step.trial.group.effect.name for step in found.steps] == ['viscous_friction']
+    assert [step.trial.candidate.effect.name for step in found.steps] == ['viscous_friction']
     assert without('torque_ripple') is found
     other = without('viscous_friction')
-    assert 'viscous_friction' not in [step.trial.group.effect.name for step in other.steps]
+    assert 'viscous_friction' not in [step.trial.candidate.effect.name for step in other.steps]
 
 
 @pytest.mark.parametrize(

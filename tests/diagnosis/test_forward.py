@@ -3,7 +3,7 @@
 """Causes are taken one by one; a way that is gone twice is looked along once."""
 
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search import forward
+from armid_ros.diagnosis.search import explain
 from armid_ros.diagnosis.search.question import as_given
 from armid_ros.diagnosis.settings import DiagnosisSettings
 import numpy as np
@@ -24,7 +24,7 @@ def search(bench):
     sigma = (np.full(2, TORQUE_NOISE),) * len(data)
     settings = DiagnosisSettings(library=LIBRARY)
     question = as_given(bench.arm, data, 4, LIBRARY)
-    return forward.Search(question, Evidence(data, sigma, sigma), settings)
+    return explain.Search(question, Evidence(data, sigma, sigma), settings)
 
 
 def taken(way):
@@ -34,14 +34,14 @@ def taken(way):
 @pytest.mark.parametrize('undecided', [False, True])
 def test_the_cause_that_takes_most_is_taken_first(search, monkeypatch, undecided):
     looks = []
-    look_at = forward.look_at
+    look_at = explain.look_at
 
     def counted(*args):
         looks.append(args)
         return look_at(*args)
 
-    monkeypatch.setattr(forward, 'look_at', counted)
-    monkeypatch.setattr(forward, 'undecided', lambda *_: undecided)
+    monkeypatch.setattr(explain, 'look_at', counted)
+    monkeypatch.setattr(explain, 'undecided', lambda *_: undecided)
     way = search.forward()
     assert taken(way) == [('viscous_friction', ('shoulder',)), ('joint_spring', ('elbow',))]
     assert len(looks) == 3
@@ -50,7 +50,7 @@ def test_the_cause_that_takes_most_is_taken_first(search, monkeypatch, undecided
 
 def test_a_search_for_no_cause_takes_none(bench, search):
     question = as_given(bench.arm, search.evidence.data, 0, LIBRARY)
-    way = forward.Search(question, search.evidence, search.settings).forward()
+    way = explain.Search(question, search.evidence, search.settings).forward()
     assert taken(way) == [] and way.first is None
 
 
@@ -62,6 +62,6 @@ def test_a_shape_that_was_taken_is_no_cause_in_another_shape(bench):
     sigma = (np.full(2, TORQUE_NOISE),) * len(data)
     settings = DiagnosisSettings(library=('torque_ripple', 'torque_offset'))
     question = as_given(bench.arm, data, 4, settings.library)
-    way = forward.Search(question, Evidence(data, sigma, sigma), settings).forward()
+    way = explain.Search(question, Evidence(data, sigma, sigma), settings).forward()
     assert taken(way) == [('torque_ripple', ('elbow',))]
-    assert ('torque_ripple', ('elbow',)) not in [one.group.key[:2] for one in way.last.ranking]
+    assert ('torque_ripple', ('elbow',)) not in [one.candidate.key[:2] for one in way.last.ranking]

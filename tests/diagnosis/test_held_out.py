@@ -5,9 +5,8 @@
 from dataclasses import replace
 
 from armid_ros.diagnosis.data.rows import Problem
-from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.held_out import denies, held_out, lead, tried_beside
-from armid_ros.diagnosis.search.products import products, with_group
+from armid_ros.diagnosis.search.held_out import held_out, products, tried_beside, with_candidate
+from armid_ros.diagnosis.search.trial import Candidate, denies, lead
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
@@ -31,7 +30,7 @@ def make_problem(rng, cause=(0.0, 0.0), noise=1.0):
 def group(bench, precision=(0.0, 0.0)):
     """Return the group whose columns come first."""
     effect = CATALOGUE['viscous_friction'].on(bench.robot, bench.robot.joints)
-    return Group(effect, slice(0, OWN), (0, 1), np.array(precision))
+    return Candidate(effect, slice(0, OWN), (0, 1), np.array(precision))
 
 
 def held(rng):
@@ -115,7 +114,7 @@ def test_a_group_that_was_there_before_has_its_old_value_free_beside_it(bench):
     (expected,), _ = held_out(twice, range(OWN, OWN + size), one, wide, to)
     both = np.concatenate([own, beside], axis=2)
     of_both = products(replace(problem, x=both), range(size), ())
-    known = with_group(of_both, problem, both, own)
+    known = with_candidate(of_both, problem, both, own)
     (trial,), _ = tried_beside(known, problem, one, wide, to)
     np.testing.assert_allclose(trial.values, expected.values, rtol=1e-8)
     np.testing.assert_allclose(trial.gains, expected.gains, rtol=1e-8)

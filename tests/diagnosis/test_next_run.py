@@ -52,7 +52,11 @@ def doubtful(named):
     """Return the same with two other names left possible, as poorer data would."""
     (step,) = named.explanation.steps
     rivals = [
-        next(t for t in named.explanation.survey.ranking if t.group.key[:2] == (name, ('elbow',)))
+        next(
+            t
+            for t in named.explanation.survey.ranking
+            if t.candidate.key[:2] == (name, ('elbow',))
+        )
         for name in ('encoder_offset', 'torque_drift')
     ]
     steps = (replace(step, rivals=tuple(rivals)),)
@@ -79,7 +83,7 @@ def test_a_provisional_name_is_held_against_the_next_best(bench):
     alone = replace(found.explanation, steps=(replace(step, rivals=()),))
     run = next_run(replace(found, verdict='partial', explanation=alone), np.random.default_rng(1))
     assert {pair.name for pair in run.separations} == {'quadratic_friction'}
-    ranking = [t.group.effect.name for t in step.ranking]
+    ranking = [t.candidate.effect.name for t in step.ranking]
     assert {pair.rival for pair in run.separations} <= set(ranking) - {'quadratic_friction'}
 
 
@@ -164,7 +168,7 @@ def test_what_was_chosen_is_about_the_best_that_there_is(bench, doubtful, chosen
     clearance = ClearanceModel.of(collision_model(bench.robot))
     rng = np.random.default_rng(4)
     (own,) = doubtful.explanation.fitted.named
-    rivals = [t.group.effect for t in doubtful.explanation.steps[0].rivals]
+    rivals = [t.candidate.effect for t in doubtful.explanation.steps[0].rivals]
     worths = []
     for template in templates(('elbow',)):
         trajectory = template.draw(bench.arm, clearance, rng)

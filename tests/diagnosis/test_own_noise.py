@@ -7,11 +7,11 @@ from dataclasses import replace
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories
 from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.data.rows import make_problem
-from armid_ros.diagnosis.search.candidates import Group
+from armid_ros.diagnosis.search.acceptance import without_echo
 from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.own_noise import without_echo
 from armid_ros.diagnosis.search.refine import Workspace
-from armid_ros.diagnosis.search.round import Beside, Round
+from armid_ros.diagnosis.search.round import Nuisance, Round
+from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
@@ -34,12 +34,12 @@ def tried(bench, seed, level=0.6, lost=0.0, loud=2.0):
     effect = effect.with_shape((level * highest,))
     columns = [part.columns(bench.arm, effect)[:, :, :1] for part in data]
     problem = make_problem(data, noise, [part.residual(bench.arm) for part in data], columns)
-    group = Group.of(effect, slice(0, 1), (0,), bench.robot)
-    (trial,), _ = held_out(problem, (), [group], np.zeros((0, 0)), np.zeros(0))
+    candidate = Candidate.of(effect, slice(0, 1), (0,), bench.robot)
+    (trial,), _ = held_out(problem, (), [candidate], np.zeros((0, 0)), np.zeros(0))
     evidence = Evidence(data, noise, noise)
-    beside = Beside((), np.zeros((0, 0)), np.zeros(0))
+    nuisance = Nuisance((), np.zeros((0, 0)), np.zeros(0))
     work = Workspace(bench.arm, data)
-    here = Round(evidence, work, DiagnosisSettings(), problem, beside, 1.0)
+    here = Round(evidence, work, DiagnosisSettings(), problem, nuisance, 1.0)
     return trial, without_echo(trial, here)
 
 

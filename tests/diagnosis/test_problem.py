@@ -7,7 +7,7 @@ from armid_ros.diagnosis.data.rows import Problem, project
 from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.fit import fit, Start
 from armid_ros.diagnosis.search.patch import Named
-from armid_ros.diagnosis.search.round import beside_fit
+from armid_ros.diagnosis.search.round import nuisance_of
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
@@ -59,7 +59,7 @@ def test_shapes_of_a_name_are_held_by_what_all_data_tell_of_them(bench):
     assert fitted.named[0].effect.shape[0] == pytest.approx(0.3, rel=0.2)
     evidence = Evidence(tuple(data), tuple(sigma), tuple(sigma))
     found = candidates(fitted, data, sigma, [CATALOGUE['viscous_friction']])
-    problem, beside = beside_fit(found, fitted, evidence)
+    problem, nuisance = nuisance_of(found, fitted, evidence)
     value, *shapes = np.sum(problem.x[:, :, list(beside.free)] ** 2, axis=(0, 1))
     assert value > 0.0
     np.testing.assert_allclose(np.diag(beside.hold), [0.0, *shapes])

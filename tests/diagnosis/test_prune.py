@@ -3,10 +3,10 @@
 """Names that others made needless are asked once more when those have gone."""
 
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search import forward, prune
+from armid_ros.diagnosis.search import explain, prune
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.question import as_given
-from armid_ros.diagnosis.search.step import Taken
+from armid_ros.diagnosis.search.trial import Taken
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 import numpy as np
@@ -30,7 +30,7 @@ def prune_by(bench, monkeypatch):
     sigma = (np.full(2, TORQUE_NOISE),) * len(data)
     evidence, settings = Evidence(data, sigma, sigma), DiagnosisSettings(library=LIBRARY)
     question = as_given(bench.arm, data, 4, LIBRARY)
-    way = forward.Search(question, evidence, settings).forward()
+    way = explain.Search(question, evidence, settings).forward()
     assert [one.named.effect.name for one in way.taken] == ['viscous_friction', 'joint_spring']
 
     def pruned(*order, also=()):
@@ -51,7 +51,7 @@ def test_a_name_that_is_needed_after_all_comes_back(prune_by, dropped):
     values = dict(zip(names, fitted.values, strict=True))
     assert values['viscous_friction'] == pytest.approx([VISCOUS], rel=0.01)
     assert values['joint_spring'][0] == pytest.approx(STIFFNESS, rel=0.01)
-    assert [step.trial.group.effect.name for step in steps] == names
+    assert [step.trial.candidate.effect.name for step in steps] == names
 
 
 def test_names_come_back_best_first(prune_by):

@@ -6,7 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories
-from armid_ros.diagnosis.search.fit import fit, Told
+from armid_ros.diagnosis.search.fit import fit, Prior
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.resampled import as_change, widened
 from armid_ros.effects import CATALOGUE
@@ -70,9 +70,9 @@ def test_nothing_named_is_nothing_to_widen(bench):
 def test_a_value_that_no_data_tell_stays_untold_where_others_are_changes(bench):
     fitted, _ = coulomb_of(bench, lambda m, tau: on_elbow(0.2 * np.sign(m.dq[:, 1])))
     untold = replace(fitted, estimate=replace(fitted.estimate, covariance=np.array([[np.inf]])))
-    told = Told((), (np.ones((4, 1, 1)),), (np.zeros((4, 1)),))
+    prior = Prior((), (np.ones((4, 1, 1)),), (np.zeros((4, 1)),))
     baseline = SimpleNamespace(
         columns=lambda arm, effect, kept: np.array([[1.0, 2.0, 3.0, 5.0]]).T
     )
     free = replace(untold, change=np.zeros(1))
-    assert as_change(free, told, baseline).estimate.std[0] == np.inf
+    assert as_change(free, prior, baseline).estimate.std[0] == np.inf

@@ -12,7 +12,9 @@ import pytest
 
 
 def trial(bench, name, joints):
-    return SimpleNamespace(group=SimpleNamespace(effect=CATALOGUE[name].on(bench.robot, joints)))
+    return SimpleNamespace(
+        candidate=SimpleNamespace(effect=CATALOGUE[name].on(bench.robot, joints))
+    )
 
 
 @pytest.mark.parametrize(
@@ -29,12 +31,12 @@ def test_the_common_goes_first(bench, first, second):
     assert rarity(trial(bench, *first)) < rarity(trial(bench, *second))
 
 
-class Told:
+class Known:
     """A cause with what it takes of each of some blocks."""
 
     def __init__(self, bench, name, gains, freedom=1.0):
         self.freedom = freedom
-        self.group = trial(bench, name, ('elbow',)).group
+        self.candidate = trial(bench, name, ('elbow',)).candidate
         self.gains = np.asarray(gains, dtype=float)
         self.gain = float(self.gains.sum())
 
@@ -50,19 +52,19 @@ def asked(total, before):
 def test_a_link_has_to_take_a_quarter_more_than_what_happens(bench, before, less, wanted):
     """Links do not change from one day to the next; their description may be off on one."""
     gains = 10.0 + np.random.default_rng(0).normal(size=36)
-    link, rotor = Told(bench, 'link_inertia', gains), Told(bench, 'rotor_inertia', less * gains)
+    link, rotor = Known(bench, 'link_inertia', gains), Known(bench, 'rotor_inertia', less * gains)
     assert beaten(rotor, link, asked(400.0, before)) == wanted
 
 
 def test_of_two_that_happen_the_lead_decides(bench):
     gains = 10.0 + np.random.default_rng(0).normal(size=36)
-    gain, rotor = Told(bench, 'torque_gain', gains), Told(bench, 'rotor_inertia', 0.85 * gains)
+    gain, rotor = Known(bench, 'torque_gain', gains), Known(bench, 'rotor_inertia', 0.85 * gains)
     assert beaten(rotor, gain, asked(400.0, object()))
 
 
 def test_what_never_happens_is_taken_only_alone(bench):
     """A link may say the same with fewer values than a payload, and does not change."""
-    link, payload = Told(bench, 'link_inertia', [9.0]), Told(bench, 'payload', [8.0])
+    link, payload = Known(bench, 'link_inertia', [9.0]), Known(bench, 'payload', [8.0])
     here = asked(10.0, object())
     assert likeliest([link, payload], {}, here) is payload
     assert likeliest([link], {}, here) is link
@@ -79,6 +81,6 @@ def test_a_body_that_contains_an_offset_is_a_rival_where_it_surely_says_more(
     monkeypatch.setattr('armid_ros.diagnosis.search.rivals.contains', lambda *_: True)
     gains = np.full(36, 10.0)
     more = noise * np.random.default_rng(0).normal(size=36)
-    offset = Told(bench, 'torque_offset', gains)
-    body = Told(bench, 'link_inertia', (1.0 + ahead) * gains + more - more.mean(), freedom=10.0)
+    offset = Known(bench, 'torque_offset', gains)
+    body = Known(bench, 'link_inertia', (1.0 + ahead) * gains + more - more.mean(), freedom=10.0)
     assert says_no_more(body, offset, asked(360.0, None)) == wanted

@@ -54,14 +54,14 @@ def significant(arm, data, sigma, names):
     projection = project(problem, free)
     left = projection.rest(problem.y).ravel()
     p = {}
-    for group in found.groups:
-        columns = projection.rest(problem.x[:, :, group.columns]).reshape(-1, group.size)
+    for candidate in found.candidates:
+        columns = projection.rest(problem.x[:, :, candidate.columns]).reshape(-1, candidate.size)
         aim = columns.T @ left
         gain = float(np.linalg.lstsq(columns.T @ columns, aim, rcond=1e-9)[0] @ aim)
-        name = group.effect.name
-        p[name] = min(p.get(name, 1.0), float(stats.chi2.sf(gain, group.size)))
+        name = candidate.effect.name
+        p[name] = min(p.get(name, 1.0), float(stats.chi2.sf(gain, candidate.size)))
     best = min(p, key=p.get)
-    return best if p[best] < 0.05 / len(found.groups) else None
+    return best if p[best] < 0.05 / len(found.candidates) else None
 
 
 FRICTION = (

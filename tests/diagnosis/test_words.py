@@ -6,10 +6,11 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.floor import NoiseFloor
-from armid_ros.diagnosis.search.step import Step
+from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import _separating, _without_later, Finding, Rival
-from armid_ros.diagnosis.verdict.words import decide, Left, not_repeating, sentence
+from armid_ros.diagnosis.verdict.gap import Left
+from armid_ros.diagnosis.verdict.words import decide, not_repeating, sentence
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
@@ -145,7 +146,7 @@ def test_an_experiment_names_the_joints_of_both():
 
 def test_what_stands_in_for_a_later_name_is_no_rival_of_an_earlier_one():
     def trial(*key):
-        return SimpleNamespace(group=SimpleNamespace(key=(*key, ())))
+        return SimpleNamespace(candidate=SimpleNamespace(key=(*key, ())))
 
     link, lag = trial('link_inertia', ('elbow',)), trial('torque_lag', ())
     first = Step(trial('viscous_friction', ('elbow',)), (link, lag), (), 1.0, 1, None)

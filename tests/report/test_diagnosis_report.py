@@ -134,7 +134,7 @@ def test_no_candidate_has_a_value_that_it_cannot_have(found, html):
     negative = [
         row
         for row, trial in zip(rows, ranking, strict=False)
-        if np.all(trial.group.effect.bounds()[0] >= 0.0) and row.value.startswith('-')
+        if np.all(trial.candidate.effect.bounds()[0] >= 0.0) and row.value.startswith('-')
     ]
     assert not negative
     shown = re.sub('<[^>]*>', '', re.sub('<script.*?</script>', '', html[html.index('<main>') :]))

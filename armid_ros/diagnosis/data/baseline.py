@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.rows import fold_rows, weighted_rows
-from armid_ros.diagnosis.search.fit import described_precision, excited, Told
+from armid_ros.diagnosis.search.fit import described_precision, excited, Prior
 from armid_ros.effects import Effect
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -91,7 +91,7 @@ class Baseline:
         torque = np.concatenate([part.torque.ravel() for part in self.data])
         return float(np.linalg.norm(left) / max(float(np.linalg.norm(torque)), 1e-300))
 
-    def told(self, arm: ArmModel, base: BaseParameters) -> Told:
+    def prior(self, arm: ArmModel, base: BaseParameters) -> Prior:
         """
         Return what these recordings tell of what is free of an arm.
 
@@ -101,7 +101,7 @@ class Baseline:
         rows = [
             part.reduce(arm.columns(part.motion)[:, :, base.independent]) for part in self.data
         ]
-        return Told(self.data, self._weighted(rows), self._weighted(self.residual))
+        return Prior(self.data, self._weighted(rows), self._weighted(self.residual))
 
     def columns(self, arm: ArmModel, effect: Effect, kept: Sequence[int]) -> FloatArray:
         """Return the columns of an effect over the misfit, one row a row and joint, (S, p)."""

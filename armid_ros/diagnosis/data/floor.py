@@ -169,9 +169,9 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     rows beside those do not count.
 
     """
-    rows, told = smooth[trajectory.rows], trajectory.informative
+    rows, informative = smooth[trajectory.rows], trajectory.informative
     bend = np.diff(rows, 2, axis=0)
-    between = told[:-2] & told[1:-1] & told[2:]
+    between = informative[:-2] & informative[1:-1] & informative[2:]
     between[:, between.sum(axis=0) < _FEW] = True
     power = np.sum(bend**2, axis=0, where=between) / np.maximum(between.sum(axis=0), 1)
     used = trajectory.used

@@ -14,11 +14,12 @@ from armid_ros.diagnosis.search.fit import excited, fit
 from armid_ros.diagnosis.search.question import with_friction
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.fitting.cutoff import cutoff_of_torques
+from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.signals import Conditioning, conditioning, MODEL_BANDS
 from armid_ros.identification.ties.recorded import band_of_motion
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
-from armid_ros.recording import Recording
+from armid_ros.recording import given_twice, Recording
 import numpy as np
 
 #: A diagnosis keeps six times the band of the motion where an identification keeps ten: what is
@@ -88,9 +89,9 @@ def choose_filters(
     if settings.partner is not None:
         return band_of_motion(recordings, used, settings.signals, _NARROW)
     if settings.signals.cutoff_hz is None:
-        beside, _ = with_friction(arm, settings.library)
-        told = beside.base_parameters(rng).independent
-        used = cutoff_of_torques(beside, told, baseline or recordings, used)
+        fuller, _ = with_friction(arm, settings.library)
+        independent = fuller.base_parameters(rng).independent
+        used = cutoff_of_torques(fuller, independent, baseline or recordings, used)
     if settings.signals.decimation is not None:
         return used
     band = used.rate_hz / (2.5 * MODEL_BANDS * used.decimation)
@@ -121,19 +122,19 @@ def prepare(
     if free and growth and np.max(np.mean(growth, axis=0)) > _GROWTH:
         narrower = thinnable(replace(used, decimation=round(1.5 * used.decimation + 0.1)))
         fewer = trajectories(recordings, narrower)
-        if np.all(_told(fewer) >= _MOVING * _told(data)):
+        if np.all(_informative_share(fewer) >= _MOVING * _informative_share(data)):
             prepared = _measured(arm, narrower, fewer, whole)
     if misfit:
         return prepared
-    beside, _ = with_friction(arm, settings.library)
+    fuller, _ = with_friction(arm, settings.library)
     uncertain = settings.thresholds.uncertain
-    allowed = uncertain * _noise_over_friction(beside, prepared, rng.spawn(1)[0])
+    allowed = uncertain * _noise_over_friction(fuller, prepared, rng.spawn(1)[0])
     allowed = np.maximum(allowed, UNSURE)
     wider = [replace(part, allowed=allowed) for part in prepared.data]
     return _measured(arm, prepared.used, wider, whole)
 
 
-def _told(data: Sequence[Trajectory]) -> FloatArray:
+def _informative_share(data: Sequence[Trajectory]) -> FloatArray:
     """Return in what share of the rows each joint moves, shape (n,)."""
     return np.asarray(np.concatenate([part.informative for part in data]).mean(axis=0))
 
@@ -142,10 +143,10 @@ def _measured(
     arm: ArmModel, used: Conditioning, data: Sequence[Trajectory], whole: BaseParameters
 ) -> Prepared:
     base, _ = excited(arm, whole, data)
-    told = [noise_floor(part, arm) for part in data]
-    refit = fit(arm, (), data, [floor.sigma for floor in told], base)
+    first = [noise_floor(part, arm) for part in data]
+    refit = fit(arm, (), data, [floor.sigma for floor in first], base)
     floors = tuple(noise_floor(part, refit.arm) for part in data)
-    as_described = tuple((a if a.period else b).sigma for a, b in zip(told, floors, strict=True))
+    as_described = tuple((a if a.period else b).sigma for a, b in zip(first, floors, strict=True))
     return Prepared(used, tuple(data), base, floors, as_described)
 
 
@@ -163,3 +164,22 @@ def _noise_over_friction(
     noise = np.sqrt(np.mean(np.square(sigma), axis=0))
     size = np.sqrt(np.mean(dry**2, axis=0))
     return np.asarray(noise / np.maximum(size, 1e-300))
+
+
+def mended(
+    recordings: Sequence[Recording],
+    validate: Sequence[Recording],
+    baseline: Sequence[Recording],
+    settings: DiagnosisSettings,
+) -> tuple[list[Recording], list[Recording], list[Recording], list[str]]:
+    """Return recordings without damaged samples, and what reading and mending did to them."""
+    notes: list[str] = []
+    whole: list[list[Recording]] = []
+    for part in (recordings, validate, baseline):
+        sound, repairs = without_damage(part, settings.signals) if part else ([], ())
+        whole.append(sound)
+        harmed_ones = [one for one in part if not one.report.unharmed]
+        notes += [f'{one.source}: {one.report.describe()}' for one in harmed_ones]
+        notes += map(str, repairs)
+    notes += filter(None, [given_twice([*recordings, *baseline], validate)])
+    return whole[0], whole[1], whole[2], notes

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
+from armid_ros.identification.fitting.normal_equations import informative_basis
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 
 #: Parts that data are held out in, two of each recording at the least: what one fast recording
 #: shows alone can be learned from half of it.
@@ -19,8 +19,6 @@ PARTS = 6
 #: Blocks of each part of the data, of a second or two, which is longer than any correlation of
 #: noise; a block has this many rows at the least.
 BLOCKS, _LEAST_ROWS = 6, 8
-#: Free columns of which others leave less than this share are dependent.
-_DEPENDENT = 1e-7
 
 
 @dataclass(frozen=True)
@@ -135,17 +133,11 @@ class Projection:
     Attributes
     ----------
     basis : ndarray, shape (R n, f)
-        Orthonormal basis of the free columns.
-    fit : ndarray, shape (f, f')
-        basis = free columns @ fit.
-    free : tuple of int
-        The columns that are free.
+        Basis of what the free columns make; orthonormal where nothing holds them.
 
     """
 
     basis: FloatArray
-    fit: FloatArray
-    free: tuple[int, ...]
 
     def rest(self, values: FloatArray) -> FloatArray:
         """Return what is left of weighted rows (R, n) or (R, n, p)."""
@@ -160,15 +152,6 @@ class Projection:
 
 def project(problem: Problem, free: Sequence[int], hold: FloatArray | None = None) -> Projection:
     """Find what the free columns can make, as far as their precision (f, f) lets them."""
-    if not len(free):
-        return Projection(np.empty((problem.y.size, 0)), np.empty((0, 0)), ())
     rows = problem.x[:, :, list(free)].reshape(-1, len(free))
-    length = np.linalg.norm(rows, axis=0)
-    scale = np.where(length > 0.0, length, 1.0)
-    own = (rows / scale).T @ (rows / scale)
-    if hold is not None:
-        own += hold / np.outer(scale, scale)
-    values, vectors = scipy.linalg.eigh(own)
-    good = values > _DEPENDENT * values[-1]
-    fit = vectors[:, good] / np.sqrt(values[good]) / scale[:, np.newaxis]
-    return Projection(rows @ fit, fit, tuple(free))
+    own = rows.T @ rows
+    return Projection(rows @ informative_basis(own if hold is None else own + hold))

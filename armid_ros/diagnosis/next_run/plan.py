@@ -79,14 +79,14 @@ class NextRun:
     @property
     def sentence(self) -> str:
         """Return what to do and what it would show, the least sure first, for a person."""
-        told = sorted((s for s in self.separations if s.z >= _NOTHING), key=lambda one: one.z)
+        separated = sorted((s for s in self.separations if s.z >= _NOTHING), key=lambda one: one.z)
         alike = [one for one in self.separations if one.z < _NOTHING]
         parts = [
             f'it should tell {one.name} from {one.rival} by {_many(one.z)} standard deviations'
-            for one in told[:_SAID]
+            for one in separated[:_SAID]
         ]
-        if len(told) > _SAID:
-            parts.append(f'and {len(told) - _SAID} more pairs of names by more')
+        if len(separated) > _SAID:
+            parts.append(f'and {len(separated) - _SAID} more pairs of names by more')
         parts += [
             f'no motion alone tells {one.name} from {one.rival} (this one by {one.z:.1f} standard '
             'deviations)'
@@ -225,9 +225,9 @@ def _doubts(diagnosis: Diagnosis) -> tuple[Doubt, ...]:
     found = {own.effect.name for own in explanation.fitted.named}
     doubts: dict[tuple[str, str], Doubt] = {}
     for named, step in pairs:
-        others = [t.group.effect for t in step.rivals]
+        others = [t.candidate.effect for t in step.rivals]
         if not others and diagnosis.verdict == 'partial':
-            others = [t.group.effect for t in step.ranking if t.gain > 0.0]
+            others = [t.candidate.effect for t in step.ranking if t.gain > 0.0]
             others = [effect for effect in others if effect.name not in found][:_RUNNERS_UP]
         for other in others:
             if other.name in found:
@@ -245,10 +245,10 @@ def _designed(
     rng: np.random.Generator,
 ) -> list[_Run]:
     """Return a motion like the best template, made for the nearest of the pairs that it tells."""
-    told = [k for k, pair in enumerate(best.separations) if pair.z >= _NOTHING]
-    if not told:
+    separated = [k for k, pair in enumerate(best.separations) if pair.z >= _NOTHING]
+    if not separated:
         return []
-    nearest = min(told, key=lambda k: best.separations[k].power)
+    nearest = min(separated, key=lambda k: best.separations[k].power)
     arm, rival = doubts[nearest].models(diagnosis)
     settings = _settings(best.template, 'T', 'all' if diagnosis.refitted else 'effects')
     bodies = collision or collision_model(arm.robot)

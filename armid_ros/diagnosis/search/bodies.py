@@ -16,7 +16,7 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.rows import weighted_rows
-from armid_ros.diagnosis.search.explain import Explanation
+from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.physical.fit_among_bodies import physical_program, PhysicalSettings
 from armid_ros.motion import FloatArray
@@ -90,9 +90,9 @@ def _triangle(
         scipy.linalg.qr(rows.reshape(-1, rank + 1), mode='r')[0][: rank + 1]
         for rows in weighted_rows(blocks, data, sigma)
     ]
-    told = explanation.told
-    if told is not None:
-        own, left = told.columns, told.left - told.columns @ fitted.change
+    prior = explanation.prior
+    if prior is not None:
+        own, left = prior.columns, prior.left - prior.columns @ fitted.change
         factors.append(np.column_stack([own, left + own @ values]))
     whole = scipy.linalg.qr(np.concatenate(factors), mode='r')[0][: rank + 1]
     return np.asarray(whole), float(sum(part.informative.sum() for part in data))

@@ -1,11 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The groups that may be named: every effect of the catalogue, per joint, pair or whole arm.
+The candidates that may be named: every effect of the catalogue, per joint, pair or whole arm.
 
-A group is an effect on its joints with one shape; an effect with shape parameters is a family of
-groups on a grid, of which the best is refined later. The columns of all joints are computed at
-once and shared out.
+An effect with shape parameters is a family of candidates on a grid, of which the best is refined
+later. The columns of all joints are computed at once and shared out.
 
 """
 
@@ -20,6 +19,7 @@ from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.rows import row_weights
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
+from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.effects import Effect, Kind
 from armid_ros.effects.gravity import with_exact_vector
 from armid_ros.effects.unexplained import Unexplained
@@ -32,47 +32,10 @@ import numpy as np
 _MOST_SHAPES = 12
 
 
-@dataclass(frozen=True)
-class Group:
-    """
-    An effect on certain joints, with a shape, and where its columns are.
-
-    Attributes
-    ----------
-    effect : Effect
-        Joints and shape included.
-    columns : slice
-        Its columns among those of all groups.
-    kept : tuple of int
-        Parameters of the effect that the columns belong to; the others are zero.
-    precision : ndarray, shape (p,)
-        How strongly their values are held to what may be expected of them.
-
-    """
-
-    effect: Effect
-    columns: slice
-    kept: tuple[int, ...]
-    precision: FloatArray
-
-    @classmethod
-    def of(cls, effect: Effect, columns: slice, kept: tuple[int, ...], robot: Robot) -> Group:
-        """Make a group that is held to what may be expected of the effect on a robot."""
-        return cls(effect, columns, kept, effect.spread(robot)[list(kept)] ** -2.0)
-
-    @property
-    def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
-        """Name, joints and quantities: groups of one key differ in their shape."""
-        return self.effect.name, self.effect.joints, self.kept
-
-    @property
-    def size(self) -> int:
-        """Return the number of its columns."""
-        return int(self.columns.stop) - int(self.columns.start)
-
-
-def group_effects(robot: Robot, kinds: Sequence[Kind]) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield effects whose columns are computed together, with the groups they belong to."""
+def candidate_effects(
+    robot: Robot, kinds: Sequence[Kind]
+) -> Iterator[tuple[Effect, list[Effect]]]:
+    """Yield effects whose columns are computed together, with the candidates they belong to."""
     for kind in with_exact_vector(kinds):
         try:
             places = kind.places(robot)
@@ -90,7 +53,7 @@ def group_effects(robot: Robot, kinds: Sequence[Kind]) -> Iterator[tuple[Effect,
 def shaped(
     effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield an effect and its groups with every shape that a search starts from."""
+    """Yield an effect and its candidates with every shape that a search starts from."""
     if not effect.shapes:
         yield effect, members
         return
@@ -115,18 +78,18 @@ def shaped(
 @dataclass(frozen=True)
 class Candidates:
     """
-    All groups with their columns in rows.
+    All candidates with their columns in rows.
 
     Attributes
     ----------
-    groups : tuple of Group
+    candidates : tuple of Candidate
         What may be named.
     columns : tuple of ndarray, each (M, n, C)
-        Columns of all groups, per trajectory, filtered and decimated.
+        Columns of all candidates, per trajectory, filtered and decimated.
 
     """
 
-    groups: tuple[Group, ...]
+    candidates: tuple[Candidate, ...]
     columns: tuple[FloatArray, ...]
 
 
@@ -139,10 +102,10 @@ def candidates(
     """Compute the columns of every effect that was not named yet."""
     arm, left = memoized_arm(fitted.arm), _left(fitted, data, sigma)
     taken = {(own.effect.name, own.effect.joints) for own in fitted.named}
-    groups: list[Group] = []
+    candidates: list[Candidate] = []
     blocks: list[list[FloatArray]] = [[] for _ in data]
     start = 0
-    for effect, members in group_effects(arm.robot, kinds):
+    for effect, members in candidate_effects(arm.robot, kinds):
         for whole, singles in shaped(effect, members, arm, left):
             for block, part in zip(blocks, data, strict=True):
                 block.append(part.columns(arm, whole))
@@ -151,9 +114,9 @@ def candidates(
                 if (single.name, single.joints) not in taken:
                     for kept in single.separate or (tuple(range(size)),):
                         span = slice(start + kept[0], start + kept[-1] + 1)
-                        groups.append(Group.of(single, span, kept, arm.robot))
+                        candidates.append(Candidate.of(single, span, kept, arm.robot))
                 start += size
-    return Candidates(tuple(groups), tuple(np.concatenate(block, axis=2) for block in blocks))
+    return Candidates(tuple(candidates), tuple(np.concatenate(block, axis=2) for block in blocks))
 
 
 def _left(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> Unexplained:

@@ -19,24 +19,27 @@ from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.data.rows import weighted_rows
-from armid_ros.diagnosis.search.explain import explain, Explanation
-from armid_ros.diagnosis.search.fit import fit, Start, Told
-from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.explain import explain
+from armid_ros.diagnosis.search.explanation import (
+    at_floor,
+    Chosen,
+    ESTIMATED,
+    Explanation,
+    freedom,
+    in_model_as_given,
+    NOISE,
+)
+from armid_ros.diagnosis.search.fit import Prior
 from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question
-from armid_ros.diagnosis.search.resampled import as_change
-from armid_ros.diagnosis.search.round import cost
-from armid_ros.diagnosis.search.step import Step
+from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.motion import FloatArray
 import numpy as np
 
 Progress = Callable[[float, str], None]
-
-NOISE, ESTIMATED = 'noise', 'an estimate of the misfit that such a model has'
 OWN_MISFIT = 'the misfit that the model had before'
 WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
-
 #: Data are recorded as often as others if their period is not longer by this factor.
 _AS_OFTEN = 1.2
 #: Said where only what a model lacks explains the gap, and not what has changed.
@@ -44,36 +47,6 @@ _EVER = (
     'the baseline does not tell whether what is named has changed since, or was there and did not '
     'show: the model lacks it'
 )
-
-
-@dataclass(frozen=True)
-class Chosen:
-    """
-    The explanation that is given.
-
-    Attributes
-    ----------
-    explanation : Explanation
-        The explanation.
-    misfit : ndarray, shape (n,)
-        Misfit that the gap is measured beside; zero where noise is all [N m].
-    floor_in_words : str
-        What the floor of the gap is.
-    notes : tuple of str
-        What a reader should know.
-    rest : Explanation or None
-        The same names beside a body that is common to both days, which tells what they leave.
-    doubt : str
-        Why the model itself may be wrong, a sentence; empty if it need not be.
-
-    """
-
-    explanation: Explanation
-    misfit: FloatArray
-    floor_in_words: str
-    notes: tuple[str, ...] = ()
-    rest: Explanation | None = None
-    doubt: str = ''
 
 
 @dataclass(frozen=True)
@@ -113,7 +86,7 @@ class Explainer:
     rng : numpy.random.Generator
         Draws states.
     tell : callable
-        Told the share that is done and what is being done.
+        Called with the share that is done and what is being done.
     written : ndarray, shape (n,), or None
         Misfit that the model is known to have, where there are no recordings of it [N m].
     unseen : sequence of Trajectory
@@ -139,9 +112,9 @@ class Explainer:
         prepared, tell = self.prepared, self.tell
         few = settings.thresholds.few_causes
         given = as_given(self.arm, prepared.data, few, settings.library)
-        told = Evidence(prepared.data, prepared.as_described, prepared.as_described)
+        described = Evidence(prepared.data, prepared.as_described, prepared.as_described)
         tell(0.2, 'the model as given')
-        first = self._explain('given', given, told, settings)
+        first = self._explain('given', given, described, settings)
         nothing = np.zeros(self.arm.robot.n_joints)
         closed = at_floor(first, settings)
         if closed and not _beside_a_correction(first):
@@ -156,7 +129,7 @@ class Explainer:
             misfit = _left_by(anew)
             tell(0.7, 'the model as given')
             sigma = tuple(np.maximum(one, misfit) for one in prepared.as_described)
-            first = self._explain('given', given, replace(told, sigma=sigma), settings)
+            first = self._explain('given', given, replace(described, sigma=sigma), settings)
             words = ESTIMATED
         if _as_good(first, anew, settings):
             return Chosen(first, misfit, words)
@@ -233,10 +206,14 @@ class Explainer:
         evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
         most, both = 2 * settings.thresholds.few_causes, [*prepared.data, *baseline.data]
         free = fitted_anew(arm, both, most, settings.library, self.rng)
-        assert free.base is not None and free.beside_base is not None
-        told = baseline.told(free.arm, free.base)
-        beside = told if free.beside is arm else baseline.told(free.beside, free.beside_base)
-        question = replace(free, told=told, beside_told=beside, since=True)
+        assert free.base is not None and free.nuisance_base is not None
+        prior = baseline.prior(free.arm, free.base)
+        nuisance_prior = (
+            prior
+            if free.nuisance_arm is arm
+            else baseline.prior(free.nuisance_arm, free.nuisance_base)
+        )
+        question = replace(free, prior=prior, nuisance_prior=nuisance_prior, since=True)
         more = None
         if self.unseen:
             unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(self.unseen)
@@ -245,7 +222,7 @@ class Explainer:
         notes: tuple[str, ...] = ()
         if not found.steps and not at_floor(found, settings):
             lacking = self._explain('lacking', question, evidence, settings)
-            if _most(lacking, settings) and _may_have_been(lacking, baseline, told, settings):
+            if _most(lacking, settings) and _may_have_been(lacking, baseline, prior, settings):
                 found, notes = lacking, (_EVER,)
         chosen = Chosen(found, misfit, OWN_MISFIT, notes, doubt=_doubt(baseline))
         if not found.steps:
@@ -283,7 +260,7 @@ def _doubt(baseline: Baseline) -> str:
 
 
 def _may_have_been(
-    found: Explanation, baseline: Baseline, told: Told, settings: DiagnosisSettings
+    found: Explanation, baseline: Baseline, prior: Prior, settings: DiagnosisSettings
 ) -> bool:
     """
     Return whether all names may have been there before, and show only now.
@@ -294,11 +271,14 @@ def _may_have_been(
     """
     data, sigma = found.evidence.data, found.evidence.sigma
     for step in found.steps:
-        group, values = step.trial.group, step.trial.values
-        own = baseline.columns(found.given, group.effect, group.kept)
-        hidden = told.nearest(own) @ values
-        then = (own @ values - told.columns @ hidden).reshape(-1, found.given.robot.n_joints)
-        rows = [part.columns(found.given, group.effect)[:, :, list(group.kept)] for part in data]
+        candidate, values = step.trial.candidate, step.trial.values
+        own = baseline.columns(found.given, candidate.effect, candidate.kept)
+        hidden = prior.nearest(own) @ values
+        then = (own @ values - prior.columns @ hidden).reshape(-1, found.given.robot.n_joints)
+        rows = [
+            part.columns(found.given, candidate.effect)[:, :, list(candidate.kept)]
+            for part in data
+        ]
         pairs = zip(rows, found.reference.columns, strict=True)
         torque = [mine @ values - free @ hidden for mine, free in pairs]
         now = np.concatenate(list(weighted_rows(torque, data, sigma)))
@@ -331,38 +311,13 @@ def _torque_rms(data: Sequence[Trajectory]) -> FloatArray:
     return Evidence(tuple(data), unit, unit).torque_rms
 
 
-def in_model_as_given(found: Explanation) -> Explanation:
-    """Return what the names explain beside a rigid body that stays as it is."""
-    arm, evidence, fitted = found.given, found.evidence, found.fitted
-    if found.told is not None and found.baseline is not None:
-        fitted = as_change(fitted, found.told, found.baseline)
-    reference = fit(arm, (), evidence.data, evidence.sigma, None)
-    alone = fit(
-        arm,
-        fitted.named,
-        evidence.data,
-        evidence.sigma,
-        None,
-        Start(fitted.values),
-        known=fitted.estimate,
-    )
-    return replace(found, base=None, told=None, fitted=alone, reference=reference)
-
-
-def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
-    """Return whether what an explanation leaves is no gap in any joint."""
-    evidence = explanation.evidence
-    limits = evidence.limits(explanation.fitted.residual, settings)
-    return bool(np.all(explanation.chi2_per_row <= limits))
-
-
 def _beside_a_correction(first: Explanation) -> bool:
     """Return whether one of several causes corrects the description, or another body may."""
     return len(first.steps) > 1 and any(_may_correct(step) for step in first.steps)
 
 
 def _may_correct(step: Step) -> bool:
-    effect, others = step.trial.group.effect, [rival.group.effect for rival in step.rivals]
+    effect, others = step.trial.candidate.effect, [rival.candidate.effect for rival in step.rivals]
     return effect.corrects or (effect.changes_body and any(one.corrects for one in others))
 
 
@@ -376,21 +331,25 @@ def _stands(first: Explanation, anew: Explanation) -> bool:
 
     """
     assert anew.survey is not None
-    there = {step.trial.group.key[:2] for step in anew.steps}
+    there = {step.trial.candidate.key[:2] for step in anew.steps}
     given = zip(first.given.effects, first.given.values, strict=True)
     open_values = {effect.name for effect, values in given if not np.any(values)}
-    groups = [step.trial.group for step in first.steps if not step.trial.group.effect.corrects]
-    gone = {group.key[:2] for group in groups if group.effect.name not in open_values} - there
+    candidates = [
+        step.trial.candidate for step in first.steps if not step.trial.candidate.effect.corrects
+    ]
+    gone = {
+        candidate.key[:2] for candidate in candidates if candidate.effect.name not in open_values
+    } - there
     wrong = any(_is_correction(step.trial, first.given) for step in first.steps)
-    seen = {trial.group.key[:2] for trial in anew.survey.ranking}
+    seen = {trial.candidate.key[:2] for trial in anew.survey.ranking}
     return gone.isdisjoint(seen) and len(gone) + wrong < 2
 
 
 def _is_correction(trial: Trial, arm: ArmModel) -> bool:
     """Return whether a cause says that the description is wrong."""
-    effect = trial.group.effect
+    effect = trial.candidate.effect
     values, std = np.zeros((2, len(effect.parameters(arm.robot))))
-    kept = list(trial.group.kept)
+    kept = list(trial.candidate.kept)
     values[kept], std[kept] = trial.values, trial.deviation
     return effect.is_correction(values, std, arm)
 
@@ -435,13 +394,7 @@ def _more_freedom(first: Explanation, anew: Explanation, settings: DiagnosisSett
 
     """
     more = freedom(anew, settings) - freedom(first, settings)
-    wrong = any(step.trial.group.effect.corrects for step in first.steps)
+    wrong = any(step.trial.candidate.effect.corrects for step in first.steps)
     if anew.base is not None and len(first.steps) > 1 and wrong:
         more -= anew.base.rank
     return more
-
-
-def freedom(explanation: Explanation, settings: DiagnosisSettings) -> float:
-    """Return how many values were chosen, those of the rigid body included."""
-    body = 0 if explanation.base is None else explanation.base.rank
-    return body + sum(cost(step.trial, settings) for step in explanation.steps)

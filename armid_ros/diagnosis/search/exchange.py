@@ -18,18 +18,18 @@ from dataclasses import dataclass
 from itertools import combinations, islice
 from math import comb
 
-from armid_ros.diagnosis.search.held_out import ROUNDING, Trial
 from armid_ros.diagnosis.search.round import Round
-from armid_ros.identification.fitting.normal_equations import informative_basis
+from armid_ros.diagnosis.search.trial import ROUNDING, Trial
+from armid_ros.identification.fitting.normal_equations import (
+    independent_basis,
+    informative_basis,
+)
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
 #: Divisions that are tried; those that exchange fewest recordings first.
 _DIVISIONS = 200
-#: Directions of the columns of a cause of which the rest leaves less than this share of their
-#: squares tell nothing.
-_UNSEEN = 1e-5
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def _count_divisions(here: Round) -> int:
     """Return how many other divisions of the recordings are tried."""
     assert here.before is not None
     later = here.before.later
-    first = len({part.fold for part in here.before.told.data})
+    first = len({part.fold for part in here.before.prior.data})
     second = len({part.fold for part in here.evidence.data})
     second += 0 if later is None else len(later.left)
     exchanges = comb(first + second, first) - 1 - (first == second)
@@ -88,16 +88,16 @@ def _showing_more(trial: Trial, here: Round) -> tuple[int, int]:
     """Return how many divisions show more of a cause than the days do, and of how many."""
     assert here.before is not None
     first, second = _before(trial, here), _today(trial, here)
-    beside, later = here.beside, here.before.later
+    nuisance, later = here.nuisance, here.before.later
     if later is not None:
-        more = later.own(here.work.arm, trial.group)
+        more = later.own(here.work.arm, trial.candidate)
         second += [Rows(*rows) for rows in zip(later.free, more, later.left, strict=True)]
-    free = here.free.reshape(-1, len(beside.free))
-    hold, pull = beside.hold + free.T @ free, beside.pull + free.T @ here.problem.y.ravel()
+    free = here.free.reshape(-1, len(nuisance.free))
+    hold, pull = nuisance.hold + free.T @ free, nuisance.pull + free.T @ here.problem.y.ravel()
     if later is not None:
         for columns, left in zip(later.free, later.left, strict=True):
             hold, pull = hold + columns.T @ columns, pull + columns.T @ left
-    return showing_more(first, second, (hold, pull), trial.group.precision)
+    return showing_more(first, second, (hold, pull), trial.candidate.precision)
 
 
 def showing_more(
@@ -126,8 +126,7 @@ def showing_more(
     border = np.array([basis.T @ (one.free.T @ one.own) for one in rows])
     own = np.array([one.own.T @ one.own for one in rows])
     aim = np.array([one.own.T @ (one.left - one.free @ free) for one in rows])
-    length = np.diag(own.sum(axis=0)) + precision  # a planar arm shows some values of a body only
-    scale = 1.0 / np.sqrt(np.maximum(length, 1e-300))
+    squares = np.diag(own.sum(axis=0)) + precision  # a planar arm shows some values of a body only
 
     def explained(members: npt.NDArray[np.bool_]) -> float:
         """Return the squares that go if a cause has one value in all and one more in some."""
@@ -136,7 +135,7 @@ def showing_more(
         products = np.block([[own.sum(axis=0), part], [part, part]]) - both.T @ both
         products += np.diag(np.tile(precision, 2))
         wanted = np.concatenate([aim.sum(axis=0), aim[members].sum(axis=0)])
-        return _squares(products, wanted, np.tile(scale, 2))
+        return float(np.sum((independent_basis(products, np.tile(squares, 2)).T @ wanted) ** 2))
 
     days = np.arange(len(rows)) >= len(first)
     least = explained(days) * (1.0 + ROUNDING)
@@ -160,22 +159,15 @@ def _divisions(days: npt.NDArray[np.bool_]) -> Iterator[npt.NDArray[np.bool_]]:
         yield other
 
 
-def _squares(products: FloatArray, aim: FloatArray, scale: FloatArray) -> float:
-    """Return the squares that columns of some products take; scale makes them of length one."""
-    values, vectors = np.linalg.eigh(products * np.outer(scale, scale))
-    seen = values > _UNSEEN
-    return float(np.sum((vectors[:, seen].T @ (aim * scale)) ** 2 / values[seen]))
-
-
 def _before(trial: Trial, here: Round) -> list[Rows]:
     """Return the recordings from before, in which what was named since does nothing."""
     assert here.before is not None
-    told, change = here.before.told, here.before.change
-    group = trial.group
-    own = here.before.baseline.columns(here.work.arm, group.effect, group.kept)
+    prior, change = here.before.prior, here.before.change
+    candidate = trial.candidate
+    own = here.before.baseline.columns(here.work.arm, candidate.effect, candidate.kept)
     result, start = [], 0
-    for columns, left in told.recordings(change):
-        free = np.zeros((len(left), len(here.beside.free)))
+    for columns, left in prior.recordings(change):
+        free = np.zeros((len(left), len(here.nuisance.free)))
         free[:, : columns.shape[1]] = columns
         result.append(Rows(free, own[start : start + len(left)], left))
         start += len(left)
@@ -189,6 +181,10 @@ def _today(trial: Trial, here: Round) -> list[Rows]:
     result = []
     for one in np.unique(fold):
         rows = fold == one
-        free, own, y = here.free[rows], here.own(trial.group)[rows], here.problem.y[rows].ravel()
+        free, own, y = (
+            here.free[rows],
+            here.own(trial.candidate)[rows],
+            here.problem.y[rows].ravel(),
+        )
         result.append(Rows(free.reshape(len(y), -1), own.reshape(len(y), -1), y))
     return result

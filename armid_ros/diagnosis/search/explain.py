@@ -11,110 +11,28 @@ matter are named in the end.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field, replace
 
-from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.fit import fit, Fitted, Start, Told
-from armid_ros.diagnosis.search.forward import Search
-from armid_ros.diagnosis.search.held_out import Trial
-from armid_ros.diagnosis.search.memoized_arm import memoized_arm, plain_arm
+from armid_ros.diagnosis.search.candidates import Candidates, candidates
+from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.fit import fit, Fitted, Start
+from armid_ros.diagnosis.search.look import Look, look_at
+from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.prune import doubtful, pruned, stands
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.resampled import widened
-from armid_ros.diagnosis.search.round import Round
-from armid_ros.diagnosis.search.step import Step, Survey, Taken
+from armid_ros.diagnosis.search.rivals import undecided
+from armid_ros.diagnosis.search.round import Before, Later, nuisance_of, Round
+from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Taken
 from armid_ros.diagnosis.search.view import View
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """
-    What a search came to.
-
-    Attributes
-    ----------
-    given : ArmModel
-        The arm as given.
-    base : BaseParameters or None
-        What was free of it; None where nothing was.
-    fitted : Fitted
-        The arm with all that was named.
-    reference : Fitted
-        The same without.
-    steps : tuple of Step
-        The names, in the order of those in ``fitted``.
-    survey : Survey or None
-        The first look at all groups.
-    evidence : Evidence
-        The data.
-    minor : tuple of Trial
-        Causes of the last look that are there beyond chance and do not matter.
-    told : Told or None
-        What other data tell of what was free.
-    by_chance : float
-        Squares that a value of any cause takes of what the names leave.
-    considered : frozenset of str
-        Names without which something else could have been found.
-    baseline : Baseline or None
-        Recordings since which the names have changed.
-
-    """
-
-    given: ArmModel
-    base: BaseParameters | None
-    fitted: Fitted
-    reference: Fitted
-    steps: tuple[Step, ...]
-    survey: Survey | None
-    evidence: Evidence
-    minor: tuple[Trial, ...] = ()
-    told: Told | None = None
-    by_chance: float = 0.0
-    considered: frozenset[str] = frozenset()
-    baseline: Baseline | None = None
-
-    def without(self, name: int) -> Explanation:
-        """Return the explanation without one of its names, the others fitted anew."""
-        fewer = self.only([k for k in range(len(self.steps)) if k != name])
-        return replace(fewer, minor=(*self.minor, self.steps[name].trial))
-
-    def only(self, keep: Sequence[int]) -> Explanation:
-        """Return the explanation with some of its names, in this order, fitted anew."""
-        fitted = fit(
-            self.given,
-            [self.fitted.named[k] for k in keep],
-            self.evidence.data,
-            self.evidence.sigma,
-            self.base,
-            Start([self.fitted.values[k] for k in keep], self.fitted.change),
-            self.told,
-        )
-        fitted = widened(fitted, self.evidence, self.told, self.by_chance)
-        return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
-
-    def forgetting(self) -> Explanation:
-        """Return the same with arms that do not hold what they have computed."""
-        return replace(
-            self,
-            given=plain_arm(self.given),
-            fitted=replace(self.fitted, arm=plain_arm(self.fitted.arm)),
-            reference=replace(self.reference, arm=plain_arm(self.reference.arm)),
-        )
-
-    @property
-    def chi2_per_row(self) -> FloatArray:
-        """Loss of each joint with the patched arm, shape (n,)."""
-        return self.evidence.chi2_per_row(self.fitted.residual)
 
 
 def explain(
@@ -132,14 +50,14 @@ def explain(
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
     taken = [*way.taken, *_friction(question, way.taken, evidence, settings, whole)]
     reference = fit(
-        question.arm, (), evidence.data, evidence.sigma, question.base, None, question.told
+        question.arm, (), evidence.data, evidence.sigma, question.base, None, question.prior
     )
-    change = way.change if question.beside is question.arm else None
+    change = way.change if question.nuisance_arm is question.arm else None
     steps, fitted = pruned(question, taken, evidence, settings, change)
     by_chance = 0.0 if last is None else last.by_chance
-    fitted = widened(fitted, evidence, question.told, by_chance)
+    fitted = widened(fitted, evidence, question.prior, by_chance)
     said = {own.effect.name for own in fitted.named}
-    small = tuple(trial for trial in minor if trial.group.effect.name not in said)
+    small = tuple(trial for trial in minor if trial.candidate.effect.name not in said)
     return Explanation(
         question.arm,
         question.base,
@@ -149,11 +67,195 @@ def explain(
         survey,
         evidence,
         small,
-        question.told,
+        question.prior,
         by_chance,
         way.considered,
         baseline,
     )
+
+
+@dataclass(frozen=True)
+class Way:
+    """
+    Causes in the order in which they were taken.
+
+    Attributes
+    ----------
+    taken : tuple of Taken
+        The causes.
+    first, last : Survey or None
+        The first look at all causes, and the last one.
+    change : ndarray, shape (r,), or None
+        What was added to what is free of the arm in the last fit.
+    considered : frozenset of str
+        Names without which the search could have gone another way.
+
+    """
+
+    taken: tuple[Taken, ...]
+    first: Survey | None
+    last: Survey | None
+    change: FloatArray | None = None
+    considered: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class _Place:
+    """What was taken on a way, the fit beside which it goes on, and a look at all causes there."""
+
+    named: tuple[Named, ...]
+    values: tuple[FloatArray, ...]
+    current: Fitted
+    found: Candidates
+    before: Before | None
+    look: Look
+    next: dict[Hashable, _Place] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Search:
+    """
+    A search for the causes of a gap.
+
+    Attributes
+    ----------
+    question : Question
+        What is asked of which arm.
+    evidence : Evidence
+        The data.
+    settings : DiagnosisSettings
+        Library and thresholds.
+    baseline : Baseline or None
+        Recordings in which nothing was wrong.
+    unseen : Evidence or None
+        More data of the same day, which nothing is fitted to.
+
+    """
+
+    question: Question
+    evidence: Evidence
+    settings: DiagnosisSettings
+    baseline: Baseline | None = None
+    unseen: Evidence | None = None
+
+    def forward(self, start: Sequence[Taken] = ()) -> Way:
+        """Take causes beside those to start with as long as any passes."""
+        if not self.question.most:
+            return Way(tuple(start), None, None)
+        steps = [one.step for one in start]
+        named, values = [one.named for one in start], [one.values for one in start]
+        first = self._fitted_place(named, values, None)
+        way = self._way(first, steps, 0.0)
+        assert way.last is not None
+        width, considered = way.last.most, self._considered(way)
+        here = replace(first.look.here, total=None, before=None, width=width)
+        found = [one.step for one in way.taken[len(start) :]]
+        if any(undecided(step.trial, step.ranking, here) for step in found):
+            way = self._way(first, steps, width)
+        return replace(way, considered=considered | self._considered(way))
+
+    def _considered(self, way: Way) -> frozenset[str]:
+        """Return what was taken or could have been, and what takes most of the rest."""
+        arm = self.question.arm
+        trials = [trial for one in way.taken for trial in (one.step.trial, *one.step.rivals)]
+        trials += [] if way.last is None else way.last.ranking[:1]
+        effects = [trial.candidate.effect for trial in trials]
+        zeros = [np.zeros(len(effect.parameters(arm.robot))) for effect in effects]
+        words = [e.named_as(values, arm) for e, values in zip(effects, zeros, strict=True)]
+        names = {word.name for said in words for word, _ in said}
+        return frozenset(names | {effect.name for effect in self.question.unknown})
+
+    def _way(self, place: _Place, steps: Sequence[Step], width: float) -> Way:
+        """Go from a place, where a lead of less than some squares decides nothing."""
+        first, taken = place.look.survey, list(steps)
+        named, values = list(place.named), list(place.values)
+        for left in range(self.question.most, 0, -1):
+            step = place.look.step(width)
+            if step is None:
+                break
+            taken.append(step)
+            named, values = self._and_named(place, step)
+            if left > 1:
+                place = self._after(place, step)
+                named, values = list(place.named), list(place.values)
+        rows = zip(named, taken, values, strict=True)
+        return Way(
+            tuple(Taken(*row) for row in rows), first, place.look.survey, place.current.change
+        )
+
+    def _after(self, place: _Place, step: Step) -> _Place:
+        """Return the place behind a step."""
+        candidate = step.trial.candidate
+        way = candidate.key, candidate.effect.shape
+        if way not in place.next:
+            named, values = self._and_named(place, step)
+            if candidate.effect.linear:
+                arm = place.current.arm
+                before = None if place.before is None else place.before.and_columns(arm, candidate)
+                here = place.look.here
+                nuisance = here.nuisance.and_columns(candidate)
+                here = replace(here, nuisance=nuisance, before=before, known=None)
+                others = tuple(one for one in place.found.candidates if one.key != candidate.key)
+                found = replace(place.found, candidates=others)
+                look = look_at(others, here)
+                after = replace(place, found=found, before=before, look=look, next={})
+                place.next[way] = replace(after, named=tuple(named), values=tuple(values))
+            else:
+                total, change = place.look.survey.total, place.current.change
+                place.next[way] = self._fitted_place(named, values, total, change)
+        return place.next[way]
+
+    def _and_named(self, place: _Place, step: Step) -> tuple[list[Named], list[FloatArray]]:
+        candidate = step.trial.candidate
+        start = np.zeros(len(candidate.effect.parameters(self.question.arm.robot)))
+        start[list(candidate.kept)] = step.trial.values
+        return [*place.named, Named(candidate.effect, candidate.kept)], [*place.values, start]
+
+    def _fitted_place(
+        self,
+        named: Sequence[Named],
+        values: Sequence[FloatArray],
+        total: float | None,
+        change: FloatArray | None = None,
+    ) -> _Place:
+        """Fit what is named, from values and a change of the body on, and look beside it."""
+        question, data, sigma = self.question, self.evidence.data, self.evidence.sigma
+        arm, base = question.nuisance_arm, question.nuisance_base
+        prior = question.nuisance_prior
+        current = fit(arm, named, data, sigma, base, Start(values, change), prior)
+        found = candidates(current, data, sigma, question.kinds(self.settings.kinds))
+        problem, nuisance = nuisance_of(found, current, self.evidence)
+        before = self._before(current)
+        work = Workspace(memoized_arm(current.arm), data)
+        here = Round(self.evidence, work, self.settings, problem, nuisance, total, before=before)
+        look = look_at(found.candidates, here)
+        if named:
+            named, values = current.named, current.values
+        return _Place(tuple(named), tuple(values), current, found, before, look)
+
+    def _before(self, current: Fitted) -> Before | None:
+        """Return what other recordings show beside an arm: those from before, and unseen ones."""
+        question, unseen = self.question, self.unseen
+        prior = question.nuisance_prior
+        if self.baseline is None or prior is None:
+            return None
+        before = Before(self.baseline, prior, current.change)
+        if unseen is None:
+            return before
+        there = fit(
+            question.nuisance_arm,
+            current.named,
+            unseen.data,
+            unseen.sigma,
+            question.nuisance_base,
+            Start(current.values),
+            prior,
+            known=current.estimate,
+        )
+        rank = len(current.change)
+        pairs = zip(there.residual, there.columns, strict=True)
+        left = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]
+        return replace(before, later=Later.of(unseen, there.columns, left))
 
 
 def _friction(
@@ -173,10 +275,10 @@ def _friction(
     """
     if not question.unknown:
         return []
-    arm, base = question.beside, question.beside_base
+    arm, base = question.nuisance_arm, question.nuisance_base
     assert base is not None
     named, start = [one.named for one in taken], Start([one.values for one in taken])
-    fitted = fit(arm, named, evidence.data, evidence.sigma, base, start, question.beside_told)
+    fitted = fit(arm, named, evidence.data, evidence.sigma, base, start, question.nuisance_prior)
     view = View.of(fitted, evidence)
     where = {int(column): k for k, column in enumerate(base.independent)}
     names = [(p.name, p.joint) for p in arm.parameters]
@@ -194,14 +296,14 @@ def _friction(
         steps: dict[int, Step] = {}
         weak: dict[int, tuple[float, float]] = {}
         for k, (effect, column, value) in alive.items():
-            group = Group.of(effect, slice(0, 1), (0,), arm.robot)
-            trial, problem, beside, power = view.trial(group, [column], [value], gone)
+            candidate = Candidate.of(effect, slice(0, 1), (0,), arm.robot)
+            trial, problem, nuisance, power = view.trial(candidate, [column], [value], gone)
             if trial is None:
                 weak[k] = doubtful(trial)
                 continue
             total = power if whole[0] is None else whole[0]
             steps[k] = Step(trial, (), (trial,), total, whole[1], least)
-            here = Round(evidence, work, settings, problem, beside, total, whole[1])
+            here = Round(evidence, work, settings, problem, nuisance, total, whole[1])
             if not stands(steps[k], here):
                 weak[k] = doubtful(trial)
         if not weak:

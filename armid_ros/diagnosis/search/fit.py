@@ -103,7 +103,7 @@ class Start:
 
 
 @dataclass(frozen=True)
-class Told:
+class Prior:
     """
     What other data tell of base parameters.
 
@@ -192,7 +192,7 @@ def fit(
     sigma: Sequence[FloatArray],
     base: BaseParameters | None,
     start: Start | None = None,
-    told: Told | None = None,
+    prior: Prior | None = None,
     known: Estimate | None = None,
 ) -> Fitted:
     """
@@ -212,7 +212,7 @@ def fit(
         What is free of the arm; None keeps it as it is.
     start : Start, optional
         Where to begin; at the arm as it is by default.
-    told : Told, optional
+    prior : Prior, optional
         What other data tell of what is free of the arm.
     known : Estimate, optional
         Of the named effects, whose values and shapes stay as they are.
@@ -225,9 +225,9 @@ def fit(
         state = state.with_change(start.change, base)
     pull = np.zeros((0, 0)) if base is None else described_precision(base, arm)
     aim = np.zeros(len(pull))
-    if told is not None and base is not None:
-        pull, aim = pull + told.precision, told.aim
-    rounds = _MOST_ROUNDS if named else int(base is not None and told is None)
+    if prior is not None and base is not None:
+        pull, aim = pull + prior.precision, prior.aim
+    rounds = _MOST_ROUNDS if named else int(base is not None and prior is None)
     rounds = 0 if known is not None else rounds
     state, residual, columns = _settled(state, (data, sigma), base, (pull, aim), rounds)
     size = 0 if base is None else base.rank
@@ -236,7 +236,7 @@ def fit(
     if estimate is None:
         covariance = np.zeros((size, size))
         if named:
-            more = [] if told is None else told.regressions(state.change, len(numbers))
+            more = [] if prior is None else prior.regressions(state.change, len(numbers))
             covariance = _covariance(columns, residual, data, sigma, more)
         estimate = Estimate(names, numbers, covariance[size:, size:])
     whole = columns[0].shape[2]
@@ -374,12 +374,12 @@ def described_precision(base: BaseParameters, arm: ArmModel) -> FloatArray:
     spread[:size] = described_spread(arm.robot).ravel()
     known = np.abs(arm.theta[size:])
     spread[size:] = np.where(known > 0.0, known, np.inf)
-    told = ~np.any((base.grouping != 0.0) & np.isinf(spread), axis=1)
+    described = ~np.any((base.grouping != 0.0) & np.isinf(spread), axis=1)
     finite = np.where(np.isfinite(spread), spread, 0.0)
-    grouped = base.grouping[told] * finite
+    grouped = base.grouping[described] * finite
     covariance = grouped @ grouped.T
     precision = np.zeros((base.rank, base.rank))
-    precision[np.ix_(told, told)] = np.linalg.pinv(covariance, hermitian=True)
+    precision[np.ix_(described, described)] = np.linalg.pinv(covariance, hermitian=True)
     return precision
 
 

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.search.acceptance import acceptable, beyond_chance, material
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
-from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
-from armid_ros.diagnosis.search.round import acceptable, beyond_chance, material, Round
-from armid_ros.diagnosis.search.step import Step, Taken
+from armid_ros.diagnosis.search.round import Round
+from armid_ros.diagnosis.search.trial import Step, Taken, Trial
 from armid_ros.diagnosis.search.view import View
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -31,7 +31,7 @@ def stands(step: Step, here: Round) -> bool:
     trial = step.trial
     if step.misfit_share is None:
         return beyond_chance(trial, here)
-    gains = trial.joint_gains(here.problem, here.own(trial.group), here.free)
+    gains = trial.joint_gains(here.problem, here.own(trial.candidate), here.free)
     return acceptable(trial, here) and material(gains, here, step.misfit_share)
 
 
@@ -67,7 +67,7 @@ def pruned(
             evidence.sigma,
             question.base,
             Start([one.values for one in alive], change),
-            question.told,
+            question.prior,
         )
         steps, change = tuple(one.step for one in alive), fitted.change
         rows = zip(fitted.named, steps, fitted.values, strict=True)
@@ -99,8 +99,8 @@ def _needless(
     weak: list[tuple[tuple[float, float], int]] = []
     view = View.of(fitted, evidence)
     for k, step in enumerate(steps):
-        trial, problem, beside, _ = view.trial_of(k)
-        here = Round(evidence, work, settings, problem, beside, step.total, step.tried)
+        trial, problem, nuisance, _ = view.trial_of(k)
+        here = Round(evidence, work, settings, problem, nuisance, step.total, step.tried)
         if trial is None or not stands(replace(step, trial=trial), here):
             weak.append((doubtful(trial), k))
     return max(weak)[1] if weak else None
@@ -119,8 +119,8 @@ def _needed_after_all(
     view = View.of(fitted, evidence, [one.named for one in dropped])
     found: dict[int, Trial] = {}
     for k, one in enumerate(dropped):
-        trial, problem, beside, _ = view.trial_of_more(k)
-        here = Round(evidence, work, settings, problem, beside, one.step.total, one.step.tried)
+        trial, problem, nuisance, _ = view.trial_of_more(k)
+        here = Round(evidence, work, settings, problem, nuisance, one.step.total, one.step.tried)
         if trial is not None and stands(replace(one.step, trial=trial), here):
             found[k] = trial
     if not found:

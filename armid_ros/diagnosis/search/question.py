@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
-from armid_ros.diagnosis.search.fit import excited, Told
+from armid_ros.diagnosis.search.fit import excited, Prior
 from armid_ros.effects import CATALOGUE, Effect, Kind
 from armid_ros.model import BaseParameters, group_columns
 import numpy as np
@@ -29,15 +29,15 @@ class Question:
         The arm as given.
     base : BaseParameters or None
         What of it is free.
-    beside : ArmModel
+    nuisance_arm : ArmModel
         The arm with the friction of joints that nobody gave values of.
-    beside_base : BaseParameters or None
+    nuisance_base : BaseParameters or None
         What of that is free.
     unknown : tuple of Effect
         That friction, joint by joint.
     most : int
         Causes that are looked for.
-    told, beside_told : Told or None
+    prior, nuisance_prior : Prior or None
         What other data tell of what is free.
     since : bool
         Whether what has changed is asked, and not what was always there.
@@ -46,12 +46,12 @@ class Question:
 
     arm: ArmModel
     base: BaseParameters | None
-    beside: ArmModel
-    beside_base: BaseParameters | None
+    nuisance_arm: ArmModel
+    nuisance_base: BaseParameters | None
     unknown: tuple[Effect, ...]
     most: int
-    told: Told | None = None
-    beside_told: Told | None = None
+    prior: Prior | None = None
+    nuisance_prior: Prior | None = None
     since: bool = False
 
     def kinds(self, library: Sequence[Kind]) -> tuple[Kind, ...]:
@@ -63,9 +63,14 @@ def as_given(
     arm: ArmModel, data: Sequence[Trajectory], most: int, library: Sequence[str]
 ) -> Question:
     """Ask what a model lacks whose values are right, as far as it has any."""
-    beside, unknown = with_friction(arm, library)
+    nuisance_arm, unknown = with_friction(arm, library)
     return Question(
-        arm, _without_values(arm, data), beside, _without_values(beside, data), unknown, most
+        arm,
+        _without_values(arm, data),
+        nuisance_arm,
+        _without_values(nuisance_arm, data),
+        unknown,
+        most,
     )
 
 
@@ -96,25 +101,25 @@ def fitted_anew(
         Parameters of the arm that stay as they are, so that a change of them is a cause.
 
     """
-    beside, unknown = with_friction(arm, library)
+    nuisance_arm, unknown = with_friction(arm, library)
     bases = []
-    for one in (arm, beside):
+    for one in (arm, nuisance_arm):
         free = np.setdiff1d(np.arange(len(one.parameters)), held)
         bases.append(excited(one, one.base_parameters(rng, free), data)[0])
-    return Question(arm, bases[0], beside, bases[1], unknown, most)
+    return Question(arm, bases[0], nuisance_arm, bases[1], unknown, most)
 
 
 def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
     """Return an arm with what every joint may be taken to have, and what was added."""
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     added: list[Effect] = []
-    beside = arm
+    fuller = arm
     for kind in CATALOGUE.values():
         joints = tuple(j for j in arm.robot.joints if (kind.name, j) not in there)
         if kind.everywhere and kind.name in library and joints:
-            beside = beside.with_effect(kind.on(arm.robot, joints))
+            fuller = fuller.with_effect(kind.on(arm.robot, joints))
             added += [kind.on(arm.robot, (joint,)) for joint in joints]
-    return beside, tuple(added)
+    return fuller, tuple(added)
 
 
 def _without_values(arm: ArmModel, data: Sequence[Trajectory]) -> BaseParameters | None:

@@ -11,16 +11,17 @@ from itertools import pairwise
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.rows import Problem, Projection
-from armid_ros.diagnosis.search.candidates import Group
+from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.effects import Effect, Shape
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 import numpy as np
+from scipy import optimize
 
 #: How far from a peak of a spectrum its side lobes are looked at, and how sharp it is [1/rev].
 _LOBES, _PEAK = 3.0, 0.2
-#: Rounds and evaluations per shape of a refinement.
-_GOLDEN, _ROUNDS = 7, 2
+#: Rounds of a refinement, and evaluations of each shape.
+_ROUNDS, _EVALUATIONS = 2, 9
 
 
 @dataclass(frozen=True)
@@ -62,17 +63,17 @@ class Workspace:
 def refine(
     problem: Problem,
     projection: Projection,
-    group: Group,
+    candidate: Candidate,
     left: FloatArray,
     work: Workspace,
-) -> tuple[Group, FloatArray]:
+) -> tuple[Candidate, FloatArray]:
     """
-    Refine the shape of a group by variable projection; return it with its columns.
+    Refine the shape of a candidate by variable projection; return it with its columns.
 
     What is left has nothing in it that the free columns could make.
 
     """
-    effect, kept = group.effect, group.kept
+    effect, kept = candidate.effect, candidate.kept
     lower, upper = (bound[list(kept)] for bound in effect.bounds())
     cache: dict[tuple[float, ...], tuple[float, FloatArray]] = {}
 
@@ -82,7 +83,7 @@ def refine(
             try:
                 columns = work.columns(effect.with_shape(shape), kept)
             except ModelError:
-                return -np.inf
+                return 0.0  # not possible: takes nothing
             weighted = (columns * problem.weight[:, :, np.newaxis]).reshape(-1, len(kept))
             own, aim = projection.products(weighted), weighted.T @ left.ravel()
             values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
@@ -97,13 +98,13 @@ def refine(
         for index, kind in enumerate(effect.shapes):
             shape = _line_search(gain, shape, index, kind)
     best = max(cache, key=lambda key: cache[key][0])
-    return replace(group, effect=effect.with_shape(best)), cache[best][1]
+    return replace(candidate, effect=effect.with_shape(best)), cache[best][1]
 
 
 def _line_search(
     gain: Callable[[FloatArray], float], shape: FloatArray, index: int, kind: Shape
 ) -> FloatArray:
-    """Search one shape around where it is, by golden sections of its logarithm if positive."""
+    """Search one shape around where it is, over its logarithm if positive (Brent 1973)."""
     value = float(shape[index])
     positive = kind.lower > 0.0 and value > 0.0 and kind.near is None and kind.unit != '1/rev'
 
@@ -126,17 +127,10 @@ def _line_search(
         near = kind.near or max(0.15, apart / max(abs(value), 1e-300))
         reach = max(near * abs(value), 1e-3)
         low, high = max(kind.lower, value - reach), min(kind.upper, value + reach)
-    golden = (np.sqrt(5.0) - 1.0) / 2.0
-    a, b = high - golden * (high - low), low + golden * (high - low)
-    fa, fb = gain(at(a)), gain(at(b))
-    for _ in range(_GOLDEN):
-        if fa > fb:
-            high, b, fb = b, a, fa
-            a = high - golden * (high - low)
-            fa = gain(at(a))
-        else:
-            low, a, fa = a, b, fb
-            b = low + golden * (high - low)
-            fb = gain(at(b))
-    chosen = at(a if fa > fb else b)
-    return chosen if max(fa, fb) > gain(shape) else shape
+    found = optimize.minimize_scalar(
+        lambda x: -gain(at(x)),
+        bounds=(low, high),
+        method='bounded',
+        options={'maxiter': _EVALUATIONS},
+    )
+    return at(found.x) if -found.fun > gain(shape) else shape

@@ -17,7 +17,7 @@ from dataclasses import replace
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import fold_rows, make_problem
-from armid_ros.diagnosis.search.fit import Fitted, Told
+from armid_ros.diagnosis.search.fit import Fitted, Prior
 from armid_ros.identification.fitting.normal_equations import (
     informative_basis,
     informative_solution,
@@ -30,7 +30,7 @@ from scipy import stats
 _LEVEL = 0.975
 
 
-def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float) -> Fitted:
+def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: float) -> Fitted:
     """
     Widen deviations to what the values vary by when parts of the data are left out (jackknife).
 
@@ -43,7 +43,7 @@ def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float
         The arm with all names.
     evidence : Evidence
         The data.
-    told : Told or None
+    prior : Prior or None
         What other data tell of what is free.
     chance : float
         Squares over the unit that a value of any cause takes of what the names leave; noise alone
@@ -55,7 +55,7 @@ def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float
         return fitted
     own, aim = _products(fitted, evidence)
     variance, freedom = np.zeros(size), 0
-    for changes in _left_out(own, aim, fitted, told):
+    for changes in _left_out(own, aim, fitted, prior):
         variance += (len(changes) - 1) * np.var(changes, axis=0)
         freedom += len(changes) - 1
     few = float(stats.t.ppf(_LEVEL, freedom) / stats.norm.ppf(_LEVEL))
@@ -64,7 +64,7 @@ def widened(fitted: Fitted, evidence: Evidence, told: Told | None, chance: float
     return _with_deviation(fitted, np.sqrt(few**2 * variance + along))
 
 
-def as_change(fitted: Fitted, told: Told, baseline: Baseline) -> Fitted:
+def as_change(fitted: Fitted, prior: Prior, baseline: Baseline) -> Fitted:
     """
     Widen deviations by what the model had wrong along each name before.
 
@@ -75,13 +75,13 @@ def as_change(fitted: Fitted, told: Told, baseline: Baseline) -> Fitted:
     ----------
     fitted : Fitted
         The arm with all names.
-    told : Told
+    prior : Prior
         What recordings from before tell of what is free.
     baseline : Baseline
         Those recordings.
 
     """
-    before = _seen_before(fitted, told, baseline)
+    before = _seen_before(fitted, prior, baseline)
     std = fitted.estimate.std
     return _with_deviation(fitted, np.hypot(np.where(np.isfinite(std), std, 0.0), before))
 
@@ -106,17 +106,17 @@ def _products(fitted: Fitted, evidence: Evidence) -> tuple[FloatArray, FloatArra
 
 
 def _left_out(
-    own: FloatArray, aim: FloatArray, fitted: Fitted, told: Told | None
+    own: FloatArray, aim: FloatArray, fitted: Fitted, prior: Prior | None
 ) -> Iterator[FloatArray]:
     """Yield by what the values change without each part of each day, (K, p)."""
     size = len(fitted.estimate.values)
     all_own, all_aim = own.sum(axis=0) + fitted.hold, aim.sum(axis=0) + fitted.pull
     pairs = zip(own, aim, strict=True)
     yield np.array([informative_solution(all_own - n, all_aim - b)[-size:] for n, b in pairs])
-    if told is None:
+    if prior is None:
         return
     before = []
-    for x, y in told.recordings(fitted.change):
+    for x, y in prior.recordings(fitted.change):
         rank = x.shape[1]
         less_own, less_aim = all_own.copy(), all_aim.copy()
         less_own[:rank, :rank] -= x.T @ x
@@ -126,7 +126,7 @@ def _left_out(
         yield np.array(before)
 
 
-def _seen_before(fitted: Fitted, told: Told, baseline: Baseline) -> FloatArray:
+def _seen_before(fitted: Fitted, prior: Prior, baseline: Baseline) -> FloatArray:
     """
     Return the values that names seem to have had before, what is free fitted beside them, (p,).
 
@@ -134,11 +134,11 @@ def _seen_before(fitted: Fitted, told: Told, baseline: Baseline) -> FloatArray:
 
     """
     result = np.zeros(len(fitted.estimate.values))
-    left = told.left - told.columns @ fitted.change
+    left = prior.left - prior.columns @ fitted.change
     for own, values, (places, _) in zip(fitted.named, fitted.values, fitted.places, strict=True):
         kept = list(own.kept)
         pair = np.column_stack([baseline.columns(fitted.arm, own.effect, kept), left])
-        pair -= told.columns @ told.nearest(pair)
+        pair -= prior.columns @ prior.nearest(pair)
         size = np.maximum(np.abs(values[kept]), 1e-300)
         scaled = pair[:, :-1] * size
         precision = scaled.T @ scaled + np.eye(len(kept))

@@ -6,9 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from armid_ros.diagnosis.data.rows import fold_rows
-from armid_ros.diagnosis.search.held_out import denies, HARDLY, lead, ROUNDING, Trial
 from armid_ros.diagnosis.search.round import cost, Round, worth
+from armid_ros.diagnosis.search.trial import lead, ROUNDING, Trial
 from armid_ros.effects import CATALOGUE
 import numpy as np
 
@@ -33,7 +32,7 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
 
 def _never_happens(trial: Trial, here: Round) -> bool:
     """Return whether a cause is none that could come between two days: links do not change."""
-    return here.before is not None and trial.group.effect.corrects
+    return here.before is not None and trial.candidate.effect.corrects
 
 
 def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
@@ -69,7 +68,7 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -
 
 def closes(trial: Trial, here: Round) -> bool:
     """Return whether a cause leaves no gap of data left out."""
-    _, rest = trial.left_out(here.problem, here.own(trial.group), here.free)
+    _, rest = trial.left_out(here.problem, here.own(trial.candidate), here.free)
     return not here.gaps(rest).any()
 
 
@@ -97,7 +96,7 @@ def undecided(first: Trial, ranking: Sequence[Trial], here: Round) -> bool:
 
 def rarity(trial: Trial) -> float:
     """Return the position in the catalogue, which goes from the common to the rare."""
-    names, effect = list(CATALOGUE), trial.group.effect
+    names, effect = list(CATALOGUE), trial.candidate.effect
     place = names.index(effect.name) if effect.name in CATALOGUE else len(names)
     return place + (_ELSEWHERE if bool(effect.joints) == effect.whole_arm else 0.0)
 
@@ -110,20 +109,20 @@ def contains(big: Trial, small: Trial, here: Round) -> bool:
     and the zero of the first encoder of an arm that moves in a plane.
 
     """
-    if not big.group.effect.joints and small.group.effect.joints:
+    if not big.candidate.effect.joints and small.candidate.effect.joints:
         return False
     thresholds = here.settings.thresholds
-    columns = here.projection.rest(here.own(big.group))
-    target = here.projection.rest(here.own(small.group)) @ small.values
+    columns = here.projection.rest(here.own(big.candidate))
+    target = here.projection.rest(here.own(small.candidate)) @ small.values
     squares = float(np.sum(target**2))
     if np.sum((columns @ big.values - target) ** 2) < thresholds.same * squares:
         if here.before is None:
             return False
-        if small.group.effect.comes_and_goes and not big.group.effect.comes_and_goes:
+        if small.candidate.effect.comes_and_goes and not big.candidate.effect.comes_and_goes:
             return True  # links do not change; a description of them may be off
     if cost(big, here.settings) <= cost(small, here.settings):
         return False
-    flat = columns.reshape(-1, big.group.size)
+    flat = columns.reshape(-1, big.candidate.size)
     fit = np.linalg.lstsq(flat, target.ravel(), rcond=1e-6)[0]
     return bool(np.sum((target.ravel() - flat @ fit) ** 2) < thresholds.contained * squares)
 
@@ -135,21 +134,3 @@ def says_no_more(big: Trial, small: Trial, here: Round) -> bool:
     thresholds = here.settings.thresholds
     more, (_, z) = worth(big, here) - worth(small, here), lead(big, small)
     return more <= 0.5 * thresholds.tie or z < thresholds.rival_z
-
-
-def denied_by_one(trial: Trial, here: Round) -> bool:
-    """
-    Return whether a recording denies a cause that others show, and that should show in it.
-
-    With recordings from before, the divisions of all recordings tell that more sharply.
-
-    """
-    data = here.evidence.data
-    if here.before is not None or len({part.fold for part in data}) < 2:
-        return False
-    recording = np.concatenate([np.full(len(part.rows), part.fold) for part in data])
-    _, first = np.unique(fold_rows(data), return_index=True)
-    owner = recording[first][trial.piece]
-    made = np.bincount(owner, trial.square)
-    shown = np.flatnonzero(made > HARDLY * made.max())
-    return any(denies(trial.cross[owner == k], trial.square[owner == k]) for k in shown)

@@ -11,19 +11,12 @@ from functools import cached_property
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import (
-    make_problem,
-    Problem,
-    project,
-    Projection,
-    weighted_rows,
-)
-from armid_ros.diagnosis.search.candidates import Candidates, Group
-from armid_ros.diagnosis.search.fit import Fitted, Told
-from armid_ros.diagnosis.search.held_out import Trial
-from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.products import Products
+from armid_ros.diagnosis.data.rows import make_problem, Problem, project, Projection, weighted_rows
+from armid_ros.diagnosis.search.candidates import Candidates
+from armid_ros.diagnosis.search.fit import Fitted, Prior
+from armid_ros.diagnosis.search.held_out import Products
 from armid_ros.diagnosis.search.refine import Workspace
+from armid_ros.diagnosis.search.trial import Candidate, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -31,7 +24,7 @@ import numpy.typing as npt
 
 
 @dataclass(frozen=True)
-class Beside:
+class Nuisance:
     """
     What is fitted beside every cause.
 
@@ -50,19 +43,23 @@ class Beside:
     hold: FloatArray
     pull: FloatArray
 
-    def and_columns(self, group: Group) -> Beside:
-        """Return the same with the columns of a group."""
-        span = range(group.columns.start, group.columns.stop)
+    def and_columns(self, candidate: Candidate) -> Nuisance:
+        """Return the same with the columns of a candidate."""
+        span = range(candidate.columns.start, candidate.columns.stop)
         size = len(self.free) + len(span)
         hold = np.zeros((size, size))
         hold[: len(self.free), : len(self.free)] = self.hold
-        hold[len(self.free) :, len(self.free) :] = np.diag(group.precision)
-        return Beside((*self.free, *span), hold, np.concatenate([self.pull, np.zeros(len(span))]))
+        hold[len(self.free) :, len(self.free) :] = np.diag(candidate.precision)
+        return Nuisance(
+            (*self.free, *span), hold, np.concatenate([self.pull, np.zeros(len(span))])
+        )
 
 
-def beside_fit(found: Candidates, current: Fitted, evidence: Evidence) -> tuple[Problem, Beside]:
+def nuisance_of(
+    found: Candidates, current: Fitted, evidence: Evidence
+) -> tuple[Problem, Nuisance]:
     """
-    Return the problem of all groups, and what is free beside each, whose columns come last.
+    Return the problem of all candidates, and what is free beside each, whose columns come last.
 
     Shapes of names are held by what all data tell of them: a part alone may tell next to nothing
     of where a strap is fixed, and predict the others by that.
@@ -73,11 +70,11 @@ def beside_fit(found: Candidates, current: Fitted, evidence: Evidence) -> tuple[
     problem = make_problem(evidence.data, evidence.sigma, current.residual, columns)
     size = problem.x.shape[2]
     free = tuple(range(size - current.columns[0].shape[2], size))
-    told = np.zeros(len(free))
+    known = np.zeros(len(free))
     first = len(free) - len(current.estimate.values)
     shapes = [first + k for _, own in current.places for k in own]
-    told[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
-    return problem, Beside(free, current.hold + np.diag(told), current.pull)
+    known[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
+    return problem, Nuisance(free, current.hold + np.diag(known), current.pull)
 
 
 @dataclass(frozen=True)
@@ -113,16 +110,16 @@ class Later:
             tuple(rows.ravel() for rows in left),
         )
 
-    def own(self, arm: ArmModel, group: Group) -> list[FloatArray]:
-        """Return the columns of a group, each (S, p)."""
+    def own(self, arm: ArmModel, candidate: Candidate) -> list[FloatArray]:
+        """Return the columns of a candidate, each (S, p)."""
         data, sigma = self.evidence.data, self.evidence.sigma
-        kept = list(group.kept)
-        rows = [part.columns(arm, group.effect)[:, :, kept] for part in data]
+        kept = list(candidate.kept)
+        rows = [part.columns(arm, candidate.effect)[:, :, kept] for part in data]
         return [part.reshape(-1, len(kept)) for part in weighted_rows(rows, data, sigma)]
 
-    def and_columns(self, arm: ArmModel, group: Group) -> Later:
-        """Return the same with the columns of a group."""
-        pairs = zip(self.free, self.own(arm, group), strict=True)
+    def and_columns(self, arm: ArmModel, candidate: Candidate) -> Later:
+        """Return the same with the columns of a candidate."""
+        pairs = zip(self.free, self.own(arm, candidate), strict=True)
         return replace(self, free=tuple(np.concatenate(pair, axis=1) for pair in pairs))
 
 
@@ -135,7 +132,7 @@ class Before:
     ----------
     baseline : Baseline
         The recordings.
-    told : Told
+    prior : Prior
         What they tell of what is free.
     change : ndarray, shape (r,)
         What was added to that.
@@ -145,16 +142,18 @@ class Before:
     """
 
     baseline: Baseline
-    told: Told
+    prior: Prior
     change: FloatArray
     later: Later | None = None
 
-    def and_columns(self, arm: ArmModel, group: Group) -> Before:
-        """Return the same where a group is fitted beside every cause."""
-        later = None if self.later is None else self.later.and_columns(arm, group)
+    def and_columns(self, arm: ArmModel, candidate: Candidate) -> Before:
+        """Return the same where a candidate is fitted beside every cause."""
+        later = None if self.later is None else self.later.and_columns(arm, candidate)
         return replace(self, later=later)
 
-    def beside(self, groups: Sequence[Group], arm: ArmModel, beside: Beside) -> Beside:
+    def nuisance(
+        self, candidates: Sequence[Candidate], arm: ArmModel, nuisance: Nuisance
+    ) -> Nuisance:
         """
         Return what is fitted beside a cause: also the values that some had before already.
 
@@ -162,19 +161,23 @@ class Before:
 
         """
         own = np.concatenate(
-            [self.baseline.columns(arm, group.effect, group.kept) for group in groups], axis=1
+            [
+                self.baseline.columns(arm, candidate.effect, candidate.kept)
+                for candidate in candidates
+            ],
+            axis=1,
         )
-        precision = np.concatenate([group.precision for group in groups])
-        left = self.told.left - self.told.columns @ self.change
-        size, known = own.shape[1], self.told.columns.shape[1]
-        whole = size + len(beside.pull)
+        precision = np.concatenate([candidate.precision for candidate in candidates])
+        left = self.prior.left - self.prior.columns @ self.change
+        size, known = own.shape[1], self.prior.columns.shape[1]
+        whole = size + len(nuisance.pull)
         hold, pull = np.zeros((whole, whole)), np.zeros(whole)
-        hold[size:, size:], pull[size:] = beside.hold, beside.pull
+        hold[size:, size:], pull[size:] = nuisance.hold, nuisance.pull
         hold[:size, :size] = own.T @ own + np.diag(precision)
-        hold[:size, size : size + known] = own.T @ self.told.columns
+        hold[:size, size : size + known] = own.T @ self.prior.columns
         hold[size : size + known, :size] = hold[:size, size : size + known].T
         pull[:size] = own.T @ left
-        return Beside((), hold, pull)
+        return Nuisance((), hold, pull)
 
 
 @dataclass(frozen=True)
@@ -191,13 +194,13 @@ class Round:
     settings : DiagnosisSettings
         Library and thresholds.
     problem : Problem
-        All columns over the unit, those of the groups first.
-    beside : Beside
+        All columns over the unit, those of the candidates first.
+    nuisance : Nuisance
         What is fitted beside every cause.
     total : float or None
         Held-out squares that shares are of; those of this round if None.
     tried : int
-        Groups that were tried, every shape for itself.
+        Candidates that were tried, every shape for itself.
     before : Before or None
         Recordings in which nothing was wrong.
     width : float
@@ -211,7 +214,7 @@ class Round:
     work: Workspace
     settings: DiagnosisSettings
     problem: Problem
-    beside: Beside
+    nuisance: Nuisance
     total: float | None = None
     tried: int = 1
     before: Before | None = None
@@ -221,12 +224,12 @@ class Round:
     @cached_property
     def free(self) -> FloatArray:
         """Columns that are fitted beside every cause, shape (R, n, f)."""
-        return self.problem.x[:, :, list(self.beside.free)]
+        return self.problem.x[:, :, list(self.nuisance.free)]
 
     @cached_property
     def projection(self) -> Projection:
         """What these leave of others."""
-        return project(self.problem, self.beside.free, self.beside.hold)
+        return project(self.problem, self.nuisance.free, self.nuisance.hold)
 
     @cached_property
     def left(self) -> FloatArray:
@@ -237,48 +240,14 @@ class Round:
         """Return the same where a lead of less than some squares decides nothing."""
         return self if width == self.width else replace(self, width=width)
 
-    def own(self, group: Group) -> FloatArray:
-        """Return the columns of a group, shape (R, n, p)."""
-        return self.problem.x[:, :, group.columns]
+    def own(self, candidate: Candidate) -> FloatArray:
+        """Return the columns of a candidate, shape (R, n, p)."""
+        return self.problem.x[:, :, candidate.columns]
 
     def gaps(self, left: FloatArray) -> npt.NDArray[np.bool_]:
         """Return in which joints what is left (R, n) is a gap, shape (n,)."""
         rows = self.evidence.split(left, self.problem.weight)
         return self.problem.chi2_per_row(left) > self.evidence.limits(rows, self.settings)
-
-
-def acceptable(trial: Trial, here: Round) -> bool:
-    """Return whether a cause is there beyond chance, pays for its freedom, and is possible."""
-    return beyond_chance(trial, here) and worth(trial, here) > 0.0
-
-
-def beyond_chance(trial: Trial, here: Round) -> bool:
-    """Return whether a cause is there beyond chance, and is possible."""
-    surely = trial.p * here.tried <= here.settings.thresholds.error_rate
-    return surely and possible(trial, here)
-
-
-def possible(trial: Trial, here: Round) -> bool:
-    """Return whether the values are what could be called by the name."""
-    effect, arm, kept = trial.group.effect, here.work.arm, list(trial.group.kept)
-    if not inside(trial, here).all():
-        return False
-    values, std = np.zeros((2, len(effect.parameters(arm.robot))))
-    values[kept], std[kept] = trial.values, trial.deviation
-    return effect.plausible(values, std, arm)
-
-
-def inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
-    """Return which values are physically possible, or differ from that by noise, shape (p,)."""
-    kept = list(trial.group.kept)
-    lower, upper = (bound[kept] for bound in room(trial.group.effect, here.work.arm))
-    slack = here.settings.thresholds.beyond_bounds * trial.deviation
-    return np.asarray((trial.values > lower - slack) & (trial.values < upper + slack))
-
-
-def material(gains: FloatArray, here: Round, misfit_share: float) -> bool:
-    """Return whether a cause that takes these squares of the joints takes as much as matters."""
-    return bool(np.any(gains >= here.evidence.least_squares(here.settings, misfit_share)))
 
 
 def worth(trial: Trial, here: Round) -> float:
@@ -290,7 +259,7 @@ def worth(trial: Trial, here: Round) -> float:
 
 def cost(trial: Trial, settings: DiagnosisSettings) -> float:
     """Return how many values and shapes the data chose, those of what is outlandish more."""
-    effect = trial.group.effect
+    effect = trial.candidate.effect
     shapes = len(effect.shapes) / max(len(effect.separate), 1)
     outside = settings.thresholds.outside if effect.external else 0.0
     return trial.freedom + shapes + outside

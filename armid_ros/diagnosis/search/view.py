@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.rows import make_problem, Problem
-from armid_ros.diagnosis.search.candidates import Group
 from armid_ros.diagnosis.search.fit import Fitted
-from armid_ros.diagnosis.search.held_out import held_out, Trial
+from armid_ros.diagnosis.search.held_out import held_out
 from armid_ros.diagnosis.search.patch import Named
-from armid_ros.diagnosis.search.round import Beside
+from armid_ros.diagnosis.search.round import Nuisance
+from armid_ros.diagnosis.search.trial import Candidate, Trial
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -104,35 +104,35 @@ class View:
 
     def trial(
         self,
-        group: Group,
+        candidate: Candidate,
         columns: Sequence[int],
         values: Sequence[float],
         gone: Sequence[int] = (),
-    ) -> tuple[Trial | None, Problem, Beside, float]:
+    ) -> tuple[Trial | None, Problem, Nuisance, float]:
         """Judge what is there already as if it were asked for now."""
         problem, free, hold, pull = self.without(columns, values, gone)
-        moved = replace(group, columns=slice(0, len(columns)))
+        moved = replace(candidate, columns=slice(0, len(columns)))
         trials, power = held_out(problem, free, [moved], hold, pull)
-        beside = Beside(free, hold, pull)
-        return (trials[0] if trials else None), problem, beside, float(power.sum())
+        nuisance = Nuisance(free, hold, pull)
+        return (trials[0] if trials else None), problem, nuisance, float(power.sum())
 
-    def trial_of(self, name: int) -> tuple[Trial | None, Problem, Beside, float]:
+    def trial_of(self, name: int) -> tuple[Trial | None, Problem, Nuisance, float]:
         """Judge a name as if it were asked for now, beside the others."""
         own = self.fitted.named[name]
         columns, shapes = self.columns(name)
         span = slice(0, len(columns))
-        group = Group.of(own.effect, span, own.kept, self.fitted.arm.robot)
-        return self.trial(group, columns, [self.value(c) for c in columns], shapes)
+        candidate = Candidate.of(own.effect, span, own.kept, self.fitted.arm.robot)
+        return self.trial(candidate, columns, [self.value(c) for c in columns], shapes)
 
-    def trial_of_more(self, name: int) -> tuple[Trial | None, Problem, Beside, float]:
+    def trial_of_more(self, name: int) -> tuple[Trial | None, Problem, Nuisance, float]:
         """Judge a name that was not fitted beside those that were."""
         first = int(self.fitted.columns[0].shape[2])
         start = first + sum(len(one.kept) for one in self.more[:name])
         own = self.more[name]
         span = range(start, start + len(own.kept))
         others = [c for c in range(first, self.problem.x.shape[2]) if c not in span]
-        group = Group.of(own.effect, slice(0, len(span)), own.kept, self.fitted.arm.robot)
-        return self.trial(group, span, [0.0] * len(span), others)
+        candidate = Candidate.of(own.effect, slice(0, len(span)), own.kept, self.fitted.arm.robot)
+        return self.trial(candidate, span, [0.0] * len(span), others)
 
 
 def _columns(own: Named, arm: ArmModel, part: Trajectory) -> FloatArray:

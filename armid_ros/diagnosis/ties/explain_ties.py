@@ -12,16 +12,17 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.data.rows import make_problem
-from armid_ros.diagnosis.search.candidates import candidates, Group
-from armid_ros.diagnosis.search.choice import Chosen, NOISE
-from armid_ros.diagnosis.search.explain import explain, Explanation
+from armid_ros.diagnosis.search.candidates import candidates
+from armid_ros.diagnosis.search.explain import explain
+from armid_ros.diagnosis.search.explanation import Chosen, Explanation, NOISE
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
-from armid_ros.diagnosis.search.held_out import held_out, Trial
+from armid_ros.diagnosis.search.held_out import held_out
+from armid_ros.diagnosis.search.look import look_at
 from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.refine import Workspace
-from armid_ros.diagnosis.search.round import Beside, Round
-from armid_ros.diagnosis.search.step import look_at, Step, Survey, Taken
+from armid_ros.diagnosis.search.round import Nuisance, Round
+from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Taken, Trial
 from armid_ros.diagnosis.search.view import View
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
@@ -148,12 +149,12 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
     whole = kind.on(ties.arm.robot, [own.effect.joints[0] for own in fitted.named])
     each = len(whole.quantities)
     kept = tuple(range(0, each * len(whole.joints), each))
-    group = Group.of(whole, span, kept, ties.arm.robot)
-    beside = Beside(free, reference.hold, reference.pull)
-    trials, power = held_out(problem, free, [group], beside.hold, beside.pull)
+    candidate = Candidate.of(whole, span, kept, ties.arm.robot)
+    nuisance = Nuisance(free, reference.hold, reference.pull)
+    trials, power = held_out(problem, free, [candidate], nuisance.hold, nuisance.pull)
     work = Workspace(memoized_arm(reference.arm), data)
-    here = Round(evidence, work, settings, problem, beside, float(power.sum()))
-    look = look_at(found.groups, here)
+    here = Round(evidence, work, settings, problem, nuisance, float(power.sum()))
+    look = look_at(found.candidates, here)
     step, survey = look.step(), look.survey
     survey = replace(survey, ranking=(*trials, *survey.ranking), tried=survey.tried + 1)
     if step is None or not trials:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.rows import weighted_rows
-from armid_ros.diagnosis.search.explain import Explanation
+from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.tied import Tied, TiedInteraction

@@ -27,12 +27,12 @@ from armid_ros.identification.ties.search import LEAST_Z
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
+from scipy import optimize
 
 #: Squares over noise that slack has to take: z > 5.
 _LEAST_GAIN = 25.0
-#: Golden sections of a common slack around the best of those that are tried.
-_GOLDEN = 8
-_RATIO = (np.sqrt(5.0) - 1.0) / 2.0
+#: Evaluations of a common slack around the best of those that are tried.
+_EVALUATIONS = 10
 
 
 @dataclass(frozen=True)
@@ -178,10 +178,14 @@ class Ties:
         tried = [0.0, *TiedSlack.shapes[0].grid]
         best = int(np.argmax([solved(slack)[0] for slack in tried]))
         low, high = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
-        for _ in range(_GOLDEN):
-            a, b = high - _RATIO * (high - low), low + _RATIO * (high - low)
-            low, high = (low, b) if solved(a)[0] > solved(b)[0] else (a, high)
-        slack = (low + high) / 2.0
+        slack = float(
+            optimize.minimize_scalar(
+                lambda slack: -solved(slack)[0],
+                bounds=(low, high),
+                method='bounded',
+                options={'maxiter': _EVALUATIONS},
+            ).x
+        )
         return slack, *solved(slack)[1:]
 
     def _damped(self, fitted: Fitted) -> Fitted:

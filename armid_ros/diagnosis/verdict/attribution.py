@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import block_squares
-from armid_ros.diagnosis.search.candidates import Group
-from armid_ros.diagnosis.search.explain import Explanation
-from armid_ros.diagnosis.search.held_out import denies, held_out
+from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.held_out import held_out
+from armid_ros.diagnosis.search.trial import Candidate, denies
 from armid_ros.diagnosis.search.view import View
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -103,18 +103,18 @@ def _left_out(
         asked = [c for k in left for c in columns[k]]
         values = [view.value(c) for c in asked]
         problem, free, hold, pull = view.without(asked, values, shapes)
-        start, groups = 0, []
+        start, candidates = 0, []
         for k in left:
             span = slice(start, start + len(columns[k]))
-            groups.append(Group.of(named[k].effect, span, named[k].kept, arm.robot))
+            candidates.append(Candidate.of(named[k].effect, span, named[k].kept, arm.robot))
             start = span.stop
-        trials, power = held_out(problem, free, groups, hold, pull, whole=False)
+        trials, power = held_out(problem, free, candidates, hold, pull, whole=False)
         whole = power if whole is None else whole
         if not taken.size:
             taken, made = np.zeros((2, len(named), len(power)))
-        by_group = {id(trial.group): trial for trial in trials}
-        for k, group in zip(left, groups, strict=True):
-            trial = by_group.get(id(group))
+        by_candidate = {id(trial.candidate): trial for trial in trials}
+        for k, candidate in zip(left, candidates, strict=True):
+            trial = by_candidate.get(id(candidate))
             if trial is not None and (best is None or trial.gain > best[0]):
                 best = trial.gain, k, trial.gains, trial.square
         if best is None:

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.diagnosis.search.explain import Explanation
-from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import ParameterName
 from armid_ros.robots import Robot
@@ -45,11 +45,11 @@ class Detectable:
 
 
 def smallest_size(trial: Trial) -> tuple[int, float]:
-    """Return which parameter of a candidate is told, and from which size on; the first of them."""
-    for index, std in zip(trial.group.kept, trial.std, strict=True):
+    """Return the first parameter of a candidate that is identifiable, and from which size on."""
+    for index, std in zip(trial.candidate.kept, trial.std, strict=True):
         if std > 0.0:  # zero: in a direction that the data do not tell
             return index, _SHOWS * float(std)
-    return trial.group.kept[0], float('inf')
+    return trial.candidate.kept[0], float('inf')
 
 
 def detectable(explanation: Explanation | None, robot: Robot) -> tuple[Detectable, ...]:
@@ -59,7 +59,7 @@ def detectable(explanation: Explanation | None, robot: Robot) -> tuple[Detectabl
         return ()
     rows = []
     for trial in survey.ranking:
-        effect = trial.group.effect
+        effect = trial.candidate.effect
         index, size = smallest_size(trial)
         parameter = effect.parameters(robot)[index]
         rows.append(Detectable(effect.said_as, effect.joints, parameter, size, trial.visible))

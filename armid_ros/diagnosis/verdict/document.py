@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from armid_ros.diagnosis.result import Diagnosis
-from armid_ros.diagnosis.search.held_out import Trial
+from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.detectable import detectable, smallest_size
 from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
@@ -147,8 +147,8 @@ def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 def _candidate(trial: Trial, total: float, tried: int) -> dict[str, Any]:
     return {
-        'name': trial.group.effect.said_as,
-        'joints': list(trial.group.effect.joints),
+        'name': trial.candidate.effect.said_as,
+        'joints': list(trial.candidate.effect.joints),
         'share': min(trial.gain / max(total, 1e-300), 1.0),
         'held_out_gain': trial.gain,
         'replicated_in': trial.replicated,

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.search.explain import Explanation
-from armid_ros.diagnosis.search.held_out import Trial
-from armid_ros.diagnosis.search.step import Step
+from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.verdict.attribution import Attribution
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.effects.tied import Tied
@@ -167,7 +166,7 @@ def small_print(
     """Say what is statistically there and does not matter."""
     result = []
     for trial in trials:
-        effect, kept = trial.group.effect, list(trial.group.kept)
+        effect, kept = trial.candidate.effect, list(trial.candidate.kept)
         names = effect.parameters(arm.robot)
         spread = np.sqrt(np.sum((trial.gains - trial.gains.mean()) ** 2))
         share, wide = trial.gain / total, 2.0 * float(spread) / total
@@ -210,7 +209,7 @@ def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Said]]:
             )
             continue
         parts = _translated(own.effect, values, covariance[span, span], arm)
-        result.append([part for part in parts if _told(part)] or parts[:1])
+        result.append([part for part in parts if _determined(part)] or parts[:1])
     return result
 
 
@@ -219,8 +218,8 @@ def _translated(
 ) -> list[_Said]:
     """Return an effect in other words, deviations by the slopes of the translation."""
     parts = []
-    told = np.isfinite(np.diag(covariance))
-    inside = np.where(np.outer(told, told), covariance, 0.0)
+    known = np.isfinite(np.diag(covariance))
+    inside = np.where(np.outer(known, known), covariance, 0.0)
     step = 1e-4 * np.sqrt(np.maximum(np.diag(inside), 1e-18))
     for position, (word, numbers) in enumerate(effect.named_as(values, arm)):
         slopes = np.column_stack(
@@ -234,13 +233,13 @@ def _translated(
             ]
         )
         std = np.sqrt(np.diag(slopes @ inside @ slopes.T))
-        std[np.any(np.abs(slopes[:, ~told]) > _ALONG, axis=1)] = np.nan
+        std[np.any(np.abs(slopes[:, ~known]) > _ALONG, axis=1)] = np.nan
         parts.append(_Said(word, word.parameters(arm.robot), numbers, std))
     return parts
 
 
-def _told(part: _Said) -> bool:
-    """Return whether any value is told from zero by three deviations, and is worth a word."""
+def _determined(part: _Said) -> bool:
+    """Return whether any value is three deviations from zero, and of a size worth mentioning."""
     typical = [q.typical[0] if q.typical else 0.0 for q in part.effect.quantities]
     size = np.abs(part.values)
     return bool(np.any((size > 3.0 * part.std) & (size > np.array(typical))))
@@ -261,9 +260,9 @@ def _without_later(steps: Sequence[Step]) -> list[Step]:
     result: list[Step] = []
     later: set[tuple[str, tuple[str, ...]]] = set()
     for step in reversed(steps):
-        rivals = tuple(trial for trial in step.rivals if trial.group.key[:2] not in later)
+        rivals = tuple(trial for trial in step.rivals if trial.candidate.key[:2] not in later)
         result.append(replace(step, rivals=rivals))
-        later.update(trial.group.key[:2] for trial in (step.trial, *step.rivals))
+        later.update(trial.candidate.key[:2] for trial in (step.trial, *step.rivals))
     return result[::-1]
 
 
@@ -273,12 +272,12 @@ def _rivals(steps: Sequence[Step], named: set[str], arm: ArmModel) -> tuple[Riva
     for step in steps:
         here: dict[str, Trial] = {}
         for trial in sorted(step.rivals, key=lambda trial: -trial.gain):
-            here.setdefault(trial.group.effect.said_as, trial)
+            here.setdefault(trial.candidate.effect.said_as, trial)
         for name in here.keys() - named:
             best.setdefault(name, []).append(here[name])
     order = sorted(best, key=lambda name: -max(trial.gain for trial in best[name]))
     return tuple(
-        Rival(name, _joints([trial.group.effect.joints for trial in best[name]], arm))
+        Rival(name, _joints([trial.candidate.effect.joints for trial in best[name]], arm))
         for name in order
     )
 

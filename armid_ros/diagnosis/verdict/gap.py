@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.rows import block_squares
-from armid_ros.diagnosis.search.explain import Explanation
+from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -27,6 +27,24 @@ _A_GAP = 0.2
 #: Deviations beyond which a joint is surely worse, and share of its squares that nobody would
 #: call worse.
 _SURELY, _SLIGHTLY = 3.0, 0.05
+
+
+@dataclass(frozen=True)
+class Left:
+    """
+    What is left in the joints.
+
+    Attributes
+    ----------
+    excess : ndarray, shape (n,)
+        Loss over the loss up to which it is no gap; above one there is something.
+    where : str
+        The data that show it, for a sentence.
+
+    """
+
+    excess: FloatArray
+    where: str
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.choice import at_floor, Chosen, freedom, in_model_as_given
-from armid_ros.diagnosis.search.explain import Explanation
-from armid_ros.diagnosis.search.held_out import HARDLY, Trial
+from armid_ros.diagnosis.search.explanation import (
+    at_floor,
+    Chosen,
+    Explanation,
+    freedom,
+    in_model_as_given,
+)
+from armid_ros.diagnosis.search.trial import HARDLY, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.effects import CATALOGUE
@@ -37,7 +42,7 @@ def own_causes_first(explain: Explain, settings: DiagnosisSettings) -> Chosen:
 
     """
     found = explain(settings)
-    outside = [s for s in found.explanation.steps if s.trial.group.effect.external]
+    outside = [s for s in found.explanation.steps if s.trial.candidate.effect.external]
     if not outside:
         return found
     own = tuple(name for name in settings.library if not CATALOGUE[name].external)
@@ -107,7 +112,7 @@ def smallest(
 
 def _opens(fewer: Explanation, explanation: Explanation, settings: DiagnosisSettings) -> bool:
     """Return whether a gap is open in a joint without a name, and closed with it."""
-    if explanation.told is not None:
+    if explanation.prior is not None:
         fewer, explanation = in_model_as_given(fewer), in_model_as_given(explanation)
     limits = explanation.evidence.limits(explanation.fitted.residual, settings)
     return bool(np.any((fewer.chi2_per_row > limits) & (explanation.chi2_per_row <= limits)))

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.verdict.gap import Left
 from armid_ros.diagnosis.verdict.where import Where
-from armid_ros.diagnosis.verdict.words import Left
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy.ndimage import uniform_filter1d

@@ -91,13 +91,13 @@ def locate(
     data = evidence.data
     total = max(float(beyond.sum()), 1e-300)
     rows = [_quantities(arm, part) for part in data]
-    told = np.concatenate([part.informative for part in data])
+    informative = np.concatenate([part.informative for part in data])
     left = np.concatenate(residual)
     result = []
     for joint in np.argsort(-beyond):
         if beyond[joint] <= 0.0:
             break
-        use = told[:, joint]
+        use = informative[:, joint]
         axes = []
         way, torque = arm.robot.position_units[joint], arm.robot.torque_units[joint]
         units = {

@@ -12,6 +12,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.diagnosis.verdict.gap import Left
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -20,31 +21,12 @@ import numpy as np
 Word = Literal[
     'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
 ]
-
 #: Recordings whose periods differ slowly, each a little, tell as well if they are so many.
 _SEVERAL = 3
 #: Less of the gap than this is none in a sentence.
 _SAID = 0.01
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
-
-
-@dataclass(frozen=True)
-class Left:
-    """
-    What is left in the joints.
-
-    Attributes
-    ----------
-    excess : ndarray, shape (n,)
-        Loss over the loss up to which it is no gap; above one there is something.
-    where : str
-        The data that show it, for a sentence.
-
-    """
-
-    excess: FloatArray
-    where: str
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ import numpy as np
 #: Directions of columns scaled to one length with less than this share of the largest eigenvalue
 #: are not identifiable: products of columns hold no more digits.
 UNINFORMATIVE = 1e-10
+#: A direction of which others leave less than this share of its squares is one of theirs.
+DEPENDENT = 1e-6
 
 
 def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) -> FloatArray:
@@ -33,6 +35,30 @@ def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) ->
     scale = 1.0 / np.sqrt(np.maximum(np.diag(products), 1e-300))
     values, vectors = np.linalg.eigh(products * np.outer(scale, scale))
     good = values > tolerance * max(float(values.max(initial=0.0)), 1e-300)
+    return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
+
+
+def independent_basis(products: FloatArray, squares: FloatArray) -> FloatArray:
+    """
+    Return the directions that other columns do not make.
+
+    Parameters
+    ----------
+    products : ndarray, shape (p, p)
+        Products with each other of what the others leave of the columns.
+    squares : ndarray, shape (p,)
+        Squares of the whole columns.
+
+    Returns
+    -------
+    ndarray, shape (p, k)
+        B of the pseudo-inverse B B'.
+
+    """
+    seen = squares > 0.0
+    scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, squares, 1.0)), 0.0)
+    values, vectors = np.linalg.eigh(products * np.outer(scale, scale))
+    good = values > DEPENDENT
     return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis
-from armid_ros.diagnosis.search.held_out import Trial
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.round import cost
+from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.report.notation import percent, probability, with_interval
 from armid_ros.report.page import Section
@@ -67,7 +67,7 @@ class CandidateTable(Section):
         return [self._row(trial, survey.total, survey.tried) for trial in survey.ranking[:_MOST]]
 
     def _row(self, trial: Trial, total: float, tried: int) -> CandidateRow:
-        effect = trial.group.effect
+        effect = trial.candidate.effect
         names = {finding.name for finding in self.diagnosis.findings}
         price = self.settings.thresholds.price * cost(trial, self.settings)
         return CandidateRow(
@@ -84,7 +84,7 @@ class CandidateTable(Section):
 
     def _value(self, trial: Trial) -> str:
         """Return the first value, where it is one that the cause can have."""
-        arm, effect, kept = self.diagnosis.arm, trial.group.effect, list(trial.group.kept)
+        arm, effect, kept = self.diagnosis.arm, trial.candidate.effect, list(trial.candidate.kept)
         if self.diagnosis.explanation is not None:
             arm = self.diagnosis.explanation.given
         lower, upper = (bound[kept] for bound in room(effect, arm))

@@ -8,118 +8,41 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
-from typing import NamedTuple
 
-from armid_ros.diagnosis.search.candidates import Group
+from armid_ros.diagnosis.search.acceptance import (
+    acceptable,
+    denied_by_one,
+    explains_itself,
+    inside,
+    made_of_noise,
+    material,
+    without_echo,
+)
 from armid_ros.diagnosis.search.exchange import changed, surely_changed
-from armid_ros.diagnosis.search.held_out import Trial, tried_beside
-from armid_ros.diagnosis.search.own_noise import explains_itself, made_of_noise, without_echo
-from armid_ros.diagnosis.search.patch import Named
-from armid_ros.diagnosis.search.products import products, with_group
+from armid_ros.diagnosis.search.held_out import products, tried_beside, with_candidate
 from armid_ros.diagnosis.search.refine import refine
 from armid_ros.diagnosis.search.rivals import (
     beaten,
     closes,
-    denied_by_one,
     likeliest,
     rarity,
     says_no_more,
     what_happens_first,
 )
-from armid_ros.diagnosis.search.round import acceptable, inside, material, Round, worth
+from armid_ros.diagnosis.search.round import Round, worth
+from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Trial
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Best groups that are looked at row by row; shapes of this many are refined, of groups that have
-#: this share of the best worth.
+#: Best candidates that are looked at row by row; shapes of this many are refined, of those that
+#: have this share of the best worth.
 _LOOKED_AT, _REFINED, _PROMISING = 30, 6, 0.4
 #: Causes that are compared with each other beside what each of them was before.
 _COMPARED = 8
-#: Rivals that are told of a name: the likeliest, each name once; more than two help nobody.
+#: Rivals that are listed for a name: the likeliest, each name once; more than two help nobody.
 _RIVALS = 2
 #: Causes in the small print.
 _SMALL_PRINT = 5
-
-
-@dataclass(frozen=True)
-class Step:
-    """
-    One name that was accepted.
-
-    Attributes
-    ----------
-    trial : Trial
-        What it explains.
-    rivals : tuple of Trial
-        Groups that the data do not exclude in its place.
-    ranking : tuple of Trial
-        The best groups of the round, one per name and joints, best first.
-    total : float
-        Held-out squares that shares are of.
-    tried : int
-        Groups that were tried, every shape for itself.
-    misfit_share : float
-        Share of the misfit that it has to take: nothing where so many divisions of the recordings
-        show less of it that a misfit does not hide it. None for friction that nobody gave values
-        of, which only has to be there.
-
-    """
-
-    trial: Trial
-    rivals: tuple[Trial, ...]
-    ranking: tuple[Trial, ...]
-    total: float
-    tried: int
-    misfit_share: float | None
-
-
-class Taken(NamedTuple):
-    """A name with its step, and the values of all its parameters."""
-
-    named: Named
-    step: Step
-    values: FloatArray
-
-
-@dataclass(frozen=True)
-class Survey:
-    """
-    What a look at all groups showed.
-
-    Attributes
-    ----------
-    ranking : tuple of Trial
-        All visible groups in their best shape, best first.
-    hidden : frozenset of str
-        Names of which what is free leaves nothing to be seen.
-    total : float
-        Held-out squares that shares are of.
-    tried : int
-        Groups that were tried, every shape for itself.
-    unseen : tuple of (str, tuple of str)
-        Names and joints of the groups that are not visible.
-    there : tuple of Trial
-        Groups that are there beyond chance, best first.
-
-    """
-
-    ranking: tuple[Trial, ...]
-    hidden: frozenset[str]
-    total: float
-    tried: int
-    unseen: tuple[tuple[str, tuple[str, ...]], ...]
-    there: tuple[Trial, ...] = ()
-
-    @property
-    def most(self) -> float:
-        """Squares that any cause takes."""
-        return max((trial.gain for trial in self.ranking), default=0.0)
-
-    @property
-    def by_chance(self) -> float:
-        """Squares that a value of a cause takes in the mean."""
-        each = [max(trial.gain, 0.0) / max(trial.freedom, 1.0) for trial in self.ranking]
-        return float(np.mean(each)) if each else 0.0
 
 
 @dataclass(frozen=True)
@@ -130,13 +53,13 @@ class Look:
     Attributes
     ----------
     survey : Survey
-        All groups.
+        All candidates.
     passing : tuple of Trial
         The causes that could be taken, best first.
     closing : dict of int to bool
         Whether each of them, by its id, leaves no gap.
     ranking : tuple of Trial
-        The best groups, one per name and joints, best first.
+        The best candidates, one per name and joints, best first.
     here : Round
         What it knows; columns of refined shapes are behind the others.
 
@@ -170,23 +93,23 @@ class Look:
             for trial in tied
             if trial is not winner and not says_no_more(trial, winner, here)
         ]
-        best = {trial.group.effect.name: trial for trial in reversed(rivals)}
+        best = {trial.candidate.effect.name: trial for trial in reversed(rivals)}
         likely = tuple(sorted(best.values(), key=rarity)[:_RIVALS])
         whole = here.settings.thresholds.misfit_share
         least = 0.0 if surely_changed(winner, here) else whole
         return Step(winner, likely, self.ranking, self.survey.total, self.survey.tried, least)
 
 
-def look_at(groups: Sequence[Group], here: Round) -> Look:
+def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
     """Try every cause beside what is free."""
-    beside = here.beside
-    known = products(here.problem, beside.free, groups)
-    trials, power = tried_beside(known, here.problem, groups, beside.hold, beside.pull)
+    nuisance = here.nuisance
+    known = products(here.problem, nuisance.free, candidates)
+    trials, power = tried_beside(known, here.problem, candidates, nuisance.hold, nuisance.pull)
     total = float(power.sum()) if here.total is None else here.total
     here = replace(here, total=total, known=known)
     seen = [t for t in trials if t.visible >= here.settings.thresholds.least_visible]
     ranking = _best_per_key(seen, here)
-    survey = _survey(groups, ranking, total, len(seen))
+    survey = _survey(candidates, ranking, total, len(seen))
     ranking, here = _with_refined_shapes(ranking, replace(here, tried=max(len(seen), 1)))
     ranking, there, closing = _examined(ranking, here)
     survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
@@ -197,68 +120,72 @@ def look_at(groups: Sequence[Group], here: Round) -> Look:
 def _best_per_key(trials: Sequence[Trial], here: Round) -> list[Trial]:
     best: dict[object, Trial] = {}
     for trial in sorted(trials, key=lambda t: -worth(t, here)):
-        best.setdefault(trial.group.key, trial)
+        best.setdefault(trial.candidate.key, trial)
     return list(best.values())
 
 
-def _part(group: Group, possible: Sequence[int], first: int) -> Group:
-    """Return a group with some of its values only, whose columns are elsewhere."""
+def _part(candidate: Candidate, possible: Sequence[int], first: int) -> Candidate:
+    """Return a candidate with some of its values only, whose columns are elsewhere."""
     return replace(
-        group,
+        candidate,
         columns=slice(first, first + len(possible)),
-        kept=tuple(group.kept[k] for k in possible),
-        precision=group.precision[list(possible)],
+        kept=tuple(candidate.kept[k] for k in possible),
+        precision=candidate.precision[list(possible)],
     )
 
 
-def _survey(groups: Sequence[Group], ranking: Sequence[Trial], total: float, tried: int) -> Survey:
-    visible = {trial.group.effect.said_as for trial in ranking}
-    seen = {trial.group.key[:2] for trial in ranking}
+def _survey(
+    candidates: Sequence[Candidate], ranking: Sequence[Trial], total: float, tried: int
+) -> Survey:
+    visible = {trial.candidate.effect.said_as for trial in ranking}
+    seen = {trial.candidate.key[:2] for trial in ranking}
     return Survey(
         tuple(ranking),
-        frozenset(group.effect.said_as for group in groups) - visible,
+        frozenset(candidate.effect.said_as for candidate in candidates) - visible,
         total,
         tried,
-        tuple(dict.fromkeys(g.key[:2] for g in groups if g.key[:2] not in seen)),
+        tuple(dict.fromkeys(g.key[:2] for g in candidates if g.key[:2] not in seen)),
     )
 
 
 def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial], Round]:
-    """Refine the shapes of the best groups; return them in order, and their columns too."""
+    """Refine the shapes of the best candidates; return them in order, and their columns too."""
     problem = here.problem
-    best = max((worth(t, here) for t in ranking if not t.group.effect.external), default=0.0)
+    best = max((worth(t, here) for t in ranking if not t.candidate.effect.external), default=0.0)
     refined: list[Trial] = []
     found: list[FloatArray] = []
     first = problem.x.shape[2]
     tried: Counter[str] = Counter()
     for trial in ranking[:_LOOKED_AT]:
-        effect = trial.group.effect
+        effect = trial.candidate.effect
         promising = worth(trial, here) > _PROMISING * best and len(refined) < _REFINED
         promising = promising and tried[effect.name] < _REFINED // 2
         if not (promising and trial.gain > 0.0):
             continue
         tried[effect.name] += 1
         possible = [k for k, good in enumerate(inside(trial, here)) if good]
-        if 0 < len(possible) < trial.group.size:
-            own = here.own(trial.group)[:, :, possible]
-            group = _part(trial.group, possible, first)
+        if 0 < len(possible) < trial.candidate.size:
+            own = here.own(trial.candidate)[:, :, possible]
+            candidate = _part(trial.candidate, possible, first)
             first += len(possible)
             found.append(own / np.where(problem.weight > 0.0, problem.weight, 1.0)[:, :, None])
-            bounded = _alone(group, own, here)
+            bounded = _alone(candidate, own, here)
             if bounded is None:
                 continue
-            trial = replace(bounded, group=group)
+            trial = replace(bounded, candidate=candidate)
             refined.append(trial)
         if not effect.shapes:
             continue
-        group, columns = refine(problem, here.projection, trial.group, here.left, here.work)
+        candidate, columns = refine(
+            problem, here.projection, trial.candidate, here.left, here.work
+        )
         span = slice(first, first + columns.shape[2])
         first = span.stop
         found.append(columns)
         weighted = columns * problem.weight[:, :, np.newaxis]
-        better = _alone(group, weighted, here)
-        own_group = replace(group, columns=span)
-        refined += [] if better is None else [replace(better, group=own_group)]
+        better = _alone(candidate, weighted, here)
+        moved = replace(candidate, columns=span)
+        refined += [] if better is None else [replace(better, candidate=moved)]
     if found:
         here = replace(here, problem=problem.with_columns(np.concatenate(found, axis=2)))
     return _best_per_key([*ranking, *refined], here), here
@@ -289,7 +216,7 @@ def _examined(
         if change is None or not acceptable(change, here):
             continue
         there.append(change)
-        takes = trial.joint_gains(here.problem, here.own(trial.group), here.free)
+        takes = trial.joint_gains(here.problem, here.own(trial.candidate), here.free)
         matters = change.gain >= least or bool(np.any(takes > most * open_squares))
         size = _size(change, takes, here)
         if not (matters and material(size, here, 0.0)):
@@ -330,12 +257,14 @@ def _compared(trials: Sequence[Trial], here: Round) -> list[Trial]:
     return [replace(one, cross=scale * one.cross, square=scale * one.square) for one in changes]
 
 
-def _alone(group: Group, own: FloatArray, here: Round) -> Trial | None:
-    """Try a group with weighted columns beside what is free."""
-    group = replace(group, columns=slice(0, group.size))
+def _alone(candidate: Candidate, own: FloatArray, here: Round) -> Trial | None:
+    """Try a candidate with weighted columns beside what is free."""
+    candidate = replace(candidate, columns=slice(0, candidate.size))
     assert here.known is not None
-    known = with_group(here.known, here.problem, here.free, own)
-    trials, _ = tried_beside(known, here.problem, [group], here.beside.hold, here.beside.pull)
+    known = with_candidate(here.known, here.problem, here.free, own)
+    trials, _ = tried_beside(
+        known, here.problem, [candidate], here.nuisance.hold, here.nuisance.pull
+    )
     return trials[0] if trials else None
 
 
@@ -349,15 +278,15 @@ def _changes(trials: Sequence[Trial], here: Round) -> list[Trial | None]:
     if here.before is None:
         return list(trials)
     problem = here.problem
-    held = here.before.beside([one.group for one in trials], here.work.arm, here.beside)
-    free = np.concatenate([*(here.own(one.group) for one in trials), here.free], axis=2)
+    held = here.before.nuisance([one.candidate for one in trials], here.work.arm, here.nuisance)
+    free = np.concatenate([*(here.own(one.candidate) for one in trials), here.free], axis=2)
     known = products(replace(problem, x=free), range(free.shape[2]), ())
     result: list[Trial | None] = []
     for trial in trials:
-        group = replace(trial.group, columns=slice(0, trial.group.size))
-        whole = with_group(known, problem, free, here.own(trial.group))
-        found, _ = tried_beside(whole, problem, [group], held.hold, held.pull)
-        result.append(replace(found[0], group=trial.group) if found else None)
+        candidate = replace(trial.candidate, columns=slice(0, trial.candidate.size))
+        whole = with_candidate(known, problem, free, here.own(trial.candidate))
+        found, _ = tried_beside(whole, problem, [candidate], held.hold, held.pull)
+        result.append(replace(found[0], candidate=trial.candidate) if found else None)
     return result
 
 
@@ -370,7 +299,7 @@ def _size(change: Trial, takes: FloatArray, here: Round) -> FloatArray:
     """
     if here.before is None:
         return takes
-    made = np.sum((here.own(change.group) @ change.values) ** 2, axis=0)
+    made = np.sum((here.own(change.candidate) @ change.values) ** 2, axis=0)
     return np.asarray(np.minimum(takes, made))
 
 

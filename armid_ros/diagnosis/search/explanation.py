@@ -1,0 +1,165 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""An explanation of a gap: the names, the fitted arm, and what they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.search.fit import fit, Fitted, Prior, Start
+from armid_ros.diagnosis.search.memoized_arm import plain_arm
+from armid_ros.diagnosis.search.resampled import as_change, widened
+from armid_ros.diagnosis.search.round import cost
+from armid_ros.diagnosis.search.trial import Step, Survey, Trial
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.model import BaseParameters
+from armid_ros.motion import FloatArray
+import numpy as np
+
+NOISE, ESTIMATED = 'noise', 'an estimate of the misfit that such a model has'
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """
+    What a search came to.
+
+    Attributes
+    ----------
+    given : ArmModel
+        The arm as given.
+    base : BaseParameters or None
+        What was free of it; None where nothing was.
+    fitted : Fitted
+        The arm with all that was named.
+    reference : Fitted
+        The same without.
+    steps : tuple of Step
+        The names, in the order of those in ``fitted``.
+    survey : Survey or None
+        The first look at all candidates.
+    evidence : Evidence
+        The data.
+    minor : tuple of Trial
+        Causes of the last look that are there beyond chance and do not matter.
+    prior : Prior or None
+        What other data tell of what was free.
+    by_chance : float
+        Squares that a value of any cause takes of what the names leave.
+    considered : frozenset of str
+        Names without which something else could have been found.
+    baseline : Baseline or None
+        Recordings since which the names have changed.
+
+    """
+
+    given: ArmModel
+    base: BaseParameters | None
+    fitted: Fitted
+    reference: Fitted
+    steps: tuple[Step, ...]
+    survey: Survey | None
+    evidence: Evidence
+    minor: tuple[Trial, ...] = ()
+    prior: Prior | None = None
+    by_chance: float = 0.0
+    considered: frozenset[str] = frozenset()
+    baseline: Baseline | None = None
+
+    def without(self, name: int) -> Explanation:
+        """Return the explanation without one of its names, the others fitted anew."""
+        fewer = self.only([k for k in range(len(self.steps)) if k != name])
+        return replace(fewer, minor=(*self.minor, self.steps[name].trial))
+
+    def only(self, keep: Sequence[int]) -> Explanation:
+        """Return the explanation with some of its names, in this order, fitted anew."""
+        fitted = fit(
+            self.given,
+            [self.fitted.named[k] for k in keep],
+            self.evidence.data,
+            self.evidence.sigma,
+            self.base,
+            Start([self.fitted.values[k] for k in keep], self.fitted.change),
+            self.prior,
+        )
+        fitted = widened(fitted, self.evidence, self.prior, self.by_chance)
+        return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
+
+    def forgetting(self) -> Explanation:
+        """Return the same with arms that do not hold what they have computed."""
+        return replace(
+            self,
+            given=plain_arm(self.given),
+            fitted=replace(self.fitted, arm=plain_arm(self.fitted.arm)),
+            reference=replace(self.reference, arm=plain_arm(self.reference.arm)),
+        )
+
+    @property
+    def chi2_per_row(self) -> FloatArray:
+        """Loss of each joint with the patched arm, shape (n,)."""
+        return self.evidence.chi2_per_row(self.fitted.residual)
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """
+    The explanation that is given.
+
+    Attributes
+    ----------
+    explanation : Explanation
+        The explanation.
+    misfit : ndarray, shape (n,)
+        Misfit that the gap is measured beside; zero where noise is all [N m].
+    floor_in_words : str
+        What the floor of the gap is.
+    notes : tuple of str
+        What a reader should know.
+    rest : Explanation or None
+        The same names beside a body that is common to both days, which tells what they leave.
+    doubt : str
+        Why the model itself may be wrong, a sentence; empty if it need not be.
+
+    """
+
+    explanation: Explanation
+    misfit: FloatArray
+    floor_in_words: str
+    notes: tuple[str, ...] = ()
+    rest: Explanation | None = None
+    doubt: str = ''
+
+
+def in_model_as_given(found: Explanation) -> Explanation:
+    """Return what the names explain beside a rigid body that stays as it is."""
+    arm, evidence, fitted = found.given, found.evidence, found.fitted
+    if found.prior is not None and found.baseline is not None:
+        fitted = as_change(fitted, found.prior, found.baseline)
+    reference = fit(arm, (), evidence.data, evidence.sigma, None)
+    alone = fit(
+        arm,
+        fitted.named,
+        evidence.data,
+        evidence.sigma,
+        None,
+        Start(fitted.values),
+        known=fitted.estimate,
+    )
+    return replace(found, base=None, prior=None, fitted=alone, reference=reference)
+
+
+def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
+    """Return whether what an explanation leaves is no gap in any joint."""
+    evidence = explanation.evidence
+    limits = evidence.limits(explanation.fitted.residual, settings)
+    return bool(np.all(explanation.chi2_per_row <= limits))
+
+
+def freedom(explanation: Explanation, settings: DiagnosisSettings) -> float:
+    """Return how many values were chosen, those of the rigid body included."""
+    body = 0 if explanation.base is None else explanation.base.rank
+    return body + sum(cost(step.trial, settings) for step in explanation.steps)

@@ -1,0 +1,302 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+A candidate, how it predicts what it was not fitted to, and how it was accepted.
+
+A candidate is an effect on certain joints with one shape. A trial is what it explains of data that
+its values were not fitted to; see `held_out`.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+from armid_ros.diagnosis.data.rows import Problem
+from armid_ros.diagnosis.search.patch import Named
+from armid_ros.effects import Effect
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+#: Squares that differ by less than this share do so by rounding.
+ROUNDING = 1e-6
+#: Recordings hardly show what takes less than this share of the share it takes of others.
+HARDLY = 0.1
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """
+    An effect on certain joints, with a shape, and where its columns are.
+
+    Attributes
+    ----------
+    effect : Effect
+        Joints and shape included.
+    columns : slice
+        Its columns among those of all candidates.
+    kept : tuple of int
+        Parameters of the effect that the columns belong to; the others are zero.
+    precision : ndarray, shape (p,)
+        How strongly their values are held to what may be expected of them.
+
+    """
+
+    effect: Effect
+    columns: slice
+    kept: tuple[int, ...]
+    precision: FloatArray
+
+    @classmethod
+    def of(cls, effect: Effect, columns: slice, kept: tuple[int, ...], robot: Robot) -> Candidate:
+        """Make a candidate that is held to what may be expected of the effect on a robot."""
+        return cls(effect, columns, kept, effect.spread(robot)[list(kept)] ** -2.0)
+
+    @property
+    def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
+        """Name, joints and quantities: candidates of one key differ in their shape."""
+        return self.effect.name, self.effect.joints, self.kept
+
+    @property
+    def size(self) -> int:
+        """Return the number of its columns."""
+        return int(self.columns.stop) - int(self.columns.start)
+
+
+def denies(cross: FloatArray, square: FloatArray) -> bool:
+    """
+    Return whether data deny a cause: no more follows it than noise would.
+
+    The slope of what is left on what the cause predicts is one for a cause, zero for none. Data
+    in which it does nothing do not deny it.
+
+    Parameters
+    ----------
+    cross, square : ndarray, shape (B,)
+        x'r and x'x of every block, of what is predicted (x) and what is left (r).
+
+    """
+    made = float(square.sum())
+    if made <= 0.0:
+        return False
+    slope = float(cross.sum()) / made
+    wide = 2.0 * float(np.sqrt(np.sum((cross - slope * square) ** 2))) / made
+    return slope + wide < 1.0 and slope - wide <= 0.0
+
+
+@dataclass(frozen=True)
+class Trial:
+    """
+    A candidate and how it predicts what it was not fitted to.
+
+    Attributes
+    ----------
+    candidate : Candidate
+        The candidate.
+    values, std : ndarray, shape (p,)
+        Its values fitted to all of the data, and their deviations as far as white noise goes.
+    visible : float
+        Share of the columns that the free ones cannot make.
+    freedom : float
+        Values that the data choose; those held by what is expected of them count in part.
+    cross, square : ndarray, shape (B,)
+        x'r and x'x of every block.
+    held_values : ndarray, shape (K, p)
+        Values without each part.
+    held_free : ndarray, shape (K, f)
+        The free values without each part, changed by the candidate, and ``held_alone`` without it.
+    piece : ndarray of int, shape (B,)
+        The part that each block is left out with.
+
+    """
+
+    candidate: Candidate
+    values: FloatArray
+    std: FloatArray
+    visible: float
+    freedom: float
+    cross: FloatArray
+    square: FloatArray
+    held_values: FloatArray
+    held_free: FloatArray
+    held_alone: FloatArray
+    piece: npt.NDArray[np.intp]
+
+    @cached_property
+    def deviation(self) -> FloatArray:
+        """Deviations of the values, those of noise of any colour by the jackknife, shape (p,)."""
+        parts = len(self.held_values)
+        change = self.held_values - self.held_values.mean(axis=0)
+        return np.asarray(np.sqrt(self.std**2 + (1.0 - 1.0 / parts) * np.sum(change**2, axis=0)))
+
+    @property
+    def gains(self) -> FloatArray:
+        """Squares that go in every block, shape (B,)."""
+        return np.asarray(2.0 * self.cross - self.square)
+
+    @cached_property
+    def gain(self) -> float:
+        """Squares over noise that go in all of the data."""
+        return float(self.gains.sum())
+
+    @cached_property
+    def slope(self) -> float:
+        """Slope of what is left on what is predicted: one for a cause, zero for noise."""
+        return float(self.cross.sum() / max(float(self.square.sum()), 1e-300))
+
+    @cached_property
+    def z(self) -> float:
+        """
+        Return the slope over its deviation.
+
+        That is what blocks differ by, and no less than white noise makes: a cause that acts in two
+        blocks may do so alike by chance.
+
+        """
+        scatter = self.cross - self.slope * self.square
+        count = len(scatter)
+        variance = float(np.sum(scatter**2)) * count / (count - 1)
+        variance = max(variance, float(self.square.sum()))
+        return float(self.cross.sum() / max(np.sqrt(variance), 1e-300))
+
+    @property
+    def p(self) -> float:
+        """Probability of such a slope if the candidate did nothing."""
+        return float(stats.t.sf(self.z, len(self.cross) - 1))
+
+    @property
+    def replicated(self) -> int:
+        """Parts of the data that lose squares."""
+        return int(np.sum(np.bincount(self.piece, self.gains) > 0.0))
+
+    def left_out(
+        self, problem: Problem, own: FloatArray, free: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """
+        Return what is left of each part without the candidate and with it, each (R, n).
+
+        Parameters are those of `joint_gains`.
+
+        """
+        piece = self.piece[problem.block]
+        alone, rest = np.empty_like(problem.y), np.empty_like(problem.y)
+        for part in range(len(self.held_values)):
+            rows = piece == part
+            alone[rows] = problem.y[rows] - free[rows] @ self.held_alone[part]
+            predicted = own[rows] @ self.held_values[part] + free[rows] @ self.held_free[part]
+            rest[rows] = problem.y[rows] - predicted
+        return alone, rest
+
+    def joint_gains(self, problem: Problem, own: FloatArray, free: FloatArray) -> FloatArray:
+        """
+        Return the squares that go in every joint, shape (n,).
+
+        What the candidate spares the data that hold the free values is shared among the joints.
+
+        Parameters
+        ----------
+        problem : Problem
+            The rows.
+        own : ndarray, shape (R, n, p)
+            Columns of the candidate.
+        free : ndarray, shape (R, n, f)
+            Columns that were free.
+
+        """
+        alone, rest = self.left_out(problem, own, free)
+        gains = np.sum(alone**2 - rest**2, axis=0)
+        seen = float(gains.sum())
+        return np.asarray(gains * max(self.gain / seen, 1.0) if seen > 0.0 else gains)
+
+
+def lead(first: Trial, other: Trial) -> tuple[float, float]:
+    """Return by how many squares one trial is ahead of another, and that over its deviation."""
+    difference = first.gains - other.gains
+    spread = float(difference.std(ddof=1)) * np.sqrt(len(difference))
+    return float(difference.sum()), float(difference.sum()) / max(spread, 1e-300)
+
+
+@dataclass(frozen=True)
+class Step:
+    """
+    One name that was accepted.
+
+    Attributes
+    ----------
+    trial : Trial
+        What it explains.
+    rivals : tuple of Trial
+        Candidates that the data do not exclude in its place.
+    ranking : tuple of Trial
+        The best candidates of the round, one per name and joints, best first.
+    total : float
+        Held-out squares that shares are of.
+    tried : int
+        Candidates that were tried, every shape for itself.
+    misfit_share : float
+        Share of the misfit that it has to take: nothing where so many divisions of the recordings
+        show less of it that a misfit does not hide it. None for friction that nobody gave values
+        of, which only has to be there.
+
+    """
+
+    trial: Trial
+    rivals: tuple[Trial, ...]
+    ranking: tuple[Trial, ...]
+    total: float
+    tried: int
+    misfit_share: float | None
+
+
+class Taken(NamedTuple):
+    """A name with its step, and the values of all its parameters."""
+
+    named: Named
+    step: Step
+    values: FloatArray
+
+
+@dataclass(frozen=True)
+class Survey:
+    """
+    What a look at all candidates showed.
+
+    Attributes
+    ----------
+    ranking : tuple of Trial
+        All visible candidates in their best shape, best first.
+    hidden : frozenset of str
+        Names of which what is free leaves nothing to be seen.
+    total : float
+        Held-out squares that shares are of.
+    tried : int
+        Candidates that were tried, every shape for itself.
+    unseen : tuple of (str, tuple of str)
+        Names and joints of the candidates that are not visible.
+    there : tuple of Trial
+        Candidates that are there beyond chance, best first.
+
+    """
+
+    ranking: tuple[Trial, ...]
+    hidden: frozenset[str]
+    total: float
+    tried: int
+    unseen: tuple[tuple[str, tuple[str, ...]], ...]
+    there: tuple[Trial, ...] = ()
+
+    @property
+    def most(self) -> float:
+        """Squares that any cause takes."""
+        return max((trial.gain for trial in self.ranking), default=0.0)
+
+    @property
+    def by_chance(self) -> float:
+        """Squares that a value of a cause takes in the mean."""
+        each = [max(trial.gain, 0.0) / max(trial.freedom, 1.0) for trial in self.ranking]
+        return float(np.mean(each)) if each else 0.0
