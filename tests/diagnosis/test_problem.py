@@ -60,6 +60,6 @@ def test_shapes_of_a_name_are_held_by_what_all_data_tell_of_them(bench):
     evidence = Evidence(tuple(data), tuple(sigma), tuple(sigma))
     found = candidates(fitted, data, sigma, [CATALOGUE['viscous_friction']])
     problem, nuisance = nuisance_of(found, fitted, evidence)
-    value, *shapes = np.sum(problem.x[:, :, list(beside.free)] ** 2, axis=(0, 1))
+    value, *shapes = np.sum(problem.x[:, :, list(nuisance.free)] ** 2, axis=(0, 1))
     assert value > 0.0
-    np.testing.assert_allclose(np.diag(beside.hold), [0.0, *shapes])
+    np.testing.assert_allclose(np.diag(nuisance.hold), [0.0, *shapes])
