@@ -27,15 +27,7 @@ def elbow(shape):
 @pytest.mark.parametrize(
     ('name', 'hide'),
     [
-        pytest.param(
-            'torque_offset',
-            elbow(lambda m, tau: np.ones(len(m))),
-            marks=pytest.mark.xfail(
-                strict=True,
-                raises=TypeError,
-                reason='friction that is fitted beside every cause is said to show at no size',
-            ),
-        ),
+        ('torque_offset', elbow(lambda m, tau: np.ones(len(m)))),
         ('quadratic_friction', elbow(lambda m, tau: m.dq[:, 1] * np.abs(m.dq[:, 1]))),
         ('rotor_inertia', elbow(lambda m, tau: m.ddq[:, 1])),
         ('torque_gain', elbow(lambda m, tau: tau)),
@@ -50,6 +42,17 @@ def test_the_size_that_shows_is_right_within_a_factor_of_four(bench, sizes, name
         found = diagnose(bench.arm, hidden, settings=settings, rng=np.random.default_rng(0))
         names = {n for f in found.findings for n in (f.name, *f.ambiguous_with)}
         assert (name in names) is there, f'{factor} times {size:.3g}: {found.summary}'
+
+
+def test_of_what_data_do_not_tell_apart_no_size_is_stated(bench):
+    """An asymmetry of Coulomb friction is an offset, which is fitted beside it."""
+    found = diagnose(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
+    document = diagnosis_document(found)
+    rows = {(row['name'], *row['joints']): row for row in document['detectable']}
+    for joint in bench.robot.joints:
+        assert rows['asymmetric_friction', joint]['parameter'] == 'viscous_asymmetry'
+        assert rows['torque_offset', joint]['min_detectable'] < 0.01
+    assert 'torque_offset' not in document['not_visible']
 
 
 def test_smooth_motion_shows_a_joint_only_if_it_is_softer(bench):

@@ -28,7 +28,7 @@ from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.resampled import widened
 from armid_ros.diagnosis.search.rivals import undecided
 from armid_ros.diagnosis.search.round import Before, Later, nuisance_of, Round
-from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Taken
+from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Taken, Trial
 from armid_ros.diagnosis.search.view import View
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -48,7 +48,10 @@ def explain(
     survey, last = way.first, way.last
     minor = () if last is None else last.there
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
-    taken = [*way.taken, *_friction(question, way.taken, evidence, settings, whole)]
+    friction, tried = _friction(question, way.taken, evidence, settings, whole)
+    taken = [*way.taken, *friction]
+    if survey is not None:
+        survey = survey.and_nuisance(tried, settings.thresholds.least_visible)
     reference = fit(
         question.arm, (), evidence.data, evidence.sigma, question.base, None, question.prior
     )
@@ -264,9 +267,9 @@ def _friction(
     evidence: Evidence,
     settings: DiagnosisSettings,
     whole: tuple[float | None, int],
-) -> list[Taken]:
+) -> tuple[list[Taken], list[Trial]]:
     """
-    Return the friction of unknown value that is there, beside what was named.
+    Return the friction of unknown value that is there, and what all of it was tried as.
 
     All of it was free beside every cause. What is likeliest to be chance goes first, as what is
     needless bends what the others take, until all that is left is there beyond it, however little
@@ -274,7 +277,7 @@ def _friction(
 
     """
     if not question.unknown:
-        return []
+        return [], []
     arm, base = question.nuisance_arm, question.nuisance_base
     assert base is not None
     named, start = [one.named for one in taken], Start([one.values for one in taken])
@@ -291,6 +294,7 @@ def _friction(
     least = settings.thresholds.misfit_share if question.since else None
     work = Workspace(memoized_arm(arm), evidence.data)
     gone: list[int] = []
+    tried: list[Trial] = []
     alive = dict(enumerate(left))
     while True:
         steps: dict[int, Step] = {}
@@ -306,12 +310,14 @@ def _friction(
             here = Round(evidence, work, settings, problem, nuisance, total, whole[1])
             if not stands(steps[k], here):
                 weak[k] = doubtful(trial)
+        tried = tried or [step.trial for step in steps.values()]
         if not weak:
             break
         _, column, value = alive.pop(max(weak, key=lambda k: weak[k]))
         view = view.dropped(column, value)
         gone.append(column)
-    return [
+    there = [
         Taken(Named(effect, (0,)), steps[k], np.array([value]))
         for k, (effect, _, value) in alive.items()
     ]
+    return there, tried

@@ -10,7 +10,8 @@ its values were not fitted to; see `held_out`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -100,10 +101,11 @@ class Trial:
         The candidate.
     values, std : ndarray, shape (p,)
         Its values fitted to all of the data, and their deviations as far as white noise goes.
+    resolution : ndarray, shape (p,)
+        Diagonal of the resolution matrix: one where the data determine a value, zero where only
+        what is expected of it does (Menke, Geophysical Data Analysis, 1989).
     visible : float
         Share of the columns that the free ones cannot make.
-    freedom : float
-        Values that the data choose; those held by what is expected of them count in part.
     cross, square : ndarray, shape (B,)
         x'r and x'x of every block.
     held_values : ndarray, shape (K, p)
@@ -118,14 +120,19 @@ class Trial:
     candidate: Candidate
     values: FloatArray
     std: FloatArray
+    resolution: FloatArray
     visible: float
-    freedom: float
     cross: FloatArray
     square: FloatArray
     held_values: FloatArray
     held_free: FloatArray
     held_alone: FloatArray
     piece: npt.NDArray[np.intp]
+
+    @property
+    def freedom(self) -> float:
+        """Values that the data choose; those held by what is expected of them count in part."""
+        return float(self.resolution.sum())
 
     @cached_property
     def deviation(self) -> FloatArray:
@@ -280,6 +287,8 @@ class Survey:
         Names and joints of the candidates that are not visible.
     there : tuple of Trial
         Candidates that are there beyond chance, best first.
+    nuisance : tuple of Trial
+        Friction of unknown value, which is fitted beside all of them.
 
     """
 
@@ -289,6 +298,19 @@ class Survey:
     tried: int
     unseen: tuple[tuple[str, tuple[str, ...]], ...]
     there: tuple[Trial, ...] = ()
+    nuisance: tuple[Trial, ...] = ()
+
+    def and_nuisance(self, trials: Sequence[Trial], least_visible: float) -> Survey:
+        """Return the survey with what is fitted beside all candidates."""
+        seen = tuple(trial for trial in trials if trial.visible >= least_visible)
+        effects = [trial.candidate.effect for trial in seen]
+        keys = {trial.candidate.key[:2] for trial in seen}
+        return replace(
+            self,
+            hidden=self.hidden - {effect.said_as for effect in effects},
+            unseen=tuple(key for key in self.unseen if key not in keys),
+            nuisance=seen,
+        )
 
     @property
     def most(self) -> float:

@@ -15,6 +15,8 @@ from armid_ros.robots import Robot
 #: Standard deviations of a value from which on it shows. On a two-link arm, effects of one to four
 #: times the size that follows were named, of half of it none.
 _SHOWS = 5.0
+#: Resolution of a value that the data determine: it is a half or less in a pair that they do not.
+_IDENTIFIABLE = 0.9
 
 
 @dataclass(frozen=True)
@@ -46,8 +48,9 @@ class Detectable:
 
 def smallest_size(trial: Trial) -> tuple[int, float]:
     """Return the first parameter of a candidate that is identifiable, and from which size on."""
-    for index, std in zip(trial.candidate.kept, trial.std, strict=True):
-        if std > 0.0:  # zero: in a direction that the data do not tell
+    rows = zip(trial.candidate.kept, trial.std, trial.resolution, strict=True)
+    for index, std, resolution in rows:
+        if resolution > _IDENTIFIABLE:
             return index, _SHOWS * float(std)
     return trial.candidate.kept[0], float('inf')
 
@@ -58,7 +61,7 @@ def detectable(explanation: Explanation | None, robot: Robot) -> tuple[Detectabl
     if survey is None:
         return ()
     rows = []
-    for trial in survey.ranking:
+    for trial in (*survey.ranking, *survey.nuisance):
         effect = trial.candidate.effect
         index, size = smallest_size(trial)
         parameter = effect.parameters(robot)[index]
