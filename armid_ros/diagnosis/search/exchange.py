@@ -21,7 +21,7 @@ from math import comb
 from armid_ros.diagnosis.search.round import Round
 from armid_ros.diagnosis.search.trial import ROUNDING, Trial
 from armid_ros.identification.fitting.normal_equations import (
-    independent_basis,
+    independent_inverse,
     informative_basis,
 )
 from armid_ros.motion import FloatArray
@@ -135,7 +135,7 @@ def showing_more(
         products = np.block([[own.sum(axis=0), part], [part, part]]) - both.T @ both
         products += np.diag(np.tile(precision, 2))
         wanted = np.concatenate([aim.sum(axis=0), aim[members].sum(axis=0)])
-        return float(np.sum((independent_basis(products, np.tile(squares, 2)).T @ wanted) ** 2))
+        return float(wanted @ independent_inverse(products, np.tile(squares, 2)) @ wanted)
 
     days = np.arange(len(rows)) >= len(first)
     least = explained(days) * (1.0 + ROUNDING)

@@ -22,7 +22,7 @@ from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.trial import Candidate, Trial
 from armid_ros.identification.fitting.normal_equations import (
     DEPENDENT,
-    independent_basis,
+    independent_inverse,
     informative_basis,
 )
 from armid_ros.motion import FloatArray
@@ -135,63 +135,65 @@ def with_candidate(
 
 
 @dataclass(frozen=True)
-class _Base:
-    """What is free, fitted to some blocks."""
-
-    inverse: FloatArray
-    theta: FloatArray
-    border: FloatArray
-    solved: FloatArray
-
-    @classmethod
-    def of(
-        cls, known: Products, train: npt.NDArray[np.bool_], hold: FloatArray, pull: FloatArray
-    ) -> _Base:
-        own = known.free[train].sum(axis=0) + hold
-        basis = informative_basis(own)
-        inverse = basis @ basis.T
-        border = known.border[train].sum(axis=0)
-        return cls(
-            inverse, inverse @ (known.aim[train].sum(axis=0) + pull), border, inverse @ border
-        )
-
-
-@dataclass(frozen=True)
-class _Part:
+class _Fits:
     """
-    A part that is held out.
+    What is free, fitted to all blocks but those of each part, and last to all of them.
 
     Attributes
     ----------
-    test : ndarray of int, shape (b,)
-        Its blocks, and ``train``, of bool, shape (B,), all others.
-    base : _Base
-        What is free, fitted to the others.
-    left : ndarray, shape (b, f)
-        Of the free columns with what that leaves.
-    target : ndarray, shape (b, C)
-        Of the columns of the candidates with what that leaves.
-    spared : ndarray, shape (b, f, C)
-        Of the free columns with what the others make of those of the candidates.
+    train : ndarray, shape (K + 1, B)
+        One for the blocks that each fit is of.
+    theta : ndarray, shape (K + 1, f)
+        Values.
+    border : ndarray, shape (K + 1, f, C)
+        Of the free columns with those of the candidates, and ``solved`` what is free makes of
+        them.
+    left : ndarray, shape (B, f)
+        Of the free columns with what the fit to the other parts leaves.
+    target : ndarray, shape (B, C)
+        Of the columns of the candidates with the same.
+    made : ndarray, shape (B, f, C)
+        Of the free columns with twice those of the candidates, less what the other parts make of
+        these.
 
     """
 
-    test: npt.NDArray[np.intp]
-    train: npt.NDArray[np.bool_]
-    base: _Base
+    train: FloatArray
+    theta: FloatArray
+    border: FloatArray
+    solved: FloatArray
     left: FloatArray
     target: FloatArray
-    spared: FloatArray
+    made: FloatArray
 
     @classmethod
     def of(
-        cls, known: Products, train: npt.NDArray[np.bool_], hold: FloatArray, pull: FloatArray
-    ) -> _Part:
-        base, test = _Base.of(known, train, hold, pull), np.flatnonzero(~train)
-        free, border = known.free[test], known.border[test]
-        left = known.aim[test] - free @ base.theta
-        target = known.target[test] - base.theta @ border
-        return cls(test, train, base, left, target, free @ base.solved)
+        cls, known: Products, part: npt.NDArray[np.intp], hold: FloatArray, pull: FloatArray
+    ) -> _Fits:
+        """Fit what is free; ``part`` of each block, shape (B,)."""
+        train = np.ones((int(part.max()) + 2, len(part)))
+        train[part, np.arange(len(part))] = 0.0
+        border = np.tensordot(train, known.border, 1)
+        aim = train @ known.aim + pull
+        theta, solved = np.empty_like(aim), np.empty_like(border)
+        for k, own in enumerate(np.tensordot(train, known.free, 1)):
+            basis = informative_basis(own + hold)
+            theta[k], solved[k] = basis @ (basis.T @ aim[k]), basis @ (basis.T @ border[k])
+        others = theta[part]
+        return cls(
+            train,
+            theta,
+            border,
+            solved,
+            known.aim - _times(known.free, others),
+            known.target - _times(known.border.transpose(0, 2, 1), others),
+            2.0 * known.border - known.free @ solved[part],
+        )
+
+
+def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Multiply each of some matrices (K, m, n) with its vector (K, n)."""
+    return np.asarray((matrices @ vectors[:, :, np.newaxis])[:, :, 0])
 
 
 def held_out(
@@ -243,80 +245,56 @@ def tried_beside(
     whole: bool = True,
 ) -> tuple[list[Trial], FloatArray]:
     """Try every candidate, of which products are known; see `held_out`."""
-    every = np.ones(len(known.power), dtype=bool)
-    folding = problem.fold_of_block
-    everything = _Base.of(known, every, hold, pull)
-    parts = [_Part.of(known, folding != k, hold, pull) for k in range(folding.max() + 1)]
-    power = _left(known, [part.base for part in parts], folding)
+    part = problem.fold_of_block
+    fits = _Fits.of(known, part, hold, pull)
+    theta = fits.theta[part]
+    power = known.power - np.sum(theta * (known.aim + fits.left), axis=1)
     counted = (hold, pull) if whole else (np.zeros_like(hold), np.zeros_like(pull))
     trials = [
-        _tried(known, candidate, k, everything, parts, folding, counted)
-        for k, candidate in enumerate(candidates)
+        _tried(known, candidate, k, fits, part, counted) for k, candidate in enumerate(candidates)
     ]
     return [trial for trial in trials if trial is not None], power
-
-
-def _left(known: Products, bases: Sequence[_Base], folding: npt.NDArray[np.intp]) -> FloatArray:
-    """Return the held-out squares of every block beside what is free alone."""
-    theta = np.array([base.theta for base in bases])[folding]  # of what is not held out: unused
-    return np.asarray(
-        known.power
-        - 2.0 * np.einsum('bf,bf->b', theta, known.aim)
-        + np.einsum('bf,bfg,bg->b', theta, known.free, theta)
-    )
 
 
 def _tried(
     known: Products,
     candidate: Candidate,
     position: int,
-    everything: _Base,
-    parts: Sequence[_Part],
-    folding: npt.NDArray[np.intp],
+    fits: _Fits,
+    part: npt.NDArray[np.intp],
     counted: tuple[FloatArray, FloatArray],
 ) -> Trial | None:
     span, own = candidate.columns, known.own[position]
-    hold = np.diag(candidate.precision)
-    border, target = known.border[:, :, span], known.target[:, span]
+    border, solved = fits.border[:, :, span], fits.solved[:, :, span]
     whole = own.sum(axis=0)
-    rest = whole - everything.border[:, span].T @ everything.solved[:, span]
+    rest = np.tensordot(fits.train, own, 1) - border.transpose(0, 2, 1) @ solved
     size = float(np.trace(whole))
-    visible = float(np.sqrt(max(np.trace(rest), 0.0) / size)) if size > _NOTHING else 0.0
+    visible = float(np.sqrt(max(np.trace(rest[-1]), 0.0) / size)) if size > _NOTHING else 0.0
     if visible**2 < DEPENDENT:
         return None
-    aim = target.sum(axis=0) - everything.border[:, span].T @ everything.theta
-    squares = np.diag(whole)
-    basis = independent_basis(rest + hold, squares)
-    inverse = basis @ basis.T
-    values = inverse @ aim
-    cross, square = np.zeros((2, len(folding)))
-    held_values, held_free = [], []
-    for part in parts:
-        test, base = part.test, part.base
-        solved = base.solved[:, span]
-        seen = own[part.train].sum(axis=0) - base.border[:, span].T @ solved + hold
-        aim = target[part.train].sum(axis=0) - base.border[:, span].T @ base.theta
-        basis = independent_basis(seen, squares)
-        v = basis @ (basis.T @ aim)
-        change = -solved @ v
-        made = border[test] @ v
-        cross[test] = part.target[:, span] @ v + part.left @ change
-        square[test] = (own[test] @ v) @ v + (2.0 * made - part.spared[:, :, span] @ v) @ change
-        share = 1.0 / (len(parts) * max(len(test), 1))
-        cross[test] += share * change @ (counted[1] - counted[0] @ base.theta)
-        square[test] += share * change @ counted[0] @ change
-        held_values.append(v)
-        held_free.append(base.theta + change)
+    aim = fits.train @ known.target[:, span] - _times(border.transpose(0, 2, 1), fits.theta)
+    inverse = independent_inverse(rest + np.diag(candidate.precision), np.diag(whole))
+    values = _times(inverse, aim)
+    change = -_times(solved, values)
+    v, moved = values[part], change[part]
+    cross = np.sum(fits.target[:, span] * v, axis=1) + np.sum(fits.left * moved, axis=1)
+    square = np.sum(_times(own, v) * v, axis=1)
+    square += np.sum(_times(fits.made[:, :, span], v) * moved, axis=1)
+    hold, pull = counted
+    held, alone = change[:-1], fits.theta[:-1]
+    share = 1.0 / (len(held) * np.maximum(np.bincount(part), 1))
+    cross += (share * np.sum(held * (pull - alone @ hold), axis=1))[part]
+    square += (share * np.sum(held * (held @ hold), axis=1))[part]
     return Trial(
         candidate,
-        values,
-        np.sqrt(np.maximum(np.diag(inverse), 0.0)),
-        np.diag(inverse @ rest),
+        values[-1],
+        np.sqrt(np.maximum(np.diag(inverse[-1]), 0.0)),
+        np.diag(inverse[-1] @ rest[-1]),
         visible,
         cross,
         square,
-        np.array(held_values),
-        np.array(held_free),
-        np.array([part.base.theta for part in parts]),
-        folding,
+        values[:-1],
+        alone + held,
+        alone,
+        part,
     )

@@ -38,28 +38,31 @@ def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) ->
     return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
 
 
-def independent_basis(products: FloatArray, squares: FloatArray) -> FloatArray:
+def independent_inverse(products: FloatArray, squares: FloatArray) -> FloatArray:
     """
-    Return the directions that other columns do not make.
+    Invert products of columns in the directions that other columns do not make.
 
     Parameters
     ----------
-    products : ndarray, shape (p, p)
+    products : ndarray, shape (..., p, p)
         Products with each other of what the others leave of the columns.
     squares : ndarray, shape (p,)
         Squares of the whole columns.
 
     Returns
     -------
-    ndarray, shape (p, k)
-        B of the pseudo-inverse B B'.
+    ndarray, shape (..., p, p)
+        Pseudo-inverses.
 
     """
     seen = squares > 0.0
     scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, squares, 1.0)), 0.0)
-    values, vectors = np.linalg.eigh(products * np.outer(scale, scale))
+    both = np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(products * both)
     good = values > DEPENDENT
-    return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
+    inverse = np.where(good, 1.0 / np.where(good, values, 1.0), 0.0)
+    scaled = vectors * inverse[..., np.newaxis, :] @ np.swapaxes(vectors, -1, -2)
+    return np.asarray(scaled * both)
 
 
 def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
