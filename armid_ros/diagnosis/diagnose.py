@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
+from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Trajectory
 from armid_ros.diagnosis.data.floor import noise_floor
@@ -29,11 +30,10 @@ from armid_ros.diagnosis.search.explanation import (
     in_model_as_given,
     NOISE,
 )
-from armid_ros.diagnosis.search.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.explain_ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
-from armid_ros.diagnosis.verdict.finding import Finding, findings, small_print
+from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.diagnosis.verdict.gap import harmed, Left, measure_gap
 from armid_ros.diagnosis.verdict.headline import (
     headline,
@@ -41,6 +41,7 @@ from armid_ros.diagnosis.verdict.headline import (
     shares_of,
     smallest,
 )
+from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.standing import held, places_held
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, not_repeating

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armid_ros.diagnosis.data.period import find_period
 from armid_ros.identification import Fit
+from armid_ros.identification.rows.period import find_period
 from armid_ros.motion import FloatArray
 import numpy as np
 

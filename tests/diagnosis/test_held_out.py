@@ -4,8 +4,8 @@
 
 from dataclasses import replace
 
-from armid_ros.diagnosis.data.rows import Problem
-from armid_ros.diagnosis.search.held_out import held_out, products, tried_beside, with_candidate
+from armid_ros.diagnosis.data.rows import Problem, products, with_candidate
+from armid_ros.diagnosis.search.held_out import held_out, tried_beside
 from armid_ros.diagnosis.search.trial import Candidate, denies, lead
 from armid_ros.effects import CATALOGUE
 import numpy as np

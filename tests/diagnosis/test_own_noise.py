@@ -4,12 +4,11 @@
 
 from dataclasses import replace
 
-from armid_ros.diagnosis.data.evidence import Evidence, trajectories
+from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Workspace
 from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.data.rows import make_problem
 from armid_ros.diagnosis.search.acceptance import without_echo
 from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.round import Nuisance, Round
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.diagnosis.settings import DiagnosisSettings

@@ -5,9 +5,9 @@
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories
 from armid_ros.diagnosis.data.rows import Problem, project
 from armid_ros.diagnosis.search.candidates import candidates
+from armid_ros.diagnosis.search.explain import nuisance_of
 from armid_ros.diagnosis.search.fit import fit, Start
 from armid_ros.diagnosis.search.patch import Named
-from armid_ros.diagnosis.search.round import nuisance_of
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
@@ -63,3 +63,7 @@ def test_shapes_of_a_name_are_held_by_what_all_data_tell_of_them(bench):
     value, *shapes = np.sum(problem.x[:, :, list(nuisance.free)] ** 2, axis=(0, 1))
     assert value > 0.0
     np.testing.assert_allclose(np.diag(nuisance.hold), [0.0, *shapes])
+
+
+def test_nothing_that_is_free_leaves_everything(problem):
+    np.testing.assert_array_equal(project(problem, ()).rest(problem.y), problem.y)

@@ -6,7 +6,8 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories
-from armid_ros.diagnosis.search.fit import fit, Prior
+from armid_ros.diagnosis.data.prior import Prior
+from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.resampled import as_change, widened
 from armid_ros.effects import CATALOGUE

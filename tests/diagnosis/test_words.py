@@ -8,8 +8,9 @@ from types import SimpleNamespace
 from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
-from armid_ros.diagnosis.verdict.finding import _separating, _without_later, Finding, Rival
+from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.diagnosis.verdict.gap import Left
+from armid_ros.diagnosis.verdict.naming import _separating, _without_later
 from armid_ros.diagnosis.verdict.words import decide, not_repeating, sentence
 from armid_ros.effects import CATALOGUE
 import numpy as np

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.data.prior import described_precision, excited, Prior
 from armid_ros.diagnosis.data.rows import fold_rows, weighted_rows
-from armid_ros.diagnosis.search.fit import described_precision, excited, Prior
 from armid_ros.effects import Effect
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray

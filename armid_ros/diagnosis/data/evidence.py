@@ -15,12 +15,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.period import find_period
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.ties.sensor_noise import SensorNoise
 from armid_ros.effects import Effect
 from armid_ros.effects.timing import smoothed
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.rows.period import find_period
 from armid_ros.identification.rows.signals import (
     Conditioning,
     decimate,
@@ -28,6 +27,7 @@ from armid_ros.identification.rows.signals import (
     segments,
     velocity_error,
 )
+from armid_ros.identification.ties.sensor_noise import SensorNoise
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
@@ -360,3 +360,39 @@ def _unsure(motion: Motion, used: Conditioning, least: FloatArray) -> FloatArray
     taps = np.abs(used.taps())
     share = signal.oaconvolve(slow.astype(float), taps[:, np.newaxis], mode='same', axes=0)
     return np.asarray(np.maximum(share, 0.0))
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """The data and the arm that columns are computed for, when shapes are refined."""
+
+    arm: ArmModel
+    data: tuple[Trajectory, ...]
+
+    def columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
+        """Return the columns of an effect in rows, shape (R, n, p)."""
+        blocks = [part.columns(self.arm, effect) for part in self.data]
+        return np.asarray(np.concatenate(blocks)[:, :, list(kept)])
+
+    def smooth_columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
+        """Return what they would be without the noise that positions have beyond the motion."""
+        smooth = tuple(part.smooth for part in self.data)
+        return replace(self, data=smooth).columns(effect, kept)
+
+    def torque_echo(
+        self, effect: Effect, kept: Sequence[int], noise: Sequence[FloatArray]
+    ) -> FloatArray:
+        """
+        Return what columns of an effect times noise of the torque are in the mean, (R, n, p).
+
+        Columns where the torque is one deviation of each trajectory, (n,) [N m], higher and lower.
+
+        """
+        blocks = []
+        for part, deviation in zip(self.data, noise, strict=True):
+            higher, lower = (
+                part.with_torque_moved(by).columns(self.arm, effect)
+                for by in (deviation, -deviation)
+            )
+            blocks.append(deviation[:, np.newaxis] * (higher - lower) / 2.0)
+        return np.asarray(np.concatenate(blocks)[:, :, list(kept)])

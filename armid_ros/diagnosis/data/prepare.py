@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import thinnable, trajectories, Trajectory, UNSURE
 from armid_ros.diagnosis.data.floor import noise_floor, NoiseFloor
-from armid_ros.diagnosis.search.fit import excited, fit
+from armid_ros.diagnosis.data.prior import excited
+from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.question import with_friction
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.fitting.cutoff import cutoff_of_torques

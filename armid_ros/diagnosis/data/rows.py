@@ -152,6 +152,98 @@ class Projection:
 
 def project(problem: Problem, free: Sequence[int], hold: FloatArray | None = None) -> Projection:
     """Find what the free columns can make, as far as their precision (f, f) lets them."""
-    rows = problem.x[:, :, list(free)].reshape(-1, len(free))
+    rows = problem.x[:, :, list(free)].reshape(problem.y.size, len(free))
     own = rows.T @ rows
     return Projection(rows @ informative_basis(own if hold is None else own + hold))
+
+
+@dataclass(frozen=True)
+class Products:
+    """
+    Products of the columns of a problem, block by block.
+
+    Attributes
+    ----------
+    free : ndarray, shape (B, f, f)
+        Of the free columns with each other.
+    aim : ndarray, shape (B, f)
+        Of the free columns with the residual.
+    border : ndarray, shape (B, f, C)
+        Of the free columns with those of the candidates.
+    target : ndarray, shape (B, C)
+        Of the columns of the candidates with the residual.
+    own : tuple of ndarray, each (B, p, p)
+        Of the columns of each candidate with each other.
+    power : ndarray, shape (B,)
+        Squares of the residual.
+
+    """
+
+    free: FloatArray
+    aim: FloatArray
+    border: FloatArray
+    target: FloatArray
+    own: tuple[FloatArray, ...]
+    power: FloatArray
+
+
+def products(problem: Problem, free: Sequence[int], spans: Sequence[slice]) -> Products:
+    """Multiply columns; those of the candidates, a span each, are the first of the problem."""
+    chosen = list(free)
+    size = max((span.stop for span in spans), default=0)
+    blocks = int(problem.block.max()) + 1
+    parts: list[list[FloatArray]] = [[] for _ in range(5)]
+    own: list[list[FloatArray]] = [[] for _ in spans]
+    for block in range(blocks):
+        rows = problem.block == block
+        y = problem.y[rows].ravel()
+        x = problem.x[rows].reshape(len(y), problem.x.shape[2])
+        f, c = x[:, chosen], x[:, :size]
+        for part, value in zip(parts, (f.T @ f, f.T @ y, f.T @ c, c.T @ y, y @ y), strict=True):
+            part.append(value)
+        for products_of, span in zip(own, spans, strict=True):
+            products_of.append(c[:, span].T @ c[:, span])
+    stacked = [np.array(part) for part in parts]
+    return Products(
+        stacked[0],
+        stacked[1].reshape(blocks, -1),
+        stacked[2].reshape(blocks, len(chosen), size),
+        stacked[3].reshape(blocks, -1),
+        tuple(np.array(part) for part in own),
+        stacked[4],
+    )
+
+
+def with_candidate(
+    known: Products, problem: Problem, free: FloatArray, own: FloatArray
+) -> Products:
+    """
+    Return the products of one candidate beside what is free.
+
+    Parameters
+    ----------
+    known : Products
+        Of what is free.
+    problem : Problem
+        The rows.
+    free : ndarray, shape (R, n, f)
+        Columns that are free.
+    own : ndarray, shape (R, n, p)
+        Columns of the candidate.
+
+    """
+    blocks, size = len(known.power), own.shape[2]
+    border = np.empty((blocks, free.shape[2], size))
+    target, inner = np.empty((blocks, size)), np.empty((blocks, size, size))
+    for block in range(blocks):
+        rows = problem.block == block
+        x = own[rows].reshape(-1, size)
+        border[block] = free[rows].reshape(len(x), -1).T @ x
+        target[block] = x.T @ problem.y[rows].ravel()
+        inner[block] = x.T @ x
+    return replace(
+        known,
+        border=border,
+        target=target,
+        own=(inner,),
+    )

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from itertools import product
 
 from armid_ros.arm import ArmModel
+from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.rows import row_weights
 from armid_ros.diagnosis.search.fit import Fitted
-from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.effects import Effect, Kind
 from armid_ros.effects.gravity import with_exact_vector

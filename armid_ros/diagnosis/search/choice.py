@@ -18,6 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.prepare import Prepared
+from armid_ros.diagnosis.data.prior import Prior
 from armid_ros.diagnosis.data.rows import weighted_rows
 from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import (
@@ -29,7 +30,6 @@ from armid_ros.diagnosis.search.explanation import (
     in_model_as_given,
     NOISE,
 )
-from armid_ros.diagnosis.search.fit import Prior
 from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question
 from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings

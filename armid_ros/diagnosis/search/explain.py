@@ -14,20 +14,20 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 
+from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.baseline import Baseline
-from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.evidence import Evidence, Workspace
+from armid_ros.diagnosis.data.rows import make_problem, Problem
 from armid_ros.diagnosis.search.candidates import Candidates, candidates
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.look import Look, look_at
-from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.prune import doubtful, pruned, stands
 from armid_ros.diagnosis.search.question import Question
-from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.resampled import widened
 from armid_ros.diagnosis.search.rivals import undecided
-from armid_ros.diagnosis.search.round import Before, Later, nuisance_of, Round
+from armid_ros.diagnosis.search.round import Before, Later, Nuisance, Round
 from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Taken, Trial
 from armid_ros.diagnosis.search.view import View
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -321,3 +321,25 @@ def _friction(
         for k, (effect, _, value) in alive.items()
     ]
     return there, tried
+
+
+def nuisance_of(
+    found: Candidates, current: Fitted, evidence: Evidence
+) -> tuple[Problem, Nuisance]:
+    """
+    Return the problem of all candidates, and what is free beside each, whose columns come last.
+
+    Shapes of names are held by what all data tell of them: a part alone may tell next to nothing
+    of where a strap is fixed, and predict the others by that.
+
+    """
+    pairs = zip(found.columns, current.columns, strict=True)
+    columns = [np.concatenate(pair, axis=2) for pair in pairs]
+    problem = make_problem(evidence.data, evidence.sigma, current.residual, columns)
+    size = problem.x.shape[2]
+    free = tuple(range(size - current.columns[0].shape[2], size))
+    known = np.zeros(len(free))
+    first = len(free) - len(current.estimate.values)
+    shapes = [first + k for _, own in current.places for k in own]
+    known[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
+    return problem, Nuisance(free, current.hold + np.diag(known), current.pull)

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.fit import fit, Fitted, Prior, Start
-from armid_ros.diagnosis.search.memoized_arm import plain_arm
+from armid_ros.diagnosis.data.prior import Prior
+from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.resampled import as_change, widened
 from armid_ros.diagnosis.search.round import cost
 from armid_ros.diagnosis.search.trial import Step, Survey, Trial

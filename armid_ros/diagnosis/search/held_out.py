@@ -16,9 +16,9 @@ All of it is algebra on products of columns, a small matrix for each block.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from armid_ros.diagnosis.data.rows import Problem
+from armid_ros.diagnosis.data.rows import Problem, Products, products
 from armid_ros.diagnosis.search.trial import Candidate, Trial
 from armid_ros.identification.fitting.normal_equations import (
     DEPENDENT,
@@ -31,107 +31,6 @@ import numpy.typing as npt
 
 #: Squares over noise of columns that are rounding, whatever the units.
 _NOTHING = 1e-100
-
-
-@dataclass(frozen=True)
-class Products:
-    """
-    Products of the columns of a problem, block by block.
-
-    Attributes
-    ----------
-    free : ndarray, shape (B, f, f)
-        Of the free columns with each other.
-    aim : ndarray, shape (B, f)
-        Of the free columns with the residual.
-    border : ndarray, shape (B, f, C)
-        Of the free columns with those of the candidates.
-    target : ndarray, shape (B, C)
-        Of the columns of the candidates with the residual.
-    diagonal : ndarray, shape (B, C)
-        Squares of the columns of the candidates.
-    own : tuple of ndarray, each (B, p, p)
-        Of the columns of each candidate with each other.
-    power : ndarray, shape (B,)
-        Squares of the residual.
-
-    """
-
-    free: FloatArray
-    aim: FloatArray
-    border: FloatArray
-    target: FloatArray
-    diagonal: FloatArray
-    own: tuple[FloatArray, ...]
-    power: FloatArray
-
-
-def products(problem: Problem, free: Sequence[int], candidates: Sequence[Candidate]) -> Products:
-    """Multiply columns; those of the candidates are the first of the problem."""
-    chosen = list(free)
-    size = max((candidate.columns.stop for candidate in candidates), default=0)
-    blocks = int(problem.block.max()) + 1
-    parts: list[list[FloatArray]] = [[] for _ in range(6)]
-    own: list[list[FloatArray]] = [[] for _ in candidates]
-    for block in range(blocks):
-        rows = problem.block == block
-        y = problem.y[rows].ravel()
-        x = problem.x[rows].reshape(len(y), problem.x.shape[2])
-        f, c = x[:, chosen], x[:, :size]
-        values = f.T @ f, f.T @ y, f.T @ c, c.T @ y, np.einsum('ij,ij->j', c, c), y @ y
-        for part, value in zip(parts, values, strict=True):
-            part.append(value)
-        for products_of, candidate in zip(own, candidates, strict=True):
-            span = candidate.columns
-            inner = c[:, span]
-            one = candidate.size == 1
-            products_of.append(values[4][span][:, np.newaxis] if one else inner.T @ inner)
-    stacked = [np.array(part) for part in parts]
-    return Products(
-        stacked[0],
-        stacked[1].reshape(blocks, -1),
-        stacked[2].reshape(blocks, len(chosen), size),
-        stacked[3].reshape(blocks, -1),
-        stacked[4].reshape(blocks, -1),
-        tuple(np.array(part) for part in own),
-        stacked[5],
-    )
-
-
-def with_candidate(
-    known: Products, problem: Problem, free: FloatArray, own: FloatArray
-) -> Products:
-    """
-    Return the products of one candidate beside what is free.
-
-    Parameters
-    ----------
-    known : Products
-        Of what is free.
-    problem : Problem
-        The rows.
-    free : ndarray, shape (R, n, f)
-        Columns that are free.
-    own : ndarray, shape (R, n, p)
-        Columns of the candidate.
-
-    """
-    blocks, size = len(known.power), own.shape[2]
-    border = np.empty((blocks, free.shape[2], size))
-    target, inner = np.empty((blocks, size)), np.empty((blocks, size, size))
-    for block in range(blocks):
-        rows = problem.block == block
-        x = own[rows].reshape(-1, size)
-        border[block] = free[rows].reshape(len(x), -1).T @ x
-        target[block] = x.T @ problem.y[rows].ravel()
-        inner[block] = x.T @ x
-    return replace(
-        known,
-        border=border,
-        target=target,
-        diagonal=np.diagonal(inner, axis1=1, axis2=2),
-        own=(inner,),
-    )
 
 
 @dataclass(frozen=True)
@@ -232,7 +131,12 @@ def held_out(
 
     """
     return tried_beside(
-        products(problem, free, candidates), problem, candidates, hold, pull, whole
+        products(problem, free, [one.columns for one in candidates]),
+        problem,
+        candidates,
+        hold,
+        pull,
+        whole,
     )
 
 

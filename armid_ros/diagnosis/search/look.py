@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
+from armid_ros.diagnosis.data.rows import products, with_candidate
 from armid_ros.diagnosis.search.acceptance import (
     acceptable,
     denied_by_one,
@@ -19,7 +20,7 @@ from armid_ros.diagnosis.search.acceptance import (
     without_echo,
 )
 from armid_ros.diagnosis.search.exchange import changed, surely_changed
-from armid_ros.diagnosis.search.held_out import products, tried_beside, with_candidate
+from armid_ros.diagnosis.search.held_out import tried_beside
 from armid_ros.diagnosis.search.refine import refine
 from armid_ros.diagnosis.search.rivals import (
     beaten,
@@ -103,7 +104,7 @@ class Look:
 def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
     """Try every cause beside what is free."""
     nuisance = here.nuisance
-    known = products(here.problem, nuisance.free, candidates)
+    known = products(here.problem, nuisance.free, [one.columns for one in candidates])
     trials, power = tried_beside(known, here.problem, candidates, nuisance.hold, nuisance.pull)
     total = float(power.sum()) if here.total is None else here.total
     here = replace(here, total=total, known=known)

@@ -7,12 +7,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.arm.memoized_arm import memoized_arm
+from armid_ros.diagnosis.data.evidence import Evidence, Workspace
 from armid_ros.diagnosis.search.acceptance import acceptable, beyond_chance, material
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
-from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.question import Question
-from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.round import Round
 from armid_ros.diagnosis.search.trial import Step, Taken, Trial
 from armid_ros.diagnosis.search.view import View

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
-from armid_ros.diagnosis.search.fit import excited, Prior
+from armid_ros.diagnosis.data.prior import excited, Prior
 from armid_ros.effects import CATALOGUE, Effect, Kind
 from armid_ros.model import BaseParameters, group_columns
 import numpy as np

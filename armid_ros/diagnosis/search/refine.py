@@ -4,15 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
-from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.data.evidence import Workspace
 from armid_ros.diagnosis.data.rows import Problem, Projection
 from armid_ros.diagnosis.search.trial import Candidate
-from armid_ros.effects import Effect, Shape
+from armid_ros.effects import Shape
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -22,42 +21,6 @@ from scipy import optimize
 _LOBES, _PEAK = 3.0, 0.2
 #: Rounds of a refinement, and evaluations of each shape.
 _ROUNDS, _EVALUATIONS = 2, 9
-
-
-@dataclass(frozen=True)
-class Workspace:
-    """The data and the arm that columns are computed for, when shapes are refined."""
-
-    arm: ArmModel
-    data: tuple[Trajectory, ...]
-
-    def columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
-        """Return the columns of an effect in rows, shape (R, n, p)."""
-        blocks = [part.columns(self.arm, effect) for part in self.data]
-        return np.asarray(np.concatenate(blocks)[:, :, list(kept)])
-
-    def smooth_columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
-        """Return what they would be without the noise that positions have beyond the motion."""
-        smooth = tuple(part.smooth for part in self.data)
-        return replace(self, data=smooth).columns(effect, kept)
-
-    def torque_echo(
-        self, effect: Effect, kept: Sequence[int], noise: Sequence[FloatArray]
-    ) -> FloatArray:
-        """
-        Return what columns of an effect times noise of the torque are in the mean, (R, n, p).
-
-        Columns where the torque is one deviation of each trajectory, (n,) [N m], higher and lower.
-
-        """
-        blocks = []
-        for part, deviation in zip(self.data, noise, strict=True):
-            higher, lower = (
-                part.with_torque_moved(by).columns(self.arm, effect)
-                for by in (deviation, -deviation)
-            )
-            blocks.append(deviation[:, np.newaxis] * (higher - lower) / 2.0)
-        return np.asarray(np.concatenate(blocks)[:, :, list(kept)])
 
 
 def refine(

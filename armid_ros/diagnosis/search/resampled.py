@@ -16,8 +16,9 @@ from dataclasses import replace
 
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.prior import Prior
 from armid_ros.diagnosis.data.rows import fold_rows, make_problem
-from armid_ros.diagnosis.search.fit import Fitted, Prior
+from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.identification.fitting.normal_equations import (
     informative_basis,
     informative_solution,

@@ -10,12 +10,9 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
-from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import make_problem, Problem, project, Projection, weighted_rows
-from armid_ros.diagnosis.search.candidates import Candidates
-from armid_ros.diagnosis.search.fit import Fitted, Prior
-from armid_ros.diagnosis.search.held_out import Products
-from armid_ros.diagnosis.search.refine import Workspace
+from armid_ros.diagnosis.data.evidence import Evidence, Workspace
+from armid_ros.diagnosis.data.prior import Prior
+from armid_ros.diagnosis.data.rows import Problem, Products, project, Projection, weighted_rows
 from armid_ros.diagnosis.search.trial import Candidate, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -53,28 +50,6 @@ class Nuisance:
         return Nuisance(
             (*self.free, *span), hold, np.concatenate([self.pull, np.zeros(len(span))])
         )
-
-
-def nuisance_of(
-    found: Candidates, current: Fitted, evidence: Evidence
-) -> tuple[Problem, Nuisance]:
-    """
-    Return the problem of all candidates, and what is free beside each, whose columns come last.
-
-    Shapes of names are held by what all data tell of them: a part alone may tell next to nothing
-    of where a strap is fixed, and predict the others by that.
-
-    """
-    pairs = zip(found.columns, current.columns, strict=True)
-    columns = [np.concatenate(pair, axis=2) for pair in pairs]
-    problem = make_problem(evidence.data, evidence.sigma, current.residual, columns)
-    size = problem.x.shape[2]
-    free = tuple(range(size - current.columns[0].shape[2], size))
-    known = np.zeros(len(free))
-    first = len(free) - len(current.estimate.values)
-    shapes = [first + k for _, own in current.places for k in own]
-    known[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
-    return problem, Nuisance(free, current.hold + np.diag(known), current.pull)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from dataclasses import replace
 from functools import cache
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.arm.memoized_arm import memoized_arm
+from armid_ros.diagnosis.data.evidence import Evidence, Workspace
 from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.data.rows import make_problem
 from armid_ros.diagnosis.search.candidates import candidates
@@ -18,9 +19,7 @@ from armid_ros.diagnosis.search.explanation import Chosen, Explanation, NOISE
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import held_out
 from armid_ros.diagnosis.search.look import look_at
-from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.question import Question
-from armid_ros.diagnosis.search.refine import Workspace
 from armid_ros.diagnosis.search.round import Nuisance, Round
 from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Taken, Trial
 from armid_ros.diagnosis.search.view import View

@@ -15,11 +15,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
-from armid_ros.diagnosis.search.memoized_arm import memoized_arm
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack

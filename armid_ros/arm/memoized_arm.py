@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from armid_ros.arm import ArmModel
+from armid_ros.arm.arm_model import ArmModel
 from armid_ros.model import LinkFrames, regressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np

@@ -1,0 +1,222 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""From the candidates of an explanation to the names of the catalogue, and their values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.trial import Step, Trial
+from armid_ros.diagnosis.verdict.attribution import Attribution
+from armid_ros.diagnosis.verdict.finding import Finding, Rival
+from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.effects.tied import Tied
+from armid_ros.estimate import ParameterName
+from armid_ros.model.spring_ties import Tie
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Slope from which on a value of a translation goes along one that no data tell.
+_ALONG = 1e-6
+
+
+@dataclass(frozen=True)
+class _Said:
+    """One name of an explanation, in the words of the catalogue."""
+
+    effect: Effect
+    parameters: tuple[ParameterName, ...]
+    values: FloatArray
+    std: FloatArray
+
+
+def findings(
+    explanation: Explanation,
+    attribution: Attribution,
+    arm: ArmModel,
+    rng: np.random.Generator,
+) -> tuple[Finding, ...]:
+    """Say what was found: effects of one name together, those that take most of the gap first."""
+    said = _in_words(explanation, arm)
+    taken = _without_later(explanation.steps)
+    merged: dict[str, list[int]] = {}
+    for index, parts in enumerate(said):
+        for part in parts:
+            merged.setdefault(part.effect.name, []).append(index)
+    result = []
+    for name, indices in merged.items():
+        parts = [part for k in indices for part in said[k] if part.effect.name == name]
+        steps = [taken[k] for k in indices]
+        joints = _joints([part.effect.joints for part in parts], arm)
+        order = [joint for joint in arm.robot.joints if joint in joints]
+        rows = [
+            (parameter, float(value), float(std))
+            for part in parts
+            for parameter, value, std in zip(part.parameters, part.values, part.std, strict=True)
+            if np.isfinite(std)
+        ]
+        places = [*order, '']
+        rows.sort(key=lambda row: places.index(row[0].joint) if row[0].joint in places else 0)
+        rivals = _rivals(steps, set(merged), arm)
+        result.append(
+            Finding(
+                name,
+                joints,
+                tuple(row[0] for row in rows),
+                tuple(row[1] for row in rows),
+                tuple(row[2] for row in rows),
+                attribution.share(indices),
+                attribution.interval(indices, rng),
+                max(min(1.0, step.trial.p * step.tried) for step in steps),
+                rivals,
+                _separating(name, order, rivals[0]) if rivals else '',
+                float(attribution.taken[indices].sum()),
+                parts[0].effect.sign,
+                _ties([part.effect for part in parts], order),
+                parts[0].effect.weighs,
+                tuple(own for own, where in merged.items() if where == indices and own != name),
+            )
+        )
+    return tuple(sorted(result, key=lambda one: -one.share))
+
+
+def small_print(
+    trials: Sequence[Trial], total: float, tried: int, arm: ArmModel
+) -> tuple[Finding, ...]:
+    """Say what is statistically there and does not matter."""
+    result = []
+    for trial in trials:
+        effect, kept = trial.candidate.effect, list(trial.candidate.kept)
+        names = effect.parameters(arm.robot)
+        spread = np.sqrt(np.sum((trial.gains - trial.gains.mean()) ** 2))
+        share, wide = trial.gain / total, 2.0 * float(spread) / total
+        result.append(
+            Finding(
+                effect.said_as,
+                effect.joints,
+                tuple(names[k] for k in kept),
+                tuple(trial.values.tolist()),
+                tuple(trial.std.tolist()),
+                share,
+                (share - wide, share + wide),
+                min(1.0, trial.p * tried),
+                gain=trial.gain,
+                sign=effect.sign,
+                weighs=effect.weighs,
+            )
+        )
+    return tuple(result)
+
+
+def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Said]]:
+    """Return the effects of the catalogue that each name of an explanation stands for."""
+    fitted = explanation.fitted
+    covariance = fitted.estimate.covariance
+    result = []
+    for own, values, place in zip(fitted.named, fitted.values, fitted.places, strict=True):
+        span = slice(place[0].start, place[1].stop)
+        words = own.effect.named_as(values, arm)
+        if len(words) == 1 and words[0][0] is own.effect:
+            result.append(
+                [
+                    _Said(
+                        own.effect,
+                        fitted.estimate.parameters[span],
+                        fitted.estimate.values[span],
+                        np.sqrt(np.diag(covariance)[span]),
+                    )
+                ]
+            )
+            continue
+        parts = _translated(own.effect, values, covariance[span, span], arm)
+        result.append([part for part in parts if _determined(part)] or parts[:1])
+    return result
+
+
+def _translated(
+    effect: Effect, values: FloatArray, covariance: FloatArray, arm: ArmModel
+) -> list[_Said]:
+    """Return an effect in other words, deviations by the slopes of the translation."""
+    parts = []
+    known = np.isfinite(np.diag(covariance))
+    inside = np.where(np.outer(known, known), covariance, 0.0)
+    step = 1e-4 * np.sqrt(np.maximum(np.diag(inside), 1e-18))
+    for position, (word, numbers) in enumerate(effect.named_as(values, arm)):
+        slopes = np.column_stack(
+            [
+                (
+                    effect.named_as(values + change, arm)[position][1]
+                    - effect.named_as(values - change, arm)[position][1]
+                )
+                / (2.0 * size)
+                for change, size in zip(np.diag(step), step, strict=True)
+            ]
+        )
+        std = np.sqrt(np.diag(slopes @ inside @ slopes.T))
+        std[np.any(np.abs(slopes[:, ~known]) > _ALONG, axis=1)] = np.nan
+        parts.append(_Said(word, word.parameters(arm.robot), numbers, std))
+    return parts
+
+
+def _determined(part: _Said) -> bool:
+    """Return whether any value is three deviations from zero, and of a size worth mentioning."""
+    typical = [q.typical[0] if q.typical else 0.0 for q in part.effect.quantities]
+    size = np.abs(part.values)
+    return bool(np.any((size > 3.0 * part.std) & (size > np.array(typical))))
+
+
+def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
+    ties = {t.joint: t for effect in effects if isinstance(effect, Tied) for t in effect.ties}
+    return tuple(ties[joint] for joint in joints if joint in ties)
+
+
+def _without_later(steps: Sequence[Step]) -> list[Step]:
+    """
+    Return steps without rivals that stand in for another name, which was taken later.
+
+    What they take is what that name takes, and was open when the first one was asked for.
+
+    """
+    result: list[Step] = []
+    later: set[tuple[str, tuple[str, ...]]] = set()
+    for step in reversed(steps):
+        rivals = tuple(trial for trial in step.rivals if trial.candidate.key[:2] not in later)
+        result.append(replace(step, rivals=rivals))
+        later.update(trial.candidate.key[:2] for trial in (step.trial, *step.rivals))
+    return result[::-1]
+
+
+def _rivals(steps: Sequence[Step], named: set[str], arm: ArmModel) -> tuple[Rival, ...]:
+    """Return the other names that are possible, the likeliest first, and where."""
+    best: dict[str, list[Trial]] = {}
+    for step in steps:
+        here: dict[str, Trial] = {}
+        for trial in sorted(step.rivals, key=lambda trial: -trial.gain):
+            here.setdefault(trial.candidate.effect.said_as, trial)
+        for name in here.keys() - named:
+            best.setdefault(name, []).append(here[name])
+    order = sorted(best, key=lambda name: -max(trial.gain for trial in best[name]))
+    return tuple(
+        Rival(name, _joints([trial.candidate.effect.joints for trial in best[name]], arm))
+        for name in order
+    )
+
+
+def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]:
+    """Return the joints of several effects of a name, in order but for those of pairs."""
+    joints = [joint for group in groups for joint in group]
+    if any(len(group) > 1 for group in groups):
+        return tuple(dict.fromkeys(joints))
+    return tuple(joint for joint in arm.robot.joints if joint in joints)
+
+
+def _separating(name: str, joints: Sequence[str], rival: Rival) -> str:
+    """Say which experiment separates a name in some joints from another one."""
+    shown = dict.fromkeys(CATALOGUE.get(one, Effect).shown_by for one in (name, rival.name))
+    own, other = (f' of {", ".join(where)}' if where else '' for where in (joints, rival.joints))
+    own = '' if own == other else own
+    names = f'{name}{own} from {rival.name}{other}'.replace('_', ' ')
+    return f'To separate {names}: {"; or ".join(shown)}.'
