@@ -52,8 +52,6 @@ import numpy as np
 #: Called with the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
-#: How often it is asked again without names that do not stand.
-_MORE_QUESTIONS = 2
 #: Verdicts by which no gap is open.
 _CLOSED = ('named', 'ambiguous')
 #: Said where no two equal periods measure the noise.
@@ -152,58 +150,23 @@ def diagnose(
 
     explain = Explainer(arm, prepared, known, rng, tell, written, seen)
 
-    def ask(by: DiagnosisSettings) -> tuple[Diagnosis, frozenset[str]]:
-        chosen = own_causes_first(explain, by)
-        said = _said(chosen, notes, asked)
-        return said, _fallen(chosen, said)
+    def ask(by: DiagnosisSettings) -> Diagnosis:
+        return _said(own_causes_first(explain, by), notes, asked)
 
-    said, fallen = ask(settings)
-    if not validate or not (said.verdict == 'unknown' or said.harmful):
+    said = ask(settings)
+    if not validate or said.verdict != 'unknown':
         return said
-    return _what_stands(ask, settings, fallen) or _small_but_all(ask, settings, said) or said
+    return _small_but_all(ask, settings, said) or said
 
 
-#: Says what is found with settings, and which names do not stand on other recordings.
-_Ask = Callable[[DiagnosisSettings], tuple[Diagnosis, frozenset[str]]]
-
-
-def _fallen(chosen: Chosen, said: Diagnosis) -> frozenset[str]:
-    """
-    Return the names that were found, and are not said or make the model worse.
-
-    A person who makes it worse may push otherwise in other recordings.
-
-    """
-    taken = {step.trial.candidate.effect for step in chosen.explanation.steps}
-    stands = {one.name for one in said.findings}
-    return frozenset(
-        effect.name
-        for effect in taken
-        if effect.name not in stands or (said.harmful and not effect.external)
-    )
-
-
-def _what_stands(
-    ask: _Ask, settings: DiagnosisSettings, fallen: frozenset[str]
+def _small_but_all(
+    ask: Callable[[DiagnosisSettings], Diagnosis], settings: DiagnosisSettings, said: Diagnosis
 ) -> Diagnosis | None:
-    """Return what closes the gap without names that did not stand; None if nothing does."""
-    for _ in range(_MORE_QUESTIONS if fallen else 0):
-        library = tuple(name for name in settings.library if name not in fallen)
-        said, more = ask(replace(settings, library=library))
-        if said.verdict in _CLOSED and not said.harmful:
-            return said
-        if not (said.verdict == 'unknown' or said.harmful) or not more:
-            break
-        fallen |= more
-    return None
-
-
-def _small_but_all(ask: _Ask, settings: DiagnosisSettings, said: Diagnosis) -> Diagnosis | None:
     """Return what closes the gap of causes that are small, but take most of it; None if none."""
-    if said.verdict != 'unknown' or not said.minor:
+    if not said.minor:
         return None
     small = tuple(dict.fromkeys(one.name for one in said.minor))
-    again, _ = ask(replace(settings.without_small_print(), library=small))
+    again = ask(replace(settings.without_small_print(), library=small))
     most = sum(one.share for one in again.findings) > settings.thresholds.open_share
     return again if again.verdict in _CLOSED and most else None
 
