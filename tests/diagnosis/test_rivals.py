@@ -41,31 +41,31 @@ class Known:
         self.gain = float(self.gains.sum())
 
 
-def asked(total, before):
-    return SimpleNamespace(total=total, width=0.0, before=before, settings=DiagnosisSettings())
+def asked(power, since):
+    return SimpleNamespace(power=power, width=0.0, since=since, settings=DiagnosisSettings())
 
 
 @pytest.mark.parametrize(
-    ('before', 'less', 'wanted'),
-    [(None, 0.85, True), (object(), 0.85, False), (object(), 0.6, True), (None, 0.995, False)],
+    ('since', 'less', 'wanted'),
+    [(False, 0.85, True), (True, 0.85, False), (True, 0.6, True), (False, 0.995, False)],
 )
-def test_a_link_has_to_take_a_quarter_more_than_what_happens(bench, before, less, wanted):
+def test_a_link_has_to_take_a_quarter_more_than_what_happens(bench, since, less, wanted):
     """Links do not change from one day to the next; their description may be off on one."""
     gains = 10.0 + np.random.default_rng(0).normal(size=36)
     link, rotor = Known(bench, 'link_inertia', gains), Known(bench, 'rotor_inertia', less * gains)
-    assert beaten(rotor, link, asked(400.0, before)) == wanted
+    assert beaten(rotor, link, asked(400.0, since)) == wanted
 
 
 def test_of_two_that_happen_the_lead_decides(bench):
     gains = 10.0 + np.random.default_rng(0).normal(size=36)
     gain, rotor = Known(bench, 'torque_gain', gains), Known(bench, 'rotor_inertia', 0.85 * gains)
-    assert beaten(rotor, gain, asked(400.0, object()))
+    assert beaten(rotor, gain, asked(400.0, True))
 
 
 def test_what_never_happens_is_taken_only_alone(bench):
     """A link may say the same with fewer values than a payload, and does not change."""
     link, payload = Known(bench, 'link_inertia', [9.0]), Known(bench, 'payload', [8.0])
-    here = asked(10.0, object())
+    here = asked(10.0, True)
     assert likeliest([link, payload], {}, here) is payload
     assert likeliest([link], {}, here) is link
 
@@ -83,4 +83,4 @@ def test_a_body_that_contains_an_offset_is_a_rival_where_it_surely_says_more(
     more = noise * np.random.default_rng(0).normal(size=36)
     offset = Known(bench, 'torque_offset', gains)
     body = Known(bench, 'link_inertia', (1.0 + ahead) * gains + more - more.mean(), freedom=10.0)
-    assert says_no_more(body, offset, asked(360.0, None)) == wanted
+    assert says_no_more(body, offset, asked(360.0, False)) == wanted

@@ -157,7 +157,8 @@ class Explainer:
         Explain what is beyond a misfit that is known in numbers alone.
 
         Without the recordings nobody can say whether a body common to both would do. A body that
-        is fitted anew stays the rival of last resort.
+        is fitted anew stays the rival of last resort, but of what was right when it was identified
+        causes that take most of the gap have changed, and not all links.
 
         """
         prepared, noise = self.prepared, self.prepared.as_described
@@ -170,8 +171,8 @@ class Explainer:
             return Chosen(found, misfit, WRITTEN_MISFIT)
         self.tell(0.6, 'the model fitted anew')
         anew = self._anew(tuple(np.maximum(one, misfit) for one in prepared.sigma), settings)
-        chosen = found if _as_good(found, anew, settings) else anew
-        return Chosen(chosen, misfit, WRITTEN_MISFIT)
+        stays = _most(found, settings) or _as_good(found, anew, settings)
+        return Chosen(found if stays else anew, misfit, WRITTEN_MISFIT)
 
     def _anew(self, sigma: tuple[FloatArray, ...], settings: DiagnosisSettings) -> Explanation:
         """

@@ -21,9 +21,9 @@ from dataclasses import dataclass
 from armid_ros.diagnosis.data.rows import Problem, Products, products
 from armid_ros.diagnosis.search.trial import Candidate, Trial
 from armid_ros.identification.fitting.normal_equations import (
-    DEPENDENT,
     independent_inverse,
     informative_basis,
+    UNINFORMATIVE,
 )
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -174,7 +174,7 @@ def _tried(
     rest = np.tensordot(fits.train, own, 1) - border.transpose(0, 2, 1) @ solved
     size = float(np.trace(whole))
     visible = float(np.sqrt(max(np.trace(rest[-1]), 0.0) / size)) if size > _NOTHING else 0.0
-    if visible**2 < DEPENDENT:
+    if visible**2 < UNINFORMATIVE:
         return None
     aim = fits.train @ known.target[:, span] - _times(border.transpose(0, 2, 1), fits.theta)
     inverse = independent_inverse(rest + np.diag(candidate.precision), np.diag(whole))

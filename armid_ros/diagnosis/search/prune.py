@@ -98,8 +98,9 @@ def _needless(
     weak: list[tuple[tuple[float, float], int]] = []
     view = View.of(fitted, evidence)
     for k, step in enumerate(steps):
-        trial, problem, nuisance, _ = view.trial_of(k)
+        trial, problem, nuisance, power = view.trial_of(k)
         here = Round(evidence, work, settings, problem, nuisance, step.total, step.tried)
+        here = replace(here, power=power)
         if trial is None or not stands(replace(step, trial=trial), here):
             weak.append((doubtful(trial), k))
     return max(weak)[1] if weak else None
@@ -118,8 +119,9 @@ def _needed_after_all(
     view = View.of(fitted, evidence, [one.named for one in dropped])
     found: dict[int, Trial] = {}
     for k, one in enumerate(dropped):
-        trial, problem, nuisance, _ = view.trial_of_more(k)
+        trial, problem, nuisance, power = view.trial_of_more(k)
         here = Round(evidence, work, settings, problem, nuisance, one.step.total, one.step.tried)
+        here = replace(here, power=power)
         if trial is not None and stands(replace(one.step, trial=trial), here):
             found[k] = trial
     if not found:

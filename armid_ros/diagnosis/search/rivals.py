@@ -18,21 +18,20 @@ _ELSEWHERE = 1.5
 
 def beaten(other: Trial, first: Trial, here: Round) -> bool:
     """Return whether one trial is so far behind another that it is no rival."""
-    assert here.total is not None
     thresholds = here.settings.thresholds
     squares, z = lead(first, other)
     if squares <= here.width:
         return False
     if _never_happens(first, here) and not _never_happens(other, here):
         return squares > thresholds.far * first.gain
-    if squares <= thresholds.tie * here.total * 0.5 and squares <= thresholds.far * first.gain:
+    if squares <= thresholds.tie * here.power * 0.5 and squares <= thresholds.far * first.gain:
         return False
     return z >= thresholds.rival_z or squares > thresholds.far * first.gain
 
 
 def _never_happens(trial: Trial, here: Round) -> bool:
     """Return whether a cause is none that could come between two days: links do not change."""
-    return here.before is not None and trial.candidate.effect.corrects
+    return here.since and trial.candidate.effect.corrects
 
 
 def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
@@ -116,7 +115,7 @@ def contains(big: Trial, small: Trial, here: Round) -> bool:
     target = here.projection.rest(here.own(small.candidate)) @ small.values
     squares = float(np.sum(target**2))
     if np.sum((columns @ big.values - target) ** 2) < thresholds.same * squares:
-        if here.before is None:
+        if not here.since:
             return False
         if small.candidate.effect.comes_and_goes and not big.candidate.effect.comes_and_goes:
             return True  # links do not change; a description of them may be off

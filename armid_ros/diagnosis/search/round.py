@@ -174,6 +174,10 @@ class Round:
         What is fitted beside every cause.
     total : float or None
         Held-out squares that shares are of; those of this round if None.
+    power : float
+        Held-out squares of this round, of which a cause has to take some to pay for its values.
+    since : bool
+        Whether what has changed is asked, and not what was always there.
     tried : int
         Candidates that were tried, every shape for itself.
     before : Before or None
@@ -195,6 +199,8 @@ class Round:
     before: Before | None = None
     width: float = 0.0
     known: Products | None = None
+    power: float = 1.0
+    since: bool = False
 
     @cached_property
     def free(self) -> FloatArray:
@@ -226,10 +232,9 @@ class Round:
 
 
 def worth(trial: Trial, here: Round) -> float:
-    """Return the share of the held-out squares that a trial takes, its freedom paid for."""
-    assert here.total is not None
+    """Return the share of what is left that a trial takes, its freedom paid for."""
     price = here.settings.thresholds.price * cost(trial, here.settings)
-    return trial.gain / max(here.total, 1e-300) - price
+    return trial.gain / max(here.power, 1e-300) - price
 
 
 def cost(trial: Trial, settings: DiagnosisSettings) -> float:

@@ -78,7 +78,7 @@ def _ties(finding: Finding) -> dict[str, Any]:
         return {}
     rows = []
     for tie in finding.ties:
-        _, value, std = finding.of_joint(tie.joint)[0]
+        _, value, std = finding.values_of(tie.joint)[0]
         rows.append(
             {
                 'segment': tie.name,

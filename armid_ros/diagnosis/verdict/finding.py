@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from armid_ros.estimate import ParameterName
 from armid_ros.model.spring_ties import Tie
 
+#: Less of the gap than this is none in a sentence.
+SAID = 0.01
+
 
 @dataclass(frozen=True)
 class Rival:
@@ -54,6 +57,9 @@ class Finding:
     together : tuple of str
         Names that are one cause with it, of which its share is: a gravity of another direction and
         another size.
+    of_joint : tuple of (str, float)
+        The joint in which it takes most of what the other names leave, and that share, where it
+        takes next to nothing of the whole gap; empty where it does.
 
     """
 
@@ -72,6 +78,7 @@ class Finding:
     ties: tuple[Tie, ...] = ()
     weighs: bool = False
     together: tuple[str, ...] = ()
+    of_joint: tuple[str, float] = ('', 0.0)
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
@@ -82,7 +89,7 @@ class Finding:
         """Return where a joint's parameters act: at a segment that is tied, or the joint."""
         return next((tie.name for tie in self.ties if tie.joint == joint), joint)
 
-    def of_joint(self, joint: str) -> list[tuple[ParameterName, float, float]]:
+    def values_of(self, joint: str) -> list[tuple[ParameterName, float, float]]:
         """Return name, value and standard deviation of the parameters of one joint."""
         rows = zip(self.parameters, self.values, self.std, strict=True)
         return [row for row in rows if row[0].joint == joint]

@@ -11,7 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.verdict.attribution import Attribution
-from armid_ros.diagnosis.verdict.finding import Finding, Rival
+from armid_ros.diagnosis.verdict.finding import Finding, Rival, SAID
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.effects.tied import Tied
 from armid_ros.estimate import ParameterName
@@ -78,9 +78,21 @@ def findings(
                 _ties([part.effect for part in parts], order),
                 parts[0].effect.weighs,
                 tuple(own for own, where in merged.items() if where == indices and own != name),
+                _of_joint(explanation, indices, attribution.share(indices)),
             )
         )
     return tuple(sorted(result, key=lambda one: -one.share))
+
+
+def _of_joint(explanation: Explanation, names: Sequence[int], share: float) -> tuple[str, float]:
+    """Return where names of a small share take most of what the others leave, and how much."""
+    others = [k for k in range(len(explanation.steps)) if k not in names]
+    if share >= SAID or not others:
+        return '', 0.0
+    without = explanation.only(others).chi2_per_row
+    taken = 1.0 - explanation.chi2_per_row / np.maximum(without, 1e-300)
+    joint = int(np.argmax(taken))
+    return explanation.given.robot.joints[joint], float(taken[joint])
 
 
 def small_print(

@@ -11,7 +11,7 @@ from typing import Literal
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
-from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.diagnosis.verdict.finding import Finding, SAID
 from armid_ros.diagnosis.verdict.gap import Left
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
@@ -23,8 +23,6 @@ Word = Literal[
 ]
 #: Recordings whose periods differ slowly, each a little, tell as well if they are so many.
 _SEVERAL = 3
-#: Less of the gap than this is none in a sentence.
-_SAID = 0.01
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
 
@@ -116,12 +114,12 @@ def _consistent(
         f'left is {floor_in_words}. As it is, the error of {robot.joints[worst]} is '
         f'{_factor(np.sqrt(as_it_is.excess[worst]))} times as large as that can be.'
     )
-    return ' '.join([text, *(sentence(one) for one in minor[:1] if one.share >= _SAID)])
+    return ' '.join([text, *(sentence(one) for one in minor[:1] if one.share >= SAID)])
 
 
 def _unexplained(minor: Sequence[Finding]) -> str:
     """Say that no cause explains a gap, and what explains most of it where something does."""
-    if not minor or minor[0].share < _SAID:
+    if not minor or minor[0].share < SAID:
         return 'Nothing in the catalogue explains it.'
     return f'Nothing in the catalogue closes it. {sentence(minor[0])}'
 
@@ -135,6 +133,10 @@ def _factor(ratio: float) -> str:
 
 def sentence(finding: Finding) -> str:
     """Say what a cause is and how much it explains, as a person would."""
+    joint, share = finding.of_joint
+    if joint:
+        taken = f'{100.0 * share:.0f} % of what the rest leaves in {joint}'
+        return f'{_subject(finding)} explains {taken}.'
     return f'{_subject(finding)} explains {_share(finding)} of the gap.'
 
 
@@ -159,7 +161,7 @@ def _sentences(findings: Sequence[Finding]) -> str:
 def _share(finding: Finding) -> str:
     """Return the share of a cause in percent."""
     share = min(max(finding.share, 0.0), 1.0)
-    return f'{100.0 * share:.0f} %' if share >= _SAID else 'less than 1 %'
+    return f'{100.0 * share:.0f} %' if share >= SAID else 'less than 1 %'
 
 
 def _subject(finding: Finding) -> str:
@@ -254,7 +256,7 @@ def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
 def _tie(finding: Finding, joint: str, segment: str) -> str:
     shown = [
         f'{p.name.replace("_", " ")} {_as_sure(value, std)} {p.unit}'
-        for p, value, std in finding.of_joint(joint)
+        for p, value, std in finding.values_of(joint)
     ]
     return f'{segment} ({", ".join(shown)})'
 

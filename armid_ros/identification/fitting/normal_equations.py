@@ -10,7 +10,8 @@ import numpy as np
 #: Directions of columns scaled to one length with less than this share of the largest eigenvalue
 #: are not identifiable: products of columns hold no more digits.
 UNINFORMATIVE = 1e-10
-#: A direction of which others leave less than this share of its squares is one of theirs.
+#: A direction of which others leave less than this share of what they leave of the best one is
+#: made of them.
 DEPENDENT = 1e-6
 
 
@@ -59,7 +60,7 @@ def independent_inverse(products: FloatArray, squares: FloatArray) -> FloatArray
     scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, squares, 1.0)), 0.0)
     both = np.outer(scale, scale)
     values, vectors = np.linalg.eigh(products * both)
-    good = values > DEPENDENT
+    good = values > np.maximum(DEPENDENT * values[..., -1:], UNINFORMATIVE)
     inverse = np.where(good, 1.0 / np.where(good, values, 1.0), 0.0)
     scaled = vectors * inverse[..., np.newaxis, :] @ np.swapaxes(vectors, -1, -2)
     return np.asarray(scaled * both)
