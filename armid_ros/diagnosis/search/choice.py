@@ -157,8 +157,8 @@ class Explainer:
         Explain what is beyond a misfit that is known in numbers alone.
 
         Without the recordings nobody can say whether a body common to both would do. A body that
-        is fitted anew stays the rival of last resort, but of what was right when it was identified
-        causes that take most of the gap have changed, and not all links.
+        is fitted anew stays the rival of last resort. It hides loads: where they take most of the
+        gap of a model that was right when it was identified, they have changed, and not all links.
 
         """
         prepared, noise = self.prepared, self.prepared.as_described
@@ -171,7 +171,8 @@ class Explainer:
             return Chosen(found, misfit, WRITTEN_MISFIT)
         self.tell(0.6, 'the model fitted anew')
         anew = self._anew(tuple(np.maximum(one, misfit) for one in prepared.sigma), settings)
-        stays = _most(found, settings) or _as_good(found, anew, settings)
+        loads = [step for step in found.steps if step.trial.candidate.effect.changes_body]
+        stays = _most(loads, settings) or _as_good(found, anew, settings)
         return Chosen(found if stays else anew, misfit, WRITTEN_MISFIT)
 
     def _anew(self, sigma: tuple[FloatArray, ...], settings: DiagnosisSettings) -> Explanation:
@@ -223,7 +224,9 @@ class Explainer:
         notes: tuple[str, ...] = ()
         if not found.steps and not at_floor(found, settings):
             lacking = self._explain('lacking', question, evidence, settings)
-            if _most(lacking, settings) and _may_have_been(lacking, baseline, prior, settings):
+            if _most(lacking.steps, settings) and _may_have_been(
+                lacking, baseline, prior, settings
+            ):
                 found, notes = lacking, (_EVER,)
         chosen = Chosen(found, misfit, OWN_MISFIT, notes, doubt=_doubt(baseline))
         if not found.steps:
@@ -290,9 +293,9 @@ def _may_have_been(
     return True
 
 
-def _most(found: Explanation, settings: DiagnosisSettings) -> bool:
+def _most(steps: Sequence[Step], settings: DiagnosisSettings) -> bool:
     """Return whether names take most of the gap."""
-    taken = sum(step.trial.gain / step.total for step in found.steps)
+    taken = sum(step.trial.gain / step.total for step in steps)
     return taken > settings.thresholds.open_share
 
 

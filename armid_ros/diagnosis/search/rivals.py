@@ -22,7 +22,7 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
     squares, z = lead(first, other)
     if squares <= here.width:
         return False
-    if _never_happens(first, here) and not _never_happens(other, here):
+    if _never_happens(first, here) and _happens(other, here):
         return squares > thresholds.far * first.gain
     if squares <= thresholds.tie * here.power * 0.5 and squares <= thresholds.far * first.gain:
         return False
@@ -34,12 +34,17 @@ def _never_happens(trial: Trial, here: Round) -> bool:
     return here.since and trial.candidate.effect.corrects
 
 
+def _happens(trial: Trial, here: Round) -> bool:
+    """Return whether a cause of the arm itself may come between two days; a person may pull."""
+    return not (_never_happens(trial, here) or trial.candidate.effect.external)
+
+
 def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
     """Return causes, best first: before one that never happens what happens and says the same."""
     first, *others = passing
     if _never_happens(first, here):
         for other in others:
-            happens = not _never_happens(other, here) and not beaten(other, first, here)
+            happens = _happens(other, here) and not beaten(other, first, here)
             if happens and contains(first, other, here):
                 return [other, first, *(trial for trial in others if trial is not other)]
     return list(passing)
@@ -55,7 +60,8 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -
     before what never does.
 
     """
-    tied = [trial for trial in tied if not _never_happens(trial, here)] or tied
+    if any(_happens(trial, here) for trial in tied):
+        tied = [trial for trial in tied if not _never_happens(trial, here)]
     if len(tied) == 1:
         return tied[0]
     able = [trial for trial in tied if closing[id(trial)]]

@@ -56,7 +56,7 @@ def independent_inverse(products: FloatArray, squares: FloatArray) -> FloatArray
         Pseudo-inverses.
 
     """
-    seen = squares > 0.0
+    seen = squares > UNINFORMATIVE * squares.max(initial=1e-300)  # others are rounding
     scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, squares, 1.0)), 0.0)
     both = np.outer(scale, scale)
     values, vectors = np.linalg.eigh(products * both)
