@@ -25,6 +25,7 @@ from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import percent, probability, with_interval
+from armid_ros.report.sections.diagnosed import share_in_words
 from armid_ros.residual import require_libraries, TABLE_FILE
 from armid_ros.robots import Robot
 import click
@@ -288,10 +289,9 @@ def _rows(finding: Finding) -> list[dict[str, str]]:
 
 def _share(finding: Finding) -> str:
     """Say how much of the gap a cause is."""
-    low, high = (percent(share) for share in finding.share_interval)
     where = ', '.join(finding.joints) or 'the whole arm'
     name = finding.name.replace('_', ' ')
-    return f'  {name} of {where}: {percent(finding.share)} of the gap ({low} to {high})'
+    return f'  {name} of {where}: {share_in_words(finding)}'
 
 
 def _minor(finding: Finding) -> dict[str, str]:

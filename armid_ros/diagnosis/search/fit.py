@@ -21,7 +21,7 @@ from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.least_squares import solve
-from armid_ros.identification.fitting.normal_equations import informative_solution
+from armid_ros.identification.fitting.normal_equations import informative_solution, ROUNDING
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
@@ -29,8 +29,6 @@ import numpy as np
 
 #: Steps of Gauss and Newton; shapes are near already.
 _MOST_ROUNDS = 4
-#: Squares of a column that are this share of those of the largest one are rounding.
-_ROUNDING = 1e-20
 
 
 @dataclass(frozen=True)
@@ -294,7 +292,7 @@ def _step(
     known = len(pull)
     own[:known, :known] += hold
     aim[:known] += pull
-    seen = np.diag(own) > _ROUNDING * np.diag(own).max(initial=1e-300)
+    seen = np.diag(own) > ROUNDING * np.diag(own).max(initial=1e-300)
     step = np.zeros(size)
     step[seen] = informative_solution(own[np.ix_(seen, seen)], aim[seen])
     return step

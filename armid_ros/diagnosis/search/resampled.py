@@ -36,7 +36,8 @@ def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: flo
     Widen deviations to what the values vary by when parts of the data are left out (jackknife).
 
     Few parts tell a spread badly: deviations are such that twice them has 95 % of Student's
-    distribution.
+    distribution. None is less than noise as large as the unit makes: where that is a misfit, names
+    may have taken a part of it.
 
     Parameters
     ----------
@@ -61,8 +62,9 @@ def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: flo
         freedom += len(changes) - 1
     few = float(stats.t.ppf(_LEVEL, freedom) / stats.norm.ppf(_LEVEL))
     basis = informative_basis(own.sum(axis=0) + fitted.hold)
-    along = max(chance - 1.0, 0.0) * np.sum(basis[-size:] ** 2, axis=1)
-    return _with_deviation(fitted, np.sqrt(few**2 * variance + along))
+    unit = np.sum(basis[-size:] ** 2, axis=1)
+    found = few**2 * variance + max(chance - 1.0, 0.0) * unit
+    return _with_deviation(fitted, np.sqrt(np.maximum(found, unit)))
 
 
 def as_change(fitted: Fitted, prior: Prior, baseline: Baseline) -> Fitted:

@@ -13,6 +13,8 @@ UNINFORMATIVE = 1e-10
 #: A direction of which others leave less than this share of what they leave of the best one is
 #: made of them.
 DEPENDENT = 1e-6
+#: Squares of a column that are this share of those of the largest one are rounding.
+ROUNDING = 1e-20
 
 
 def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) -> FloatArray:
@@ -56,7 +58,7 @@ def independent_inverse(products: FloatArray, squares: FloatArray) -> FloatArray
         Pseudo-inverses.
 
     """
-    seen = squares > UNINFORMATIVE * squares.max(initial=1e-300)  # others are rounding
+    seen = squares > ROUNDING * squares.max(initial=1e-300)
     scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, squares, 1.0)), 0.0)
     both = np.outer(scale, scale)
     values, vectors = np.linalg.eigh(products * both)

@@ -22,6 +22,15 @@ from armid_ros.report.page import Section
 _MOST = 3
 
 
+def share_in_words(finding: Finding) -> str:
+    """Return how much a cause takes of the gap, or of what the others leave in its joint."""
+    joint, share = finding.of_joint
+    if joint:
+        return f'{percent(share)} of what the rest leaves in {joint}'
+    low, high = (percent(end) for end in finding.share_interval)
+    return f'{percent(finding.share)} of the gap ({low} to {high})'
+
+
 @dataclass(frozen=True)
 class Shares(Section):
     """

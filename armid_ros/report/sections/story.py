@@ -10,8 +10,14 @@ from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis, Finding
 from armid_ros.report.arm_picture import ArmPicture, draw_arm
-from armid_ros.report.notation import digits, percent, torque_unit, with_interval
+from armid_ros.report.notation import (
+    digits,
+    percent,
+    torque_unit,
+    with_interval,
+)
 from armid_ros.report.page import render, Section
+from armid_ros.report.sections.diagnosed import share_in_words
 from armid_ros.residual import JointResidual, Residual
 from markupsafe import Markup
 import numpy as np
@@ -152,11 +158,10 @@ def _cause(finding: Finding) -> str:
     more = len(finding.values) - len(values)
     listed = ', '.join([*values, f'{more} more'] if more else values)
     numbers = f': {listed}' if listed else ''
-    low, high = finding.share_interval
-    share = f'{percent(finding.share)} of the gap ({percent(low)} to {percent(high)})'
     rivals = ', '.join(name.replace('_', ' ') for name in finding.ambiguous_with)
     doubt = f'; the data do not distinguish it from {rivals}' if rivals else ''
-    return f'{finding.name.replace("_", " ")}{where}{numbers}; explains {share}{doubt}'
+    name, share = finding.name.replace('_', ' '), share_in_words(finding)
+    return f'{name}{where}{numbers}; explains {share}{doubt}'
 
 
 def _likeness(one: JointResidual) -> str:
