@@ -73,6 +73,7 @@ def diagnose(
     validate: Sequence[Recording] = (),
     baseline: Sequence[Recording] = (),
     misfit: Misfit | None = None,
+    covariance: FloatArray | None = None,
     settings: DiagnosisSettings | None = None,
     rng: np.random.Generator,
     progress: Progress | None = None,
@@ -93,6 +94,8 @@ def diagnose(
         leaves of them is its own misfit, and what is asked is what has changed since.
     misfit : Misfit, optional
         What the model left when it was identified, where there is no baseline to measure it.
+    covariance : ndarray, shape (P, P), optional
+        Of the parameters of the model, beside the misfit.
     settings : DiagnosisSettings, optional
         Library and thresholds.
     rng : numpy.random.Generator
@@ -120,6 +123,7 @@ def diagnose(
             validate=validate,
             baseline=baseline,
             misfit=misfit,
+            covariance=covariance,
             settings=settings.without_small_print(),
             rng=rng,
             progress=tell,
@@ -148,7 +152,7 @@ def diagnose(
 
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
 
-    explain = Explainer(arm, prepared, known, rng, tell, written, seen)
+    explain = Explainer(arm, prepared, known, rng, tell, written, seen, covariance)
 
     def ask(by: DiagnosisSettings) -> Diagnosis:
         return _said(own_causes_first(explain, by), notes, asked)

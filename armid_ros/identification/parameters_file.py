@@ -13,6 +13,7 @@ from armid_ros.errors import ArmidError, ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.files import finite, is_file, load_json, load_yaml, read_text, reading
 from armid_ros.identification.description import kinematics_digest
+from armid_ros.model.base_parameters import symbol
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot
 import numpy as np
@@ -72,6 +73,30 @@ class ParameterFile:
         if self.covariance is None:
             return np.asarray(np.diag(self.std[chosen] ** 2))
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
+
+    def standard_covariance(self, parameters: Sequence[ParameterName]) -> FloatArray | None:
+        """
+        Return the covariance of what the values say of standard parameters.
+
+        The torque of a motion that shows no more than theirs is off by that of its columns times
+        this. Parameters that are in none of the values have none.
+
+        Parameters
+        ----------
+        parameters : sequence of ParameterName
+            Of a model, rigid ones and those of effects, P of them.
+
+        Returns
+        -------
+        ndarray, shape (P, P), or None
+            None if the file does not have it.
+
+        """
+        if self.covariance is None or len(self.terms) < len(self.values):
+            return None
+        rows = [self.terms[name] for name in self.values]
+        lift = np.linalg.pinv(_matrix(rows, [symbol(name) for name in parameters]))
+        return np.asarray(lift @ self.covariance @ lift.T)
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """

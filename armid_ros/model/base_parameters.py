@@ -73,7 +73,7 @@ class BaseParameters:
     @property
     def terms(self) -> tuple[dict[str, float], ...]:
         """Factor of each standard parameter in each base parameter, as their names have them."""
-        symbols = [_symbol(parameter) for parameter in self.standard]
+        symbols = [symbol(parameter) for parameter in self.standard]
         return tuple(
             {symbols[column]: float(row[column]) for column in np.flatnonzero(row)}
             for row in self.grouping
@@ -263,7 +263,7 @@ def _keep_order(standard: tuple[ParameterName, ...]) -> list[int]:
     return sorted(range(len(standard)), key=key)
 
 
-def _symbol(parameter: ParameterName) -> str:
+def symbol(parameter: ParameterName) -> str:
     """Name a grouped parameter; a rigid one carries the number of its joint already."""
     numbered = parameter.name[-1:].isdigit() or not parameter.joint
     return parameter.name if numbered else f'{parameter.name}[{parameter.joint}]'
@@ -277,7 +277,7 @@ def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...
         if column != leader:
             factor = float(f'{abs(row[column]):.6g}')
             sign = float(np.sign(row[column]))
-            factors.setdefault(factor, []).append((sign, _symbol(standard[column])))
+            factors.setdefault(factor, []).append((sign, symbol(standard[column])))
     for factor, terms in factors.items():
         if factor == 1.0:
             text += ''.join(f' {"+" if sign > 0 else "-"} {name}' for sign, name in terms)

@@ -9,7 +9,7 @@ from armid_ros.diagnosis.data.evidence import Evidence, trajectories
 from armid_ros.diagnosis.data.prior import Prior
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Named
-from armid_ros.diagnosis.search.resampled import as_change, widened
+from armid_ros.diagnosis.search.resampled import as_change, widened, with_model_error
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning
@@ -77,3 +77,26 @@ def test_a_value_that_no_data_tell_stays_untold_where_others_are_changes(bench):
     )
     free = replace(untold, change=np.zeros(1))
     assert as_change(free, prior, baseline).estimate.std[0] == np.inf
+
+
+def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
+    """Spread of a value over models that are off by draws of their covariance."""
+    rng = np.random.default_rng(7)
+    own = np.zeros((len(bench.arm.parameters),) * 2)
+    mz, fv = 13, 21  # of the lower link, and viscous friction of the elbow
+    own[np.ix_([mz, fv], [mz, fv])] = 1e-4 * np.array([[1.0, 0.5], [0.5, 1.0]])
+    recordings = bench.recordings(lambda m, tau: on_elbow(0.4 * m.q[:, 1]))
+    data = tuple(trajectories(recordings, conditioning(recordings, SignalSettings()), bench.arm))
+    sigma = tuple(np.full(2, 0.03) for _ in data)
+    evidence = Evidence(data, sigma, sigma)
+    named = [Named(CATALOGUE['joint_spring'].on(bench.robot, ('elbow',)), (0, 1))]
+    exact = fit(bench.arm, named, data, sigma, None)
+    values = []
+    for _ in range(60):
+        off = rng.multivariate_normal(np.zeros(len(own)), own)
+        arm = bench.arm.with_theta(bench.arm.theta + off)
+        values.append(fit(arm, named, data, sigma, None).estimate.values[0])
+    wide = with_model_error(exact, evidence, bench.arm, own).estimate.std[0]
+    noise = exact.estimate.std[0]
+    assert np.std(values) > 3.0 * noise  # errors of the model are what the value follows
+    assert wide == pytest.approx(np.hypot(np.std(values), noise), rel=0.3)

@@ -19,9 +19,11 @@ from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, F
 from armid_ros.diagnosis.verdict.document import SCHEMA
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import ArmidError
-from armid_ros.files import json_text
+from armid_ros.files import is_file, json_text
 from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.identifiability import excludes_zero
+from armid_ros.identification.parameters_file import read_parameters
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import percent, probability, with_interval
@@ -199,7 +201,9 @@ def diagnose(
         material=asked.material,
         everything=asked.everything,
     )
-    misfit = None if asked.model is None or data.baseline else load_misfit(asked.model)
+    identified = None if data.baseline else asked.model
+    misfit = None if identified is None else load_misfit(identified)
+    covariance = None if identified is None else _covariance_of(identified, arm)
     with progress('reading') as tick:
         recordings, held_out, before = data.read(loaded, beside, partner.partner_topic)
         result = run(
@@ -208,6 +212,7 @@ def diagnose(
             validate=held_out,
             baseline=before,
             misfit=misfit,
+            covariance=covariance,
             settings=settings,
             rng=np.random.default_rng(seed),
             progress=tick,
@@ -231,6 +236,12 @@ def diagnose(
         return
     show(result)
     _show_extras(out, extras)
+
+
+def _covariance_of(path: Path, arm: ArmModel) -> FloatArray | None:
+    """Return the covariance of a model's parameters from what identify wrote beside it."""
+    beside = path.with_name('identification.json')
+    return read_parameters(beside).standard_covariance(arm.parameters) if is_file(beside) else None
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:

@@ -31,6 +31,7 @@ from armid_ros.diagnosis.search.explanation import (
     NOISE,
 )
 from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question
+from armid_ros.diagnosis.search.resampled import with_model_error
 from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.assess.grade_limits import LIMITS
@@ -42,6 +43,11 @@ OWN_MISFIT = 'the misfit that the model had before'
 WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
 #: Data are recorded as often as others if their period is not longer by this factor.
 _AS_OFTEN = 1.2
+#: Said where a model stands for the day on which nothing was wrong.
+_AS_EXACT = (
+    'values of the model are taken as exact, as identification.json is not beside it: what they '
+    'are off by is not in the intervals'
+)
 #: Said where only what a model lacks explains the gap, and not what has changed.
 _EVER = (
     'the baseline does not tell whether what is named has changed since, or was there and did not '
@@ -91,6 +97,8 @@ class Explainer:
         Misfit that the model is known to have, where there are no recordings of it [N m].
     unseen : sequence of Trajectory
         More data of the same day, which nothing is fitted to.
+    covariance : ndarray, shape (P, P), or None
+        Of the parameters of the model, where there are no recordings of it.
 
     """
 
@@ -101,6 +109,7 @@ class Explainer:
     tell: Progress
     written: FloatArray | None = None
     unseen: Sequence[Trajectory] = ()
+    covariance: FloatArray | None = None
     _answers: list[_Answer] = field(default_factory=list)
 
     def __call__(self, settings: DiagnosisSettings) -> Chosen:
@@ -167,13 +176,17 @@ class Explainer:
         most = 2 * settings.thresholds.few_causes
         given = as_given(self.arm, prepared.data, most, settings.library)
         found = self._explain('given', replace(given, since=True), evidence, settings)
+        notes = (_AS_EXACT,) if found.steps and self.covariance is None else ()
+        if self.covariance is not None:
+            fitted = with_model_error(found.fitted, evidence, self.arm, self.covariance)
+            found = replace(found, fitted=fitted)
         if at_floor(found, settings):
-            return Chosen(found, misfit, WRITTEN_MISFIT)
+            return Chosen(found, misfit, WRITTEN_MISFIT, notes)
         self.tell(0.6, 'the model fitted anew')
         anew = self._anew(tuple(np.maximum(one, misfit) for one in prepared.sigma), settings)
         loads = [step for step in found.steps if step.trial.candidate.effect.changes_body]
         stays = _most(loads, settings) or _as_good(found, anew, settings)
-        return Chosen(found if stays else anew, misfit, WRITTEN_MISFIT)
+        return Chosen(found if stays else anew, misfit, WRITTEN_MISFIT, notes)
 
     def _anew(self, sigma: tuple[FloatArray, ...], settings: DiagnosisSettings) -> Explanation:
         """

@@ -14,10 +14,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.prior import Prior
-from armid_ros.diagnosis.data.rows import fold_rows, make_problem
+from armid_ros.diagnosis.data.rows import fold_rows, make_problem, weighted_rows
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.identification.fitting.normal_equations import (
     informative_basis,
@@ -85,8 +86,48 @@ def as_change(fitted: Fitted, prior: Prior, baseline: Baseline) -> Fitted:
 
     """
     before = _seen_before(fitted, prior, baseline)
+    return _with_deviation(fitted, np.hypot(_known(fitted), before))
+
+
+def with_model_error(
+    fitted: Fitted, evidence: Evidence, arm: ArmModel, covariance: FloatArray
+) -> Fitted:
+    """
+    Widen deviations by what the parameters of a model are off by, which names make up for.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        The model with all names.
+    evidence : Evidence
+        The data.
+    arm : ArmModel
+        The model.
+    covariance : ndarray, shape (P, P)
+        Of its parameters.
+
+    """
+    size = len(fitted.estimate.values)
+    if not size:
+        return fitted
+    data, sigma = evidence.data, evidence.sigma
+    own = np.zeros((len(fitted.hold), len(fitted.hold)))
+    error = np.zeros((len(own), len(covariance)))
+    torques = [part.reduce(arm.columns(part.motion)) for part in data]
+    pairs = weighted_rows(fitted.columns, data, sigma), weighted_rows(torques, data, sigma)
+    for columns, torque in zip(*pairs, strict=True):
+        x = columns.reshape(-1, len(own))
+        own += x.T @ x
+        error += x.T @ torque.reshape(len(x), -1)
+    follows = informative_solution(own + fitted.hold, error)[-size:]
+    variance = np.einsum('kp,pq,kq->k', follows, covariance, follows)
+    return _with_deviation(fitted, np.hypot(_known(fitted), np.sqrt(np.maximum(variance, 0.0))))
+
+
+def _known(fitted: Fitted) -> FloatArray:
+    """Return the deviations that are known, zero where none is, shape (p,)."""
     std = fitted.estimate.std
-    return _with_deviation(fitted, np.hypot(np.where(np.isfinite(std), std, 0.0), before))
+    return np.where(np.isfinite(std), std, 0.0)
 
 
 def _with_deviation(fitted: Fitted, deviation: FloatArray) -> Fitted:
