@@ -230,8 +230,16 @@ class Search:
         problem, nuisance = nuisance_of(found, current, self.evidence)
         before = self._before(current)
         work = Workspace(memoized_arm(current.arm), data)
-        here = Round(self.evidence, work, self.settings, problem, nuisance, total, before=before)
-        here = replace(here, since=question.since)
+        here = Round(
+            self.evidence,
+            work,
+            self.settings,
+            problem,
+            nuisance,
+            total,
+            before=before,
+            since=question.since,
+        )
         look = look_at(found.candidates, here)
         if named:
             named, values = current.named, current.values
@@ -308,8 +316,7 @@ def _friction(
                 continue
             total = power if whole[0] is None else whole[0]
             steps[k] = Step(trial, (), (trial,), total, whole[1], least)
-            here = Round(evidence, work, settings, problem, nuisance, total, whole[1])
-            here = replace(here, power=power)
+            here = Round(evidence, work, settings, problem, nuisance, tried=whole[1], power=power)
             if not stands(steps[k], here):
                 weak[k] = doubtful(trial)
         tried = tried or [step.trial for step in steps.values()]

@@ -99,8 +99,7 @@ def _needless(
     view = View.of(fitted, evidence)
     for k, step in enumerate(steps):
         trial, problem, nuisance, power = view.trial_of(k)
-        here = Round(evidence, work, settings, problem, nuisance, step.total, step.tried)
-        here = replace(here, power=power)
+        here = Round(evidence, work, settings, problem, nuisance, tried=step.tried, power=power)
         if trial is None or not stands(replace(step, trial=trial), here):
             weak.append((doubtful(trial), k))
     return max(weak)[1] if weak else None
@@ -120,8 +119,9 @@ def _needed_after_all(
     found: dict[int, Trial] = {}
     for k, one in enumerate(dropped):
         trial, problem, nuisance, power = view.trial_of_more(k)
-        here = Round(evidence, work, settings, problem, nuisance, one.step.total, one.step.tried)
-        here = replace(here, power=power)
+        here = Round(
+            evidence, work, settings, problem, nuisance, tried=one.step.tried, power=power
+        )
         if trial is not None and stands(replace(one.step, trial=trial), here):
             found[k] = trial
     if not found:
