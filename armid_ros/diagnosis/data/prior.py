@@ -18,7 +18,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 
 #: Free columns of which the others leave less than this share of their length are grouped.
-_EXCITED = 1e-4
+EXCITED = 1e-4
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def excited(
     columns = [part.reduce(arm.columns(part.motion)[:, :, theory.independent]) for part in data]
     stacked = np.concatenate([block.reshape(-1, theory.rank) for block in columns])
     names = tuple(theory.standard[column] for column in theory.independent)
-    kept = group_columns(stacked, names, tolerance=_EXCITED)
+    kept = group_columns(stacked, names, tolerance=EXCITED)
     if kept.rank == theory.rank:
         return theory, columns
     base = replace(

@@ -9,13 +9,10 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
-from armid_ros.diagnosis.data.prior import excited, Prior
+from armid_ros.diagnosis.data.prior import EXCITED, excited, Prior
 from armid_ros.effects import CATALOGUE, Effect, Kind
 from armid_ros.model import BaseParameters, group_columns
 import numpy as np
-
-#: Friction of which the rest leaves less than this share of its columns is fitted with the rest.
-_TOLD = 1e-4
 
 
 @dataclass(frozen=True)
@@ -131,4 +128,4 @@ def _without_values(arm: ArmModel, data: Sequence[Trajectory]) -> BaseParameters
         return None
     columns = [part.reduce(arm.effect_columns(part.motion)[:, :, free - rigid]) for part in data]
     stacked = np.concatenate([block.reshape(-1, len(free)) for block in columns])
-    return group_columns(stacked, tuple(names[k] for k in free), _TOLD).among(names, free)
+    return group_columns(stacked, tuple(names[k] for k in free), EXCITED).among(names, free)
