@@ -38,12 +38,15 @@ class Misfit:
         Root mean square residual of each joint [N m].
     relative_error_percent : float
         100 |tau - tau_hat| / |tau| over all joints.
+    covariance : ndarray, shape (P, P), or None
+        Of the parameters of the model, where it is known; model.yaml does not have it.
 
     """
 
     data: str
     rms: Mapping[str, float]
     relative_error_percent: float
+    covariance: FloatArray | None = None
 
     def document(self) -> dict[str, Any]:
         """Return the block that model.yaml holds."""

@@ -73,7 +73,6 @@ def diagnose(
     validate: Sequence[Recording] = (),
     baseline: Sequence[Recording] = (),
     misfit: Misfit | None = None,
-    covariance: FloatArray | None = None,
     settings: DiagnosisSettings | None = None,
     rng: np.random.Generator,
     progress: Progress | None = None,
@@ -94,8 +93,6 @@ def diagnose(
         leaves of them is its own misfit, and what is asked is what has changed since.
     misfit : Misfit, optional
         What the model left when it was identified, where there is no baseline to measure it.
-    covariance : ndarray, shape (P, P), optional
-        Of the parameters of the model, beside the misfit.
     settings : DiagnosisSettings, optional
         Library and thresholds.
     rng : numpy.random.Generator
@@ -123,7 +120,6 @@ def diagnose(
             validate=validate,
             baseline=baseline,
             misfit=misfit,
-            covariance=covariance,
             settings=settings.without_small_print(),
             rng=rng,
             progress=tell,
@@ -149,6 +145,7 @@ def diagnose(
     if tied is not None:
         return _said(tied, notes, asked)
     written = None if misfit is None else misfit.of(arm.robot)
+    covariance = None if misfit is None else misfit.covariance
 
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
 

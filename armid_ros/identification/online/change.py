@@ -22,7 +22,7 @@ _INDEPENDENT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class ChangeCandidate:
     """
     One thing that may change.
 
@@ -61,7 +61,7 @@ class Candidate:
         text = self.name.replace('_', ' ')
         return f'{text} at {self.joint}' if self.joint else text
 
-    def includes(self, other: Candidate) -> bool:
+    def includes(self, other: ChangeCandidate) -> bool:
         """Whether all that the other one is about is among this one's."""
         return set(other.parameters) <= set(self.parameters)
 
@@ -73,9 +73,9 @@ class Change:
 
     Attributes
     ----------
-    candidate : Candidate
+    candidate : ChangeCandidate
         What explains the torques best.
-    rivals : tuple of Candidate
+    rivals : tuple of ChangeCandidate
         What explains them nearly as well.
     t, detected : float
         When it changed, to a quarter of a second, and when that was clear [s].
@@ -84,8 +84,8 @@ class Change:
 
     """
 
-    candidate: Candidate
-    rivals: tuple[Candidate, ...]
+    candidate: ChangeCandidate
+    rivals: tuple[ChangeCandidate, ...]
     t: float
     detected: float
     size: Estimate
@@ -110,7 +110,7 @@ class Change:
         return f'{self.candidate.label} has changed: {sizes}{rivals}'
 
 
-def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[Candidate, ...]:
+def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[ChangeCandidate, ...]:
     """
     List what may change: every effect on every joint, friction of a joint, what the arm holds.
 
@@ -139,20 +139,22 @@ def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[Candidate, .
     return tuple(candidate for candidate in found if candidate.parameters)
 
 
-def _candidate(name: str, joint: str, columns: Sequence[int], base: BaseParameters) -> Candidate:
+def _candidate(
+    name: str, joint: str, columns: Sequence[int], base: BaseParameters
+) -> ChangeCandidate:
     kept = _independent(base.grouping[:, columns])
     directions = base.grouping[:, [columns[k] for k in kept]]
-    return Candidate(
+    return ChangeCandidate(
         name, joint, tuple(base.standard[columns[k]] for k in kept), directions, directions
     )
 
 
-def _carried(effect: Effect, arm: ArmModel, base: BaseParameters) -> Candidate:
+def _carried(effect: Effect, arm: ArmModel, base: BaseParameters) -> ChangeCandidate:
     """Return a body that a link may hold; its parameters add to the link's own."""
     names = effect.parameters(arm.robot)
     columns = base.grouping[:, list(effect.adds_to(arm.robot))]
     kept = [k for k in _independent(columns) if k < _REPORTED]
-    return Candidate(
+    return ChangeCandidate(
         effect.name,
         effect.joints[0],
         tuple(names[k] for k in kept),

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.online.background import Background, Pieces
-from armid_ros.identification.online.change import Candidate
+from armid_ros.identification.online.change import ChangeCandidate
 from armid_ros.identification.online.change_score import (
     Block,
     Projected,
@@ -82,9 +82,9 @@ class FoundChange:
         The last ones.
     first : int
         Which of them it was in.
-    best : Candidate
+    best : ChangeCandidate
         What explains the torques best.
-    rivals : tuple of Candidate
+    rivals : tuple of ChangeCandidate
         What explains them nearly as well.
     likelihood : float
         Logarithm of the likelihood ratio.
@@ -93,8 +93,8 @@ class FoundChange:
 
     blocks: tuple[Block, ...]
     first: int
-    best: Candidate
-    rivals: tuple[Candidate, ...]
+    best: ChangeCandidate
+    rivals: tuple[ChangeCandidate, ...]
     likelihood: float
 
     @property
@@ -114,7 +114,7 @@ class ChangeSearch:
 
     Parameters
     ----------
-    candidates : sequence of Candidate
+    candidates : sequence of ChangeCandidate
         What may change.
     directions : ndarray, shape (P, Q)
         What a unit of each quantity of theirs adds to the parameters.
@@ -127,7 +127,7 @@ class ChangeSearch:
 
     def __init__(
         self,
-        candidates: Sequence[Candidate],
+        candidates: Sequence[ChangeCandidate],
         directions: FloatArray,
         chance: float,
         work: Background,
@@ -256,7 +256,7 @@ class ChangeSearch:
         return max(_CLEAR, _CORRECTION * likelihood) if soon else _CLEAR
 
     @staticmethod
-    def _most_common(best: Candidate, alike: Sequence[Candidate]) -> Candidate:
+    def _most_common(best: ChangeCandidate, alike: Sequence[ChangeCandidate]) -> ChangeCandidate:
         """Return the load where it explains the torques as well: arms pick things up all day."""
         return next((c for c in alike if c.common), best)
 

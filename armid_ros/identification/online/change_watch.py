@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 
 from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import at_once, Background, Foreground, Job, Pieces
-from armid_ros.identification.online.change import Candidate, Change
+from armid_ros.identification.online.change import Change, ChangeCandidate
 from armid_ros.identification.online.change_score import Block
 from armid_ros.identification.online.change_search import (
     BLOCK,
@@ -78,7 +78,7 @@ class ChangeWatch:
         Learns.
     nuisance : NuisanceRows or None
         Makes rows of what is learned for the tests alone.
-    candidates : sequence of Candidate
+    candidates : sequence of ChangeCandidate
         What may change.
     settings : ChangeSettings, optional
         How readily a change is believed.
@@ -96,7 +96,7 @@ class ChangeWatch:
         self,
         estimator: RecursiveLeastSquares,
         nuisance: NuisanceRows | None,
-        candidates: Sequence[Candidate],
+        candidates: Sequence[ChangeCandidate],
         settings: ChangeSettings | None = None,
         work: Background | None = None,
     ) -> None:

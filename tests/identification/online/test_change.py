@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.estimate import ParameterName
-from armid_ros.identification.online.change import Candidate, change_candidates
+from armid_ros.identification.online.change import change_candidates, ChangeCandidate
 from armid_ros.identification.online.change_score import Block, score_statistics
 from armid_ros.identification.online.change_watch import ChangeWatch
 from armid_ros.identification.online.null_calibration import NullCalibration, Weighed
@@ -218,7 +218,7 @@ def test_a_window_that_the_model_fits_worse_than_usual_says_less_of_the_size():
     rng, truth = np.random.default_rng(7), np.array([1.0, -2.0, 0.5])
     parameters = tuple(ParameterName(f'p{k}', '', '') for k in range(3))
     step = np.array([[0.0], [0.0], [1.0]])
-    candidate = Candidate('payload', 'hand', parameters[2:], step, step)
+    candidate = ChangeCandidate('payload', 'hand', parameters[2:], step, step)
     widths = []
     rows, noise = rng.normal(size=(6000, 4, 3)), rng.normal(size=(6000, 4))
     for louder in (1.0, 3.0):
