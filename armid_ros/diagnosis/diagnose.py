@@ -34,7 +34,7 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.explain_ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.diagnosis.verdict.finding import Finding
-from armid_ros.diagnosis.verdict.gap import harmed, Left, measure_gap
+from armid_ros.diagnosis.verdict.gap import Excess, harmed, measure_gap
 from armid_ros.diagnosis.verdict.headline import (
     headline,
     own_causes_first,
@@ -224,7 +224,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     if unseen is not None:
         sure, least_sure = _sure(unseen, chosen), settings.thresholds.predicted
         left.append(_left(rest, sure, settings, 'recordings that were not used', least_sure))
-    resting: list[Left] = []
+    resting: list[Excess] = []
     if settings.partner is None:
         parts = [evidence, *([] if unseen is None else [unseen])]
         resting = [held(rest.fitted.arm, part, asked.before, asked.arm) for part in parts]
@@ -336,17 +336,17 @@ def _left(
     settings: DiagnosisSettings,
     where: str,
     more: float = 1.0,
-) -> Left:
+) -> Excess:
     if evidence.data is explanation.evidence.data:
         residual = explanation.fitted.residual
     else:
         residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
-    return Left(_excess(residual, evidence, settings) / more, f'in {where}')
+    return Excess(_excess(residual, evidence, settings) / more, f'in {where}')
 
 
-def _as_it_is(arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings) -> Left:
+def _as_it_is(arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings) -> Excess:
     residual = [part.residual(arm) for part in evidence.data]
-    return Left(_excess(residual, evidence, settings), 'in the recordings')
+    return Excess(_excess(residual, evidence, settings), 'in the recordings')
 
 
 def _excess(

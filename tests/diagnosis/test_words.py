@@ -9,7 +9,7 @@ from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
-from armid_ros.diagnosis.verdict.gap import Left
+from armid_ros.diagnosis.verdict.gap import Excess
 from armid_ros.diagnosis.verdict.naming import _separating, _without_later
 from armid_ros.diagnosis.verdict.words import decide, not_repeating, sentence
 from armid_ros.effects import CATALOGUE
@@ -20,12 +20,12 @@ FLOOR = 'the misfit that the model had before'
 
 
 def said(arm, as_it_is):
-    closed = Left(np.full(arm.robot.n_joints, 0.9), 'in the recordings')
+    closed = Excess(np.full(arm.robot.n_joints, 0.9), 'in the recordings')
     return decide((), (), [closed], arm, FLOOR, as_it_is)
 
 
 def test_a_model_that_explains_as_it_is_needs_no_fit(bench):
-    closed = Left(np.full(bench.robot.n_joints, 0.8), 'in the recordings')
+    closed = Excess(np.full(bench.robot.n_joints, 0.8), 'in the recordings')
     for as_it_is in (None, closed):
         verdict = said(bench.arm, as_it_is)
         assert verdict.word == 'consistent'
@@ -35,7 +35,7 @@ def test_a_model_that_explains_as_it_is_needs_no_fit(bench):
 def test_a_model_that_has_to_be_fitted_says_where_it_is_off_and_by_how_much(bench):
     excess = np.full(bench.robot.n_joints, 0.8)
     excess[-1] = 4.0
-    verdict = said(bench.arm, Left(excess, 'in the recordings'))
+    verdict = said(bench.arm, Excess(excess, 'in the recordings'))
     assert verdict.word == 'consistent'
     assert 'once its rigid body and friction are fitted' in verdict.summary
     assert f'the error of {bench.robot.joints[-1]} is 2.0 times as large' in verdict.summary
@@ -45,7 +45,7 @@ def test_what_does_not_repeat_has_to_matter(bench):
     joints = bench.robot.n_joints
     one = np.ones(joints)
     floor = NoiseFloor(0.1 * one, 8.0, 20.0 * one, np.array([0.05, 0.2]), one)
-    closed = Left(0.5 * one, 'in the recordings')
+    closed = Excess(0.5 * one, 'in the recordings')
 
     def word(least):
         strange = not_repeating([floor] * 3, bench.arm, Thresholds(), least * one)
@@ -74,7 +74,7 @@ def small_finding(bench, share):
 
 
 def test_what_is_not_explained_is_said_with_what_explains_most_of_it(bench):
-    gap = Left(4.0 * np.ones(bench.robot.n_joints), 'in the recordings')
+    gap = Excess(4.0 * np.ones(bench.robot.n_joints), 'in the recordings')
     small = small_finding(bench, 0.3)
 
     def text(minor):
@@ -90,7 +90,7 @@ def test_what_is_not_explained_is_said_with_what_explains_most_of_it(bench):
 
 
 def test_names_that_are_one_cause_are_one_sentence(bench):
-    closed = Left(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
+    closed = Excess(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
 
     def found(name, share, together=()):
         effect = CATALOGUE[name].on(bench.robot)
@@ -112,8 +112,8 @@ def test_names_that_are_one_cause_are_one_sentence(bench):
 
 @pytest.mark.parametrize(('share', 'mentioned'), [(0.3, True), (0.001, False)])
 def test_small_print_of_no_size_is_not_read_out(bench, share, mentioned):
-    off = Left(4.0 * np.ones(bench.robot.n_joints), 'in the recordings')
-    closed = Left(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
+    off = Excess(4.0 * np.ones(bench.robot.n_joints), 'in the recordings')
+    closed = Excess(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
     minor = (small_finding(bench, share),)
     summary = decide((), (), [closed], bench.arm, FLOOR, off, minor).summary
     assert ('encoder offset' in summary) == mentioned
@@ -131,7 +131,7 @@ def test_small_print_of_no_size_is_not_read_out(bench, share, mentioned):
     ],
 )
 def test_what_could_stand_in_another_joint_is_said_with_it(bench, rivals, said):
-    closed = Left(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
+    closed = Excess(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
     effect = CATALOGUE['torque_offset'].on(bench.robot, ('elbow',))
     numbers = (effect.parameters(bench.robot), (1.0,), (0.1,), 0.9, (0.8, 0.95), 0.0)
     found = Finding('torque_offset', ('elbow',), *numbers, rivals=rivals)

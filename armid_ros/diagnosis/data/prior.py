@@ -47,7 +47,7 @@ class Prior:
         return np.concatenate([rows.reshape(-1, rows.shape[2]) for rows in self.rows])
 
     @cached_property
-    def left(self) -> FloatArray:
+    def residual(self) -> FloatArray:
         """Return what is left in these rows, shape (S,)."""
         return np.concatenate([rest.ravel() for rest in self.rest])
 
@@ -59,7 +59,7 @@ class Prior:
     @cached_property
     def aim(self) -> FloatArray:
         """Products of the columns with what is left, shape (r,)."""
-        return np.asarray(self.columns.T @ self.left)
+        return np.asarray(self.columns.T @ self.residual)
 
     def nearest(self, columns: FloatArray) -> FloatArray:
         """Return the changes of what is free that come nearest to columns (S, p), shape (r, p)."""

@@ -90,8 +90,8 @@ def explains_itself(trial: Trial, here: Round) -> bool:
 
     """
     own = here.projection.rest(here.own(trial.candidate))
-    after = here.problem.chi2_per_row(here.left - own @ trial.values)
-    before = np.minimum(here.problem.chi2_per_row(here.left), here.evidence.noise_share)
+    after = here.problem.chi2_per_row(here.residual - own @ trial.values)
+    before = np.minimum(here.problem.chi2_per_row(here.residual), here.evidence.noise_share)
     return bool(np.any(after < here.settings.thresholds.below_noise * before))
 
 
@@ -119,6 +119,6 @@ def without_echo(trial: Trial, here: Round) -> Trial:
 def _taken(columns: FloatArray, here: Round) -> float:
     """Return the squares that weighted columns (R, n, p) take of what is left."""
     flat = columns.reshape(-1, columns.shape[2])
-    own, aim = here.projection.products(flat), flat.T @ here.left.ravel()
+    own, aim = here.projection.products(flat), flat.T @ here.residual.ravel()
     values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
     return float(2.0 * values @ aim - values @ own @ values)

@@ -92,7 +92,7 @@ def _triangle(
     ]
     prior = explanation.prior
     if prior is not None:
-        own, left = prior.columns, prior.left - prior.columns @ fitted.change
+        own, left = prior.columns, prior.residual - prior.columns @ fitted.change
         factors.append(np.column_stack([own, left + own @ values]))
     whole = scipy.linalg.qr(np.concatenate(factors), mode='r')[0][: rank + 1]
     return np.asarray(whole), float(sum(part.informative.sum() for part in data))

@@ -43,14 +43,14 @@ class Rows:
         Columns of what is fitted beside a cause.
     own : ndarray, shape (S, p)
         Columns of the cause.
-    left : ndarray, shape (S,)
+    residual : ndarray, shape (S,)
         What is left of the torque.
 
     """
 
     free: FloatArray
     own: FloatArray
-    left: FloatArray
+    residual: FloatArray
 
 
 def changed(trial: Trial, here: Round) -> bool:
@@ -79,7 +79,7 @@ def _count_divisions(here: Round) -> int:
     later = here.before.later
     first = len({part.fold for part in here.before.prior.data})
     second = len({part.fold for part in here.evidence.data})
-    second += 0 if later is None else len(later.left)
+    second += 0 if later is None else len(later.residual)
     exchanges = comb(first + second, first) - 1 - (first == second)
     return min(exchanges, _DIVISIONS)
 
@@ -91,11 +91,11 @@ def _showing_more(trial: Trial, here: Round) -> tuple[int, int]:
     nuisance, later = here.nuisance, here.before.later
     if later is not None:
         more = later.own(here.work.arm, trial.candidate)
-        second += [Rows(*rows) for rows in zip(later.free, more, later.left, strict=True)]
+        second += [Rows(*rows) for rows in zip(later.free, more, later.residual, strict=True)]
     free = here.free.reshape(-1, len(nuisance.free))
     hold, pull = nuisance.hold + free.T @ free, nuisance.pull + free.T @ here.problem.y.ravel()
     if later is not None:
-        for columns, left in zip(later.free, later.left, strict=True):
+        for columns, left in zip(later.free, later.residual, strict=True):
             hold, pull = hold + columns.T @ columns, pull + columns.T @ left
     return showing_more(first, second, (hold, pull), trial.candidate.precision)
 
@@ -125,7 +125,7 @@ def showing_more(
     free = basis @ (basis.T @ known[1])
     border = np.array([basis.T @ (one.free.T @ one.own) for one in rows])
     own = np.array([one.own.T @ one.own for one in rows])
-    aim = np.array([one.own.T @ (one.left - one.free @ free) for one in rows])
+    aim = np.array([one.own.T @ (one.residual - one.free @ free) for one in rows])
     squares = np.diag(own.sum(axis=0)) + precision  # a planar arm shows some values of a body only
 
     def explained(members: npt.NDArray[np.bool_]) -> float:

@@ -179,7 +179,7 @@ def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial]
         if not effect.shapes:
             continue
         candidate, columns = refine(
-            problem, here.projection, trial.candidate, here.left, here.work
+            problem, here.projection, trial.candidate, here.residual, here.work
         )
         span = slice(first, first + columns.shape[2])
         first = span.stop
@@ -237,7 +237,7 @@ def _examined(
 
 def _open_squares(here: Round) -> FloatArray:
     """Return the squares of every joint in which a gap is open; infinite where none is, (n,)."""
-    return np.where(here.gaps(here.left), np.sum(here.left**2, axis=0), np.inf)
+    return np.where(here.gaps(here.residual), np.sum(here.residual**2, axis=0), np.inf)
 
 
 def _compared(trials: Sequence[Trial], here: Round) -> list[Trial]:

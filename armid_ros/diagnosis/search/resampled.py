@@ -178,7 +178,7 @@ def _seen_before(fitted: Fitted, prior: Prior, baseline: Baseline) -> FloatArray
 
     """
     result = np.zeros(len(fitted.estimate.values))
-    left = prior.left - prior.columns @ fitted.change
+    left = prior.residual - prior.columns @ fitted.change
     for own, values, (places, _) in zip(fitted.named, fitted.values, fitted.places, strict=True):
         kept = list(own.kept)
         pair = np.column_stack([baseline.columns(fitted.arm, own.effect, kept), left])

@@ -63,14 +63,14 @@ class Later:
         The recordings.
     free : tuple of ndarray, each (S, f)
         Columns of what is fitted beside every cause, of each recording.
-    left : tuple of ndarray, each (S,)
+    residual : tuple of ndarray, each (S,)
         What is left of it.
 
     """
 
     evidence: Evidence
     free: tuple[FloatArray, ...]
-    left: tuple[FloatArray, ...]
+    residual: tuple[FloatArray, ...]
 
     @classmethod
     def of(
@@ -143,7 +143,7 @@ class Before:
             axis=1,
         )
         precision = np.concatenate([candidate.precision for candidate in candidates])
-        left = self.prior.left - self.prior.columns @ self.change
+        left = self.prior.residual - self.prior.columns @ self.change
         size, known = own.shape[1], self.prior.columns.shape[1]
         whole = size + len(nuisance.pull)
         hold, pull = np.zeros((whole, whole)), np.zeros(whole)
@@ -213,7 +213,7 @@ class Round:
         return project(self.problem, self.nuisance.free, self.nuisance.hold)
 
     @cached_property
-    def left(self) -> FloatArray:
+    def residual(self) -> FloatArray:
         """What these leave of the residual, shape (R, n)."""
         return self.projection.rest(self.problem.y)
 

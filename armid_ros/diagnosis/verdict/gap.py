@@ -30,20 +30,20 @@ _SURELY, _SLIGHTLY = 3.0, 0.05
 
 
 @dataclass(frozen=True)
-class Left:
+class Excess:
     """
-    What is left in the joints.
+    What is left in the joints beyond what is no gap.
 
     Attributes
     ----------
-    excess : ndarray, shape (n,)
+    ratio : ndarray, shape (n,)
         Loss over the loss up to which it is no gap; above one there is something.
     where : str
         The data that show it, for a sentence.
 
     """
 
-    excess: FloatArray
+    ratio: FloatArray
     where: str
 
 

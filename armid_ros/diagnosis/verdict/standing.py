@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.verdict.gap import Left
+from armid_ros.diagnosis.verdict.gap import Excess
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -37,7 +37,7 @@ _BESIDE = (
 )
 
 
-def held(arm: ArmModel, evidence: Evidence, before: Baseline | None, given: ArmModel) -> Left:
+def held(arm: ArmModel, evidence: Evidence, before: Baseline | None, given: ArmModel) -> Excess:
     """
     Return what acts on joints that stand still or turn round, beyond friction.
 
@@ -59,12 +59,12 @@ def held(arm: ArmModel, evidence: Evidence, before: Baseline | None, given: ArmM
         unit = (before.misfit,) * len(before.data)
         then = standing(given, Evidence(before.data, unit, unit), before.residual)
         excess = excess / np.maximum(_AS_BEFORE * then, 1.0)
-    return Left(excess, _BESIDE)
+    return Excess(excess, _BESIDE)
 
 
-def places_held(arm: ArmModel, left: Sequence[Left]) -> tuple[Where, ...]:
+def places_held(arm: ArmModel, left: Sequence[Excess]) -> tuple[Where, ...]:
     """Say which joints are held, the worst first."""
-    excess = np.max([np.zeros(arm.robot.n_joints), *(one.excess for one in left)], axis=0)
+    excess = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in left)], axis=0)
     beyond = np.where(excess > 1.0, excess, 0.0)
     order = np.argsort(-beyond)[: np.count_nonzero(beyond)]
     whole = float(beyond.sum())

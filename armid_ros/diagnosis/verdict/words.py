@@ -12,7 +12,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.floor import NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
-from armid_ros.diagnosis.verdict.gap import Left
+from armid_ros.diagnosis.verdict.gap import Excess
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -48,10 +48,10 @@ class Verdict:
 def decide(
     findings: Sequence[Finding],
     strange: Sequence[str],
-    left: Sequence[Left],
+    left: Sequence[Excess],
     arm: ArmModel,
     floor_in_words: str,
-    as_it_is: Left | None = None,
+    as_it_is: Excess | None = None,
     minor: Sequence[Finding] = (),
 ) -> Verdict:
     """
@@ -63,25 +63,25 @@ def decide(
         What was named.
     strange : sequence of str
         Joints that did not do the same in equal periods; see `not_repeating`.
-    left : sequence of Left
+    left : sequence of Excess
         What the patched model leaves, of each set of data.
     arm : ArmModel
         Gives the joints.
     floor_in_words : str
         What was there before, or noise.
-    as_it_is : Left or None
+    as_it_is : Excess or None
         What the model leaves as it is, where its body and known effects were fitted anew.
     minor : sequence of Finding
         The small print, the most important first.
 
     """
-    worst = max(left, key=lambda one: float(one.excess.max()))
-    open_gap = bool(worst.excess.max() > 1.0)
-    joint = arm.robot.joints[int(np.argmax(worst.excess))]
+    worst = max(left, key=lambda one: float(one.ratio.max()))
+    open_gap = bool(worst.ratio.max() > 1.0)
+    joint = arm.robot.joints[int(np.argmax(worst.ratio))]
     if strange and (not findings or open_gap):
         return Verdict('not_repeatable', _strange(strange, findings))
     rest = (
-        f'the error of {joint} is {_factor(np.sqrt(worst.excess.max()))} times as large as '
+        f'the error of {joint} is {_factor(np.sqrt(worst.ratio.max()))} times as large as '
         f'{floor_in_words} can be {worst.where}'
     )
     if not findings:
@@ -103,16 +103,16 @@ def decide(
 
 
 def _consistent(
-    floor_in_words: str, as_it_is: Left | None, minor: Sequence[Finding], robot: Robot
+    floor_in_words: str, as_it_is: Excess | None, minor: Sequence[Finding], robot: Robot
 ) -> str:
     """Say what a model explains, and what has to be fitted anew for that."""
-    if as_it_is is None or as_it_is.excess.max() <= 1.0:
+    if as_it_is is None or as_it_is.ratio.max() <= 1.0:
         return f'The model explains the recordings: what is left is {floor_in_words}.'
-    worst = int(np.argmax(as_it_is.excess))
+    worst = int(np.argmax(as_it_is.ratio))
     text = (
         'The model explains the recordings once its rigid body and friction are fitted: what is '
         f'left is {floor_in_words}. As it is, the error of {robot.joints[worst]} is '
-        f'{_factor(np.sqrt(as_it_is.excess[worst]))} times as large as that can be.'
+        f'{_factor(np.sqrt(as_it_is.ratio[worst]))} times as large as that can be.'
     )
     return ' '.join([text, *(sentence(one) for one in minor[:1] if one.share >= SAID)])
 
