@@ -21,7 +21,7 @@ def recording(rng, value):
 def asked(first, second):
     rows = [*first, *second]
     free = np.concatenate([one.free for one in rows])
-    left = np.concatenate([one.left for one in rows])
+    left = np.concatenate([one.residual for one in rows])
     more, _divisions = showing_more(
         first, second, (free.T @ free, free.T @ left), np.array([1e-9])
     )
@@ -53,7 +53,7 @@ def test_values_that_no_motion_shows_hide_no_change():
     rng = np.random.default_rng(2)
     values = rng.normal(size=7) + np.array([0, 0, 0, 9, 9, 9, 9])
     days = [recording(rng, value) for value in values]
-    wide = [Rows(one.free, np.hstack([one.own, 1e-12 * one.own]), one.left) for one in days]
+    wide = [Rows(one.free, np.hstack([one.own, 1e-12 * one.own]), one.residual) for one in days]
     free, left = (np.concatenate([getattr(one, n) for one in days]) for n in ('free', 'left'))
     known = free.T @ free, free.T @ left
     assert showing_more(wide[:3], wide[3:], known, np.array([1e-9, 0.3])) == (0, 34)
