@@ -54,7 +54,7 @@ def test_values_that_no_motion_shows_hide_no_change():
     values = rng.normal(size=7) + np.array([0, 0, 0, 9, 9, 9, 9])
     days = [recording(rng, value) for value in values]
     wide = [Rows(one.free, np.hstack([one.own, 1e-12 * one.own]), one.residual) for one in days]
-    free, left = (np.concatenate([getattr(one, n) for one in days]) for n in ('free', 'left'))
+    free, left = (np.concatenate([getattr(one, n) for one in days]) for n in ('free', 'residual'))
     known = free.T @ free, free.T @ left
     assert showing_more(wide[:3], wide[3:], known, np.array([1e-9, 0.3])) == (0, 34)
 
