@@ -17,8 +17,14 @@ def hidden(size):
 @pytest.mark.parametrize('size', [0.05, 0.2])
 def test_a_small_cause_is_named_beside_one_that_takes_everything(bench, size):
     settings = DiagnosisSettings(material=0.0)
-    recordings = bench.recordings(hidden(size))
-    found = diagnose(bench.arm, recordings, settings=settings, rng=np.random.default_rng(0))
+    misfit = Misfit('held-out', {'shoulder': 0.01, 'elbow': 0.01}, 0.2)
+    found = diagnose(
+        bench.arm,
+        bench.recordings(hidden(size)),
+        misfit=misfit,
+        settings=settings,
+        rng=np.random.default_rng(0),
+    )
     drag, spring = found.findings
     assert found.verdict == 'named'
     assert (drag.name, drag.joints) == ('quadratic_friction', ('shoulder',)) and drag.share > 0.99

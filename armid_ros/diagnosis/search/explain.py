@@ -316,7 +316,8 @@ def _friction(
                 continue
             total = power if whole[0] is None else whole[0]
             steps[k] = Step(trial, (), (trial,), total, whole[1], least)
-            here = Round(evidence, work, settings, problem, nuisance, tried=whole[1], power=power)
+            here = Round(evidence, work, settings, problem, nuisance, total, whole[1])
+            here = replace(here, power=power, since=question.since)
             if not stands(steps[k], here):
                 weak[k] = doubtful(trial)
         tried = tried or [step.trial for step in steps.values()]

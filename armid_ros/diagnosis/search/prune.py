@@ -71,13 +71,13 @@ def pruned(
         steps, change = tuple(one.step for one in alive), fitted.change
         rows = zip(fitted.named, steps, fitted.values, strict=True)
         alive = [Taken(*row) for row in rows]
-        needless = _needless(fitted, steps, evidence, settings, work)
+        needless = _needless(fitted, steps, evidence, settings, work, question.since)
         if needless is not None:
             gone = alive.pop(needless)
             if not any(gone.step is step for step in back):
                 dropped.append(gone)
             continue
-        needed = _needed_after_all(fitted, dropped, evidence, settings, work)
+        needed = _needed_after_all(fitted, dropped, evidence, settings, work, question.since)
         if needed is None:
             return steps, fitted
         again = dropped.pop(needed[0])._replace(values=needed[1])
@@ -91,6 +91,7 @@ def _needless(
     evidence: Evidence,
     settings: DiagnosisSettings,
     work: Workspace,
+    since: bool,
 ) -> int | None:
     """Return the name that is likeliest to be chance beside the others; None if all stand."""
     if not steps:
@@ -99,7 +100,7 @@ def _needless(
     view = View.of(fitted, evidence)
     for k, step in enumerate(steps):
         trial, problem, nuisance, power = view.trial_of(k)
-        here = Round(evidence, work, settings, problem, nuisance, tried=step.tried, power=power)
+        here = _round(step, Round(evidence, work, settings, problem, nuisance, power=power), since)
         if trial is None or not stands(replace(step, trial=trial), here):
             weak.append((doubtful(trial), k))
     return max(weak)[1] if weak else None
@@ -111,6 +112,7 @@ def _needed_after_all(
     evidence: Evidence,
     settings: DiagnosisSettings,
     work: Workspace,
+    since: bool,
 ) -> tuple[int, FloatArray] | None:
     """Return which dropped name takes most beside those that stay, and its values."""
     if not dropped:
@@ -119,9 +121,8 @@ def _needed_after_all(
     found: dict[int, Trial] = {}
     for k, one in enumerate(dropped):
         trial, problem, nuisance, power = view.trial_of_more(k)
-        here = Round(
-            evidence, work, settings, problem, nuisance, tried=one.step.tried, power=power
-        )
+        here = Round(evidence, work, settings, problem, nuisance, power=power)
+        here = _round(one.step, here, since)
         if trial is not None and stands(replace(one.step, trial=trial), here):
             found[k] = trial
     if not found:
@@ -130,3 +131,8 @@ def _needed_after_all(
     values = np.zeros_like(dropped[most].values)
     values[list(dropped[most].named.kept)] = found[most].values
     return most, values
+
+
+def _round(step: Step, here: Round, since: bool) -> Round:
+    """Return a round that asks again as a cause was asked for."""
+    return replace(here, total=step.total, tried=step.tried, since=since)

@@ -24,7 +24,7 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
         return False
     if _never_happens(first, here) and _happens(other, here):
         return squares > thresholds.far * first.gain
-    if squares <= thresholds.tie * here.power * 0.5 and squares <= thresholds.far * first.gain:
+    if squares <= thresholds.tie * here.currency * 0.5 and squares <= thresholds.far * first.gain:
         return False
     return z >= thresholds.rival_z or squares > thresholds.far * first.gain
 

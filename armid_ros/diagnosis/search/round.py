@@ -175,7 +175,7 @@ class Round:
     total : float or None
         Held-out squares that shares are of; those of this round if None.
     power : float
-        Held-out squares of this round, of which a cause has to take some to pay for its values.
+        Held-out squares of this round.
     since : bool
         Whether what has changed is asked, and not what was always there.
     tried : int
@@ -201,6 +201,18 @@ class Round:
     known: Products | None = None
     power: float = 1.0
     since: bool = False
+
+    @property
+    def currency(self) -> float:
+        """
+        Squares that a cause pays for its values with.
+
+        Those that are left where a change is asked: a small one counts beside any large one. Where
+        the description may be off in everything, those of the whole gap.
+
+        """
+        assert self.total is not None
+        return max(self.power if self.since else self.total, 1e-300)
 
     @cached_property
     def free(self) -> FloatArray:
@@ -234,7 +246,7 @@ class Round:
 def worth(trial: Trial, here: Round) -> float:
     """Return the share of what is left that a trial takes, its freedom paid for."""
     price = here.settings.thresholds.price * cost(trial, here.settings)
-    return trial.gain / max(here.power, 1e-300) - price
+    return trial.gain / here.currency - price
 
 
 def cost(trial: Trial, settings: DiagnosisSettings) -> float:
