@@ -19,8 +19,8 @@ class Thresholds:
     Attributes
     ----------
     price : float
-        Share of what is left that each value or shape of a cause has to take before it counts: 50
-        values of a rigid body, a tenth.
+        Share of the gap, or of what is left of it where a change is asked, that each value or shape
+        of a cause has to take before it counts: 50 values of a rigid body, a tenth.
     outside : float
         Values that a cause from outside the arm counts for beside its own: a person or a strap can
         pull in any way.
@@ -30,7 +30,7 @@ class Thresholds:
     rival_z : float
         Deviations by which a name has to be ahead of another one to exclude it.
     tie : float
-        Share of what is left by which it has to be ahead as well.
+        Share of the same by which it has to be ahead as well.
     far : float
         Lead over its own share that excludes another one however few blocks show it, and that
         a link, which never changes, has to have over what may happen between two days.
