@@ -19,8 +19,8 @@ class Thresholds:
     Attributes
     ----------
     price : float
-        Share of the gap, or of what is left of it where a change is asked, that each value or shape
-        of a cause has to take before it counts: 50 values of a rigid body, a tenth.
+        Share of the gap, or of what is left where a change is asked, that each value or shape of a
+        cause has to take before it counts: 50 values of a rigid body, a tenth.
     outside : float
         Values that a cause from outside the arm counts for beside its own: a person or a strap can
         pull in any way.
