@@ -23,7 +23,7 @@ from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.look import Look, look_at
 from armid_ros.diagnosis.search.patch import Named
-from armid_ros.diagnosis.search.prune import doubtful, pruned, stands
+from armid_ros.diagnosis.search.prune import as_asked, doubtful, pruned, stands
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.resampled import widened
 from armid_ros.diagnosis.search.rivals import undecided
@@ -316,8 +316,8 @@ def _friction(
                 continue
             total = power if whole[0] is None else whole[0]
             steps[k] = Step(trial, (), (trial,), total, whole[1], least)
-            here = Round(evidence, work, settings, problem, nuisance, total, whole[1])
-            here = replace(here, power=power, since=question.since)
+            here = Round(evidence, work, settings, problem, nuisance, power=power)
+            here = as_asked(steps[k], here, question.since)
             if not stands(steps[k], here):
                 weak[k] = doubtful(trial)
         tried = tried or [step.trial for step in steps.values()]

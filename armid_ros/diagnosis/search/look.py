@@ -106,9 +106,9 @@ def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
     nuisance = here.nuisance
     known = products(here.problem, nuisance.free, [one.columns for one in candidates])
     trials, power = tried_beside(known, here.problem, candidates, nuisance.hold, nuisance.pull)
-    here = replace(here, power=float(power.sum()), known=known)
-    total = here.power if here.total is None else here.total
-    here = replace(here, total=total)
+    left = float(power.sum())
+    total = left if here.total is None else here.total
+    here = replace(here, total=total, power=left, known=known)
     seen = [t for t in trials if t.visible >= here.settings.thresholds.least_visible]
     ranking = _best_per_key(seen, here)
     survey = _survey(candidates, ranking, total, len(seen))

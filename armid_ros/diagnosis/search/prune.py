@@ -34,6 +34,11 @@ def stands(step: Step, here: Round) -> bool:
     return acceptable(trial, here) and material(gains, here, step.misfit_share)
 
 
+def as_asked(step: Step, here: Round, since: bool) -> Round:
+    """Return a round in which a cause is asked for again as it was when it was taken."""
+    return replace(here, total=step.total, tried=step.tried, since=since)
+
+
 def pruned(
     question: Question,
     taken: Sequence[Taken],
@@ -100,7 +105,8 @@ def _needless(
     view = View.of(fitted, evidence)
     for k, step in enumerate(steps):
         trial, problem, nuisance, power = view.trial_of(k)
-        here = _round(step, Round(evidence, work, settings, problem, nuisance, power=power), since)
+        here = Round(evidence, work, settings, problem, nuisance, power=power)
+        here = as_asked(step, here, since)
         if trial is None or not stands(replace(step, trial=trial), here):
             weak.append((doubtful(trial), k))
     return max(weak)[1] if weak else None
@@ -122,7 +128,7 @@ def _needed_after_all(
     for k, one in enumerate(dropped):
         trial, problem, nuisance, power = view.trial_of_more(k)
         here = Round(evidence, work, settings, problem, nuisance, power=power)
-        here = _round(one.step, here, since)
+        here = as_asked(one.step, here, since)
         if trial is not None and stands(replace(one.step, trial=trial), here):
             found[k] = trial
     if not found:
@@ -131,8 +137,3 @@ def _needed_after_all(
     values = np.zeros_like(dropped[most].values)
     values[list(dropped[most].named.kept)] = found[most].values
     return most, values
-
-
-def _round(step: Step, here: Round, since: bool) -> Round:
-    """Return a round that asks again as a cause was asked for."""
-    return replace(here, total=step.total, tried=step.tried, since=since)
