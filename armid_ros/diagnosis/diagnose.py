@@ -37,7 +37,6 @@ from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.diagnosis.verdict.gap import Excess, harmed, measure_gap
 from armid_ros.diagnosis.verdict.headline import (
     headline,
-    own_causes_first,
     shares_of,
     smallest,
 )
@@ -152,7 +151,7 @@ def diagnose(
     explain = Explainer(arm, prepared, known, rng, tell, written, seen, covariance)
 
     def ask(by: DiagnosisSettings) -> Diagnosis:
-        return _said(own_causes_first(explain, by), notes, asked)
+        return _said(explain(by), notes, asked)
 
     said = ask(settings)
     if not validate or said.verdict != 'unknown':

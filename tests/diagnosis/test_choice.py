@@ -2,18 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which causes stay beside a correction of the description."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories
-from armid_ros.diagnosis.data.prepare import choose_filters, prepare
 from armid_ros.diagnosis.search.choice import (
     _as_good,
     _beside_a_correction,
     _more_freedom,
     _stands,
     _told_by,
-    Explainer,
 )
 from armid_ros.diagnosis.search.explanation import at_floor, freedom
 from armid_ros.diagnosis.search.trial import Candidate
@@ -101,25 +98,6 @@ def test_a_body_costs_nothing_where_one_of_several_causes_corrects_it_anyway(ben
     anew.base = SimpleNamespace(rank=30)
     assert freedom(anew, settings) == 30
     assert _more_freedom(first, anew, settings) == body - freedom(first, settings)
-
-
-def test_names_that_played_no_part_are_not_asked_about_again(bench):
-    recordings = bench.recordings(lambda m, tau: 0.4 * m.dq * [0.0, 1.0])
-    settings, rng = DiagnosisSettings(), np.random.default_rng(0)
-    used = choose_filters(bench.arm, recordings, [], settings, rng)
-    data = trajectories(recordings, used)
-    prepared = prepare(bench.arm, recordings, used, data, settings, rng)
-    explain = Explainer(bench.arm, prepared, None, rng, lambda share, what: None)
-
-    def without(name):
-        fewer = tuple(other for other in settings.library if other != name)
-        return explain(replace(settings, library=fewer)).explanation
-
-    found = explain(settings).explanation
-    assert [step.trial.candidate.effect.name for step in found.steps] == ['viscous_friction']
-    assert without('torque_ripple') is found
-    other = without('viscous_friction')
-    assert 'viscous_friction' not in [step.trial.candidate.effect.name for step in other.steps]
 
 
 @pytest.mark.parametrize(

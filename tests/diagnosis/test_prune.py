@@ -35,11 +35,11 @@ def prune_by(bench, monkeypatch):
 
     def pruned(*order, also=()):
         needless = iter(order)
-        monkeypatch.setattr(prune, '_needless', lambda *_: next(needless))
+        monkeypatch.setattr(prune.Retrial, 'needless', lambda *_: next(needless))
         step = way.taken[0].step
         more = [Named(CATALOGUE[name].on(bench.robot, ('elbow',)), (0,)) for name in also]
         taken = [*way.taken, *(Taken(own, step, np.ones(1)) for own in more)]
-        return prune.pruned(question, taken, evidence, settings)
+        return prune.pruned(prune.Retrial(question, evidence, settings), taken)
 
     return pruned
 

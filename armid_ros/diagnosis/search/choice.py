@@ -12,7 +12,7 @@ where there are recordings from before, no cause is named that a body common to 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
@@ -30,7 +30,7 @@ from armid_ros.diagnosis.search.explanation import (
     in_model_as_given,
     NOISE,
 )
-from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question
+from armid_ros.diagnosis.search.question import as_given, fitted_anew
 from armid_ros.diagnosis.search.resampled import with_model_error
 from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -56,30 +56,9 @@ _EVER = (
 
 
 @dataclass(frozen=True)
-class _Answer:
-    """What was found, and by which names."""
-
-    what: str
-    settings: DiagnosisSettings
-    explanation: Explanation
-
-    def holds(self, what: str, evidence: Evidence, settings: DiagnosisSettings) -> bool:
-        """Return whether the same would be found by fewer names: those that played no part."""
-        asked, now = set(self.settings.library), set(settings.library)
-        sigma = zip(self.explanation.evidence.sigma, evidence.sigma, strict=True)
-        return (
-            what == self.what
-            and now <= asked
-            and replace(settings, library=self.settings.library) == self.settings
-            and not (asked - now) & self.explanation.considered
-            and all(np.array_equal(mine, other) for mine, other in sigma)
-        )
-
-
-@dataclass(frozen=True)
 class Explainer:
     """
-    Explains the gap of an arm by what a library has; it may be asked again with less of it.
+    Explains the gap of an arm by what a library has.
 
     Attributes
     ----------
@@ -110,7 +89,6 @@ class Explainer:
     written: FloatArray | None = None
     unseen: Sequence[Trajectory] = ()
     covariance: FloatArray | None = None
-    _answers: list[_Answer] = field(default_factory=list)
 
     def __call__(self, settings: DiagnosisSettings) -> Chosen:
         """Explain the gap."""
@@ -123,7 +101,7 @@ class Explainer:
         given = as_given(self.arm, prepared.data, few, settings.library)
         described = Evidence(prepared.data, prepared.as_described, prepared.as_described)
         tell(0.2, 'the model as given')
-        first = self._explain('given', given, described, settings)
+        first = explain(given, described, settings)
         nothing = np.zeros(self.arm.robot.n_joints)
         closed = at_floor(first, settings)
         if closed and not _beside_a_correction(first):
@@ -138,28 +116,11 @@ class Explainer:
             misfit = _left_by(anew)
             tell(0.7, 'the model as given')
             sigma = tuple(np.maximum(one, misfit) for one in prepared.as_described)
-            first = self._explain('given', given, replace(described, sigma=sigma), settings)
+            first = explain(given, replace(described, sigma=sigma), settings)
             words = ESTIMATED
         if _as_good(first, anew, settings):
             return Chosen(first, misfit, words)
         return Chosen(anew, nothing, words)
-
-    def _explain(
-        self,
-        what: str,
-        question: Question,
-        evidence: Evidence,
-        settings: DiagnosisSettings,
-        baseline: Baseline | None = None,
-        unseen: Evidence | None = None,
-    ) -> Explanation:
-        """Explain data, unless the answer is known."""
-        for answer in self._answers:
-            if answer.holds(what, evidence, settings):
-                return answer.explanation
-        found = explain(question, evidence, settings, baseline=baseline, unseen=unseen)
-        self._answers.append(_Answer(what, settings, found))
-        return found
 
     def _beside(self, misfit: FloatArray, settings: DiagnosisSettings) -> Chosen:
         """
@@ -175,7 +136,7 @@ class Explainer:
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
         most = 2 * settings.thresholds.few_causes
         given = as_given(self.arm, prepared.data, most, settings.library)
-        found = self._explain('given', replace(given, since=True), evidence, settings)
+        found = explain(replace(given, since=True), evidence, settings)
         notes = (_AS_EXACT,) if found.steps and self.covariance is None else ()
         if self.covariance is not None:
             fitted = with_model_error(found.fitted, evidence, self.arm, self.covariance)
@@ -200,7 +161,7 @@ class Explainer:
         evidence = Evidence(data, sigma, tuple(self.prepared.sigma))
         many = settings.thresholds.many_causes
         question = fitted_anew(arm, data, many, library, self.rng)
-        found = self._explain('anew', question, evidence, settings)
+        found = explain(question, evidence, settings)
         rigid, described = len(arm.robot.rigid_parameters), arm.theta
         change = np.abs(found.fitted.arm.theta[: len(described)] - described)
         known = (np.arange(len(described)) >= rigid) & (described != 0.0)
@@ -209,7 +170,7 @@ class Explainer:
         if not len(changed):
             return found
         question = fitted_anew(arm, data, many, library, self.rng, changed.tolist())
-        return self._explain('anew but for what changed', question, evidence, settings)
+        return explain(question, evidence, settings)
 
     def _since(self, baseline: Baseline, settings: DiagnosisSettings) -> Chosen:
         """Explain what has changed since the baseline."""
@@ -233,10 +194,10 @@ class Explainer:
         if self.unseen:
             unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(self.unseen)
             more = Evidence(tuple(self.unseen), unit, unit, baseline.varies)
-        found = self._explain('since', question, evidence, settings, baseline, more)
+        found = explain(question, evidence, settings, baseline=baseline, unseen=more)
         notes: tuple[str, ...] = ()
         if not found.steps and not at_floor(found, settings):
-            lacking = self._explain('lacking', question, evidence, settings)
+            lacking = explain(question, evidence, settings)
             if _most(lacking.steps, settings) and _may_have_been(
                 lacking, baseline, prior, settings
             ):

@@ -23,7 +23,7 @@ from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.look import Look, look_at
 from armid_ros.diagnosis.search.patch import Named
-from armid_ros.diagnosis.search.prune import as_asked, doubtful, pruned, stands
+from armid_ros.diagnosis.search.prune import doubtful, pruned, Retrial
 from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.resampled import widened
 from armid_ros.diagnosis.search.rivals import undecided
@@ -48,7 +48,8 @@ def explain(
     survey, last = way.first, way.last
     minor = () if last is None else last.there
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
-    friction, tried = _friction(question, way.taken, evidence, settings, whole)
+    retrial = Retrial(question, evidence, settings)
+    friction, tried = _friction(retrial, way.taken, whole)
     taken = [*way.taken, *friction]
     if survey is not None:
         survey = survey.and_nuisance(tried, settings.thresholds.least_visible)
@@ -56,7 +57,7 @@ def explain(
         question.arm, (), evidence.data, evidence.sigma, question.base, None, question.prior
     )
     change = way.change if question.nuisance_arm is question.arm else None
-    steps, fitted = pruned(question, taken, evidence, settings, change)
+    steps, fitted = pruned(retrial, taken, change)
     by_chance = 0.0 if last is None else last.by_chance
     fitted = widened(fitted, evidence, question.prior, by_chance)
     said = {own.effect.name for own in fitted.named}
@@ -72,7 +73,6 @@ def explain(
         small,
         question.prior,
         by_chance,
-        way.considered,
         baseline,
     )
 
@@ -90,8 +90,6 @@ class Way:
         The first look at all causes, and the last one.
     change : ndarray, shape (r,), or None
         What was added to what is free of the arm in the last fit.
-    considered : frozenset of str
-        Names without which the search could have gone another way.
 
     """
 
@@ -99,7 +97,6 @@ class Way:
     first: Survey | None
     last: Survey | None
     change: FloatArray | None = None
-    considered: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -150,23 +147,12 @@ class Search:
         first = self._fitted_place(named, values, None)
         way = self._way(first, steps, 0.0)
         assert way.last is not None
-        width, considered = way.last.most, self._considered(way)
+        width = way.last.most
         here = replace(first.look.here, total=None, before=None, width=width)
         found = [one.step for one in way.taken[len(start) :]]
         if any(undecided(step.trial, step.ranking, here) for step in found):
             way = self._way(first, steps, width)
-        return replace(way, considered=considered | self._considered(way))
-
-    def _considered(self, way: Way) -> frozenset[str]:
-        """Return what was taken or could have been, and what takes most of the rest."""
-        arm = self.question.arm
-        trials = [trial for one in way.taken for trial in (one.step.trial, *one.step.rivals)]
-        trials += [] if way.last is None else way.last.ranking[:1]
-        effects = [trial.candidate.effect for trial in trials]
-        zeros = [np.zeros(len(effect.parameters(arm.robot))) for effect in effects]
-        words = [e.named_as(values, arm) for e, values in zip(effects, zeros, strict=True)]
-        names = {word.name for said in words for word, _ in said}
-        return frozenset(names | {effect.name for effect in self.question.unknown})
+        return way
 
     def _way(self, place: _Place, steps: Sequence[Step], width: float) -> Way:
         """Go from a place, where a lead of less than some squares decides nothing."""
@@ -271,11 +257,7 @@ class Search:
 
 
 def _friction(
-    question: Question,
-    taken: Sequence[Taken],
-    evidence: Evidence,
-    settings: DiagnosisSettings,
-    whole: tuple[float | None, int],
+    retrial: Retrial, taken: Sequence[Taken], whole: tuple[float | None, int]
 ) -> tuple[list[Taken], list[Trial]]:
     """
     Return the friction of unknown value that is there, and what all of it was tried as.
@@ -285,6 +267,7 @@ def _friction(
     that takes: the values of causes lean on what is left out. What has changed has to matter, too.
 
     """
+    question, evidence = retrial.question, retrial.evidence
     if not question.unknown:
         return [], []
     arm, base = question.nuisance_arm, question.nuisance_base
@@ -294,43 +277,38 @@ def _friction(
     view = View.of(fitted, evidence)
     where = {int(column): k for k, column in enumerate(base.independent)}
     names = [(p.name, p.joint) for p in arm.parameters]
-    theta, left = fitted.arm.theta, []
+    alive = []
     for effect in question.unknown:
         parameter = effect.parameters(arm.robot)[0]
         column = names.index((parameter.name, parameter.joint))
         if column in where:
-            left.append((effect, where[column], float(theta[column])))
-    least = settings.thresholds.misfit_share if question.since else None
-    work = Workspace(memoized_arm(arm), evidence.data)
+            alive.append((effect, where[column], float(fitted.arm.theta[column])))
+    least = retrial.settings.thresholds.misfit_share if question.since else None
     gone: list[int] = []
     tried: list[Trial] = []
-    alive = dict(enumerate(left))
     while True:
-        steps: dict[int, Step] = {}
-        weak: dict[int, tuple[float, float]] = {}
-        for k, (effect, column, value) in alive.items():
+        there: list[Taken] = []
+        weak: list[tuple[tuple[float, float], int]] = []
+        seen: list[Trial] = []
+        for k, (effect, column, value) in enumerate(alive):
             candidate = Candidate.of(effect, slice(0, 1), (0,), arm.robot)
-            trial, problem, nuisance, power = view.trial(candidate, [column], [value], gone)
-            if trial is None:
-                weak[k] = doubtful(trial)
+            again = view.trial(candidate, [column], [value], gone)
+            if again.trial is None:
+                weak.append((doubtful(None), k))
                 continue
-            total = power if whole[0] is None else whole[0]
-            steps[k] = Step(trial, (), (trial,), total, whole[1], least)
-            here = Round(evidence, work, settings, problem, nuisance, power=power)
-            here = as_asked(steps[k], here, question.since)
-            if not stands(steps[k], here):
-                weak[k] = doubtful(trial)
-        tried = tried or [step.trial for step in steps.values()]
+            seen.append(again.trial)
+            total = again.power if whole[0] is None else whole[0]
+            step = Step(again.trial, (), (again.trial,), total, whole[1], least)
+            if retrial.stands(step, again):
+                there.append(Taken(Named(effect, (0,)), step, np.array([value])))
+            else:
+                weak.append((doubtful(again.trial), k))
+        tried = tried or seen
         if not weak:
-            break
-        _, column, value = alive.pop(max(weak, key=lambda k: weak[k]))
+            return there, tried
+        _, column, value = alive.pop(max(weak)[1])
         view = view.dropped(column, value)
         gone.append(column)
-    there = [
-        Taken(Named(effect, (0,)), steps[k], np.array([value]))
-        for k, (effect, _, value) in alive.items()
-    ]
-    return there, tried
 
 
 def nuisance_of(

@@ -51,8 +51,6 @@ class Explanation:
         What other data tell of what was free.
     by_chance : float
         Squares that a value of any cause takes of what the names leave.
-    considered : frozenset of str
-        Names without which something else could have been found.
     baseline : Baseline or None
         Recordings since which the names have changed.
 
@@ -68,7 +66,6 @@ class Explanation:
     minor: tuple[Trial, ...] = ()
     prior: Prior | None = None
     by_chance: float = 0.0
-    considered: frozenset[str] = frozenset()
     baseline: Baseline | None = None
 
     def without(self, name: int) -> Explanation:

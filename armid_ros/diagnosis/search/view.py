@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
@@ -17,6 +18,29 @@ from armid_ros.diagnosis.search.round import Nuisance
 from armid_ros.diagnosis.search.trial import Candidate, Trial
 from armid_ros.motion import FloatArray
 import numpy as np
+
+
+class Again(NamedTuple):
+    """
+    What is there already, judged as if it were asked for now.
+
+    Attributes
+    ----------
+    trial : Trial or None
+        What it explains; None where nothing of it is visible.
+    problem : Problem
+        The problem, its columns first.
+    nuisance : Nuisance
+        What is fitted beside it.
+    power : float
+        Held-out squares without it.
+
+    """
+
+    trial: Trial | None
+    problem: Problem
+    nuisance: Nuisance
+    power: float
 
 
 @dataclass(frozen=True)
@@ -108,15 +132,15 @@ class View:
         columns: Sequence[int],
         values: Sequence[float],
         gone: Sequence[int] = (),
-    ) -> tuple[Trial | None, Problem, Nuisance, float]:
+    ) -> Again:
         """Judge what is there already as if it were asked for now."""
         problem, free, hold, pull = self.without(columns, values, gone)
         moved = replace(candidate, columns=slice(0, len(columns)))
         trials, power = held_out(problem, free, [moved], hold, pull)
-        nuisance = Nuisance(free, hold, pull)
-        return (trials[0] if trials else None), problem, nuisance, float(power.sum())
+        trial = trials[0] if trials else None
+        return Again(trial, problem, Nuisance(free, hold, pull), float(power.sum()))
 
-    def trial_of(self, name: int) -> tuple[Trial | None, Problem, Nuisance, float]:
+    def trial_of(self, name: int) -> Again:
         """Judge a name as if it were asked for now, beside the others."""
         own = self.fitted.named[name]
         columns, shapes = self.columns(name)
@@ -124,7 +148,7 @@ class View:
         candidate = Candidate.of(own.effect, span, own.kept, self.fitted.arm.robot)
         return self.trial(candidate, columns, [self.value(c) for c in columns], shapes)
 
-    def trial_of_more(self, name: int) -> tuple[Trial | None, Problem, Nuisance, float]:
+    def trial_of_more(self, name: int) -> Again:
         """Judge a name that was not fitted beside those that were."""
         first = int(self.fitted.columns[0].shape[2])
         start = first + sum(len(one.kept) for one in self.more[:name])

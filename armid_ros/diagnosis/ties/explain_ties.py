@@ -120,9 +120,9 @@ def _explanation(ties: Ties, fitted: Fitted) -> Explanation:
     share = ties.settings.thresholds.misfit_share
     steps = []
     for k in range(len(fitted.named)):
-        trial, _, _, total = view.trial_of(k)
-        assert trial is not None
-        steps.append(Step(trial, rivals, (trial,), total, survey.tried, share))
+        again = view.trial_of(k)
+        assert again.trial is not None
+        steps.append(Step(again.trial, rivals, (again.trial,), again.power, survey.tried, share))
     base: BaseParameters | None = ties.base
     return Explanation(ties.arm, base, fitted, reference, tuple(steps), survey, ties.evidence)
 
