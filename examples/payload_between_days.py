@@ -23,4 +23,4 @@ print(changed)
 print(f'added: {changed.load:.2f} kg')
 
 # ... or Friday's recording against Monday's model.
-print(ar.diagnose(ar.identify(URDF, monday).arm, friday))
+print(ar.diagnose(ar.identify(URDF, monday), friday))

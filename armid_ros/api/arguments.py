@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from armid_ros.arm import ArmModel
+from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import USUAL_EFFECTS
 from armid_ros.errors import RecordingError
 from armid_ros.recording import Recording
@@ -20,7 +20,8 @@ from armid_ros.robots import load_robot, Robot, shipped_robots
 from armid_ros.robots.shipped import shipped_path
 import numpy as np
 
-#: A robot: as it is, as part of a model, by a shipped name, or by the path of its description.
+#: A robot: as it is, as part of a model, by a shipped name, or by the path of its description or
+#: of the model.yaml of one.
 RobotLike = Robot | ArmModel | str | Path
 #: A recording: as it is, or the path of a bag or a table.
 RecordingLike = Recording | str | Path
@@ -40,7 +41,14 @@ def robot_of(robot: RobotLike) -> Robot:
     """Return the robot that is meant."""
     if isinstance(robot, ArmModel):
         return robot.robot
-    return robot if isinstance(robot, Robot) else load_robot(str(robot))
+    if isinstance(robot, Robot):
+        return robot
+    return load_model(robot).robot if is_model(robot) else load_robot(str(robot))
+
+
+def is_model(path: str | Path) -> bool:
+    """Return whether a path is that of a model.yaml, and not of a description."""
+    return Path(path).suffix in ('.yaml', '.yml')
 
 
 def source_of(robot: Robot) -> str:
@@ -55,6 +63,8 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
     """Return the model that is meant; a robot alone gets the usual friction."""
     if isinstance(arm, ArmModel):
         return arm
+    if not isinstance(arm, Robot) and is_model(arm):
+        return load_model(arm)
     return ArmModel.of(arm if isinstance(arm, Robot) else str(arm), effects=effects)
 
 

@@ -13,6 +13,7 @@ from typing import Any, Literal, TYPE_CHECKING
 from armid_ros.api.arguments import (
     arm_of,
     generator,
+    is_model,
     RecordingLike,
     recordings_of,
     Rng,
@@ -20,13 +21,15 @@ from armid_ros.api.arguments import (
     source_of,
     with_sources_apart,
 )
+from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.table import Shown, Summary
-from armid_ros.arm import ArmModel, save_model
+from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_urdf
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
 from armid_ros.files import write_file
 from armid_ros.identification import SignalSettings
+from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.notation import with_interval
 from armid_ros.residual import (
@@ -188,7 +191,7 @@ class DiagnosisResult(Shown):
 
 
 def diagnose(
-    arm: RobotLike,
+    arm: RobotLike | IdentificationResult,
     recordings: RecordingLike | Sequence[RecordingLike],
     *,
     validate: RecordingLike | Sequence[RecordingLike] = (),
@@ -204,8 +207,10 @@ def diagnose(
 
     Parameters
     ----------
-    arm : model, robot, name or path
-        What is believed of the arm, such as ``identify(...).arm``.
+    arm : identification, model, robot, name or path
+        What is believed of the arm. Of what ``identify`` returned, and of the path of the
+        model.yaml that it wrote, it is known what the model left then: without a ``baseline`` the
+        gap is what is beyond that. An `ArmModel` is believed as it is.
     recordings : recording or path, or several
         What it did.
     validate : recording or path, or several
@@ -236,23 +241,38 @@ def diagnose(
     Examples
     --------
     >>> import armid_ros as ar
-    >>> arm = ar.load_model('monday_result/model.yaml')
-    >>> found = ar.diagnose(arm, 'today_1', validate='today_2', baseline='monday')
+    >>> model = ar.identify('my_arm.urdf', 'monday', validate='tuesday')
+    >>> found = ar.diagnose(model, 'today_1', validate='today_2')
     >>> found.verdict
     'named'
 
     """
     if residual is not None:
         require_libraries()
-    model = arm_of(arm, effects)
+    model, misfit = _believed(arm, effects)
     looked_at, held_out, before = with_sources_apart(
         *(recordings_of(group, model.robot) for group in (recordings, validate, baseline))
     )
     require_once([*looked_at, *before], held_out)
-    more: dict[str, Any] = {'baseline': before} if before else {}
-    settings = DiagnosisSettings(signals=SignalSettings(cutoff, decimation))
     result = run(
-        model, looked_at, validate=held_out, settings=settings, rng=generator(rng), **more
+        model,
+        looked_at,
+        validate=held_out,
+        baseline=before,
+        misfit=None if before else misfit,
+        settings=DiagnosisSettings(signals=SignalSettings(cutoff, decimation)),
+        rng=generator(rng),
     )
     learned = None if residual is None else learn_residual(result, generator(rng))
     return DiagnosisResult(result, model, tuple(looked_at), tuple(held_out), learned)
+
+
+def _believed(
+    arm: RobotLike | IdentificationResult, effects: str
+) -> tuple[ArmModel, Misfit | None]:
+    """Return a model, and what it left when it was identified, where that is known."""
+    if isinstance(arm, IdentificationResult):
+        return arm.arm, arm.misfit
+    model = arm_of(arm, effects)
+    written = isinstance(arm, (str, Path)) and is_model(arm)
+    return model, read_misfit(str(arm), model) if written else None

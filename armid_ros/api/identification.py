@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -22,7 +22,7 @@ from armid_ros.api.arguments import (
     with_sources_apart,
 )
 from armid_ros.api.table import Shown, Summary
-from armid_ros.arm import ArmModel, save_model
+from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.estimate import Estimate
 from armid_ros.files import write_file
@@ -40,6 +40,7 @@ from armid_ros.identification import (
 )
 from armid_ros.identification import identify as run
 from armid_ros.identification.estimators.names import Estimator
+from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.recording import Recording, require_once
 
 if TYPE_CHECKING:
@@ -114,6 +115,13 @@ class IdentificationResult(Shown):
         return (self.held_out_score or self.training).relative_error_percent
 
     @property
+    def misfit(self) -> Misfit:
+        """What the model leaves, with the covariance of its parameters."""
+        known = parameters_of(self.arm.robot.name, self.document())
+        covariance = known.standard_covariance(self.arm.parameters)
+        return replace(self.core.misfit(self.validation), covariance=covariance)
+
+    @property
     def grade(self) -> str:
         """How far it can be believed, in a word."""
         return self._graded.word
@@ -162,7 +170,7 @@ class IdentificationResult(Shown):
         """Write model.yaml, identification.json and report.html as ``armid identify`` does."""
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
-        save_model(out / 'model.yaml', self.arm, self._robot, self.estimate)
+        save_model(out / 'model.yaml', self.arm, self._robot, self.estimate, self.misfit)
         write_document(out / 'identification.json', self.document())
         self.report(out / 'report.html')
         if self.core.physical is not None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import time
 from typing import Any
 
-from armid_ros.arm import ArmModel, Misfit, save_model
+from armid_ros.arm import ArmModel, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.cli import columns, options
 from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
@@ -27,7 +27,6 @@ from armid_ros.identification import (
     IdentificationSettings,
     PhysicalCertificate,
     PhysicalSettings,
-    Score,
     Verification,
     verify,
     write_document,
@@ -235,7 +234,9 @@ def identify(
     if work.scores:
         document['methods'] = [score.document() for score in work.scores]
     source = options.kept_source(robot.robot_source, loaded, out)
-    save_model(out / 'model.yaml', result.arm, source, result.estimate, _misfit(work))
+    save_model(
+        out / 'model.yaml', result.arm, source, result.estimate, result.misfit(work.validation)
+    )
     exports = _export(result.arm, out) if bodies.physical else {}
     page = identification_report(
         result,
@@ -321,15 +322,6 @@ def _print(
         say(f'relative error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
     files = ['model.yaml', 'identification.json', 'report.html', *exports]
     say(f'{out}: {", ".join(files)}')
-
-
-def _misfit(work: _Work) -> Misfit:
-    """Return what the model leaves, of held-out recordings where there are any."""
-    held_out = [fit for part in work.validation.values() for fit in part]
-    score = Score.of(held_out or work.result.training)
-    rms = dict(zip(work.result.arm.robot.joints, score.rms.tolist(), strict=True))
-    data = 'held-out' if held_out else 'training'
-    return Misfit(data, rms, score.relative_error_percent)
 
 
 def _export(arm: ArmModel, out: Path) -> dict[str, tuple[str, ...]]:

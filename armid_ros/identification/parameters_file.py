@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from armid_ros.arm import ArmModel, load_misfit, Misfit
 from armid_ros.errors import ArmidError, ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.files import finite, is_file, load_json, load_yaml, read_text, reading
@@ -162,6 +163,29 @@ def read_parameters(path: str | Path) -> ParameterFile:
             raise ModelError(f"its 'schema' has to be {' or '.join(_SCHEMAS)}")
         read = parameters_of(str(path), document)
     return read if read.kinematics else _with_robot(read, path)
+
+
+def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
+    """
+    Read what a model left when it was identified; None if its file does not say.
+
+    Parameters
+    ----------
+    path : str or Path
+        model.yaml; the covariance of its parameters is in the identification.json beside it.
+    arm : ArmModel
+        The model.
+
+    Raises
+    ------
+    ModelError
+        Naming the file and what is wrong in it.
+
+    """
+    misfit, beside = load_misfit(path), Path(path).with_name('identification.json')
+    if misfit is None or not is_file(beside):
+        return misfit
+    return replace(misfit, covariance=read_parameters(beside).standard_covariance(arm.parameters))
 
 
 def _with_robot(found: ParameterFile, path: Path) -> ParameterFile:

@@ -108,6 +108,15 @@ def test_a_saved_identification_is_what_the_command_line_writes(model, tmp_path)
     np.testing.assert_allclose(again.theta, model.arm.theta)
 
 
+def test_what_a_model_left_is_known_of_an_identification_and_of_its_file(model, loaded, tmp_path):
+    written = model.save(tmp_path / 'result') / 'model.yaml'
+    first, second = (ar.diagnose(arm, loaded) for arm in (model, written))
+    assert first.core.baseline == 'the misfit that the model had when it was identified'
+    assert first.names == ('payload',)
+    assert second.document()['effects'] == first.document()['effects']
+    assert not first.core.notes
+
+
 def test_a_physical_identification_gives_a_urdf_that_loads(runs, tmp_path):
     found = ar.identify('humanoid_arm', runs[0], physical=True)
     found.urdf(tmp_path / 'arm.urdf')

@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-from armid_ros.arm import ArmModel, load_misfit, load_model, Misfit
+from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns, options
 from armid_ros.cli.diagnose import partner as partner_options
 from armid_ros.cli.diagnose.files import DiagnosisCase, make_extras, write_results
@@ -19,10 +19,10 @@ from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, F
 from armid_ros.diagnosis.verdict.document import SCHEMA
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import ArmidError
-from armid_ros.files import is_file, json_text
+from armid_ros.files import json_text
 from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.identifiability import excludes_zero
-from armid_ros.identification.parameters_file import read_parameters
+from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import percent, probability, with_interval
@@ -200,7 +200,7 @@ def diagnose(
         material=asked.material,
         everything=asked.everything,
     )
-    misfit = None if asked.model is None or data.baseline else _misfit_of(asked.model, arm)
+    misfit = None if asked.model is None or data.baseline else read_misfit(asked.model, arm)
     with progress('reading') as tick:
         recordings, held_out, before = data.read(loaded, beside, partner.partner_topic)
         result = run(
@@ -232,14 +232,6 @@ def diagnose(
         return
     show(result)
     _show_extras(out, extras)
-
-
-def _misfit_of(path: Path, arm: ArmModel) -> Misfit | None:
-    """Return the misfit of a model, with the covariance that identify wrote beside it."""
-    misfit, beside = load_misfit(path), path.with_name('identification.json')
-    if misfit is None or not is_file(beside):
-        return misfit
-    return replace(misfit, covariance=read_parameters(beside).standard_covariance(arm.parameters))
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
