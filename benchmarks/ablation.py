@@ -22,7 +22,6 @@ from pkgutil import resolve_name
 from typing import Any
 from unittest.mock import patch
 
-from armid_ros.diagnosis.search.fit import fit, Start
 import numpy as np
 
 from benchmarks.lived import run, select
@@ -88,17 +87,13 @@ def nowhere(here: Any) -> np.ndarray:
     return np.full(here.problem.y.shape[1], np.inf)
 
 
-def all_names(question, taken, evidence, settings, change=None):
+def all_names(retrial: Any, taken: Sequence[Any], change: Any = None) -> Any:
     """Fit all names together and drop none."""
-    named, start = [one.named for one in taken], Start([one.values for one in taken], change)
-    data, sigma = evidence.data, evidence.sigma
-    fitted = fit(question.arm, named, data, sigma, question.base, start, question.prior)
-    return tuple(one.step for one in taken), fitted
+    return tuple(one.step for one in taken), retrial.fitted(taken, change)
 
 
 #: By the names of the table in docs/reference/rates.md.
 RULES = {
-    'own causes before a person': Rule(('verdict.headline._as_good',), no),
     'names that may be nothing go': Rule(('verdict.headline.may_be_nothing',), no),
     'small names that close a gap stay': Rule(('verdict.headline._opens',), no),
     'names that other data deny go': Rule(('verdict.attribution.Attribution.denied',), no),

@@ -51,8 +51,6 @@ import numpy as np
 #: Called with the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
-#: Verdicts by which no gap is open.
-_CLOSED = ('named', 'ambiguous')
 #: Said where no two equal periods measure the noise.
 _ASSUMED = (
     'nothing repeats in some recordings: their noise is assumed from what rows differ by from '
@@ -149,26 +147,7 @@ def diagnose(
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
 
     explain = Explainer(arm, prepared, known, rng, tell, written, seen, covariance)
-
-    def ask(by: DiagnosisSettings) -> Diagnosis:
-        return _said(explain(by), notes, asked)
-
-    said = ask(settings)
-    if not validate or said.verdict != 'unknown':
-        return said
-    return _small_but_all(ask, settings, said) or said
-
-
-def _small_but_all(
-    ask: Callable[[DiagnosisSettings], Diagnosis], settings: DiagnosisSettings, said: Diagnosis
-) -> Diagnosis | None:
-    """Return what closes the gap of causes that are small, but take most of it; None if none."""
-    if not said.minor:
-        return None
-    small = tuple(dict.fromkeys(one.name for one in said.minor))
-    again = ask(replace(settings.without_small_print(), library=small))
-    most = sum(one.share for one in again.findings) > settings.thresholds.open_share
-    return again if again.verdict in _CLOSED and most else None
+    return _said(explain(settings), notes, asked)
 
 
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:

@@ -5,7 +5,7 @@
 from dataclasses import fields
 
 from armid_ros.diagnosis.data import evidence, rows
-from armid_ros.diagnosis.search import acceptance, look, trial
+from armid_ros.diagnosis.search import exchange, look, trial
 from armid_ros.diagnosis.settings import Thresholds
 import numpy as np
 import pytest
@@ -54,11 +54,11 @@ def test_one_number_is_changed_and_no_other(name, factor):
 
 
 def test_a_number_of_a_module_is_changed_wherever_it_was_imported_and_back_again():
-    usual = trial.HARDLY
-    with changed(['search/trial.py HARDLY', 'price', 'search/look.py _COMPARED'], 0.7):
-        assert trial.HARDLY == acceptance.HARDLY == pytest.approx(0.7 * usual)
+    usual = trial.ROUNDING
+    with changed(['search/trial.py ROUNDING', 'price', 'search/look.py _COMPARED'], 0.7):
+        assert trial.ROUNDING == exchange.ROUNDING == pytest.approx(0.7 * usual)
         assert look._COMPARED == round(0.7 * 8)
-    assert trial.HARDLY == acceptance.HARDLY == usual
+    assert trial.ROUNDING == exchange.ROUNDING == usual
     assert look._COMPARED == 8
 
 

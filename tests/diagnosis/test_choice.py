@@ -8,11 +8,10 @@ from armid_ros.diagnosis.data.evidence import Evidence, trajectories
 from armid_ros.diagnosis.search.choice import (
     _as_good,
     _beside_a_correction,
-    _more_freedom,
     _stands,
     _told_by,
 )
-from armid_ros.diagnosis.search.explanation import at_floor, freedom
+from armid_ros.diagnosis.search.explanation import at_floor
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
@@ -82,22 +81,6 @@ def test_friction_without_values_is_part_of_the_correction(bench):
 )
 def test_what_may_be_a_correction_is_asked_about(bench, names, rivals, asked):
     assert _beside_a_correction(explanation(bench, *names, rivals=rivals)) == asked
-
-
-@pytest.mark.parametrize(
-    ('names', 'body'),
-    [
-        (('payload', 'torque_offset'), 30),
-        (('link_inertia',), 30),
-        (('link_inertia', 'torque_offset'), 0),
-        (('torque_offset', 'link_inertia'), 0),
-    ],
-)
-def test_a_body_costs_nothing_where_one_of_several_causes_corrects_it_anyway(bench, names, body):
-    first, anew, settings = explanation(bench, *names), explanation(bench), DiagnosisSettings()
-    anew.base = SimpleNamespace(rank=30)
-    assert freedom(anew, settings) == 30
-    assert _more_freedom(first, anew, settings) == body - freedom(first, settings)
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armid_ros.diagnosis.data.rows import fold_rows
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.round import Round, worth
-from armid_ros.diagnosis.search.trial import denies, HARDLY, Trial
+from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -47,24 +46,6 @@ def inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
 def material(gains: FloatArray, here: Round, misfit_share: float) -> bool:
     """Return whether a cause that takes these squares of the joints takes as much as matters."""
     return bool(np.any(gains >= here.evidence.least_squares(here.settings, misfit_share)))
-
-
-def denied_by_one(trial: Trial, here: Round) -> bool:
-    """
-    Return whether a recording denies a cause that others show, and that should show in it.
-
-    With recordings from before, the divisions of all recordings tell that more sharply.
-
-    """
-    data = here.evidence.data
-    if here.before is not None or len({part.fold for part in data}) < 2:
-        return False
-    recording = np.concatenate([np.full(len(part.rows), part.fold) for part in data])
-    _, first = np.unique(fold_rows(data), return_index=True)
-    owner = recording[first][trial.piece]
-    made = np.bincount(owner, trial.square)
-    shown = np.flatnonzero(made > HARDLY * made.max())
-    return any(denies(trial.cross[owner == k], trial.square[owner == k]) for k in shown)
 
 
 def made_of_noise(trial: Trial, here: Round) -> bool:

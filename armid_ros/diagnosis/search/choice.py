@@ -18,8 +18,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
 from armid_ros.diagnosis.data.prepare import Prepared
-from armid_ros.diagnosis.data.prior import Prior
-from armid_ros.diagnosis.data.rows import weighted_rows
 from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import (
     at_floor,
@@ -47,11 +45,6 @@ _AS_OFTEN = 1.2
 _AS_EXACT = (
     'values of the model are taken as exact, as identification.json is not beside it: what they '
     'are off by is not in the intervals'
-)
-#: Said where only what a model lacks explains the gap, and not what has changed.
-_EVER = (
-    'the baseline does not tell whether what is named has changed since, or was there and did not '
-    'show: the model lacks it'
 )
 
 
@@ -195,14 +188,7 @@ class Explainer:
             unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(self.unseen)
             more = Evidence(tuple(self.unseen), unit, unit, baseline.varies)
         found = explain(question, evidence, settings, baseline=baseline, unseen=more)
-        notes: tuple[str, ...] = ()
-        if not found.steps and not at_floor(found, settings):
-            lacking = explain(question, evidence, settings)
-            if _most(lacking.steps, settings) and _may_have_been(
-                lacking, baseline, prior, settings
-            ):
-                found, notes = lacking, (_EVER,)
-        chosen = Chosen(found, misfit, OWN_MISFIT, notes, doubt=_doubt(baseline))
+        chosen = Chosen(found, misfit, OWN_MISFIT, doubt=_doubt(baseline))
         if not found.steps:
             return chosen
         return replace(chosen, explanation=in_model_as_given(found), rest=found)
@@ -235,36 +221,6 @@ def _doubt(baseline: Baseline) -> str:
         f'The model leaves {error:.0f} % of the torque of the baseline itself: is it the model of '
         'this arm? A change of less is not seen.'
     )
-
-
-def _may_have_been(
-    found: Explanation, baseline: Baseline, prior: Prior, settings: DiagnosisSettings
-) -> bool:
-    """
-    Return whether all names may have been there before, and show only now.
-
-    What the baseline was fitted with hides most of a name there. Of the rest less than the misfit
-    may be seen in every joint of the baseline, and more in some joint of the data.
-
-    """
-    data, sigma = found.evidence.data, found.evidence.sigma
-    for step in found.steps:
-        candidate, values = step.trial.candidate, step.trial.values
-        own = baseline.columns(found.given, candidate.effect, candidate.kept)
-        hidden = prior.nearest(own) @ values
-        then = (own @ values - prior.columns @ hidden).reshape(-1, found.given.robot.n_joints)
-        rows = [
-            part.columns(found.given, candidate.effect)[:, :, list(candidate.kept)]
-            for part in data
-        ]
-        pairs = zip(rows, found.reference.columns, strict=True)
-        torque = [mine @ values - free @ hidden for mine, free in pairs]
-        now = np.concatenate(list(weighted_rows(torque, data, sigma)))
-        least = settings.thresholds.misfit_share
-        power = np.mean(then**2, axis=0), np.mean(now**2, axis=0)
-        if np.any(power[0] > least) or not np.any(power[1] > least):
-            return False
-    return True
 
 
 def _most(steps: Sequence[Step], settings: DiagnosisSettings) -> bool:
@@ -342,14 +298,14 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     Return whether causes in the model as given explain as much as a body fitted anew.
 
     Where that leaves noise, they have to leave as little; a noise that is assumed excuses nothing
-    that it does not leave, nor do more values of causes than a body that is wrong anyway needs.
+    that it does not leave.
     Where it leaves a gap itself, it has to take more beside them than its values cost.
 
     """
     evidence = first.evidence
     left, fitted = first.fitted.residual, anew.fitted.residual
     after, least = evidence.chi2_per_row(left), evidence.chi2_per_row(fitted)
-    more = _more_freedom(first, anew, settings)
+    more = freedom(anew, settings) - freedom(first, settings)
     alike = settings.thresholds.same_fit * least
     if more >= 0.0:
         alike = alike + evidence.matters(settings)
@@ -361,18 +317,3 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
         return False
     gap = max(float(evidence.count @ evidence.chi2_per_row(first.reference.residual)), 1e-300)
     return float(evidence.count @ (after - least)) <= settings.thresholds.price * more * gap
-
-
-def _more_freedom(first: Explanation, anew: Explanation, settings: DiagnosisSettings) -> float:
-    """
-    Return how many more values were chosen with a body fitted anew.
-
-    Those of the body are no choice where one of several causes says that the description is wrong
-    anyway.
-
-    """
-    more = freedom(anew, settings) - freedom(first, settings)
-    wrong = any(step.trial.candidate.effect.corrects for step in first.steps)
-    if anew.base is not None and len(first.steps) > 1 and wrong:
-        more -= anew.base.rank
-    return more

@@ -189,15 +189,17 @@ def _tried(
     share = 1.0 / (len(held) * np.maximum(np.bincount(part), 1))
     cross += (share * np.sum(held * (pull - alone @ hold), axis=1))[part]
     square += (share * np.sum(held * (held @ hold), axis=1))[part]
+    std = np.sqrt(np.maximum(np.diagonal(inverse, axis1=1, axis2=2), 0.0))
     return Trial(
         candidate,
         values[-1],
-        np.sqrt(np.maximum(np.diag(inverse[-1]), 0.0)),
+        std[-1],
         np.diag(inverse[-1] @ rest[-1]),
         visible,
         cross,
         square,
         values[:-1],
+        std[:-1],
         alone + held,
         alone,
         part,

@@ -12,7 +12,6 @@ from itertools import takewhile
 from armid_ros.diagnosis.data.rows import products, with_candidate
 from armid_ros.diagnosis.search.acceptance import (
     acceptable,
-    denied_by_one,
     explains_itself,
     inside,
     made_of_noise,
@@ -212,7 +211,7 @@ def _examined(
     there: list[Trial] = []
     large: list[Trial] = []
     for trial in ranking[:_LOOKED_AT]:
-        if not acceptable(trial, here) or denied_by_one(trial, here):
+        if not acceptable(trial, here):
             continue
         (change,) = _changes([trial], here)
         if change is None or not acceptable(change, here):

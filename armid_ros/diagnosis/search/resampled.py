@@ -20,6 +20,7 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.prior import Prior
 from armid_ros.diagnosis.data.rows import fold_rows, make_problem, weighted_rows
 from armid_ros.diagnosis.search.fit import Fitted
+from armid_ros.identification.fitting.jackknife import jackknife
 from armid_ros.identification.fitting.normal_equations import (
     informative_basis,
     informative_solution,
@@ -58,12 +59,14 @@ def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: flo
         return fitted
     own, aim = _products(fitted, evidence)
     variance, freedom = np.zeros(size), 0
-    for changes in _left_out(own, aim, fitted, prior):
-        variance += (len(changes) - 1) * np.var(changes, axis=0)
-        freedom += len(changes) - 1
+    all_own, all_aim = own.sum(axis=0) + fitted.hold, aim.sum(axis=0) + fitted.pull
+    change, std = _values(all_own, all_aim, size)
+    for held in _left_out(own, aim, fitted, prior):
+        changes, deviations = (np.array(one) for one in zip(*held, strict=True))
+        variance += jackknife(change, std, changes, deviations)
+        freedom += len(held) - 1
     few = float(stats.t.ppf(_LEVEL, freedom) / stats.norm.ppf(_LEVEL))
-    basis = informative_basis(own.sum(axis=0) + fitted.hold)
-    unit = np.sum(basis[-size:] ** 2, axis=1)
+    unit = std**2
     found = few**2 * variance + max(chance - 1.0, 0.0) * unit
     return _with_deviation(fitted, np.sqrt(np.maximum(found, unit)))
 
@@ -149,14 +152,19 @@ def _products(fitted: Fitted, evidence: Evidence) -> tuple[FloatArray, FloatArra
     return np.array(own), np.array(aim)
 
 
+def _values(own: FloatArray, aim: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
+    """Return the last values that solve normal equations, and their deviations, each (p,)."""
+    basis = informative_basis(own)
+    return (basis @ (basis.T @ aim))[-size:], np.sqrt(np.sum(basis[-size:] ** 2, axis=1))
+
+
 def _left_out(
     own: FloatArray, aim: FloatArray, fitted: Fitted, prior: Prior | None
-) -> Iterator[FloatArray]:
-    """Yield by what the values change without each part of each day, (K, p)."""
+) -> Iterator[list[tuple[FloatArray, FloatArray]]]:
+    """Yield by what the values change without each part of each day, and deviations, each (p,)."""
     size = len(fitted.estimate.values)
     all_own, all_aim = own.sum(axis=0) + fitted.hold, aim.sum(axis=0) + fitted.pull
-    pairs = zip(own, aim, strict=True)
-    yield np.array([informative_solution(all_own - n, all_aim - b)[-size:] for n, b in pairs])
+    yield [_values(all_own - n, all_aim - b, size) for n, b in zip(own, aim, strict=True)]
     if prior is None:
         return
     before = []
@@ -165,9 +173,9 @@ def _left_out(
         less_own, less_aim = all_own.copy(), all_aim.copy()
         less_own[:rank, :rank] -= x.T @ x
         less_aim[:rank] -= x.T @ y
-        before.append(informative_solution(less_own, less_aim)[-size:])
+        before.append(_values(less_own, less_aim, size))
     if len(before) > 1:
-        yield np.array(before)
+        yield before
 
 
 def _seen_before(fitted: Fitted, prior: Prior, baseline: Baseline) -> FloatArray:

@@ -18,6 +18,7 @@ from typing import NamedTuple
 from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.effects import Effect
+from armid_ros.identification.fitting.jackknife import jackknife
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -26,8 +27,6 @@ from scipy import stats
 
 #: Squares that differ by less than this share do so by rounding.
 ROUNDING = 1e-6
-#: Recordings hardly show what takes less than this share of the share it takes of others.
-HARDLY = 0.1
 
 
 @dataclass(frozen=True)
@@ -108,8 +107,8 @@ class Trial:
         Share of the columns that the free ones cannot make.
     cross, square : ndarray, shape (B,)
         x'r and x'x of every block.
-    held_values : ndarray, shape (K, p)
-        Values without each part.
+    held_values, held_std : ndarray, shape (K, p)
+        Values without each part, and their deviations as far as white noise goes.
     held_free : ndarray, shape (K, f)
         The free values without each part, changed by the candidate, and ``held_alone`` without it.
     piece : ndarray of int, shape (B,)
@@ -125,6 +124,7 @@ class Trial:
     cross: FloatArray
     square: FloatArray
     held_values: FloatArray
+    held_std: FloatArray
     held_free: FloatArray
     held_alone: FloatArray
     piece: npt.NDArray[np.intp]
@@ -136,10 +136,9 @@ class Trial:
 
     @cached_property
     def deviation(self) -> FloatArray:
-        """Deviations of the values, those of noise of any colour by the jackknife, shape (p,)."""
-        parts = len(self.held_values)
-        change = self.held_values - self.held_values.mean(axis=0)
-        return np.asarray(np.sqrt(self.std**2 + (1.0 - 1.0 / parts) * np.sum(change**2, axis=0)))
+        """Deviations of the values, with those of noise of any colour, shape (p,)."""
+        coloured = jackknife(self.values, self.std, self.held_values, self.held_std)
+        return np.asarray(np.sqrt(self.std**2 + coloured))
 
     @property
     def gains(self) -> FloatArray:

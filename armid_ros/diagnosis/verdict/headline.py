@@ -9,11 +9,13 @@ from armid_ros.diagnosis.search.explanation import (
     Explanation,
     in_model_as_given,
 )
-from armid_ros.diagnosis.search.trial import HARDLY
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.identification.fitting.identifiability import excludes_zero
 import numpy as np
+
+#: Recordings hardly show what takes less than this share of the share it takes of others.
+_HARDLY = 0.1
 
 
 def headline(
@@ -68,7 +70,7 @@ def shares_of(explanation: Explanation, unseen: Evidence | None) -> tuple[Attrib
     names = range(len(explanation.steps))
     seen = attribute(explanation, unseen)
     denied = [k for k in reversed(seen.order) if seen.denied(k)]
-    shown = seen.share(names) > HARDLY * left_out.share(names)
+    shown = seen.share(names) > _HARDLY * left_out.share(names)
     return (seen if shown else left_out), denied
 
 
