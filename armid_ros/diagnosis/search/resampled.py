@@ -11,7 +11,6 @@ along a cause by chance, as it does along the other causes that were tried.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
@@ -58,13 +57,14 @@ def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: flo
     if not size:
         return fitted
     own, aim = _products(fitted, evidence)
-    variance, freedom = np.zeros(size), 0
     all_own, all_aim = own.sum(axis=0) + fitted.hold, aim.sum(axis=0) + fitted.pull
     change, std = _values(all_own, all_aim, size)
-    for held in _left_out(own, aim, fitted, prior):
-        changes, deviations = (np.array(one) for one in zip(*held, strict=True))
-        variance += jackknife(change, std, changes, deviations)
-        freedom += len(held) - 1
+    variance, freedom = np.zeros(size), 0
+    for parts in (list(zip(own, aim, strict=True)), _recordings_before(fitted, prior)):
+        if len(parts) > 1:
+            held = [_values(all_own - x, all_aim - y, size) for x, y in parts]
+            variance += jackknife(change, std, *np.array(held).transpose(1, 0, 2))
+            freedom += len(parts) - 1
     few = float(stats.t.ppf(_LEVEL, freedom) / stats.norm.ppf(_LEVEL))
     unit = std**2
     found = few**2 * variance + max(chance - 1.0, 0.0) * unit
@@ -158,24 +158,17 @@ def _values(own: FloatArray, aim: FloatArray, size: int) -> tuple[FloatArray, Fl
     return (basis @ (basis.T @ aim))[-size:], np.sqrt(np.sum(basis[-size:] ** 2, axis=1))
 
 
-def _left_out(
-    own: FloatArray, aim: FloatArray, fitted: Fitted, prior: Prior | None
-) -> Iterator[list[tuple[FloatArray, FloatArray]]]:
-    """Yield by what the values change without each part of each day, and deviations, each (p,)."""
-    size = len(fitted.estimate.values)
-    all_own, all_aim = own.sum(axis=0) + fitted.hold, aim.sum(axis=0) + fitted.pull
-    yield [_values(all_own - n, all_aim - b, size) for n, b in zip(own, aim, strict=True)]
+def _recordings_before(fitted: Fitted, prior: Prior | None) -> list[tuple[FloatArray, FloatArray]]:
+    """Return products of columns with each other and the rest, of recordings from before."""
     if prior is None:
-        return
-    before = []
+        return []
+    products = []
     for x, y in prior.recordings(fitted.change):
         rank = x.shape[1]
-        less_own, less_aim = all_own.copy(), all_aim.copy()
-        less_own[:rank, :rank] -= x.T @ x
-        less_aim[:rank] -= x.T @ y
-        before.append(_values(less_own, less_aim, size))
-    if len(before) > 1:
-        yield before
+        own, aim = np.zeros_like(fitted.hold), np.zeros_like(fitted.pull)
+        own[:rank, :rank], aim[:rank] = x.T @ x, x.T @ y
+        products.append((own, aim))
+    return products
 
 
 def _seen_before(fitted: Fitted, prior: Prior, baseline: Baseline) -> FloatArray:
