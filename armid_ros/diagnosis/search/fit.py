@@ -21,7 +21,7 @@ from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.least_squares import solve
-from armid_ros.identification.fitting.normal_equations import informative_solution, ROUNDING
+from armid_ros.identification.fitting.normal_equations import informative_solution, NO_COLUMN
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
@@ -292,7 +292,7 @@ def _step(
     known = len(pull)
     own[:known, :known] += hold
     aim[:known] += pull
-    seen = np.diag(own) > ROUNDING * np.diag(own).max(initial=1e-300)
+    seen = np.diag(own) > NO_COLUMN * np.diag(own).max(initial=1e-300)
     step = np.zeros(size)
     step[seen] = informative_solution(own[np.ix_(seen, seen)], aim[seen])
     return step

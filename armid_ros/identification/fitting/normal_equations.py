@@ -12,9 +12,9 @@ import numpy as np
 UNINFORMATIVE = 1e-10
 #: A direction of which others leave less than this share of what they leave of the best one is
 #: made of them.
-DEPENDENT = 1e-6
+_DEPENDENT = 1e-6
 #: Squares of a column that are this share of those of the largest one are rounding.
-ROUNDING = 1e-20
+NO_COLUMN = 1e-20
 
 
 def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) -> FloatArray:
@@ -58,11 +58,11 @@ def independent_inverse(products: FloatArray, squares: FloatArray) -> FloatArray
         Pseudo-inverses.
 
     """
-    seen = squares > ROUNDING * squares.max(initial=1e-300)
+    seen = squares > NO_COLUMN * squares.max(initial=1e-300)
     scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, squares, 1.0)), 0.0)
     both = np.outer(scale, scale)
     values, vectors = np.linalg.eigh(products * both)
-    good = values > np.maximum(DEPENDENT * values[..., -1:], UNINFORMATIVE)
+    good = values > np.maximum(_DEPENDENT * values[..., -1:], UNINFORMATIVE)
     inverse = np.where(good, 1.0 / np.where(good, values, 1.0), 0.0)
     scaled = vectors * inverse[..., np.newaxis, :] @ np.swapaxes(vectors, -1, -2)
     return np.asarray(scaled * both)
