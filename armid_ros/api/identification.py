@@ -170,7 +170,8 @@ class IdentificationResult(Shown):
         """Write model.yaml, identification.json and report.html as ``armid identify`` does."""
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
-        save_model(out / 'model.yaml', self.arm, self._robot, self.estimate, self.misfit)
+        misfit = self.core.misfit(self.validation)
+        save_model(out / 'model.yaml', self.arm, self._robot, self.estimate, misfit)
         write_document(out / 'identification.json', self.document())
         self.report(out / 'report.html')
         if self.core.physical is not None:

@@ -143,11 +143,9 @@ def diagnose(
         return _said(tied, notes, asked)
     written = None if misfit is None else misfit.of(arm.robot)
     covariance = None if misfit is None else misfit.covariance
-
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
-
-    explain = Explainer(arm, prepared, known, rng, tell, written, seen, covariance)
-    return _said(explain(settings), notes, asked)
+    explainer = Explainer(arm, prepared, known, rng, tell, settings, written, seen, covariance)
+    return _said(explainer.chosen(), notes, asked)
 
 
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:

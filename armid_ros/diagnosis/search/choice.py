@@ -65,6 +65,8 @@ class Explainer:
         Draws states.
     tell : callable
         Called with the share that is done and what is being done.
+    settings : DiagnosisSettings
+        Library and thresholds.
     written : ndarray, shape (n,), or None
         Misfit that the model is known to have, where there are no recordings of it [N m].
     unseen : sequence of Trajectory
@@ -79,17 +81,18 @@ class Explainer:
     baseline: Baseline | None
     rng: np.random.Generator
     tell: Progress
+    settings: DiagnosisSettings
     written: FloatArray | None = None
     unseen: Sequence[Trajectory] = ()
     covariance: FloatArray | None = None
 
-    def __call__(self, settings: DiagnosisSettings) -> Chosen:
+    def chosen(self) -> Chosen:
         """Explain the gap."""
         if self.baseline is not None:
-            return self._since(self.baseline, settings)
+            return self._since(self.baseline)
         if self.written is not None:
-            return self._beside(self.written, settings)
-        prepared, tell = self.prepared, self.tell
+            return self._beside(self.written)
+        prepared, tell, settings = self.prepared, self.tell, self.settings
         few = settings.thresholds.few_causes
         given = as_given(self.arm, prepared.data, few, settings.library)
         described = Evidence(prepared.data, prepared.as_described, prepared.as_described)
@@ -100,7 +103,7 @@ class Explainer:
         if closed and not _beside_a_correction(first):
             return Chosen(first, nothing, NOISE)
         tell(0.4, 'the model fitted anew')
-        anew = self._anew(tuple(prepared.sigma), settings)
+        anew = self._anew(tuple(prepared.sigma))
         corrected = at_floor(anew, settings)
         if corrected and len(first.steps) > 1 and not _stands(first, anew):
             return Chosen(anew, nothing, NOISE)
@@ -115,7 +118,7 @@ class Explainer:
             return Chosen(first, misfit, words)
         return Chosen(anew, nothing, words)
 
-    def _beside(self, misfit: FloatArray, settings: DiagnosisSettings) -> Chosen:
+    def _beside(self, misfit: FloatArray) -> Chosen:
         """
         Explain what is beyond a misfit that is known in numbers alone.
 
@@ -124,7 +127,7 @@ class Explainer:
         gap of a model that was right when it was identified, they have changed, and not all links.
 
         """
-        prepared, noise = self.prepared, self.prepared.as_described
+        prepared, settings, noise = self.prepared, self.settings, self.prepared.as_described
         self.tell(0.2, 'what has changed')
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
         most = 2 * settings.thresholds.few_causes
@@ -137,12 +140,12 @@ class Explainer:
         if at_floor(found, settings):
             return Chosen(found, misfit, WRITTEN_MISFIT, notes)
         self.tell(0.6, 'the model fitted anew')
-        anew = self._anew(tuple(np.maximum(one, misfit) for one in prepared.sigma), settings)
+        anew = self._anew(tuple(np.maximum(one, misfit) for one in prepared.sigma))
         loads = [step for step in found.steps if step.trial.candidate.effect.changes_body]
         stays = _most(loads, settings) or _as_good(found, anew, settings)
         return Chosen(found if stays else anew, misfit, WRITTEN_MISFIT, notes)
 
-    def _anew(self, sigma: tuple[FloatArray, ...], settings: DiagnosisSettings) -> Explanation:
+    def _anew(self, sigma: tuple[FloatArray, ...]) -> Explanation:
         """
         Explain the data beside a rigid body and known effects that are fitted anew.
 
@@ -150,7 +153,8 @@ class Explainer:
         changed, and is asked about as a cause.
 
         """
-        arm, data, library = self.arm, self.prepared.data, settings.library
+        arm, data, settings = self.arm, self.prepared.data, self.settings
+        library = settings.library
         evidence = Evidence(data, sigma, tuple(self.prepared.sigma))
         many = settings.thresholds.many_causes
         question = fitted_anew(arm, data, many, library, self.rng)
@@ -165,9 +169,9 @@ class Explainer:
         question = fitted_anew(arm, data, many, library, self.rng, changed.tolist())
         return explain(question, evidence, settings)
 
-    def _since(self, baseline: Baseline, settings: DiagnosisSettings) -> Chosen:
+    def _since(self, baseline: Baseline) -> Chosen:
         """Explain what has changed since the baseline."""
-        arm, prepared = self.arm, self.prepared
+        arm, prepared, settings = self.arm, self.prepared, self.settings
         self.tell(0.2, 'what has changed')
         misfit = baseline.misfit * _louder(prepared, baseline)
         noise = _told_by(baseline, prepared, misfit)
@@ -298,8 +302,8 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     Return whether causes in the model as given explain as much as a body fitted anew.
 
     Where that leaves noise, they have to leave as little; a noise that is assumed excuses nothing
-    that it does not leave.
-    Where it leaves a gap itself, it has to take more beside them than its values cost.
+    that it does not leave. Where it leaves a gap itself, it has to take more beside them than its
+    values cost.
 
     """
     evidence = first.evidence

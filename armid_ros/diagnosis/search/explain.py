@@ -53,9 +53,7 @@ def explain(
     taken = [*way.taken, *friction]
     if survey is not None:
         survey = survey.and_nuisance(tried, settings.thresholds.least_visible)
-    reference = fit(
-        question.arm, (), evidence.data, evidence.sigma, question.base, None, question.prior
-    )
+    reference = retrial.fitted((), None)
     change = way.change if question.nuisance_arm is question.arm else None
     steps, fitted = pruned(retrial, taken, change)
     by_chance = 0.0 if last is None else last.by_chance
