@@ -10,10 +10,9 @@ to tell two names apart.
 
 from armid_ros.diagnosis.diagnose import diagnose
 from armid_ros.diagnosis.next_run.plan import EXPERIMENT_FILE, next_run, NextRun
-from armid_ros.diagnosis.result import Diagnosis
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.document import diagnosis_document
-from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 
 __all__ = [
     'Diagnosis',

@@ -15,15 +15,12 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
-from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Trajectory
-from armid_ros.diagnosis.data.floor import noise_floor
-from armid_ros.diagnosis.data.gate import check_data
-from armid_ros.diagnosis.data.prepare import choose_filters, mended, prepare, Prepared
-from armid_ros.diagnosis.result import Diagnosis
-from armid_ros.diagnosis.search.bodies import as_bodies
+from armid_ros.diagnosis.data.floor import Baseline, noise_floor
+from armid_ros.diagnosis.data.prepare import check_data, choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.search.choice import Explainer
 from armid_ros.diagnosis.search.explanation import (
+    as_bodies,
     Chosen,
     ESTIMATED,
     Explanation,
@@ -31,17 +28,23 @@ from armid_ros.diagnosis.search.explanation import (
     NOISE,
 )
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.ties.explain_ties import diagnose_ties
-from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
-from armid_ros.diagnosis.verdict.finding import Finding
-from armid_ros.diagnosis.verdict.gap import Excess, harmed, measure_gap
-from armid_ros.diagnosis.verdict.headline import (
+from armid_ros.diagnosis.ties.ties import diagnose_ties
+from armid_ros.diagnosis.verdict.attribution import (
+    attribute,
+    Attribution,
     headline,
     shares_of,
     smallest,
 )
+from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
+from armid_ros.diagnosis.verdict.gap import (
+    Excess,
+    harmed,
+    held,
+    measure_gap,
+    places_held,
+)
 from armid_ros.diagnosis.verdict.naming import findings, small_print
-from armid_ros.diagnosis.verdict.standing import held, places_held
 from armid_ros.diagnosis.verdict.where import locate, Where
 from armid_ros.diagnosis.verdict.words import decide, not_repeating
 from armid_ros.motion import FloatArray

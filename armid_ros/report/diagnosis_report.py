@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, NextRun
-from armid_ros.diagnosis.verdict.detectable import detectable
+from armid_ros.diagnosis.verdict.document import detectable
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
 from armid_ros.report.notation import counted, robot_label

@@ -3,7 +3,7 @@
 """A cause has changed between two days if no other division of the recordings shows more of it."""
 
 from armid_ros.diagnosis import diagnose
-from armid_ros.diagnosis.search.exchange import Rows, showing_more
+from armid_ros.diagnosis.search.acceptance import Rows, showing_more
 from armid_ros.effects import make_effect
 from armid_ros.identification import identify
 import numpy as np

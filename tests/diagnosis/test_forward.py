@@ -4,7 +4,7 @@
 
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search import explain
-from armid_ros.diagnosis.search.question import as_given
+from armid_ros.diagnosis.search.candidates import as_given
 from armid_ros.diagnosis.settings import DiagnosisSettings
 import numpy as np
 import pytest

@@ -7,7 +7,7 @@ from armid_ros.diagnosis import diagnose, DiagnosisSettings
 from armid_ros.diagnosis.data.evidence import trajectories
 from armid_ros.diagnosis.data.floor import noise_floor
 from armid_ros.diagnosis.data.prepare import choose_filters
-from armid_ros.diagnosis.data.prior import excited
+from armid_ros.diagnosis.data.rows import excited
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.effects import CATALOGUE, make_effect

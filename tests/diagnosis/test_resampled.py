@@ -6,10 +6,10 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.evidence import Evidence, trajectories
-from armid_ros.diagnosis.data.prior import Prior
+from armid_ros.diagnosis.data.rows import Prior
 from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.held_out import as_change, widened, with_model_error
 from armid_ros.diagnosis.search.patch import Named
-from armid_ros.diagnosis.search.resampled import as_change, widened, with_model_error
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning

@@ -4,7 +4,7 @@
 
 from types import SimpleNamespace
 
-from armid_ros.diagnosis.search.rivals import beaten, likeliest, rarity, says_no_more
+from armid_ros.diagnosis.search.round import beaten, likeliest, rarity, says_no_more
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 import numpy as np
@@ -78,7 +78,7 @@ def test_a_body_that_contains_an_offset_is_a_rival_where_it_surely_says_more(
     bench, monkeypatch, ahead, noise, wanted
 ):
     """A load on a link is a constant torque of a small range, and other torque besides."""
-    monkeypatch.setattr('armid_ros.diagnosis.search.rivals.contains', lambda *_: True)
+    monkeypatch.setattr('armid_ros.diagnosis.search.round.contains', lambda *_: True)
     gains = np.full(36, 10.0)
     more = noise * np.random.default_rng(0).normal(size=36)
     offset = Known(bench, 'torque_offset', gains)

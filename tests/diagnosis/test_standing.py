@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.verdict.standing import standing
+from armid_ros.diagnosis.verdict.gap import standing
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 import numpy as np

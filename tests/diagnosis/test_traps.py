@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
 from armid_ros.diagnosis.data.floor import noise_floor
-from armid_ros.diagnosis.data.prior import excited
-from armid_ros.diagnosis.data.rows import make_problem, project
+from armid_ros.diagnosis.data.rows import excited, make_problem, project
 from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.effects import Action, CATALOGUE, Effect, Quantity

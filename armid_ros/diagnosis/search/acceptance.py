@@ -1,17 +1,36 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which candidates may be named: beyond chance, possible, material, and not made of noise."""
+"""
+Which candidates may be named: beyond chance, possible, material, not made of noise, and changed.
+
+What a model gets wrong of one motion is another thing than what it gets wrong of the next, and of
+hundreds of causes some lie along the difference of two days. Where nothing happened the recordings
+of both days are exchangeable: divided into two groups in another way they show as much of a cause.
+It has changed between the days if no other division shows more of it, or of many divisions hardly
+one: a permutation test, which needs no distribution of the misfit.
+
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, islice
+from math import comb
 
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.round import Round, worth
-from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.diagnosis.search.trial import ROUNDING, Trial
+from armid_ros.identification.fitting.normal_equations import (
+    independent_inverse,
+    informative_basis,
+)
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
+
+#: Divisions that are tried; those that exchange fewest recordings first.
+_DIVISIONS = 200
 
 
 def acceptable(trial: Trial, here: Round) -> bool:
@@ -103,3 +122,161 @@ def _taken(columns: FloatArray, here: Round) -> float:
     own, aim = here.projection.products(flat), flat.T @ here.residual.ravel()
     values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
     return float(2.0 * values @ aim - values @ own @ values)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """
+    Rows of one recording, over the unit of the gap.
+
+    Attributes
+    ----------
+    free : ndarray, shape (S, f)
+        Columns of what is fitted beside a cause.
+    own : ndarray, shape (S, p)
+        Columns of the cause.
+    residual : ndarray, shape (S,)
+        What is left of the torque.
+
+    """
+
+    free: FloatArray
+    own: FloatArray
+    residual: FloatArray
+
+
+def changed(trial: Trial, here: Round) -> bool:
+    """Return whether hardly a division of the recordings shows more of a cause than the days."""
+    if here.before is None:
+        return True
+    more, divisions = _showing_more(trial, here)
+    return more == 0 or _seldom(more, divisions, here)
+
+
+def surely_changed(trial: Trial, here: Round) -> bool:
+    """Return whether so many divisions show less of a cause that a misfit hides no change."""
+    if here.before is None or not _seldom(0, _count_divisions(here), here):
+        return False
+    return _seldom(*_showing_more(trial, here), here)
+
+
+def _seldom(more: int, divisions: int, here: Round) -> bool:
+    """Return whether chance makes the days stand out as they do in few cases of a hundred."""
+    return more + 1 <= here.settings.thresholds.exchanged * (divisions + 1)
+
+
+def _count_divisions(here: Round) -> int:
+    """Return how many other divisions of the recordings are tried."""
+    assert here.before is not None
+    later = here.before.later
+    first = len({part.fold for part in here.before.prior.data})
+    second = len({part.fold for part in here.evidence.data})
+    second += 0 if later is None else len(later.residual)
+    exchanges = comb(first + second, first) - 1 - (first == second)
+    return min(exchanges, _DIVISIONS)
+
+
+def _showing_more(trial: Trial, here: Round) -> tuple[int, int]:
+    """Return how many divisions show more of a cause than the days do, and of how many."""
+    assert here.before is not None
+    first, second = _before(trial, here), _today(trial, here)
+    nuisance, later = here.nuisance, here.before.later
+    if later is not None:
+        more = later.own(here.work.arm, trial.candidate)
+        second += [Rows(*rows) for rows in zip(later.free, more, later.residual, strict=True)]
+    free = here.free.reshape(-1, len(nuisance.free))
+    hold, pull = nuisance.hold + free.T @ free, nuisance.pull + free.T @ here.problem.y.ravel()
+    if later is not None:
+        for columns, left in zip(later.free, later.residual, strict=True):
+            hold, pull = hold + columns.T @ columns, pull + columns.T @ left
+    return showing_more(first, second, (hold, pull), trial.candidate.precision)
+
+
+def showing_more(
+    first: Sequence[Rows],
+    second: Sequence[Rows],
+    known: tuple[FloatArray, FloatArray],
+    precision: FloatArray,
+) -> tuple[int, int]:
+    """
+    Return how many other divisions of recordings differ by more than two groups, and of how many.
+
+    Parameters
+    ----------
+    first, second : sequence of Rows
+        Recordings of the two groups.
+    known : tuple of ndarray, shapes (f, f) and (f,)
+        Products of the free columns of all of them with each other and with what is left, and of
+        whatever else holds them.
+    precision : ndarray, shape (p,)
+        How strongly the values of the cause are held to zero.
+
+    """
+    rows = [*first, *second]
+    basis = informative_basis(known[0])
+    free = basis @ (basis.T @ known[1])
+    border = np.array([basis.T @ (one.free.T @ one.own) for one in rows])
+    own = np.array([one.own.T @ one.own for one in rows])
+    aim = np.array([one.own.T @ (one.residual - one.free @ free) for one in rows])
+    squares = np.diag(own.sum(axis=0)) + precision  # a planar arm shows some values of a body only
+
+    def explained(members: npt.NDArray[np.bool_]) -> float:
+        """Return the squares that go if a cause has one value in all and one more in some."""
+        both = np.concatenate([border.sum(axis=0), border[members].sum(axis=0)], axis=1)
+        part = own[members].sum(axis=0)
+        products = np.block([[own.sum(axis=0), part], [part, part]]) - both.T @ both
+        products += np.diag(np.tile(precision, 2))
+        wanted = np.concatenate([aim.sum(axis=0), aim[members].sum(axis=0)])
+        return float(wanted @ independent_inverse(products, np.tile(squares, 2)) @ wanted)
+
+    days = np.arange(len(rows)) >= len(first)
+    least = explained(days) * (1.0 + ROUNDING)
+    others = [explained(other) for other in _divisions(days)]
+    return sum(other > least for other in others), len(others)
+
+
+def _divisions(days: npt.NDArray[np.bool_]) -> Iterator[npt.NDArray[np.bool_]]:
+    """Yield other divisions into groups of the same sizes, but for the exchange of all."""
+    before, today = np.flatnonzero(~days), np.flatnonzero(days)
+    pairs = (
+        (out, into)
+        for count in range(1, min(len(before), len(today)) + 1)
+        for out in combinations(today, count)
+        for into in combinations(before, count)
+        if count < len(today) or count < len(before)
+    )
+    for out, into in islice(pairs, _DIVISIONS):
+        other = days.copy()
+        other[list(out)], other[list(into)] = False, True
+        yield other
+
+
+def _before(trial: Trial, here: Round) -> list[Rows]:
+    """Return the recordings from before, in which what was named since does nothing."""
+    assert here.before is not None
+    prior, change = here.before.prior, here.before.change
+    candidate = trial.candidate
+    own = here.before.baseline.columns(here.work.arm, candidate.effect, candidate.kept)
+    result, start = [], 0
+    for columns, left in prior.recordings(change):
+        free = np.zeros((len(left), len(here.nuisance.free)))
+        free[:, : columns.shape[1]] = columns
+        result.append(Rows(free, own[start : start + len(left)], left))
+        start += len(left)
+    return result
+
+
+def _today(trial: Trial, here: Round) -> list[Rows]:
+    """Return the recordings in which a cause is looked for."""
+    data = here.evidence.data
+    fold = np.concatenate([np.full(len(part.rows), part.fold) for part in data])
+    result = []
+    for one in np.unique(fold):
+        rows = fold == one
+        free, own, y = (
+            here.free[rows],
+            here.own(trial.candidate)[rows],
+            here.problem.y[rows].ravel(),
+        )
+        result.append(Rows(free.reshape(len(y), -1), own.reshape(len(y), -1), y))
+    return result

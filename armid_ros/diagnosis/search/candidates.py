@@ -1,35 +1,159 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The candidates that may be named: every effect of the catalogue, per joint, pair or whole arm.
+What is asked of an arm: what of it is free beside every cause, and which causes there may be.
 
-An effect with shape parameters is a family of candidates on a grid, of which the best is refined
-later. The columns of all joints are computed at once and shared out.
+Candidates are every effect of the catalogue, per joint, pair or whole arm. An effect with shape
+parameters is a family of candidates on a grid, of which the best is refined later by variable
+projection (Golub and Pereyra 1973): values are fitted at each shape. The columns of all joints are
+computed at once and shared out.
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.diagnosis.data.evidence import Trajectory
-from armid_ros.diagnosis.data.rows import row_weights
+from armid_ros.diagnosis.data.evidence import Trajectory, Workspace
+from armid_ros.diagnosis.data.rows import EXCITED, excited, Prior, Problem, Projection, row_weights
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.trial import Candidate
-from armid_ros.effects import Effect, Kind
+from armid_ros.effects import CATALOGUE, Effect, Kind, Shape
 from armid_ros.effects.gravity import with_exact_vector
 from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
+from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
+from scipy import optimize
 
 #: Most combinations of shape values that a search starts from.
 _MOST_SHAPES = 12
+#: How far from a peak of a spectrum its side lobes are looked at, and how sharp it is [1/rev].
+_LOBES, _PEAK = 3.0, 0.2
+#: Rounds of a refinement, and evaluations of each shape.
+_ROUNDS, _EVALUATIONS = 2, 9
+
+
+@dataclass(frozen=True)
+class Question:
+    """
+    What is asked of an arm.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        The arm as given.
+    base : BaseParameters or None
+        What of it is free.
+    nuisance_arm : ArmModel
+        The arm with the friction of joints that nobody gave values of.
+    nuisance_base : BaseParameters or None
+        What of that is free.
+    unknown : tuple of Effect
+        That friction, joint by joint.
+    most : int
+        Causes that are looked for.
+    prior, nuisance_prior : Prior or None
+        What other data tell of what is free.
+    since : bool
+        Whether what has changed is asked, and not what was always there.
+
+    """
+
+    arm: ArmModel
+    base: BaseParameters | None
+    nuisance_arm: ArmModel
+    nuisance_base: BaseParameters | None
+    unknown: tuple[Effect, ...]
+    most: int
+    prior: Prior | None = None
+    nuisance_prior: Prior | None = None
+    since: bool = False
+
+    def kinds(self, library: Sequence[Kind]) -> tuple[Kind, ...]:
+        """Return what is looked for, of effects that may be named."""
+        return tuple(kind.as_change() for kind in library) if self.since else tuple(library)
+
+
+def as_given(
+    arm: ArmModel, data: Sequence[Trajectory], most: int, library: Sequence[str]
+) -> Question:
+    """Ask what a model lacks whose values are right, as far as it has any."""
+    nuisance_arm, unknown = with_friction(arm, library)
+    return Question(
+        arm,
+        _without_values(arm, data),
+        nuisance_arm,
+        _without_values(nuisance_arm, data),
+        unknown,
+        most,
+    )
+
+
+def fitted_anew(
+    arm: ArmModel,
+    data: Sequence[Trajectory],
+    most: int,
+    library: Sequence[str],
+    rng: np.random.Generator,
+    held: Sequence[int] = (),
+) -> Question:
+    """
+    Ask what a model lacks of which only the structure counts.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The arm.
+    data : sequence of Trajectory
+        The data.
+    most : int
+        Causes that are looked for.
+    library : sequence of str
+        Names that may be given.
+    rng : numpy.random.Generator
+        Draws states.
+    held : sequence of int
+        Parameters of the arm that stay as they are, so that a change of them is a cause.
+
+    """
+    nuisance_arm, unknown = with_friction(arm, library)
+    bases = []
+    for one in (arm, nuisance_arm):
+        free = np.setdiff1d(np.arange(len(one.parameters)), held)
+        bases.append(excited(one, one.base_parameters(rng, free), data)[0])
+    return Question(arm, bases[0], nuisance_arm, bases[1], unknown, most)
+
+
+def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
+    """Return an arm with what every joint may be taken to have, and what was added."""
+    there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
+    added: list[Effect] = []
+    fuller = arm
+    for kind in CATALOGUE.values():
+        joints = tuple(j for j in arm.robot.joints if (kind.name, j) not in there)
+        if kind.everywhere and kind.name in library and joints:
+            fuller = fuller.with_effect(kind.on(arm.robot, joints))
+            added += [kind.on(arm.robot, (joint,)) for joint in joints]
+    return fuller, tuple(added)
+
+
+def _without_values(arm: ArmModel, data: Sequence[Trajectory]) -> BaseParameters | None:
+    """Return the parameters of effects that have no value yet, as far as data tell them."""
+    rigid = len(arm.robot.rigid_parameters)
+    names, theta = arm.parameters, arm.theta
+    free = np.array([k for k in range(rigid, len(names)) if theta[k] == 0.0], dtype=np.intp)
+    if not len(free):
+        return None
+    columns = [part.reduce(arm.effect_columns(part.motion)[:, :, free - rigid]) for part in data]
+    stacked = np.concatenate([block.reshape(-1, len(free)) for block in columns])
+    return group_columns(stacked, tuple(names[k] for k in free), EXCITED).among(names, free)
 
 
 def candidate_effects(
@@ -133,3 +257,79 @@ def _left(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray
         row_weights(data, sigma),
         np.concatenate(fitted.columns),
     )
+
+
+def refine(
+    problem: Problem,
+    projection: Projection,
+    candidate: Candidate,
+    left: FloatArray,
+    work: Workspace,
+) -> tuple[Candidate, FloatArray]:
+    """
+    Refine the shape of a candidate by variable projection; return it with its columns.
+
+    What is left has nothing in it that the free columns could make.
+
+    """
+    effect, kept = candidate.effect, candidate.kept
+    lower, upper = (bound[list(kept)] for bound in effect.bounds())
+    cache: dict[tuple[float, ...], tuple[float, FloatArray]] = {}
+
+    def gain(shape: FloatArray) -> float:
+        key = tuple(shape.tolist())
+        if key not in cache:
+            try:
+                columns = work.columns(effect.with_shape(shape), kept)
+            except ModelError:
+                return 0.0  # not possible: takes nothing
+            weighted = (columns * problem.weight[:, :, np.newaxis]).reshape(-1, len(kept))
+            own, aim = projection.products(weighted), weighted.T @ left.ravel()
+            values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
+            if len(kept) == 1:  # what is not possible is no gain
+                values = np.clip(values, lower, upper)
+            cache[key] = float(2.0 * values @ aim - values @ own @ values), columns
+        return cache[key][0]
+
+    shape = np.array(effect.shape)
+    gain(shape)
+    for _ in range(_ROUNDS if len(shape) > 1 else 1):
+        for index, kind in enumerate(effect.shapes):
+            shape = _line_search(gain, shape, index, kind)
+    best = max(cache, key=lambda key: cache[key][0])
+    return replace(candidate, effect=effect.with_shape(best)), cache[best][1]
+
+
+def _line_search(
+    gain: Callable[[FloatArray], float], shape: FloatArray, index: int, kind: Shape
+) -> FloatArray:
+    """Search one shape around where it is, over its logarithm if positive (Brent 1973)."""
+    value = float(shape[index])
+    positive = kind.lower > 0.0 and value > 0.0 and kind.near is None and kind.unit != '1/rev'
+
+    def at(x: float) -> FloatArray:
+        moved = shape.copy()
+        moved[index] = np.exp(x) if positive else x
+        return moved
+
+    if kind.unit == '1/rev':  # side lobes beside the peak are almost as high
+        scan = value + np.linspace(-_LOBES, _LOBES, 25)
+        value = max(scan[scan > kind.lower].tolist(), key=lambda x: gain(at(x)))
+        low, high = value - _PEAK, value + _PEAK
+    elif positive:
+        ratio = max([b / a for a, b in pairwise(sorted(kind.grid)) if a > 0.0] or [3.0])
+        ratio = min(ratio, 3.5)
+        low = np.log(max(kind.lower, value / ratio))
+        high = np.log(min(kind.upper, value * ratio))
+    else:
+        apart = max([b - a for a, b in pairwise(sorted(kind.grid))] or [0.0])
+        near = kind.near or max(0.15, apart / max(abs(value), 1e-300))
+        reach = max(near * abs(value), 1e-3)
+        low, high = max(kind.lower, value - reach), min(kind.upper, value + reach)
+    found = optimize.minimize_scalar(
+        lambda x: -gain(at(x)),
+        bounds=(low, high),
+        method='bounded',
+        options={'maxiter': _EVALUATIONS},
+    )
+    return at(found.x) if -found.fun > gain(shape) else shape

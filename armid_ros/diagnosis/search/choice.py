@@ -15,9 +15,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
+from armid_ros.diagnosis.data.floor import Baseline
 from armid_ros.diagnosis.data.prepare import Prepared
+from armid_ros.diagnosis.search.candidates import as_given, fitted_anew
 from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import (
     at_floor,
@@ -28,8 +29,7 @@ from armid_ros.diagnosis.search.explanation import (
     in_model_as_given,
     NOISE,
 )
-from armid_ros.diagnosis.search.question import as_given, fitted_anew
-from armid_ros.diagnosis.search.resampled import with_model_error
+from armid_ros.diagnosis.search.held_out import with_model_error
 from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.assess.grade_limits import LIMITS

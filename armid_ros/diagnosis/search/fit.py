@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Trajectory
-from armid_ros.diagnosis.data.prior import described_precision, Prior
-from armid_ros.diagnosis.data.rows import weighted_rows
+from armid_ros.diagnosis.data.rows import described_precision, Prior, weighted_rows
 from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName

@@ -12,24 +12,26 @@ from itertools import takewhile
 from armid_ros.diagnosis.data.rows import products, with_candidate
 from armid_ros.diagnosis.search.acceptance import (
     acceptable,
+    changed,
     explains_itself,
     inside,
     made_of_noise,
     material,
+    surely_changed,
     without_echo,
 )
-from armid_ros.diagnosis.search.exchange import changed, surely_changed
+from armid_ros.diagnosis.search.candidates import refine
 from armid_ros.diagnosis.search.held_out import tried_beside
-from armid_ros.diagnosis.search.refine import refine
-from armid_ros.diagnosis.search.rivals import (
+from armid_ros.diagnosis.search.round import (
     beaten,
     closes,
     likeliest,
     rarity,
+    Round,
     says_no_more,
     what_happens_first,
+    worth,
 )
-from armid_ros.diagnosis.search.round import Round, worth
 from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Trial
 from armid_ros.motion import FloatArray
 import numpy as np

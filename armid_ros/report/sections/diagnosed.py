@@ -10,7 +10,7 @@ import math
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis, Finding
-from armid_ros.diagnosis.verdict.detectable import Detectable
+from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.effects import CATALOGUE
 from armid_ros.report.bars import Bar, BarChart
