@@ -94,8 +94,8 @@ def all_names(retrial: Any, taken: Sequence[Any], change: Any = None) -> Any:
 
 #: By the names of the table in docs/reference/rates.md.
 RULES = {
-    'names that may be nothing go': Rule(('verdict.headline.may_be_nothing',), no),
-    'small names that close a gap stay': Rule(('verdict.headline._opens',), no),
+    'names that may be nothing go': Rule(('verdict.attribution.may_be_nothing',), no),
+    'small names that close a gap stay': Rule(('verdict.attribution._opens',), no),
     'names that other data deny go': Rule(('verdict.attribution.Attribution.denied',), no),
     'needless names go': Rule(('search.explain.pruned',), all_names),
     'a small lead decides nothing': Rule(('search.explain.undecided',), no),

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
-from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Trajectory
-from armid_ros.diagnosis.data.floor import Baseline, noise_floor
+from armid_ros.diagnosis.data.evidence import Baseline, Evidence, noise_floor
 from armid_ros.diagnosis.data.prepare import check_data, choose_filters, mended, prepare, Prepared
+from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
 from armid_ros.diagnosis.search.choice import Explainer
 from armid_ros.diagnosis.search.explanation import (
     as_bodies,

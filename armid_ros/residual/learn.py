@@ -10,7 +10,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis
-from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.effects import Effect
 from armid_ros.effects.learned import as_effect, TorqueMap
 from armid_ros.motion import FloatArray

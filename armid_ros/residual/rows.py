@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.effects.learned import weight
 from armid_ros.motion import FloatArray
 import numpy as np

@@ -4,8 +4,8 @@
 
 from dataclasses import fields
 
-from armid_ros.diagnosis.data import evidence, rows
-from armid_ros.diagnosis.search import exchange, look, trial
+from armid_ros.diagnosis.data import rows, trajectory
+from armid_ros.diagnosis.search import acceptance, look, trial
 from armid_ros.diagnosis.settings import Thresholds
 import numpy as np
 import pytest
@@ -56,19 +56,19 @@ def test_one_number_is_changed_and_no_other(name, factor):
 def test_a_number_of_a_module_is_changed_wherever_it_was_imported_and_back_again():
     usual = trial.ROUNDING
     with changed(['search/trial.py ROUNDING', 'price', 'search/look.py _COMPARED'], 0.7):
-        assert trial.ROUNDING == exchange.ROUNDING == pytest.approx(0.7 * usual)
+        assert trial.ROUNDING == acceptance.ROUNDING == pytest.approx(0.7 * usual)
         assert look._COMPARED == round(0.7 * 8)
-    assert trial.ROUNDING == exchange.ROUNDING == usual
+    assert trial.ROUNDING == acceptance.ROUNDING == usual
     assert look._COMPARED == 8
 
 
 def test_numbers_of_modules_are_all_found_once():
     found = of_modules()
     assert len(found) == len(set(found)) > 40
-    assert {'data/rows.py BLOCKS', 'data/evidence.py _REST_SPEED'} <= set(found)
+    assert {'data/rows.py BLOCKS', 'data/trajectory.py _REST_SPEED'} <= set(found)
     with changed(found, 1.3):
         assert rows.BLOCKS == 8
-        assert evidence._REST_SPEED == pytest.approx(0.026)
+        assert trajectory._REST_SPEED == pytest.approx(0.026)
 
 
 def test_a_level_is_moved_by_what_is_beyond_it():

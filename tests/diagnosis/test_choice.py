@@ -4,7 +4,8 @@
 
 from types import SimpleNamespace
 
-from armid_ros.diagnosis.data.evidence import Evidence, trajectories
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.choice import (
     _as_good,
     _beside_a_correction,

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fit of what was named."""
 
-from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.data.evidence import noise_floor
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
 from armid_ros.effects import CATALOGUE

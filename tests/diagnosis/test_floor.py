@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The noise floor comes from repeated periods, encoder noise included, of each trajectory."""
 
-from armid_ros.diagnosis.data.evidence import trajectories
-from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.data.evidence import noise_floor
+from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np

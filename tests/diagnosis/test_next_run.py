@@ -8,8 +8,7 @@ from types import SimpleNamespace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, next_run
-from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.next_run.plan import CLEARANCE, templates
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
 from armid_ros.diagnosis.search.fit import fit

@@ -4,9 +4,9 @@
 
 from dataclasses import replace
 
-from armid_ros.diagnosis.data.evidence import Evidence, trajectories, Workspace
-from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.rows import make_problem
+from armid_ros.diagnosis.data.trajectory import trajectories, Workspace
 from armid_ros.diagnosis.search.acceptance import without_echo
 from armid_ros.diagnosis.search.held_out import held_out
 from armid_ros.diagnosis.search.round import Nuisance, Round

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The weighted rows and what free columns leave of them."""
 
-from armid_ros.diagnosis.data.evidence import Evidence, trajectories
+from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Problem, project
+from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.explain import nuisance_of
 from armid_ros.diagnosis.search.fit import fit, Start

@@ -4,10 +4,10 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.data.evidence import trajectories
-from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.data.evidence import noise_floor
 from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.data.rows import excited
+from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.effects import CATALOGUE, make_effect

@@ -5,8 +5,9 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from armid_ros.diagnosis.data.evidence import Evidence, trajectories
+from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Prior
+from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.held_out import as_change, widened, with_model_error
 from armid_ros.diagnosis.search.patch import Named

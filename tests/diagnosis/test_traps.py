@@ -10,7 +10,7 @@ The data and the library are the same for both; what differs is the one step tha
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.data.evidence import noise_floor
 from armid_ros.diagnosis.data.rows import excited, make_problem, project
 from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.fit import fit

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A residual is described by the joint and the quantity it follows, in the units of the joint."""
 
-from armid_ros.diagnosis.data.evidence import Evidence, trajectories
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.verdict.where import locate
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np

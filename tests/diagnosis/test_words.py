@@ -5,7 +5,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from armid_ros.diagnosis.data.floor import NoiseFloor
+from armid_ros.diagnosis.data.evidence import NoiseFloor
 from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival

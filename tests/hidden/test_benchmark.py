@@ -4,8 +4,8 @@
 
 import json
 
-from armid_ros.diagnosis.data.evidence import trajectories
-from armid_ros.diagnosis.data.floor import noise_floor
+from armid_ros.diagnosis.data.evidence import noise_floor
+from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.verdict.gap import Overlay
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
+from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.effects.load import described_spread
 from armid_ros.identification.fitting.normal_equations import (
     informative_basis,
@@ -120,13 +120,6 @@ def weighted_rows(
     for own, part, s in zip(rows, data, sigma, strict=True):
         weight = row_weights([part], [s])
         yield own * (weight[:, :, np.newaxis] if own.ndim > 2 else weight)
-
-
-def block_squares(residual: Sequence[FloatArray], evidence: Evidence) -> FloatArray:
-    """Return the squares over the unit of what is left (M, n), by block and joint, (B, n)."""
-    block, _ = block_rows(evidence.data)
-    rows = np.concatenate(list(weighted_rows(residual, evidence.data, evidence.sigma)))
-    return np.column_stack([np.bincount(block, column) for column in rows.T**2])
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:

@@ -15,9 +15,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
-from armid_ros.diagnosis.data.floor import Baseline
+from armid_ros.diagnosis.data.evidence import Baseline, Evidence
 from armid_ros.diagnosis.data.prepare import Prepared
+from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.candidates import as_given, fitted_anew
 from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import (

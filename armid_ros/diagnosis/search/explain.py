@@ -15,9 +15,9 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.diagnosis.data.evidence import Evidence, Workspace
-from armid_ros.diagnosis.data.floor import Baseline
+from armid_ros.diagnosis.data.evidence import Baseline, Evidence
 from armid_ros.diagnosis.data.rows import make_problem, Problem
+from armid_ros.diagnosis.data.trajectory import Workspace
 from armid_ros.diagnosis.search.candidates import Candidates, candidates, Question
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start

@@ -14,8 +14,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Trajectory
 from armid_ros.diagnosis.data.rows import described_precision, Prior, weighted_rows
+from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName

@@ -23,8 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.floor import Baseline
+from armid_ros.diagnosis.data.evidence import Baseline, Evidence
 from armid_ros.diagnosis.data.rows import (
     fold_rows,
     make_problem,

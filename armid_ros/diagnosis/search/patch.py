@@ -9,7 +9,7 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.diagnosis.data.evidence import Trajectory
+from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.effects import Effect, TorqueReading
 from armid_ros.estimate import ParameterName
 from armid_ros.model import BaseParameters

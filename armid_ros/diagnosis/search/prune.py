@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.diagnosis.data.evidence import Evidence, Trajectory, Workspace
+from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import make_problem, Problem
+from armid_ros.diagnosis.data.trajectory import Trajectory, Workspace
 from armid_ros.diagnosis.search.acceptance import acceptable, beyond_chance, material
 from armid_ros.diagnosis.search.candidates import Question
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Evidence, Workspace
-from armid_ros.diagnosis.data.floor import Baseline
+from armid_ros.diagnosis.data.evidence import Baseline, Evidence
 from armid_ros.diagnosis.data.rows import (
     Prior,
     Problem,
@@ -19,6 +18,7 @@ from armid_ros.diagnosis.data.rows import (
     Projection,
     weighted_rows,
 )
+from armid_ros.diagnosis.data.trajectory import Workspace
 from armid_ros.diagnosis.search.trial import Candidate, lead, ROUNDING, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import block_squares
 from armid_ros.diagnosis.search.explanation import (
     Explanation,
     in_model_as_given,
@@ -142,13 +141,13 @@ def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence)
     """Predict other data with the first name, the first two, and so on, fitted to the data."""
     arms = [explanation.reference.arm, *_staircase(explanation, order)]
     left = [[part.residual(arm) for part in unseen.data] for arm in arms]
-    squares = [block_squares(rows, unseen).sum(axis=1) for rows in left]
+    squares = [unseen.block_squares(rows).sum(axis=1) for rows in left]
     taken, made = np.zeros((2, len(order), len(squares[0])))
     for position, k in enumerate(order):
         taken[k] = squares[position] - squares[position + 1]
         steps = zip(left[position], left[position + 1], strict=True)
         predicted = [before - after for before, after in steps]
-        made[k] = block_squares(predicted, unseen).sum(axis=1)
+        made[k] = unseen.block_squares(predicted).sum(axis=1)
     return Attribution(tuple(order), squares[0], taken, made)
 
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Trajectory
-from armid_ros.diagnosis.data.floor import NoiseFloor
+from armid_ros.diagnosis.data.evidence import NoiseFloor
+from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.verdict.gap import Gap
 from armid_ros.diagnosis.verdict.where import Where

@@ -19,9 +19,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
-from armid_ros.diagnosis.data.floor import Baseline
-from armid_ros.diagnosis.data.rows import block_squares
+from armid_ros.diagnosis.data.evidence import Baseline, Evidence
+from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.where import Where
@@ -185,7 +184,7 @@ def _worse(
     before: ArmModel, after: ArmModel, evidence: Evidence, settings: DiagnosisSettings
 ) -> npt.NDArray[np.bool_]:
     left = [[part.residual(arm) for part in evidence.data] for arm in (before, after)]
-    had, has = (block_squares(rows, evidence) for rows in left)
+    had, has = (evidence.block_squares(rows) for rows in left)
     more = has - had
     spread = more.std(axis=0, ddof=1) * np.sqrt(len(more))
     total = more.sum(axis=0)

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Evidence, Trajectory
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.floor import NoiseFloor
+from armid_ros.diagnosis.data.evidence import NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
 from armid_ros.diagnosis.verdict.gap import Excess
