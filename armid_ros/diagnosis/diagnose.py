@@ -206,7 +206,9 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     resting: list[Excess] = []
     if settings.partner is None:
         parts = [evidence, *([] if unseen is None else [unseen])]
-        resting = [held(rest.fitted.arm, part, asked.before, asked.arm) for part in parts]
+        resting = [
+            held(rest.fitted.arm, part, asked.before, asked.arm, settings) for part in parts
+        ]
     total = float(attribute(explanation, None).whole.sum())
     tried = 1 if explanation.survey is None else explanation.survey.tried
     minor = small_print(explanation.minor, max(total, 1e-300), tried, arm)
@@ -260,14 +262,14 @@ def _as_stated(
 ) -> tuple[Explanation, Attribution, list[str]]:
     """Return names in the model as given, or beside a body common to both days, and a note."""
     as_described = in_model_as_given(rest)
-    alone = shares_of(as_described, unseen)[0]
+    alone = shares_of(as_described, unseen, settings)[0]
     names, least = range(len(as_described.steps)), settings.thresholds.headline
     if alone.share(names) >= least:
         small = smallest(as_described, alone, settings, least) if len(names) > 1 else None
         if small is None:
             return as_described, alone, []
         fewer = rest.without(small)
-        return _as_stated(fewer, shares_of(fewer, unseen)[0], unseen, arm, settings)
+        return _as_stated(fewer, shares_of(fewer, unseen, settings)[0], unseen, arm, settings)
     bodily, remarks = as_bodies(rest, arm)
     return bodily, shares, [_COMMON, *remarks]
 

@@ -25,15 +25,17 @@ class Thresholds:
         Values that a cause from outside the arm counts for beside its own: a person or a strap can
         pull in any way.
     error_rate : float
-        Probability of a name where nothing is, over all groups that were tried: an alarm in five
-        hundred healthy arms.
+        Probability of a name where nothing is, over all candidates that were tried: an alarm in
+        five hundred healthy arms.
     rival_z : float
         Deviations by which a name has to be ahead of another one to exclude it.
     tie : float
-        Share of the same by which it has to be ahead as well.
+        Share of the same by which it has to be ahead as well, and share of a simpler cause, in
+        squares, that what contains it leaves at most.
     far : float
         Lead over its own share that excludes another one however few blocks show it, and that
-        a link, which never changes, has to have over what may happen between two days.
+        a link, which never changes, or a load of one that is not at the end of the arm has to have
+        over what happens between two days.
     misfit_share : float
         Power of a cause over that of the model's own misfit, below which it is small print in that
         joint: a quarter of it names a change in one of five arms to which nothing happened.
@@ -42,11 +44,12 @@ class Thresholds:
         Where there are so many of them that one is less than that, smaller changes are told, too.
     headline : float
         Share that a cause takes of a gap beside the misfit that a model had before, below which it
-        is small print.
+        is small print; recordings hardly show causes that take less than this share of what they
+        take of others.
     same_fit : float
         Factor between losses of two explanations that are as good as each other where the unit is
         a misfit of other data, which varies so from motion to motion as a rule, or a noise that
-        is assumed because nothing repeats.
+        is assumed because nothing repeats. What holds a joint at rest varies so, too.
     uncertain : float
         Share of the noise of a row that dry friction may be wrong by where the sign of a velocity
         is uncertain: beside reversals it is wrong by 0.5 to 2 times itself in five kinds of arms.
@@ -65,12 +68,11 @@ class Thresholds:
         Share of the squares of a joint in which a gap is open that a cause takes if it matters
         there, however little that is of the gap of the arm; and of the whole gap that a cause
         takes which is named though nothing shows that it has changed, or though it is small.
-    beyond_bounds : float
-        Deviations by which a value may be beyond what is physically possible.
-    contained : float
-        Share of the torque of a simpler cause, in squares, that what contains it leaves at most.
+    surely : float
+        Deviations that noise may make: a value may be beyond what is possible by so many, and a
+        joint is worse, or held, beyond them.
     same : float
-        Share by which causes differ that are one in other words.
+        Share, in squares, by which torques of causes differ that are one in other words.
     smooth_share : float
         A cause that takes less than this share of its squares without the noise of positions
         beyond the band of the motion is made of that noise.
@@ -106,8 +108,7 @@ class Thresholds:
     confidence: float = 0.999
     predicted: float = 2.0
     open_share: float = 0.5
-    beyond_bounds: float = 3.0
-    contained: float = 0.02
+    surely: float = 3.0
     same: float = 1e-3
     smooth_share: float = 0.1
     below_noise: float = 0.8

@@ -109,8 +109,6 @@ class Effect(ABC):
     #: Whether it says that the description is wrong, and never happens to an arm: where one value
     #: of a description is wrong, others may be.
     corrects: ClassVar[bool] = False
-    #: Whether it is of the whole arm as a rule, and seldom of one joint; else it is the reverse.
-    whole_arm: ClassVar[bool] = False
     #: Whether it comes from outside the arm: a person, another machine.
     external: ClassVar[bool] = False
     #: Whether it is learned from the residual, and so names no cause.
@@ -164,6 +162,11 @@ class Effect(ABC):
     @classmethod
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         return robot.joints
+
+    def in_usual_place(self, robot: Robot) -> bool:
+        """Return whether it is where such an effect is as a rule: see `on`."""
+        default = self._default_joints(robot)
+        return bool(self.joints) == bool(default) and set(self.joints) <= set(default)
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
@@ -235,8 +238,20 @@ class Effect(ABC):
             ) from None
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
-    def spread(self, robot: Robot) -> FloatArray:
-        """Return how large values may be expected to be, infinite if at all, shape (P,)."""
+    def spread(
+        self, robot: Robot, found: tuple[FloatArray, FloatArray] | None = None
+    ) -> FloatArray:
+        """
+        Return how large values may be expected to be, infinite if at all, shape (P,).
+
+        Parameters
+        ----------
+        robot : Robot
+            What it acts on.
+        found : tuple of ndarray, each (P,), optional
+            Values and deviations that data tell: one may limit the others.
+
+        """
         return np.full(len(self.parameters(robot)), np.inf)
 
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:

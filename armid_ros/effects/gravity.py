@@ -30,7 +30,6 @@ class _GravityEffect(Effect):
     """An effect of the whole arm."""
 
     changes_body = True
-    whole_arm = True
 
     @classmethod
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:

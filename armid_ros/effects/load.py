@@ -37,7 +37,9 @@ class _LinkBody(Effect):
         parameters[self._rows(arm.robot)] += values
         return Action(robot=arm.robot.with_inertias(parameters))
 
-    def spread(self, robot: Robot) -> FloatArray:
+    def spread(
+        self, robot: Robot, found: tuple[FloatArray, FloatArray] | None = None
+    ) -> FloatArray:
         """Return what descriptions of the links are off by at the most, shape (P,)."""
         return described_spread(robot).ravel()[self._rows(robot)]
 
@@ -123,9 +125,19 @@ class Payload(_LinkBody):
         heaviest = np.maximum(values[0] + _SURELY * std[0], 0.0)
         return bool(most * heaviest < np.maximum(aside, 0.0) ** 2)
 
-    def spread(self, robot: Robot) -> FloatArray:
-        """Return what an arm may carry at the most: as much as it weighs, a little off, (P,)."""
+    def spread(
+        self, robot: Robot, found: tuple[FloatArray, FloatArray] | None = None
+    ) -> FloatArray:
+        """
+        Return what an arm may carry at the most: as much as it weighs, a little off, shape (P,).
+
+        First moments and inertia go with the mass: a light load has no large ones.
+
+        """
         mass = float(robot.rigid_parameters[:: len(LINK_PARAMETERS)].sum())
+        if found is not None:
+            values, std = found
+            mass = min(mass, float(np.abs(values[0]) + _SURELY * std[0]))
         return np.asarray(mass * np.array([1.0] + 3 * [_REACH] + 6 * [_REACH**2]))
 
 
@@ -140,8 +152,20 @@ class PayloadChange(Payload):
 
     quantities = tuple(replace(one, lower=-np.inf) for one in Payload.quantities)
 
+    @classmethod
+    def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
+        """Return all links: what is put onto one between two days is none of its own mass."""
+        return tuple((joint,) for joint in robot.joints)
+
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether what was taken or put down may be called a load."""
+        """
+        Return whether what was taken or put down may be called a load.
+
+        Its mass may be what no motion tells, such as that of an inner link; its moment has to be.
+
+        """
+        if std[0] == 0.0:
+            return bool(np.any(values[1:4]))
         return super().plausible(np.concatenate([np.abs(values[:1]), values[1:]]), std, arm)
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:

@@ -45,6 +45,10 @@ class _Pairs(Effect):
             raise ModelError(f'{cls.name}: {robot.name} has one joint only, nothing to couple')
         return cls._default_pairs(robot.joints)
 
+    def in_usual_place(self, robot: Robot) -> bool:
+        """Return that any pair of joints is as usual as another one."""
+        return True
+
     @classmethod
     def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
         return joints[-2:]
@@ -177,6 +181,10 @@ class JointCoupling(_Pairs):
             raise ModelError(
                 f'{self.name}: {twice[0]} leads two pairs; put it second in one of them'
             )
+
+    def in_usual_place(self, robot: Robot) -> bool:
+        """Return that any pair of joints is as usual as another one."""
+        return True
 
     @classmethod
     def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:

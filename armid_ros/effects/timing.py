@@ -64,7 +64,6 @@ class TimeDelay(LateReading):
     name = 'time_delay'
     summary = 'torque readings older than the positions they are recorded with'
     shown_by = 'the same motion at two speeds, and a sweep of frequency'
-    whole_arm = True
     quantities = (Quantity('delay', 's', lower=-0.1, upper=0.1, typical=(0.0005, 0.02)),)
     linear = False
     instantaneous = False

@@ -39,3 +39,13 @@ def test_data_in_which_a_cause_does_nothing_do_not_deny_it(rows):
     cause, noise = rows
     assert not attribution(0.0 * cause, noise).denied(0)
     assert not attribution(1e-4 * cause, noise).denied(0)
+
+
+def test_data_in_which_a_cause_makes_as_much_as_noise_do_not_deny_it():
+    """A tilt makes little of a motion that hardly turns the axis that feels it."""
+    cause = np.zeros((BLOCKS, 50))
+    cause[:2, 0] = 1.3
+    left = np.zeros_like(cause)
+    left[:2, 0] = [0.5, 0.6]
+    assert not attribution(cause, left).denied(0)
+    assert attribution(10.0 * cause, left).denied(0)

@@ -4,6 +4,7 @@
 
 from armid_ros.diagnosis import diagnose
 from armid_ros.identification import identify
+from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
 
@@ -80,3 +81,37 @@ def test_a_change_may_be_less_by_what_the_model_had_wrong_before(bench):
         assert one.findings[0].values[0] == pytest.approx(0.3, abs=0.03)
     assert 0.02 < found.findings[0].std[0] < 0.07
     assert fresh.findings[0].std[0] < 0.02
+
+
+@pytest.mark.parametrize('seed', [7, 8, 9])
+def test_what_another_motion_makes_of_a_misfit_is_no_change(upright, seed):
+    """A lag and friction with the load are there on both days; only numbers of the first are."""
+
+    def clutter(motion, tau):
+        lag = -0.004 * np.gradient(tau, motion.t, axis=0)
+        return lag + 0.02 * np.abs(tau) * np.sign(motion.dq)
+
+    model = identify(upright.arm, upright.recordings(clutter, 3), rng=np.random.default_rng(0))
+    found = diagnose(
+        model.arm,
+        upright.recordings(clutter, seed),
+        misfit=model.misfit({}),
+        rng=np.random.default_rng(0),
+    )
+    assert (found.verdict, found.findings) == ('consistent', ())
+
+
+def test_a_load_of_a_link_between_two_days_is_a_payload(upright):
+    """Links do not change, and something may be fixed to any of them."""
+    body = np.zeros(30)
+    body[10:20] = [1.0, 0.1, 0.0, 0.2, 0.05, 0.0, 0.06, -0.02, 0.0, 0.02]
+    true = upright.robot.with_inertias(upright.robot.rigid_parameters + body)
+
+    def load(motion, tau):
+        return inverse_dynamics(true, motion) - inverse_dynamics(upright.robot, motion)
+
+    before, after, new = (upright.recordings(make, k) for k, make in enumerate((None, load, load)))
+    (found,) = asked(upright, before, after, new).findings
+    assert (found.name, found.joints) == ('payload', ('shoulder',))
+    values = dict(zip([p.name for p in found.parameters], found.values, strict=True))
+    assert values['payload_mz'] == pytest.approx(0.2, rel=0.05)

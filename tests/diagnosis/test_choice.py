@@ -26,7 +26,7 @@ def explanation(bench, *names, rivals=(), shown=()):
 
     def trial(name):
         effect = CATALOGUE[name].on(bench.robot, ('elbow',))
-        candidate = Candidate.of(effect, slice(0, 1), (0,), bench.robot)
+        candidate = Candidate(effect, slice(0, 1), (0,), bench.robot)
         told = {'values': np.array([1.0]), 'deviation': np.array([0.1])}
         return SimpleNamespace(candidate=candidate, freedom=1.0, **told)
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a group predicts of data that it was not fitted to, beside a refit row by row."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.data.rows import Problem, products, with_candidate
 from armid_ros.diagnosis.search.held_out import held_out, tried_beside
@@ -27,10 +27,21 @@ def make_problem(rng, cause=(0.0, 0.0), noise=1.0):
     return Problem(x, y, weight, block, FOLDS)
 
 
+@dataclass(frozen=True)
+class Expected(CATALOGUE['viscous_friction']):
+    """Friction of which values about zero are expected, as surely as these precisions say."""
+
+    precision: tuple[float, ...] = (0.0, 0.0)
+
+    def spread(self, robot, found=None):
+        with np.errstate(divide='ignore'):
+            return np.array(self.precision) ** -0.5
+
+
 def group(bench, precision=(0.0, 0.0)):
     """Return the group whose columns come first."""
-    effect = CATALOGUE['viscous_friction'].on(bench.robot, bench.robot.joints)
-    return Candidate(effect, slice(0, OWN), (0, 1), np.array(precision))
+    effect = Expected(bench.robot.joints, precision=precision)
+    return Candidate(effect, slice(0, OWN), (0, 1), bench.robot)
 
 
 def held(rng):

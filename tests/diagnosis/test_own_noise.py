@@ -33,7 +33,7 @@ def tried(bench, seed, level=0.6, lost=0.0, loud=2.0):
     effect = effect.with_shape((level * highest,))
     columns = [part.columns(bench.arm, effect)[:, :, :1] for part in data]
     problem = make_problem(data, noise, [part.residual(bench.arm) for part in data], columns)
-    candidate = Candidate.of(effect, slice(0, 1), (0,), bench.robot)
+    candidate = Candidate(effect, slice(0, 1), (0,), bench.robot)
     (trial,), _ = held_out(problem, (), [candidate], np.zeros((0, 0)), np.zeros(0))
     evidence = Evidence(data, noise, noise)
     nuisance = Nuisance((), np.zeros((0, 0)), np.zeros(0))

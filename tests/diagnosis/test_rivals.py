@@ -13,7 +13,9 @@ import pytest
 
 def trial(bench, name, joints):
     return SimpleNamespace(
-        candidate=SimpleNamespace(effect=CATALOGUE[name].on(bench.robot, joints))
+        candidate=SimpleNamespace(
+            effect=CATALOGUE[name].on(bench.robot, joints), robot=bench.robot
+        )
     )
 
 
@@ -54,6 +56,14 @@ def test_a_link_has_to_take_a_quarter_more_than_what_happens(bench, since, less,
     gains = 10.0 + np.random.default_rng(0).normal(size=36)
     link, rotor = Known(bench, 'link_inertia', gains), Known(bench, 'rotor_inertia', less * gains)
     assert beaten(rotor, link, asked(400.0, since)) == wanted
+
+
+def test_a_load_is_at_the_end_of_an_arm_where_it_may_be(bench):
+    at_end, inside = Known(bench, 'payload', [9.0]), Known(bench, 'payload', [9.1])
+    inside.candidate.effect = CATALOGUE['payload'].on(bench.robot, ('shoulder',))
+    here = asked(10.0, True)
+    assert likeliest([inside, at_end], {}, here) is at_end
+    assert likeliest([inside], {}, here) is inside
 
 
 def test_of_two_that_happen_the_lead_decides(bench):

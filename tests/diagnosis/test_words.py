@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.evidence import NoiseFloor
+from armid_ros.diagnosis.search.explanation import NOISE
 from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
@@ -30,6 +31,16 @@ def test_a_model_that_explains_as_it_is_needs_no_fit(bench):
         verdict = said(bench.arm, as_it_is)
         assert verdict.word == 'consistent'
         assert verdict.summary == f'The model explains the recordings: what is left is {FLOOR}.'
+
+
+def test_what_is_there_and_too_small_to_matter_is_said_beside_noise(bench):
+    """A Stribeck torque of a hundredth of a joint's torque is no gap, and no noise either."""
+    closed = Excess(np.full(bench.robot.n_joints, 0.9), 'in the recordings')
+    small = Finding('stribeck_friction', ('elbow',), (), (), (), 0.45, (0.4, 0.5), 0.0)
+    summary = decide((), (), [closed], bench.arm, NOISE, None, [small]).summary
+    assert 'too small to matter. A stribeck friction in elbow explains 45 %' in summary
+    beside_a_misfit = decide((), (), [closed], bench.arm, FLOOR, None, [small]).summary
+    assert 'stribeck' not in beside_a_misfit
 
 
 def test_a_model_that_has_to_be_fitted_says_where_it_is_off_and_by_how_much(bench):

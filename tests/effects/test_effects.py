@@ -51,6 +51,18 @@ def test_coupled_friction_dissipates_along_the_shaft_only(robot, motion, with_va
     assert not np.any(friction[:, :4])
 
 
+def test_moments_of_a_load_go_with_its_mass(robot):
+    """As large as those of the arm where its mass is unknown, of any sign."""
+    load, size = make_effect('payload', robot), 10
+    expected = load.spread(robot)
+    mass = robot.rigid_parameters[::size].sum()
+    std = np.zeros(size)
+    for value in (0.1 * mass, -0.1 * mass):
+        values = np.full(size, value)
+        np.testing.assert_allclose(load.spread(robot, (values, std)), 0.1 * expected)
+    np.testing.assert_allclose(load.spread(robot, (np.zeros(size), std + np.inf)), expected)
+
+
 def test_moon_is_earth_with_less_gravity(robot, motion, with_values):
     moon = load_robot('humanoid_arm', gravity='moon')
     tau = with_values('gravity_magnitude', [1.62 - 9.81]).torque(motion)

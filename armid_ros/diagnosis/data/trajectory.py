@@ -36,7 +36,7 @@ from scipy import signal
 #: Columns are computed at this many times the rate of the rows: enough for signs and hysteresis.
 _OVERSAMPLING = 8
 #: A joint slower than this share of its top speed for this long [s] is at rest.
-_REST_SPEED, _REST_TIME = 0.02, 0.2
+_REST_SPEED, REST_TIME = 0.02, 0.2
 #: Below this share of the top speed, or so many deviations of its noise, the sign of a velocity is
 #: uncertain, and so is dry friction.
 _REVERSAL_SPEED, _REVERSAL_NOISE = 0.004, 3.0
@@ -222,7 +222,7 @@ def _trajectory(
 def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
     """Return where joints stand still, shape (N, n)."""
     rest = np.zeros(motion.q.shape, dtype=bool)
-    shortest = _REST_TIME / float(motion.t[1] - motion.t[0])
+    shortest = REST_TIME / float(motion.t[1] - motion.t[0])
     for joint in range(motion.n_joints):
         speed = np.abs(motion.dq[:, joint])
         slow = np.concatenate([[False], speed <= _REST_SPEED * speed.max(), [False]])

@@ -58,7 +58,7 @@ def inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
     """Return which values are physically possible, or differ from that by noise, shape (p,)."""
     kept = list(trial.candidate.kept)
     lower, upper = (bound[kept] for bound in room(trial.candidate.effect, here.work.arm))
-    slack = here.settings.thresholds.beyond_bounds * trial.deviation
+    slack = here.settings.thresholds.surely * trial.deviation
     return np.asarray((trial.values > lower - slack) & (trial.values < upper + slack))
 
 

@@ -238,7 +238,7 @@ def candidates(
                 if (single.name, single.joints) not in taken:
                     for kept in single.separate or (tuple(range(size)),):
                         span = slice(start + kept[0], start + kept[-1] + 1)
-                        candidates.append(Candidate.of(single, span, kept, arm.robot))
+                        candidates.append(Candidate(single, span, kept, arm.robot))
                 start += size
     return Candidates(tuple(candidates), tuple(np.concatenate(block, axis=2) for block in blocks))
 

@@ -122,9 +122,11 @@ class Explainer:
         """
         Explain what is beyond a misfit that is known in numbers alone.
 
-        Without the recordings nobody can say whether a body common to both would do. A body that
-        is fitted anew stays the rival of last resort. It hides loads: where they take most of the
-        gap of a model that was right when it was identified, they have changed, and not all links.
+        Another motion makes another misfit, and without the recordings nobody can say what it is
+        like: a model that leaves no gap as it is has nothing named. Nor can anybody say whether a
+        body common to both would do. A body that is fitted anew stays the rival of last resort. It
+        hides loads: where they take most of the gap of a model that was right when it was
+        identified, they have changed, and not all links.
 
         """
         prepared, settings, noise = self.prepared, self.settings, self.prepared.as_described
@@ -133,6 +135,10 @@ class Explainer:
         most = 2 * settings.thresholds.few_causes
         given = as_given(self.arm, prepared.data, most, settings.library)
         found = explain(replace(given, since=True), evidence, settings)
+        nothing = found.only(())
+        if at_floor(nothing, settings):
+            small = tuple(step.trial for step in found.steps)
+            found = replace(nothing, minor=(*small, *found.minor))
         notes = (_AS_EXACT,) if found.steps and self.covariance is None else ()
         if self.covariance is not None:
             fitted = with_model_error(found.fitted, evidence, self.arm, self.covariance)

@@ -286,7 +286,7 @@ def _friction(
         weak: list[tuple[tuple[float, float], int]] = []
         seen: list[Trial] = []
         for k, (effect, column, value) in enumerate(alive):
-            candidate = Candidate.of(effect, slice(0, 1), (0,), arm.robot)
+            candidate = Candidate(effect, slice(0, 1), (0,), arm.robot)
             again = view.trial(candidate, [column], [value], gone)
             if again.trial is None:
                 weak.append((doubtful(None), k))

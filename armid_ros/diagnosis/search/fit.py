@@ -17,10 +17,13 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.rows import described_precision, Prior, weighted_rows
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
-from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.identification.fitting.least_squares import solve
-from armid_ros.identification.fitting.normal_equations import informative_solution, NO_COLUMN
+from armid_ros.identification.fitting.least_squares import noise_products
+from armid_ros.identification.fitting.normal_equations import (
+    informative_basis,
+    informative_solution,
+    NO_COLUMN,
+)
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
@@ -134,10 +137,10 @@ def fit(
     state = Patch(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
     if start.change is not None and base is not None:
         state = state.with_change(start.change, base)
-    pull = np.zeros((0, 0)) if base is None else described_precision(base, arm)
-    aim = np.zeros(len(pull))
+    described = np.zeros((0, 0)) if base is None else described_precision(base, arm)
+    pull, aim = described, np.zeros(len(described))
     if prior is not None and base is not None:
-        pull, aim = pull + prior.precision, prior.aim
+        pull, aim = described + prior.precision, prior.aim
     rounds = _MOST_ROUNDS if named else int(base is not None and prior is None)
     rounds = 0 if known is not None else rounds
     state, residual, columns = _settled(state, (data, sigma), base, (pull, aim), rounds)
@@ -148,7 +151,7 @@ def fit(
         covariance = np.zeros((size, size))
         if named:
             more = [] if prior is None else prior.regressions(state.change, len(numbers))
-            covariance = _covariance(columns, residual, data, sigma, more)
+            covariance = _covariance(columns, residual, (data, sigma), described, more)
         estimate = Estimate(names, numbers, covariance[size:, size:])
     whole = columns[0].shape[2]
     hold, held_to = np.zeros((whole, whole)), np.zeros(whole)
@@ -300,33 +303,54 @@ def _step(
 def _covariance(
     columns: Sequence[FloatArray],
     residual: Sequence[FloatArray],
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
+    rows: tuple[Sequence[Trajectory], Sequence[FloatArray]],
+    described: FloatArray,
     more: Sequence[Regression] = (),
 ) -> FloatArray:
-    """Return the covariance, colour of the residual included; infinite where others make it."""
+    """
+    Return the covariance, shape (f, f); infinite where others make it.
+
+    Parameters
+    ----------
+    columns, residual : sequence of ndarray, each (M, n, f) and (M, n)
+        Of each trajectory.
+    rows : tuple
+        The data, and their noise [N m], whose colour the residual tells.
+    described : ndarray, shape (r, r)
+        Precision of the description of the first values.
+    more : sequence of Regression
+        Other data, over their noise.
+
+    """
+    data, sigma = rows
     size = columns[0].shape[2]
-    weighted = list(weighted_rows(columns, data, sigma))
-    every = [*weighted, *(part.columns for part in more)]
-    stacked = np.concatenate([block.reshape(-1, size) for block in every])
-    names = tuple(ParameterName(str(k), '', '') for k in range(size))
-    kept = group_columns(stacked, names, tolerance=1e-5).independent
+    hold = np.zeros((size, size))
+    hold[: len(described), : len(described)] = described
     lefts = weighted_rows(residual, data, sigma)
     problem = [
-        Regression(
-            part.at_rows.with_torque(left),
-            block[:, :, kept],
-            part.informative,
-            part.source,
-        )
-        for part, block, left in zip(data, weighted, lefts, strict=True)
+        Regression(part.at_rows.with_torque(left), block, part.informative, part.source)
+        for part, block, left in zip(data, weighted_rows(columns, data, sigma), lefts, strict=True)
     ]
-    problem += [part.restrict(kept) for part in more]
+    problem += more
+    stacked = np.concatenate([*(part.columns.reshape(-1, size) for part in problem), _root(hold)])
+    names = tuple(ParameterName(str(k), '', '') for k in range(size))
+    kept = group_columns(stacked, names, tolerance=1e-5).independent
     covariance = np.diag(np.full(size, np.inf))
     if not len(kept):
         return covariance
-    try:
-        covariance[np.ix_(kept, kept)] = solve(problem, 'ols').covariance
-    except (np.linalg.LinAlgError, ValueError) as error:
-        raise ModelError(f'the patched model cannot be fitted: {error}') from error
+    problem = [part.restrict(kept) for part in problem]
+    told = np.concatenate([part.informative for part in problem]).astype(float)
+    left = np.concatenate([part.target for part in problem]) * told
+    own, known = stacked[:, kept].T @ stacked[:, kept], hold[np.ix_(kept, kept)]
+    basis = informative_basis(own)
+    bread = basis @ basis.T
+    covariance[np.ix_(kept, kept)] = (
+        bread @ (noise_products(problem, left, told, basis) + known) @ bread
+    )
     return covariance
+
+
+def _root(precision: FloatArray) -> FloatArray:
+    """Return rows R with R'R = a precision, shape (p, p)."""
+    values, vectors = np.linalg.eigh(precision)
+    return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, np.newaxis] * vectors.T)

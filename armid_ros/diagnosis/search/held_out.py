@@ -34,7 +34,8 @@ from armid_ros.diagnosis.data.rows import (
     weighted_rows,
 )
 from armid_ros.diagnosis.search.fit import Fitted
-from armid_ros.diagnosis.search.trial import Candidate, Trial
+from armid_ros.diagnosis.search.trial import Candidate, IDENTIFIABLE, Trial
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.fitting.jackknife import jackknife
 from armid_ros.identification.fitting.normal_equations import (
     independent_inverse,
@@ -49,8 +50,6 @@ from scipy import stats
 
 #: Squares over noise of columns that are rounding, whatever the units.
 _NOTHING = 1e-100
-#: One side of a 95 % interval.
-_LEVEL = 0.975
 
 
 @dataclass(frozen=True)
@@ -197,8 +196,13 @@ def _tried(
     if visible**2 < UNINFORMATIVE:
         return None
     aim = fits.train @ known.target[:, span] - _times(border.transpose(0, 2, 1), fits.theta)
-    inverse = independent_inverse(rest + np.diag(candidate.precision), np.diag(whole))
-    values = _times(inverse, aim)
+    inverse, values = _held(rest, aim, whole, candidate)
+    resolved = np.diag(inverse[-1] @ rest[-1]) > IDENTIFIABLE
+    std = np.sqrt(np.diag(inverse[-1]).clip(0.0))
+    narrower = candidate.as_found(values[-1], np.where(resolved, std, np.inf))
+    if np.any(narrower.precision != candidate.precision):
+        candidate = narrower
+        inverse, values = _held(rest, aim, whole, candidate)
     change = -_times(solved, values)
     v, moved = values[part], change[part]
     cross = np.sum(fits.target[:, span] * v, axis=1) + np.sum(fits.left * moved, axis=1)
@@ -224,6 +228,14 @@ def _tried(
         alone,
         part,
     )
+
+
+def _held(
+    rest: FloatArray, aim: FloatArray, whole: FloatArray, candidate: Candidate
+) -> tuple[FloatArray, FloatArray]:
+    """Return inverses (K, p, p) and values (K, p) that are held to what may be expected."""
+    inverse = independent_inverse(rest + np.diag(candidate.precision), np.diag(whole))
+    return inverse, _times(inverse, aim)
 
 
 def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: float) -> Fitted:
@@ -259,7 +271,7 @@ def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: flo
             held = [_values(all_own - x, all_aim - y, size) for x, y in parts]
             variance += jackknife(change, std, *np.array(held).transpose(1, 0, 2))
             freedom += len(parts) - 1
-    few = float(stats.t.ppf(_LEVEL, freedom) / stats.norm.ppf(_LEVEL))
+    few = float(stats.t.ppf(stats.norm.cdf(HALF_WIDTH), freedom) / HALF_WIDTH)
     unit = std**2
     found = few**2 * variance + max(chance - 1.0, 0.0) * unit
     return _with_deviation(fitted, np.sqrt(np.maximum(found, unit)))

@@ -133,7 +133,6 @@ def _part(candidate: Candidate, possible: Sequence[int], first: int) -> Candidat
         candidate,
         columns=slice(first, first + len(possible)),
         kept=tuple(candidate.kept[k] for k in possible),
-        precision=candidate.precision[list(possible)],
     )
 
 

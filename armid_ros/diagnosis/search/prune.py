@@ -156,7 +156,7 @@ class View:
         own = self.fitted.named[name]
         columns, shapes = self.columns(name)
         span = slice(0, len(columns))
-        candidate = Candidate.of(own.effect, span, own.kept, self.fitted.arm.robot)
+        candidate = Candidate(own.effect, span, own.kept, self.fitted.arm.robot)
         return self.trial(candidate, columns, [self.value(c) for c in columns], shapes)
 
     def trial_of_more(self, name: int) -> Again:
@@ -166,7 +166,7 @@ class View:
         own = self.more[name]
         span = range(start, start + len(own.kept))
         others = [c for c in range(first, self.problem.x.shape[2]) if c not in span]
-        candidate = Candidate.of(own.effect, slice(0, len(span)), own.kept, self.fitted.arm.robot)
+        candidate = Candidate(own.effect, slice(0, len(span)), own.kept, self.fitted.arm.robot)
         return self.trial(candidate, span, [0.0] * len(span), others)
 
 

@@ -274,7 +274,7 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
     squares, z = lead(first, other)
     if squares <= here.width:
         return False
-    if _never_happens(first, here) and _happens(other, here):
+    if _seldom(first, here) and _as_a_rule(other, here):
         return squares > thresholds.far * first.gain
     if squares <= thresholds.tie * here.currency * 0.5 and squares <= thresholds.far * first.gain:
         return False
@@ -289,6 +289,17 @@ def _never_happens(trial: Trial, here: Round) -> bool:
 def _happens(trial: Trial, here: Round) -> bool:
     """Return whether a cause of the arm itself may come between two days; a person may pull."""
     return not (_never_happens(trial, here) or trial.candidate.effect.external)
+
+
+def _seldom(trial: Trial, here: Round) -> bool:
+    """Return whether a cause hardly comes between two days: a link, or a load of an inner one."""
+    effect = trial.candidate.effect
+    return here.since and effect.changes_body and (effect.corrects or not _usual(trial))
+
+
+def _as_a_rule(trial: Trial, here: Round) -> bool:
+    """Return whether a cause is of the arm itself, and such as comes between two days."""
+    return not (_seldom(trial, here) or trial.candidate.effect.external)
 
 
 def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
@@ -309,11 +320,13 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -
     Of several that are as good it is the commonest.
 
     One cause that explains everything goes before two that do it together, and what happens goes
-    before what never does.
+    before what never or seldom does.
 
     """
     if any(_happens(trial, here) for trial in tied):
         tied = [trial for trial in tied if not _never_happens(trial, here)]
+    if any(_as_a_rule(trial, here) for trial in tied):
+        tied = [trial for trial in tied if not _seldom(trial, here)]
     if len(tied) == 1:
         return tied[0]
     able = [trial for trial in tied if closing[id(trial)]]
@@ -321,6 +334,10 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -
         return simplest(able, here)
     alike = [t for t in tied if t.gain >= (1.0 - ROUNDING) * tied[0].gain]
     return min(alike, key=rarity)
+
+
+def _usual(trial: Trial) -> bool:
+    return trial.candidate.effect.in_usual_place(trial.candidate.robot)
 
 
 def closes(trial: Trial, here: Round) -> bool:
@@ -355,7 +372,7 @@ def rarity(trial: Trial) -> float:
     """Return the position in the catalogue, which goes from the common to the rare."""
     names, effect = list(CATALOGUE), trial.candidate.effect
     place = names.index(effect.name) if effect.name in CATALOGUE else len(names)
-    return place + (_ELSEWHERE if bool(effect.joints) == effect.whole_arm else 0.0)
+    return place + (0.0 if _usual(trial) else _ELSEWHERE)
 
 
 def contains(big: Trial, small: Trial, here: Round) -> bool:
@@ -368,25 +385,32 @@ def contains(big: Trial, small: Trial, here: Round) -> bool:
     """
     if not big.candidate.effect.joints and small.candidate.effect.joints:
         return False
-    thresholds = here.settings.thresholds
-    columns = here.projection.rest(here.own(big.candidate))
-    target = here.projection.rest(here.own(small.candidate)) @ small.values
-    squares = float(np.sum(target**2))
-    if np.sum((columns @ big.values - target) ** 2) < thresholds.same * squares:
+    columns, others = (here.projection.rest(here.own(one.candidate)) for one in (big, small))
+    flat, target = columns.reshape(-1, big.candidate.size), (others @ small.values).ravel()
+    thresholds, squares = here.settings.thresholds, float(target @ target)
+    apart = np.sum((flat @ big.values - target) ** 2)
+    if apart < thresholds.same * squares or _same_body(big, small):
         if not here.since:
             return False
         if small.candidate.effect.comes_and_goes and not big.candidate.effect.comes_and_goes:
             return True  # links do not change; a description of them may be off
     if cost(big, here.settings) <= cost(small, here.settings):
         return False
-    flat = columns.reshape(-1, big.candidate.size)
-    fit = np.linalg.lstsq(flat, target.ravel(), rcond=1e-6)[0]
-    return bool(np.sum((target.ravel() - flat @ fit) ** 2) < thresholds.contained * squares)
+    fit = np.linalg.lstsq(flat, target, rcond=1e-6)[0]
+    return bool(np.sum((target - flat @ fit) ** 2) < thresholds.tie * squares)
+
+
+def _same_body(one: Trial, other: Trial) -> bool:
+    """Return whether two causes are the body of one link in other words."""
+    added = [trial.candidate.effect.adds_to(trial.candidate.robot) for trial in (one, other)]
+    return bool(added[0]) and added[0] == added[1]
 
 
 def says_no_more(big: Trial, small: Trial, here: Round) -> bool:
     """Return whether a cause contains another one and, its freedom paid for, explains no more."""
     if not contains(big, small, here):
+        return False
+    if here.before is None and _same_body(big, small):
         return False
     thresholds = here.settings.thresholds
     more, (_, z) = worth(big, here) - worth(small, here), lead(big, small)

@@ -25,6 +25,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+#: Resolution of a value that the data determine: it is a half or less in a pair that they do not.
+IDENTIFIABLE = 0.9
 #: Squares that differ by less than this share do so by rounding.
 ROUNDING = 1e-6
 
@@ -42,20 +44,30 @@ class Candidate:
         Its columns among those of all candidates.
     kept : tuple of int
         Parameters of the effect that the columns belong to; the others are zero.
-    precision : ndarray, shape (p,)
-        How strongly their values are held to what may be expected of them.
+    robot : Robot
+        What the effect acts on.
+    found : tuple of ndarray, each (P,), or None
+        Values that data tell, and their deviations: one may limit what is expected of the others.
 
     """
 
     effect: Effect
     columns: slice
     kept: tuple[int, ...]
-    precision: FloatArray
+    robot: Robot
+    found: tuple[FloatArray, FloatArray] | None = None
 
-    @classmethod
-    def of(cls, effect: Effect, columns: slice, kept: tuple[int, ...], robot: Robot) -> Candidate:
-        """Make a candidate that is held to what may be expected of the effect on a robot."""
-        return cls(effect, columns, kept, effect.spread(robot)[list(kept)] ** -2.0)
+    @cached_property
+    def precision(self) -> FloatArray:
+        """How strongly the values are held to what may be expected of them, shape (p,)."""
+        return self.effect.spread(self.robot, self.found)[list(self.kept)] ** -2.0
+
+    def as_found(self, values: FloatArray, std: FloatArray) -> Candidate:
+        """Return the same where data tell its values and their deviations, each (p,)."""
+        size = len(self.effect.parameters(self.robot))
+        whole, deviation = np.zeros(size), np.full(size, np.inf)
+        whole[list(self.kept)], deviation[list(self.kept)] = values, std
+        return replace(self, found=(whole, deviation))
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
@@ -73,7 +85,8 @@ def denies(cross: FloatArray, square: FloatArray) -> bool:
     Return whether data deny a cause: no more follows it than noise would.
 
     The slope of what is left on what the cause predicts is one for a cause, zero for none. Data
-    in which it does nothing do not deny it.
+    in which it does nothing do not deny it: the deviation of the slope is what blocks differ by,
+    and no less than white noise makes.
 
     Parameters
     ----------
@@ -85,7 +98,7 @@ def denies(cross: FloatArray, square: FloatArray) -> bool:
     if made <= 0.0:
         return False
     slope = float(cross.sum()) / made
-    wide = 2.0 * float(np.sqrt(np.sum((cross - slope * square) ** 2))) / made
+    wide = 2.0 * float(np.sqrt(max(np.sum((cross - slope * square) ** 2), made))) / made
     return slope + wide < 1.0 and slope - wide <= 0.0
 
 

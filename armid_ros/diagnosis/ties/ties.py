@@ -345,7 +345,7 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
     whole = kind.on(ties.arm.robot, [own.effect.joints[0] for own in fitted.named])
     each = len(whole.quantities)
     kept = tuple(range(0, each * len(whole.joints), each))
-    candidate = Candidate.of(whole, span, kept, ties.arm.robot)
+    candidate = Candidate(whole, span, kept, ties.arm.robot)
     nuisance = Nuisance(free, reference.hold, reference.pull)
     trials, power = held_out(problem, free, [candidate], nuisance.hold, nuisance.pull)
     work = Workspace(memoized_arm(reference.arm), data)

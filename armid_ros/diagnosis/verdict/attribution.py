@@ -30,8 +30,6 @@ import numpy as np
 
 #: Resamplings of the blocks: ends of a 95 % interval are known to a tenth of it.
 _RESAMPLINGS = 500
-#: Recordings hardly show what takes less than this share of the share it takes of others.
-_HARDLY = 0.1
 
 
 @dataclass(frozen=True)
@@ -113,15 +111,15 @@ def _left_out(
         start, candidates = 0, []
         for k in left:
             span = slice(start, start + len(columns[k]))
-            candidates.append(Candidate.of(named[k].effect, span, named[k].kept, arm.robot))
+            candidates.append(Candidate(named[k].effect, span, named[k].kept, arm.robot))
             start = span.stop
         trials, power = held_out(problem, free, candidates, hold, pull, whole=False)
         whole = power if whole is None else whole
         if not taken.size:
             taken, made = np.zeros((2, len(named), len(power)))
-        by_candidate = {id(trial.candidate): trial for trial in trials}
+        by_column = {trial.candidate.columns.start: trial for trial in trials}
         for k, candidate in zip(left, candidates, strict=True):
-            trial = by_candidate.get(id(candidate))
+            trial = by_column.get(candidate.columns.start)
             if trial is not None and (best is None or trial.gain > best[0]):
                 best = trial.gain, k, trial.gains, trial.square
         if best is None:
@@ -167,7 +165,7 @@ def headline(
     what was named.
 
     """
-    shares, denied = shares_of(explanation, unseen)
+    shares, denied = shares_of(explanation, unseen, settings)
     gone = denied[0] if denied else smallest(explanation, shares, settings, least)
     if gone is None:
         return explanation, shares
@@ -201,7 +199,9 @@ def _opens(fewer: Explanation, explanation: Explanation, settings: DiagnosisSett
     return bool(np.any((fewer.chi2_per_row > limits) & (explanation.chi2_per_row <= limits)))
 
 
-def shares_of(explanation: Explanation, unseen: Evidence | None) -> tuple[Attribution, list[int]]:
+def shares_of(
+    explanation: Explanation, unseen: Evidence | None, settings: DiagnosisSettings
+) -> tuple[Attribution, list[int]]:
     """Share out the gap, and return the names that other data deny, the least first."""
     left_out = attribute(explanation, None)
     if unseen is None:
@@ -209,7 +209,7 @@ def shares_of(explanation: Explanation, unseen: Evidence | None) -> tuple[Attrib
     names = range(len(explanation.steps))
     seen = attribute(explanation, unseen)
     denied = [k for k in reversed(seen.order) if seen.denied(k)]
-    shown = seen.share(names) > _HARDLY * left_out.share(names)
+    shown = seen.share(names) > settings.thresholds.headline * left_out.share(names)
     return (seen if shown else left_out), denied
 
 

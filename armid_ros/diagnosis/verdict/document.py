@@ -14,7 +14,7 @@ import math
 from typing import Any
 
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.diagnosis.search.trial import IDENTIFIABLE, Trial
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import ParameterName
@@ -29,8 +29,6 @@ _MOST_CANDIDATES = 20
 #: Standard deviations of a value from which on it shows. On a two-link arm, effects of one to four
 #: times the size that follows were named, of half of it none.
 _SHOWS = 5.0
-#: Resolution of a value that the data determine: it is a half or less in a pair that they do not.
-_IDENTIFIABLE = 0.9
 
 
 def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[str, Any]:
@@ -220,7 +218,7 @@ def smallest_size(trial: Trial) -> tuple[int, float]:
     """Return the first parameter of a candidate that is identifiable, and from which size on."""
     rows = zip(trial.candidate.kept, trial.std, trial.resolution, strict=True)
     for index, std, resolution in rows:
-        if resolution > _IDENTIFIABLE:
+        if resolution > IDENTIFIABLE:
             return index, _SHOWS * float(std)
     return trial.candidate.kept[0], float('inf')
 

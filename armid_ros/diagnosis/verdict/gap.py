@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Baseline, Evidence
-from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.data.trajectory import REST_TIME, Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.where import Where
@@ -31,16 +31,11 @@ from scipy.ndimage import uniform_filter1d
 
 #: A joint has a gap where the squares beyond the floor are this many times the floor.
 _A_GAP = 0.2
-#: Deviations beyond which a joint is surely worse, or held, and share of its squares that nobody
-#: would call worse.
-_SURELY, _SLIGHTLY = 3.0, 0.05
+#: Share of the squares of a joint that nobody would call worse.
+_SLIGHTLY = 0.05
 #: Dry friction by which a joint at rest may be held: twice that of motion until it breaks away,
 #: and once what a model has of it in a direction of its own choice.
 _HELD = 3.0
-#: What lasts shorter may be chance, or what a filter of positions makes of a jerk [s].
-_SHORTEST = 0.2
-#: Factor on what a baseline shows of it: a brake holds an arm on every day.
-_AS_BEFORE = 1.5
 #: Where it is, for a table, and the end of a sentence.
 _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
 _BESIDE = (
@@ -190,12 +185,18 @@ def _worse(
     total = more.sum(axis=0)
     floor = np.maximum(had.sum(axis=0), evidence.count)
     gap = evidence.chi2_per_row(left[1]) > evidence.as_good(settings) + evidence.matters(settings)
-    surely = (total > _SURELY * spread) & (total > _SLIGHTLY * floor)
+    surely = (total > settings.thresholds.surely * spread) & (total > _SLIGHTLY * floor)
     by_far = total > (settings.thresholds.same_fit - 1.0) * floor
     return np.asarray((surely | by_far) & gap)
 
 
-def held(arm: ArmModel, evidence: Evidence, before: Baseline | None, given: ArmModel) -> Excess:
+def held(
+    arm: ArmModel,
+    evidence: Evidence,
+    before: Baseline | None,
+    given: ArmModel,
+    settings: DiagnosisSettings,
+) -> Excess:
     """
     Return what acts on joints that stand still or turn round, beyond friction.
 
@@ -206,17 +207,21 @@ def held(arm: ArmModel, evidence: Evidence, before: Baseline | None, given: ArmM
     evidence : Evidence
         The data.
     before : Baseline or None
-        Recordings in which nothing was wrong, of the arm as given: what held it then does still.
+        Recordings in which nothing was wrong, of the arm as given: what held it then, such as a
+        brake, does still.
     given : ArmModel
         That arm.
+    settings : DiagnosisSettings
+        Thresholds.
 
     """
     residual = [part.residual(arm) for part in evidence.data]
-    excess = standing(arm, evidence, residual)
+    surely = settings.thresholds.surely
+    excess = standing(arm, evidence, residual, surely)
     if before is not None:
         unit = (before.misfit,) * len(before.data)
-        then = standing(given, Evidence(before.data, unit, unit), before.residual)
-        excess = excess / np.maximum(_AS_BEFORE * then, 1.0)
+        then = standing(given, Evidence(before.data, unit, unit), before.residual, surely)
+        excess = excess / np.maximum(settings.thresholds.same_fit * then, 1.0)
     return Excess(excess, _BESIDE)
 
 
@@ -232,14 +237,16 @@ def places_held(arm: ArmModel, left: Sequence[Excess]) -> tuple[Where, ...]:
     )
 
 
-def standing(arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray]) -> FloatArray:
+def standing(
+    arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], surely: float
+) -> FloatArray:
     """
     Return by how much what is left of rows that tell nothing is beyond friction, squared, (n,).
 
     Noise and misfit counted in; a joint that turns round accelerates most, and what a model gets
     wrong grows with the torque that it predicts. What a filter of positions makes of a jerk is as
-    much below as above in the mean of its own time. Zero where it is not, and where no dry
-    friction is known.
+    much below as above in the mean of its own time, and what lasts shorter than a rest does may be
+    chance. Noise is so many deviations. Zero where it is not, and where no dry friction is known.
 
     """
     friction = arm.action().dry_friction
@@ -252,10 +259,10 @@ def standing(arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray]) 
         held = _HELD * friction.largest(arm.load(part.at_rows))
         louder = np.maximum(np.abs(part.torque - left) / usual, 1.0)
         period = float(part.t[1] - part.t[0])
-        shortest = max(_SHORTEST, 1.0 / part.used.cutoff_hz)
+        shortest = max(REST_TIME, 1.0 / part.used.cutoff_hz)
         lasting = uniform_filter1d(left, max(round(shortest / period), 1), axis=0)
-        beyond = (lasting / (held + _SURELY * sigma * louder)) ** 2
+        beyond = (lasting / (held + surely * sigma * louder)) ** 2
         more = ~part.informative & (held > 0.0) & (beyond > 1.0)
         time += period * more.sum(axis=0)
         squares += period * np.sum(beyond, axis=0, where=more)
-    return np.where(time > _SHORTEST, squares / np.maximum(time, 1e-300), 0.0)
+    return np.where(time > REST_TIME, squares / np.maximum(time, 1e-300), 0.0)

@@ -10,6 +10,7 @@ from typing import Literal
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import NoiseFloor
+from armid_ros.diagnosis.search.explanation import NOISE
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
 from armid_ros.diagnosis.verdict.gap import Excess
@@ -105,16 +106,20 @@ def decide(
 def _consistent(
     floor_in_words: str, as_it_is: Excess | None, minor: Sequence[Finding], robot: Robot
 ) -> str:
-    """Say what a model explains, and what has to be fitted anew for that."""
+    """Say what a model explains, what has to be fitted anew for that, and what is too small."""
+    small = [sentence(one) for one in minor[:1] if one.share >= SAID]
     if as_it_is is None or as_it_is.ratio.max() <= 1.0:
-        return f'The model explains the recordings: what is left is {floor_in_words}.'
+        text = f'The model explains the recordings: what is left is {floor_in_words}'
+        if floor_in_words == NOISE and small:
+            return f'{text}, or too small to matter. {small[0]}'
+        return f'{text}.'
     worst = int(np.argmax(as_it_is.ratio))
     text = (
         'The model explains the recordings once its rigid body and friction are fitted: what is '
         f'left is {floor_in_words}. As it is, the error of {robot.joints[worst]} is '
         f'{_factor(np.sqrt(as_it_is.ratio[worst]))} times as large as that can be.'
     )
-    return ' '.join([text, *(sentence(one) for one in minor[:1] if one.share >= SAID)])
+    return ' '.join([text, *small])
 
 
 def _unexplained(minor: Sequence[Finding]) -> str:
@@ -171,9 +176,8 @@ def _subject(finding: Finding) -> str:
     if finding.ties:
         where = ', '.join(_tie(finding, tie.joint, tie.name) for tie in finding.ties)
         return f'{words.capitalize()} at {where}'
-    if finding.weighs and finding.values:
-        down = ' that was put down' if finding.values[0] < -HALF_WIDTH * finding.std[0] else ''
-        return f'{article} {words} {_weight(finding)} on {finding.joints[0]}{down}'
+    if finding.weighs:
+        return f'{article} {words} {_weight(finding)} on {finding.joints[0]}{_put_down(finding)}'
     if len(finding.joints) > _JOINTS_SAID:
         return f'{words.capitalize()} in {len(finding.joints)} joints'
     where = f' in {", ".join(finding.joints)}' if finding.joints else ''
@@ -196,10 +200,22 @@ def _values(finding: Finding) -> Iterator[str]:
 
 def _weight(finding: Finding) -> str:
     """Return the mass of a payload, or that it is not determined."""
-    mass, std = abs(finding.values[0]), finding.std[0]
-    if mass < HALF_WIDTH * std:
+    mass, std = _mass(finding)
+    if not abs(mass) > HALF_WIDTH * std:
         return 'whose mass these data do not determine'
-    return f'of {_as_sure(mass, std)} kg'
+    return f'of {_as_sure(abs(mass), std)} kg'
+
+
+def _put_down(finding: Finding) -> str:
+    """Return that a payload is less than nothing, if it is."""
+    mass, std = _mass(finding)
+    return ' that was put down' if mass < -HALF_WIDTH * std else ''
+
+
+def _mass(finding: Finding) -> tuple[float, float]:
+    """Return the mass of a payload and its deviation [kg], zero where no data tell it."""
+    rows = zip(finding.parameters, finding.values, finding.std, strict=True)
+    return next(((value, std) for p, value, std in rows if p.unit == 'kg'), (0.0, 0.0))
 
 
 def _with_degrees(value: float, std: float, unit: str) -> str:

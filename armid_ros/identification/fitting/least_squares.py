@@ -217,9 +217,10 @@ def _noise_spectrum(
     Estimate the power spectrum of the noise from a residual.
 
     Its autocovariance is that of the samples that tell something, lag by lag over as many pairs
-    as there are (Parzen 1963). The residual is whitened by an autoregression, its spectrum
-    smoothed by a Parzen window over lags, and coloured again, which keeps peaks from being
-    smoothed away (Andrews and Monahan 1992). What the fit took is made up for in the same band.
+    as there are (Parzen 1963), without the negative power that it may have where there are gaps.
+    The residual is whitened by an autoregression, its spectrum smoothed by a Parzen window over
+    lags, and coloured again, which keeps peaks from being smoothed away (Andrews and Monahan
+    1992). What the fit took is made up for in the same band.
 
     Parameters
     ----------
@@ -239,7 +240,8 @@ def _noise_spectrum(
     count = len(residual)
     size = 2 * count
     lags = _autocovariance(residual, told)
-    power = np.fft.rfft(np.concatenate([lags, [0.0], lags[:0:-1]])).real
+    power = np.fft.rfft(np.concatenate([lags, [0.0], lags[:0:-1]])).real.clip(0.0)
+    lags = np.fft.irfft(power, size)[:count]
     whitening = _whitening(lags, size)
     lags = np.fft.irfft(power * whitening, size)[: count // 2]
     reach = _correlation_reach(lags, count)

@@ -70,6 +70,21 @@ def test_stated_deviations_know_of_gaps():
     np.testing.assert_allclose(stated, scatter, rtol=0.2)
 
 
+def test_no_gaps_make_deviations_that_are_out_of_all_proportion():
+    """Of a motion with dwells the products of rows may be those of no noise at all."""
+    stated = []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        lengths = rng.integers([5, 1], [40, 25], (40, 2)).ravel()
+        told = np.repeat(np.tile([True, False], 40), lengths)[:200]
+        data = replace(
+            problem(rng, 200, colour=0.97), informative=told[:, np.newaxis] & [True, True]
+        )
+        stated.append(np.sqrt(np.diag(solve([data]).covariance)))
+    usual = np.median(stated, axis=0)
+    assert np.all(stated < 5.0 * usual)
+
+
 def test_outliers_do_not_pull():
     data = problem(np.random.default_rng(1), noise=np.full(2, 0.05))
     tau = data.tau.copy()
