@@ -123,10 +123,10 @@ class Explainer:
         Explain what is beyond a misfit that is known in numbers alone.
 
         Another motion makes another misfit, and without the recordings nobody can say what it is
-        like: a model that leaves no gap as it is has nothing named. Nor can anybody say whether a
-        body common to both would do. A body that is fitted anew stays the rival of last resort. It
-        hides loads: where they take most of the gap of a model that was right when it was
-        identified, they have changed, and not all links.
+        like: a model that leaves no more than it may of motions that were not used has nothing
+        named. Nor can anybody say whether a body common to both would do. A body that is fitted
+        anew stays the rival of last resort. It hides loads: where they take most of the gap of a
+        model that was right when it was identified, they have changed, and not all links.
 
         """
         prepared, settings, noise = self.prepared, self.settings, self.prepared.as_described
@@ -136,7 +136,8 @@ class Explainer:
         given = as_given(self.arm, prepared.data, most, settings.library)
         found = explain(replace(given, since=True), evidence, settings)
         nothing = found.only(())
-        if at_floor(nothing, settings):
+        usual = settings.thresholds.predicted * evidence.as_good(settings)
+        if np.all(nothing.chi2_per_row <= usual + evidence.matters(settings)):
             small = tuple(step.trial for step in found.steps)
             found = replace(nothing, minor=(*small, *found.minor))
         notes = (_AS_EXACT,) if found.steps and self.covariance is None else ()
