@@ -206,9 +206,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     resting: list[Excess] = []
     if settings.partner is None:
         parts = [evidence, *([] if unseen is None else [unseen])]
-        resting = [
-            held(rest.fitted.arm, part, asked.before, asked.arm, settings) for part in parts
-        ]
+        resting = [held(rest.fitted.arm, part, asked.before, arm, settings) for part in parts]
     total = float(attribute(explanation, None).whole.sum())
     tried = 1 if explanation.survey is None else explanation.survey.tried
     minor = small_print(explanation.minor, max(total, 1e-300), tried, arm)

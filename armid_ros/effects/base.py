@@ -17,7 +17,7 @@ acts with the shape that it has.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar, Protocol, Self
@@ -238,20 +238,8 @@ class Effect(ABC):
             ) from None
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
-    def spread(
-        self, robot: Robot, found: tuple[FloatArray, FloatArray] | None = None
-    ) -> FloatArray:
-        """
-        Return how large values may be expected to be, infinite if at all, shape (P,).
-
-        Parameters
-        ----------
-        robot : Robot
-            What it acts on.
-        found : tuple of ndarray, each (P,), optional
-            Values and deviations that data tell: one may limit the others.
-
-        """
+    def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
+        """Return how large values may be, shape (P,); found ones and their std limit others."""
         return np.full(len(self.parameters(robot)), np.inf)
 
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -379,12 +367,7 @@ class Effect(ABC):
         """
         Return whether values within the bounds are what one would call by this name.
 
-        Parameters
-        ----------
-        values, std : ndarray, shape (P,)
-            Parameter values and their deviations, as far as white noise goes.
-        arm : Arm
-            The arm without them.
+        Deviations of the values, each (P,), are those of white noise; the arm is without them.
 
         """
         return True

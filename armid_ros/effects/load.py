@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.effects.action import Action
@@ -37,9 +38,7 @@ class _LinkBody(Effect):
         parameters[self._rows(arm.robot)] += values
         return Action(robot=arm.robot.with_inertias(parameters))
 
-    def spread(
-        self, robot: Robot, found: tuple[FloatArray, FloatArray] | None = None
-    ) -> FloatArray:
+    def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
         """Return what descriptions of the links are off by at the most, shape (P,)."""
         return described_spread(robot).ravel()[self._rows(robot)]
 
@@ -125,9 +124,7 @@ class Payload(_LinkBody):
         heaviest = np.maximum(values[0] + _SURELY * std[0], 0.0)
         return bool(most * heaviest < np.maximum(aside, 0.0) ** 2)
 
-    def spread(
-        self, robot: Robot, found: tuple[FloatArray, FloatArray] | None = None
-    ) -> FloatArray:
+    def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
         """
         Return what an arm may carry at the most: as much as it weighs, a little off, shape (P,).
 

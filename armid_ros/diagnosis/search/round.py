@@ -410,8 +410,6 @@ def says_no_more(big: Trial, small: Trial, here: Round) -> bool:
     """Return whether a cause contains another one and, its freedom paid for, explains no more."""
     if not contains(big, small, here):
         return False
-    if here.before is None and _same_body(big, small):
-        return False
     thresholds = here.settings.thresholds
     more, (_, z) = worth(big, here) - worth(small, here), lead(big, small)
     return more <= 0.5 * thresholds.tie or z < thresholds.rival_z
