@@ -182,10 +182,6 @@ class JointCoupling(_Pairs):
                 f'{self.name}: {twice[0]} leads two pairs; put it second in one of them'
             )
 
-    def in_usual_place(self, robot: Robot) -> bool:
-        """Return that any pair of joints is as usual as another one."""
-        return True
-
     @classmethod
     def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(joint for pair in pairwise(joints) for joint in pair)

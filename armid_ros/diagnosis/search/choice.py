@@ -135,11 +135,10 @@ class Explainer:
         most = 2 * settings.thresholds.few_causes
         given = as_given(self.arm, prepared.data, most, settings.library)
         found = explain(replace(given, since=True), evidence, settings)
-        nothing = found.only(())
         usual = settings.thresholds.predicted * evidence.as_good(settings)
-        if np.all(nothing.chi2_per_row <= usual + evidence.matters(settings)):
-            small = tuple(step.trial for step in found.steps)
-            found = replace(nothing, minor=(*small, *found.minor))
+        before = evidence.chi2_per_row(found.reference.residual)
+        if np.all(before <= usual + evidence.matters(settings)):
+            found = found.with_nothing_named()
         notes = (_AS_EXACT,) if found.steps and self.covariance is None else ()
         if self.covariance is not None:
             fitted = with_model_error(found.fitted, evidence, self.arm, self.covariance)

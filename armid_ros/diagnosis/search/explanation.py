@@ -101,6 +101,11 @@ class Explanation:
         fitted = widened(fitted, self.evidence, self.prior, self.by_chance)
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
+    def with_nothing_named(self) -> Explanation:
+        """Return the explanation with all of its names in the small print."""
+        small = tuple(step.trial for step in self.steps)
+        return replace(self, fitted=self.reference, steps=(), minor=(*small, *self.minor))
+
     def forgetting(self) -> Explanation:
         """Return the same with arms that do not hold what they have computed."""
         return replace(

@@ -17,6 +17,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.rows import described_precision, Prior, weighted_rows
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
+from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.least_squares import noise_products
 from armid_ros.identification.fitting.normal_equations import (
@@ -341,12 +342,13 @@ def _covariance(
     problem = [part.restrict(kept) for part in problem]
     told = np.concatenate([part.informative for part in problem]).astype(float)
     left = np.concatenate([part.target for part in problem]) * told
-    own, known = stacked[:, kept].T @ stacked[:, kept], hold[np.ix_(kept, kept)]
-    basis = informative_basis(own)
+    try:
+        basis = informative_basis(stacked[:, kept].T @ stacked[:, kept])
+        products = noise_products(problem, left, told, basis) + hold[np.ix_(kept, kept)]
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise ModelError(f'the patched model cannot be fitted: {error}') from error
     bread = basis @ basis.T
-    covariance[np.ix_(kept, kept)] = (
-        bread @ (noise_products(problem, left, told, basis) + known) @ bread
-    )
+    covariance[np.ix_(kept, kept)] = bread @ products @ bread
     return covariance
 
 

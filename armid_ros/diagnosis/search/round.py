@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
@@ -274,41 +275,36 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
     squares, z = lead(first, other)
     if squares <= here.width:
         return False
-    if _seldom(first, here) and _as_a_rule(other, here):
+    often = _comes(other, here) is _Comes.OFTEN and not other.candidate.effect.external
+    if _comes(first, here) > _Comes.OFTEN and often:
         return squares > thresholds.far * first.gain
     if squares <= thresholds.tie * here.currency * 0.5 and squares <= thresholds.far * first.gain:
         return False
     return z >= thresholds.rival_z or squares > thresholds.far * first.gain
 
 
-def _never_happens(trial: Trial, here: Round) -> bool:
-    """Return whether a cause is none that could come between two days: links do not change."""
-    return here.since and trial.candidate.effect.corrects
+class _Comes(IntEnum):
+    """How seldom a cause comes between two days."""
+
+    OFTEN, SELDOM, NEVER = range(3)
 
 
-def _happens(trial: Trial, here: Round) -> bool:
-    """Return whether a cause of the arm itself may come between two days; a person may pull."""
-    return not (_never_happens(trial, here) or trial.candidate.effect.external)
-
-
-def _seldom(trial: Trial, here: Round) -> bool:
-    """Return whether a cause hardly comes between two days: a link, or a load of an inner one."""
+def _comes(trial: Trial, here: Round) -> _Comes:
+    """Return how seldom a cause comes: a link never changes, an inner one hardly has a load."""
     effect = trial.candidate.effect
-    return here.since and effect.changes_body and (effect.corrects or not _usual(trial))
-
-
-def _as_a_rule(trial: Trial, here: Round) -> bool:
-    """Return whether a cause is of the arm itself, and such as comes between two days."""
-    return not (_seldom(trial, here) or trial.candidate.effect.external)
+    if here.since and effect.corrects:
+        return _Comes.NEVER
+    seldom = here.since and effect.changes_body and not _usual(trial)
+    return _Comes.SELDOM if seldom else _Comes.OFTEN
 
 
 def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
     """Return causes, best first: before one that never happens what happens and says the same."""
     first, *others = passing
-    if _never_happens(first, here):
+    if _comes(first, here) is _Comes.NEVER:
         for other in others:
-            happens = _happens(other, here) and not beaten(other, first, here)
-            if happens and contains(first, other, here):
+            happens = _comes(other, here) < _Comes.NEVER and not other.candidate.effect.external
+            if happens and not beaten(other, first, here) and contains(first, other, here):
                 return [other, first, *(trial for trial in others if trial is not other)]
     return list(passing)
 
@@ -323,10 +319,9 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -
     before what never or seldom does.
 
     """
-    if any(_happens(trial, here) for trial in tied):
-        tied = [trial for trial in tied if not _never_happens(trial, here)]
-    if any(_as_a_rule(trial, here) for trial in tied):
-        tied = [trial for trial in tied if not _seldom(trial, here)]
+    of_arm = [_comes(trial, here) for trial in tied if not trial.candidate.effect.external]
+    least = min(of_arm, default=_Comes.NEVER)
+    tied = [trial for trial in tied if _comes(trial, here) <= least]
     if len(tied) == 1:
         return tied[0]
     able = [trial for trial in tied if closing[id(trial)]]
