@@ -9,11 +9,13 @@ from types import SimpleNamespace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, next_run
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
+from armid_ros.diagnosis.next_run import plan
 from armid_ros.diagnosis.next_run.plan import CLEARANCE, templates
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Named
 from armid_ros.effects import CATALOGUE
+from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
     excitation_faults,
@@ -122,8 +124,9 @@ def test_the_worth_of_a_motion_is_what_the_rival_leaves(bench, doubtful):
     power = Separation.of(doubtful, Doubt(own, zero), trajectory).power
     motion = trajectory.motion(np.arange(1000) / 50.0)
     speed = np.abs(motion.dq)
-    used, floors = doubtful.data[0].used, doubtful.floors
-    sigma = np.sqrt(np.mean([floor.sigma**2 for floor in floors], axis=0))
+    used = doubtful.data[0].used
+    unit = doubtful.explanation.evidence.sigma
+    sigma = np.sqrt(np.mean(np.square(unit), axis=0))
     rows = used.rate_hz / used.decimation / 50.0
     weight = np.where(speed > 0.02 * speed.max(axis=0), np.sqrt(rows) / sigma, 0.0)
     (value,) = doubtful.arm.values_of(own.effect)
@@ -163,6 +166,21 @@ def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen)
     assert chosen.expected_z > 5.0
 
 
+def test_a_motion_is_designed_only_where_no_template_is_enough(doubtful, monkeypatch):
+    designed = []
+
+    def design(*arguments, **options):
+        designed.append(arguments)
+        raise TrajectoryError('asked')
+
+    monkeypatch.setattr(plan, 'design', design)
+    assert plan.next_run(doubtful, np.random.default_rng(1)).expected_z > 5.0
+    assert not designed
+    monkeypatch.setattr(plan, '_SURE', np.inf)
+    plan.next_run(doubtful, np.random.default_rng(1))
+    assert designed
+
+
 def test_what_was_chosen_is_about_the_best_that_there_is(bench, doubtful, chosen):
     clearance = ClearanceModel.of(collision_model(bench.robot))
     rng = np.random.default_rng(4)
@@ -189,9 +207,11 @@ def test_only_a_known_payload_tells_a_gain_from_the_mass():
     found = SimpleNamespace(
         arm=arm,
         refitted=True,
-        floors=[SimpleNamespace(sigma=np.array([0.02]))],
         data=[SimpleNamespace(used=used)],
-        explanation=SimpleNamespace(fitted=SimpleNamespace(named=[Named(gain, (0,))])),
+        explanation=SimpleNamespace(
+            fitted=SimpleNamespace(named=[Named(gain, (0,))]),
+            evidence=SimpleNamespace(sigma=[np.array([0.02])]),
+        ),
     )
     trajectory = FourierTrajectory(
         robot.joints, 8.0, np.zeros(1), np.array([[0.8, 1.0]]), np.array([[0.5, 0.4]])

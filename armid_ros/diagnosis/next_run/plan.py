@@ -4,7 +4,8 @@
 The next run: of many motions that the arm can make, the one that separates names best.
 
 T-optimality (Atkinson and Fedorov 1975): with the named effect in the arm, a motion is worth what
-the rival, with everything that is free fitted to it, cannot explain of its torque, over noise.
+the rival, with everything that is free fitted to it, cannot explain of its torque, over the unit
+of the gap.
 
 Each motion shows something else: slow and fast motion of all joints, motion of single joints,
 reversals so small that dry friction does not break away, shaking; and the same with a known
@@ -44,8 +45,8 @@ _DRAWS = 6
 CLEARANCE = 0.01
 #: The file that a run is written to.
 EXPERIMENT_FILE = 'experiment.yaml'
-#: Names are told apart beyond doubt at this many standard deviations: a payload is not asked for
-#: where a motion alone does it.
+#: Names are told apart beyond doubt at this many standard deviations: no payload is asked for
+#: where a motion alone does it, and no motion is designed where a template does.
 _SURE = 5.0
 #: ... and not at all below this many.
 _NOTHING = 1.0
@@ -354,11 +355,11 @@ def _designed(
     collision: CollisionModel | None,
     rng: np.random.Generator,
 ) -> list[_Run]:
-    """Return a motion like the best template, made for the nearest of the pairs that it tells."""
-    separated = [k for k, pair in enumerate(best.separations) if pair.z >= _NOTHING]
-    if not separated:
+    """Return a motion like the best template, made for the nearest of the pairs in doubt."""
+    doubtful = [k for k, pair in enumerate(best.separations) if _NOTHING <= pair.z < _SURE]
+    if not doubtful:
         return []
-    nearest = min(separated, key=lambda k: best.separations[k].power)
+    nearest = min(doubtful, key=lambda k: best.separations[k].power)
     arm, rival = doubts[nearest].models(diagnosis)
     settings = _settings(best.template, 'T', 'all' if diagnosis.refitted else 'effects')
     bodies = collision or collision_model(arm.robot)

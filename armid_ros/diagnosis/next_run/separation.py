@@ -110,7 +110,7 @@ class Separation:
         Parameters
         ----------
         diagnosis : Diagnosis
-            Gives the arm, what is free of it, and the noise.
+            Gives the arm, what is free of it, and the unit of its gap.
         doubt : Doubt
             The two names.
         trajectory : FourierTrajectory
@@ -194,14 +194,16 @@ def _point(robot: Robot, frame: str) -> FloatArray:
 
 def _weight(diagnosis: Diagnosis, motion: Motion) -> FloatArray:
     """
-    Return the square root of the rows that a sample stands for over their noise, shape (N, n).
+    Return the square root of the rows that a sample stands for over their unit, shape (N, n).
 
-    Noise that is white over the rows has their rate in it: more samples tell no more.
+    Noise that is white over the rows has their rate in it: more samples tell no more. Where the
+    unit is a misfit it is so in the next run.
 
     """
+    assert diagnosis.explanation is not None
     used = diagnosis.data[0].used
     rows = used.rate_hz / used.decimation / _RATE
-    sigma = np.sqrt(np.mean([floor.sigma**2 for floor in diagnosis.floors], axis=0))
+    sigma = np.sqrt(np.mean([unit**2 for unit in diagnosis.explanation.evidence.sigma], axis=0))
     moving = np.abs(motion.dq) > _SLOW * np.abs(motion.dq).max(axis=0)
     return np.asarray(np.where(moving, np.sqrt(rows) / sigma, 0.0))
 
