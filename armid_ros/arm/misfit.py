@@ -5,7 +5,8 @@ What a model leaves of the recordings it was tried on, kept in model.yaml.
 
 No real arm is as its model to the noise. A diagnosis that asks what has changed measures in units
 of what the model left before. The block ``misfit`` of model.yaml has ``unit``, ``data`` - held-out
-or training -, ``rms`` of the residual by joint, and ``relative_error_percent`` of the torque.
+or training -, ``rms`` of the residual by joint, and ``relative_error_percent`` of the torque. What
+a model gets wrong of an arm grows with what the arm does: ``torque_rms`` says what it did.
 
 """
 
@@ -38,6 +39,8 @@ class Misfit:
         Root mean square residual of each joint [N m].
     relative_error_percent : float
         100 |tau - tau_hat| / |tau| over all joints.
+    torque_rms : mapping of str to float, or None
+        Root mean square torque of each joint [N m]; None where it is not known.
     covariance : ndarray, shape (P, P), or None
         Of the parameters of the model, where it is known; model.yaml does not have it.
 
@@ -46,20 +49,32 @@ class Misfit:
     data: str
     rms: Mapping[str, float]
     relative_error_percent: float
+    torque_rms: Mapping[str, float] | None = None
     covariance: FloatArray | None = None
 
     def document(self) -> dict[str, Any]:
         """Return the block that model.yaml holds."""
-        return {
+        block = {
             'unit': 'N m',
             'data': self.data,
             'rms': {joint: float(value) for joint, value in self.rms.items()},
             'relative_error_percent': float(self.relative_error_percent),
         }
+        if self.torque_rms is not None:
+            block['torque_rms'] = {j: float(value) for j, value in self.torque_rms.items()}
+        return block
 
-    def of(self, robot: Robot) -> FloatArray:
+    def of(self, robot: Robot, torque_rms: FloatArray | None = None) -> FloatArray:
         """
         Return the root mean square residual of the joints of a robot, shape (n,) [N m].
+
+        Parameters
+        ----------
+        robot : Robot
+            The arm.
+        torque_rms : ndarray, shape (n,), optional
+            Root mean square torque of other recordings [N m]: where it is more, so is what is
+            left.
 
         Raises
         ------
@@ -73,7 +88,15 @@ class Misfit:
                 f"the misfit says nothing of joint '{missing[0]}'; its joints are "
                 f'{", ".join(self.rms)}'
             )
-        return np.array([self.rms[joint] for joint in robot.joints])
+        left = np.array([self.rms[joint] for joint in robot.joints])
+        if torque_rms is None or self.torque_rms is None:
+            return left
+        return left * louder(torque_rms, np.array([self.torque_rms[j] for j in robot.joints]))
+
+
+def louder(now: FloatArray, before: FloatArray) -> FloatArray:
+    """Return by how much more torque there is now than there was before, at least 1, (n,)."""
+    return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
 
 
 def load_misfit(path: str | Path) -> Misfit | None:
@@ -101,14 +124,23 @@ def load_misfit(path: str | Path) -> Misfit | None:
 
 def _misfit(block: Any) -> Misfit:
     try:
-        rms = {str(joint): value for joint, value in block['rms'].items()}
+        rms, torque = (block.get(key) for key in ('rms', 'torque_rms'))
         data, error = str(block['data']), block['relative_error_percent']
+        named = _torques(rms), None if torque is None else _torques(torque)
     except (AttributeError, KeyError, TypeError) as fault:
         raise ModelError(f'misfit: {type(fault).__name__} {fault}') from fault
     if data not in _DATA:
         raise ModelError(f"misfit has data '{data}', not {' or '.join(_DATA)}")
-    torques = {joint: finite(value, f"misfit of joint '{joint}'") for joint, value in rms.items()}
+    if named[1] is not None and not named[1].keys() >= named[0].keys():
+        raise ModelError('misfit: torque_rms is not of the joints that rms is of')
+    return Misfit(data, named[0], finite(error, 'relative_error_percent of the misfit'), named[1])
+
+
+def _torques(block: Any) -> dict[str, float]:
+    torques = {
+        str(joint): finite(value, f"misfit of joint '{joint}'") for joint, value in block.items()
+    }
     negative = [joint for joint, value in torques.items() if value < 0.0]
     if negative:
         raise ModelError(f"misfit of joint '{negative[0]}' is negative")
-    return Misfit(data, torques, finite(error, 'relative_error_percent of the misfit'))
+    return torques

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
-from armid_ros.diagnosis.data.evidence import Baseline, Evidence, noise_floor
+from armid_ros.diagnosis.data.evidence import Baseline, Evidence, noise_floor, torque_rms
 from armid_ros.diagnosis.data.prepare import check_data, choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
 from armid_ros.diagnosis.search.choice import Explainer
@@ -144,7 +144,7 @@ def diagnose(
     tied = _tied(asked, recordings)
     if tied is not None:
         return _said(tied, notes, asked)
-    written = None if misfit is None else misfit.of(arm.robot)
+    written = None if misfit is None else misfit.of(arm.robot, torque_rms(prepared.data))
     covariance = None if misfit is None else misfit.covariance
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
     explainer = Explainer(arm, prepared, known, rng, tell, settings, written, seen, covariance)

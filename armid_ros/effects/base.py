@@ -106,8 +106,7 @@ class Effect(ABC):
     #: Attributes of a joint of URDF and of MJCF that hold its one quantity; '' if none does.
     urdf_attribute: ClassVar[str] = ''
     mjcf_attribute: ClassVar[str] = ''
-    #: Whether it says that the description is wrong, and never happens to an arm: where one value
-    #: of a description is wrong, others may be.
+    #: Whether it says that the description is wrong, where others may be, and never happens.
     corrects: ClassVar[bool] = False
     #: Whether it comes from outside the arm: a person, another machine.
     external: ClassVar[bool] = False
@@ -413,6 +412,9 @@ class Arm(Protocol):
 
     def values_of(self, effect: Effect) -> FloatArray:
         """Return the values of an effect, shape (P_e,)."""
+
+    def action(self) -> Action:
+        """Return how all its effects act together."""
 
     def link_motion(self, motion: Motion) -> Motion:
         """Return the true motion of the links where another one was recorded."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from armid_ros.effects.action import Action, DryFriction
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
-from armid_ros.effects.quantities import Quantity, Shape
+from armid_ros.effects.quantities import Quantity, Shape, SURELY
 from armid_ros.effects.smooth import smooth_direction, SmoothColumns
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -108,6 +108,15 @@ class AsymmetricFriction(Effect):
         Quantity('viscous_asymmetry', 'N m s/rad', typical=(0.002, 5.0)),
     )
     holds_at_rest = True
+
+    def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
+        """Return whether what is known of friction still opposes motion in both directions."""
+        friction = arm.action().dry_friction
+        if friction is None:
+            return True
+        known = friction.largest(np.zeros(arm.robot.n_joints))
+        shift, doubt = (np.abs(scatter(self, each, arm.robot)[0]) for each in (values, std))
+        return bool(np.all(shift <= known + SURELY * doubt))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(dFc, dFv) = (|sign(dq)|, |dq|), shape (N, n, P)."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.quantities import Quantity
+from armid_ros.effects.quantities import Quantity, SURELY
 from armid_ros.model import joint_axis, LINK_PARAMETERS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -17,8 +17,6 @@ import numpy as np
 
 #: How far from its joint a link's mass may be without a word in the description [m].
 _REACH = 0.1
-#: Standard deviations by which a mass may be more than its estimate.
-_SURELY = 3.0
 _UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 
@@ -103,7 +101,7 @@ class Payload(_LinkBody):
         """Return whether it may weigh something, not farther away than the arm is long."""
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
         length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH
-        heaviest = float(values[0] + _SURELY * std[0])
+        heaviest = float(values[0] + SURELY * std[0])
         return bool(heaviest > 0.0 and np.linalg.norm(values[1:4]) < length * heaviest)
 
     def is_correction(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
@@ -119,9 +117,9 @@ class Payload(_LinkBody):
         share = np.array([x * x, 2.0 * x * y, y * y, 2.0 * x * z, 2.0 * y * z, z * z])
         if not np.all(std[4:][share != 0.0] > 0.0) or not axis.any():
             return False
-        aside = np.linalg.norm(np.cross(axis, values[1:4])) - _SURELY * np.linalg.norm(std[1:4])
-        most = share @ values[4:] + _SURELY * np.abs(share) @ std[4:]
-        heaviest = np.maximum(values[0] + _SURELY * std[0], 0.0)
+        aside = np.linalg.norm(np.cross(axis, values[1:4])) - SURELY * np.linalg.norm(std[1:4])
+        most = share @ values[4:] + SURELY * np.abs(share) @ std[4:]
+        heaviest = np.maximum(values[0] + SURELY * std[0], 0.0)
         return bool(most * heaviest < np.maximum(aside, 0.0) ** 2)
 
     def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
@@ -134,7 +132,7 @@ class Payload(_LinkBody):
         mass = float(robot.rigid_parameters[:: len(LINK_PARAMETERS)].sum())
         if found is not None:
             values, std = found
-            mass = min(mass, float(np.abs(values[0]) + _SURELY * std[0]))
+            mass = min(mass, float(np.abs(values[0]) + SURELY * std[0]))
         return np.asarray(mass * np.array([1.0] + 3 * [_REACH] + 6 * [_REACH**2]))
 
 

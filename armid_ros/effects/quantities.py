@@ -22,6 +22,9 @@ _PRISMATIC_UNITS = {
     '1/rev': '1/(2 pi m)',
 }
 
+#: Standard deviations by which a value surely differs from another.
+SURELY = 3.0
+
 
 @dataclass(frozen=True)
 class Quantity:

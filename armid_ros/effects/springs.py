@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter
-from armid_ros.effects.quantities import Quantity, Shape
+from armid_ros.effects.quantities import Quantity, Shape, SURELY
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -18,9 +18,6 @@ import numpy as np
 _BUMPER = 0.15
 #: ... and shares of the range that was moved through between which a search looks for them.
 _EDGES = (0.02, 0.05, 0.1, 0.2, 0.3)
-
-#: Deviations by which a stiffness has to differ from zero.
-_SURELY = 3.0
 
 
 @dataclass(frozen=True)
@@ -59,7 +56,7 @@ class JointSpring(Effect):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether there is surely a stiffness; a preload alone is an offset."""
-        return bool(values[0] > _SURELY * std[0])
+        return bool(values[0] > SURELY * std[0])
 
 
 @dataclass(frozen=True)

@@ -121,12 +121,15 @@ class Score:
         The same of each joint.
     rms : ndarray, shape (n,)
         Root mean square residual of each joint [N m].
+    torque_rms : ndarray, shape (n,)
+        Root mean square torque of each joint [N m].
 
     """
 
     relative_error_percent: float
     joint_relative_error_percent: FloatArray
     rms: FloatArray
+    torque_rms: FloatArray
 
     @staticmethod
     def of(fits: Sequence[Fit]) -> Score:
@@ -134,11 +137,12 @@ class Score:
         used = np.concatenate([fit.informative for fit in fits])
         residual = used * np.concatenate([fit.residual for fit in fits])
         tau = used * np.concatenate([fit.motion.tau for fit in fits if fit.motion.tau is not None])
-        lengths = np.linalg.norm(tau, axis=0)
+        lengths, count = np.linalg.norm(tau, axis=0), np.maximum(used.sum(axis=0), 1)
         return Score(
             float(100.0 * np.linalg.norm(residual) / np.linalg.norm(tau)),
             100.0 * np.linalg.norm(residual, axis=0) / np.where(lengths > 0.0, lengths, np.inf),
-            np.sqrt(np.sum(residual**2, axis=0) / np.maximum(used.sum(axis=0), 1)),
+            np.linalg.norm(residual, axis=0) / np.sqrt(count),
+            lengths / np.sqrt(count),
         )
 
 
@@ -206,9 +210,12 @@ class Identification:
         """Return what the model leaves, of held-out recordings where there are any."""
         held_out = [fit for part in validation.values() for fit in part]
         score = Score.of(held_out or self.training)
-        rms = dict(zip(self.arm.robot.joints, score.rms.tolist(), strict=True))
+        joints = self.arm.robot.joints
+        rms, torque = (
+            dict(zip(joints, each.tolist(), strict=True)) for each in (score.rms, score.torque_rms)
+        )
         data = 'held-out' if held_out else 'training'
-        return Misfit(data, rms, score.relative_error_percent)
+        return Misfit(data, rms, score.relative_error_percent, torque)
 
     @property
     def unidentified(self) -> tuple[Unidentified, ...]:

@@ -57,9 +57,15 @@ class Healthy:
         informative = np.concatenate([part.informative for part in data])
         informative[:, ~informative.any(axis=0)] = True  # of a joint that never moved, all of it
         mean = np.mean(left**2, axis=0, where=informative)
-        torque = float(np.sum(self.recording.tau**2) / len(self.recording))
-        rms = dict(zip(self.arm.robot.joints, np.sqrt(mean).tolist(), strict=True))
-        return Misfit('held-out', rms, 100.0 * float(np.sqrt(mean.sum() / torque)))
+        whole = float(np.sum(self.recording.tau**2) / len(self.recording))
+        torque = np.mean(
+            np.concatenate([part.torque for part in data]) ** 2, axis=0, where=informative
+        )
+        rms, loud = (
+            dict(zip(self.arm.robot.joints, np.sqrt(each).tolist(), strict=True))
+            for each in (mean, torque)
+        )
+        return Misfit('held-out', rms, 100.0 * float(np.sqrt(mean.sum() / whole)), loud)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ def robot():
 def path(robot, tmp_path):
     """Return a model with a misfit of 0.1, 0.2, ... N m."""
     rms = {joint: 0.1 * (k + 1) for k, joint in enumerate(robot.joints)}
-    misfit = Misfit('held-out', rms, 5.1)
+    loud = dict.fromkeys(robot.joints, 2.0)
+    misfit = Misfit('held-out', rms, 5.1, loud)
     save_model(tmp_path / 'model.yaml', ArmModel(robot), robot.name, misfit=misfit)
     return tmp_path / 'model.yaml'
 
@@ -29,6 +30,9 @@ def test_it_comes_back_and_the_model_is_the_same_without_it(robot, path):
     assert found.data == 'held-out'
     assert found.relative_error_percent == 5.1
     np.testing.assert_allclose(found.of(robot), 0.1 * np.arange(1, 7))
+    torque = np.array([1.0, 2.0, 3.0, 4.0, 0.0, 8.0])
+    factor = np.array([1.0, 1.0, 1.5, 2.0, 1.0, 4.0])
+    np.testing.assert_allclose(found.of(robot, torque), factor * found.of(robot))
     assert yaml.safe_load(path.read_text())['misfit']['unit'] == 'N m'
     np.testing.assert_array_equal(load_model(path).theta, ArmModel(robot).theta)
 
@@ -45,6 +49,8 @@ def test_a_model_that_was_not_identified_has_none(robot, tmp_path):
         ({'rms': {'elbow_pitch': float('nan')}}, 'elbow_pitch'),
         ({'rms': 'much'}, 'misfit'),
         ({'data': 'guessed'}, 'guessed'),
+        ({'torque_rms': {'elbow_pitch': 1.0}}, 'torque_rms'),
+        ({'torque_rms': {'elbow_pitch': -1.0}}, 'elbow_pitch'),
         ({'relative_error_percent': None}, 'misfit'),
     ],
 )

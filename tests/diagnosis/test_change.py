@@ -115,3 +115,15 @@ def test_a_load_of_a_link_between_two_days_is_a_payload(upright):
     assert (found.name, found.joints) == ('payload', ('shoulder',))
     values = dict(zip([p.name for p in found.parameters], found.values, strict=True))
     assert values['payload_mz'] == pytest.approx(0.2, rel=0.05)
+
+
+def test_drag_of_three_joints_is_no_person_who_slows_them_down(upright):
+    """One damper at a link slows all joints before it, each of them a little wrongly."""
+    drag = np.array([0.3, 0.35, 0.15])
+    before, after, new = (
+        upright.recordings(make, k)
+        for k, make in enumerate((None, *2 * (lambda motion, tau: drag * motion.dq,)))
+    )
+    (found,) = asked(upright, before, after, new).findings
+    assert (found.name, found.joints) == ('viscous_friction', upright.robot.joints)
+    assert np.allclose(found.values, drag, atol=0.05)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from armid_ros.diagnosis.search.round import beaten, likeliest, rarity, says_no_more
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
+from armid_ros.effects.gravity import GravityVector
 import numpy as np
 import pytest
 
@@ -31,6 +32,12 @@ def trial(bench, name, joints):
 )
 def test_the_common_goes_first(bench, first, second):
     assert rarity(trial(bench, *first)) < rarity(trial(bench, *second))
+
+
+def test_gravity_of_any_direction_is_as_common_as_a_base_that_leans(bench):
+    leaning = trial(bench, 'base_tilt', ())
+    leaning.candidate.effect = GravityVector.on(bench.robot)
+    assert rarity(leaning) == rarity(trial(bench, 'base_tilt', ()))
 
 
 class Known:

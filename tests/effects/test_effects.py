@@ -3,7 +3,7 @@
 """Friction, rotors, gravity and bodies, each against what it is in physics."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
+from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.model import inverse_dynamics
 from armid_ros.robots import load_robot
 import numpy as np
@@ -105,3 +105,14 @@ def test_a_body_may_be_a_payload_and_one_lighter_about_its_axis_than_a_point_may
     nothing = np.concatenate([values[:4], 0.1 * values[4:]])
     assert effect.is_correction(nothing, std, arm)
     assert not effect.is_correction(nothing, np.abs(values), arm)
+
+
+@pytest.mark.parametrize(('shift', 'opposes'), [(0.4, True), (-0.4, True), (0.7, False)])
+def test_friction_of_any_direction_opposes_the_motion(robot, shift, opposes):
+    """A joint of 0.5 N m of friction is not pushed forwards by 0.2 N m of it."""
+    arm = ArmModel(robot).with_effect(make_effect('coulomb_friction', robot), np.full(6, 0.5))
+    effect = CATALOGUE['asymmetric_friction'].on(robot, ('elbow_pitch',))
+    values, sure = np.array([shift, 0.0]), np.full(2, 0.01)
+    assert effect.plausible(values, sure, arm) == opposes
+    assert effect.plausible(values, 10.0 * sure, arm)
+    assert effect.plausible(values, sure, ArmModel(robot))

@@ -177,6 +177,12 @@ class Evidence:
         return np.maximum(total, 1e-12)
 
 
+def torque_rms(data: Sequence[Trajectory]) -> FloatArray:
+    """Return the root mean square torque of each joint, of rows that tell something, (n,)."""
+    unit = tuple(np.ones(part.motion.n_joints) for part in data)
+    return Evidence(tuple(data), unit, unit).torque_rms
+
+
 @dataclass(frozen=True)
 class NoiseFloor:
     """

@@ -15,7 +15,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Baseline, Evidence
+from armid_ros.arm.misfit import louder
+from armid_ros.diagnosis.data.evidence import Baseline, Evidence, torque_rms
 from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.candidates import as_given, fitted_anew
@@ -179,7 +180,8 @@ class Explainer:
         """Explain what has changed since the baseline."""
         arm, prepared, settings = self.arm, self.prepared, self.settings
         self.tell(0.2, 'what has changed')
-        misfit = baseline.misfit * _louder(prepared, baseline)
+        now, then = torque_rms(prepared.data), torque_rms(baseline.data)
+        misfit = baseline.misfit * louder(now, then)
         noise = _told_by(baseline, prepared, misfit)
         sigma = tuple(np.maximum(one, misfit) for one in noise)
         evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
@@ -237,22 +239,6 @@ def _most(steps: Sequence[Step], settings: DiagnosisSettings) -> bool:
     """Return whether names take most of the gap."""
     taken = sum(step.trial.gain / step.total for step in steps)
     return taken > settings.thresholds.open_share
-
-
-def _louder(prepared: Prepared, baseline: Baseline) -> FloatArray:
-    """
-    Return by how much more torque the data have than the baseline, at least 1, shape (n,).
-
-    What a model gets wrong of an arm grows with what the arm does.
-
-    """
-    now, before = (_torque_rms(data) for data in (prepared.data, baseline.data))
-    return np.maximum(now / np.maximum(before, 1e-12), 1.0)
-
-
-def _torque_rms(data: Sequence[Trajectory]) -> FloatArray:
-    unit = tuple(np.ones(part.motion.n_joints) for part in data)
-    return Evidence(tuple(data), unit, unit).torque_rms
 
 
 def _beside_a_correction(first: Explanation) -> bool:

@@ -41,13 +41,16 @@ def explain(
     unseen: Evidence | None = None,
 ) -> Explanation:
     """Take causes as long as any passes, then name the friction that matters, and prune."""
-    way = Search(question, evidence, settings, baseline, unseen).forward(start)
-    survey, last = way.first, way.last
-    minor = () if last is None else last.there
+    search = Search(question, evidence, settings, baseline, unseen)
+    way = search.forward(start)
+    survey, last = way.first, None if way.last is None else way.last.look.survey
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
     retrial = Retrial(question, evidence, settings)
     friction, tried = _friction(retrial, way.taken, whole)
-    taken = [*way.taken, *friction]
+    found = [*way.taken, *search.in_place_of(friction, way)]
+    if len(found) > len(way.taken):
+        friction, _ = _friction(retrial, found, whole)
+    taken = [*found, *friction]
     if survey is not None:
         survey = survey.and_nuisance(tried, settings.thresholds.least_visible)
     reference = retrial.fitted((), None)
@@ -56,6 +59,7 @@ def explain(
     by_chance = 0.0 if last is None else last.by_chance
     fitted = widened(fitted, evidence, question.prior, by_chance)
     said = {own.effect.name for own in fitted.named}
+    minor = () if last is None else last.there
     small = tuple(trial for trial in minor if trial.candidate.effect.name not in said)
     return Explanation(
         question.arm,
@@ -73,28 +77,6 @@ def explain(
 
 
 @dataclass(frozen=True)
-class Way:
-    """
-    Causes in the order in which they were taken.
-
-    Attributes
-    ----------
-    taken : tuple of Taken
-        The causes.
-    first, last : Survey or None
-        The first look at all causes, and the last one.
-    change : ndarray, shape (r,), or None
-        What was added to what is free of the arm in the last fit.
-
-    """
-
-    taken: tuple[Taken, ...]
-    first: Survey | None
-    last: Survey | None
-    change: FloatArray | None = None
-
-
-@dataclass(frozen=True)
 class _Place:
     """What was taken on a way, the fit beside which it goes on, and a look at all causes there."""
 
@@ -105,6 +87,30 @@ class _Place:
     before: Before | None
     look: Look
     next: dict[Hashable, _Place] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Way:
+    """
+    Causes in the order in which they were taken.
+
+    Attributes
+    ----------
+    taken : tuple of Taken
+        The causes.
+    first : Survey or None
+        What the first look at all causes showed.
+    last : _Place or None
+        Where the last look was.
+    change : ndarray, shape (r,), or None
+        What was added to what is free of the arm in the last fit.
+
+    """
+
+    taken: tuple[Taken, ...]
+    first: Survey | None
+    last: _Place | None
+    change: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -142,7 +148,7 @@ class Search:
         first = self._fitted_place(named, values, None)
         way = self._way(first, steps, 0.0)
         assert way.last is not None
-        width = way.last.most
+        width = way.last.look.width
         here = replace(first.look.here, total=None, before=None, width=width)
         found = [one.step for one in way.taken[len(start) :]]
         if any(undecided(step.trial, step.ranking, here) for step in found):
@@ -163,9 +169,41 @@ class Search:
                 place = self._after(place, step)
                 named, values = list(place.named), list(place.values)
         rows = zip(named, taken, values, strict=True)
-        return Way(
-            tuple(Taken(*row) for row in rows), first, place.look.survey, place.current.change
-        )
+        return Way(tuple(Taken(*row) for row in rows), first, place, place.current.change)
+
+    def in_place_of(self, friction: Sequence[Taken], way: Way) -> list[Taken]:
+        """
+        Return what is there in place of offsets that were free beside every cause.
+
+        A gain of a joint that holds much weight is an offset and a little more. Friction is what
+        every joint has, and no offset is: what takes one has to be ahead of all causes.
+
+        """
+        question, place = self.question, way.last
+        asked = [one.named.effect for one in friction if not one.named.effect.friction]
+        if not asked or place is None or place.before is not None:
+            return []
+        arm, base = question.nuisance_arm, question.nuisance_base
+        assert base is not None
+        names = [(p.name, p.joint) for p in arm.parameters]
+        where = [
+            names.index((p.name, p.joint)) for one in asked for p in one.parameters(arm.robot)
+        ]
+        here = replace(place.look.here, total=None)
+        for column in sorted(np.flatnonzero(np.isin(base.independent, where)), reverse=True):
+            value = place.current.arm.theta[base.independent[column]]
+            here = here.without(int(column), float(value))
+        found: list[Taken] = []
+        others = place.found.candidates
+        for _ in range(min(len(asked), self.settings.thresholds.few_causes)):
+            step = look_at(others, here).step()
+            if step is None:
+                break
+            found.append(_of(step, question))
+            taken = step.trial.candidate
+            here = replace(here, nuisance=here.nuisance.and_columns(taken), known=None)
+            others = tuple(one for one in others if one.key != taken.key)
+        return found
 
     def _after(self, place: _Place, step: Step) -> _Place:
         """Return the place behind a step."""
@@ -190,10 +228,8 @@ class Search:
         return place.next[way]
 
     def _and_named(self, place: _Place, step: Step) -> tuple[list[Named], list[FloatArray]]:
-        candidate = step.trial.candidate
-        start = np.zeros(len(candidate.effect.parameters(self.question.arm.robot)))
-        start[list(candidate.kept)] = step.trial.values
-        return [*place.named, Named(candidate.effect, candidate.kept)], [*place.values, start]
+        one = _of(step, self.question)
+        return [*place.named, one.named], [*place.values, one.values]
 
     def _fitted_place(
         self,
@@ -249,6 +285,14 @@ class Search:
         pairs = zip(there.residual, there.columns, strict=True)
         left = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]
         return replace(before, later=Later.of(unseen, there.columns, left))
+
+
+def _of(step: Step, question: Question) -> Taken:
+    """Return the name of a step, with the values that it was found with."""
+    candidate = step.trial.candidate
+    values = np.zeros(len(candidate.effect.parameters(question.arm.robot)))
+    values[list(candidate.kept)] = step.trial.values
+    return Taken(Named(candidate.effect, candidate.kept), step, values)
 
 
 def _friction(

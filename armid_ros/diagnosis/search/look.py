@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
@@ -25,6 +25,8 @@ from armid_ros.diagnosis.search.held_out import tried_beside
 from armid_ros.diagnosis.search.round import (
     beaten,
     closes,
+    comes,
+    cost,
     likeliest,
     rarity,
     Round,
@@ -43,6 +45,8 @@ _LOOKED_AT, _REFINED, _PROMISING = 30, 6, 0.4
 _COMPARED = 8
 #: Rivals that are listed for a name: the likeliest, each name once; more than two help nobody.
 _RIVALS = 2
+#: What stands for a cause of any name.
+_ANY = ''
 #: Causes in the small print.
 _SMALL_PRINT = 5
 
@@ -73,6 +77,18 @@ class Look:
     ranking: tuple[Trial, ...]
     here: Round
 
+    @property
+    def width(self) -> float:
+        """
+        Squares that any cause takes of what is left: a lead of less decides nothing.
+
+        Where there are recordings from before, what was there already is no measure of a change.
+
+        """
+        best = self.ranking[:_COMPARED]
+        found = [_changes([trial], self.here)[0] for trial in best]
+        return max((change.gain for change in found if change is not None), default=0.0)
+
     def step(self, width: float = 0.0) -> Step | None:
         """
         Return the cause that takes most of what is left, of those that have changed.
@@ -85,7 +101,13 @@ class Look:
         ahead = list(takewhile(lambda trial: not changed(trial, here), self.passing))
         if len(ahead) == len(self.passing):
             return None
-        first, *others = what_happens_first(self.passing[len(ahead) :], here)
+        passing = what_happens_first(self.passing[len(ahead) :], here)
+        parts = _joint_by_joint(passing, self.ranking, here)
+        if parts:
+            where = _touched(parts[0], here)
+            passing = [trial for trial in passing if _touched(trial, here) == where]
+            ahead = [trial for trial in ahead if _touched(trial, here) == where]
+        first, *others = passing
         behind = [trial for trial in others if not beaten(trial, first, here)]
         able = [first, *(trial for trial in behind if changed(trial, here))]
         winner = likeliest(able, self.closing, here)
@@ -96,10 +118,17 @@ class Look:
             if trial is not winner and not says_no_more(trial, winner, here)
         ]
         best = {trial.candidate.effect.name: trial for trial in reversed(rivals)}
-        likely = tuple(sorted(best.values(), key=rarity)[:_RIVALS])
+        likely = sorted(best.values(), key=lambda trial: (comes(trial, here), rarity(trial)))
         whole = here.settings.thresholds.misfit_share
         least = 0.0 if surely_changed(winner, here) else whole
-        return Step(winner, likely, self.ranking, self.survey.total, self.survey.tried, least)
+        return Step(
+            winner,
+            tuple(likely[:_RIVALS]),
+            self.ranking,
+            self.survey.total,
+            self.survey.tried,
+            least,
+        )
 
 
 def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
@@ -134,6 +163,47 @@ def _part(candidate: Candidate, possible: Sequence[int], first: int) -> Candidat
         columns=slice(first, first + len(possible)),
         kept=tuple(candidate.kept[k] for k in possible),
     )
+
+
+def _joint_by_joint(
+    passing: Sequence[Trial], ranking: Sequence[Trial], here: Round
+) -> list[Trial]:
+    """
+    Return what joints have, each for itself, if together it beats the cause that takes most.
+
+    They are simpler and take more. Friction of three joints is one cause each, and a person who
+    pulls at all of them takes more than any. Joints have the same cause, or beside one from
+    outside, which can be like any, each its own. The best that has changed is ahead; empty if
+    there is none.
+
+    """
+    first = passing[0]
+    if len(_touched(first, here)) < 2:
+        return []
+    groups: defaultdict[str, dict[tuple[int, ...], Trial]] = defaultdict(dict)
+    for trial in ranking[:_LOOKED_AT]:
+        where = _touched(trial, here)
+        if len(where) == 1 and acceptable(trial, here):
+            groups[trial.candidate.effect.name].setdefault(where, trial)
+            if first.candidate.effect.external:
+                groups[_ANY].setdefault(where, trial)
+    able = [id(trial) for trial in passing if changed(trial, here)]
+    found = [[*group.values()] for group in groups.values()]
+    found = [group for group in found if any(id(trial) in able for trial in group)]
+    if not found:
+        return []
+    parts = max(found, key=lambda group: sum(worth(trial, here) for trial in group))
+    cross, square = (sum(getattr(t, name) for t in parts) for name in ('cross', 'square'))
+    whole = replace(parts[0], cross=cross, square=square)
+    simpler = sum(cost(trial, here.settings) for trial in parts) <= cost(first, here.settings)
+    if not (simpler and whole.gain > first.gain and beaten(first, whole, here)):
+        return []
+    return sorted(parts, key=lambda trial: (id(trial) not in able, -worth(trial, here)))
+
+
+def _touched(trial: Trial, here: Round) -> tuple[int, ...]:
+    """Return the joints whose torque a cause changes."""
+    return tuple(np.flatnonzero(np.any(here.own(trial.candidate), axis=(0, 2))).tolist())
 
 
 def _survey(

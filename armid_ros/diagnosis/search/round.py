@@ -245,6 +245,16 @@ class Round:
         """Return the same where a lead of less than some squares decides nothing."""
         return self if width == self.width else replace(self, width=width)
 
+    def without(self, place: int, value: float) -> Round:
+        """Return the same where one of the free columns is not there, and had a value."""
+        free = [column for k, column in enumerate(self.nuisance.free) if k != place]
+        kept = [k for k in range(len(self.nuisance.free)) if k != place]
+        hold, pull = self.nuisance.hold, self.nuisance.pull
+        column = self.problem.x[:, :, self.nuisance.free[place]]
+        problem = replace(self.problem, y=self.problem.y + value * column)
+        nuisance = Nuisance(tuple(free), hold[np.ix_(kept, kept)], pull[kept])
+        return replace(self, problem=problem, nuisance=nuisance, known=None)
+
     def own(self, candidate: Candidate) -> FloatArray:
         """Return the columns of a candidate, shape (R, n, p)."""
         return self.problem.x[:, :, candidate.columns]
@@ -275,35 +285,35 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
     squares, z = lead(first, other)
     if squares <= here.width:
         return False
-    often = _comes(other, here) is _Comes.OFTEN and not other.candidate.effect.external
-    if _comes(first, here) > _Comes.OFTEN and often:
+    often = comes(other, here) is Comes.OFTEN and not other.candidate.effect.external
+    if comes(first, here) > Comes.OFTEN and often:
         return squares > thresholds.far * first.gain
     if squares <= thresholds.tie * here.currency * 0.5 and squares <= thresholds.far * first.gain:
         return False
     return z >= thresholds.rival_z or squares > thresholds.far * first.gain
 
 
-class _Comes(IntEnum):
+class Comes(IntEnum):
     """How seldom a cause comes between two days."""
 
     OFTEN, SELDOM, NEVER = range(3)
 
 
-def _comes(trial: Trial, here: Round) -> _Comes:
+def comes(trial: Trial, here: Round) -> Comes:
     """Return how seldom a cause comes: a link never changes, an inner one hardly has a load."""
     effect = trial.candidate.effect
     if here.since and effect.corrects:
-        return _Comes.NEVER
+        return Comes.NEVER
     seldom = here.since and effect.changes_body and not _usual(trial)
-    return _Comes.SELDOM if seldom else _Comes.OFTEN
+    return Comes.SELDOM if seldom else Comes.OFTEN
 
 
 def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
     """Return causes, best first: before one that never happens what happens and says the same."""
     first, *others = passing
-    if _comes(first, here) is _Comes.NEVER:
+    if comes(first, here) is Comes.NEVER:
         for other in others:
-            happens = _comes(other, here) < _Comes.NEVER and not other.candidate.effect.external
+            happens = comes(other, here) < Comes.NEVER and not other.candidate.effect.external
             if happens and not beaten(other, first, here) and contains(first, other, here):
                 return [other, first, *(trial for trial in others if trial is not other)]
     return list(passing)
@@ -319,9 +329,9 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -
     before what never or seldom does.
 
     """
-    of_arm = [_comes(trial, here) for trial in tied if not trial.candidate.effect.external]
-    least = min(of_arm, default=_Comes.NEVER)
-    tied = [trial for trial in tied if _comes(trial, here) <= least]
+    of_arm = [comes(trial, here) for trial in tied if not trial.candidate.effect.external]
+    least = min(of_arm, default=Comes.NEVER)
+    tied = [trial for trial in tied if comes(trial, here) <= least]
     if len(tied) == 1:
         return tied[0]
     able = [trial for trial in tied if closing[id(trial)]]
@@ -365,8 +375,8 @@ def undecided(first: Trial, ranking: Sequence[Trial], here: Round) -> bool:
 
 def rarity(trial: Trial) -> float:
     """Return the position in the catalogue, which goes from the common to the rare."""
-    names, effect = list(CATALOGUE), trial.candidate.effect
-    place = names.index(effect.name) if effect.name in CATALOGUE else len(names)
+    names, name = list(CATALOGUE), trial.candidate.effect.said_as
+    place = names.index(name) if name in CATALOGUE else len(names)
     return place + (0.0 if _usual(trial) else _ELSEWHERE)
 
 

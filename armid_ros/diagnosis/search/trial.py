@@ -325,11 +325,6 @@ class Survey:
         )
 
     @property
-    def most(self) -> float:
-        """Squares that any cause takes."""
-        return max((trial.gain for trial in self.ranking), default=0.0)
-
-    @property
     def by_chance(self) -> float:
         """Squares that a value of a cause takes in the mean."""
         each = [max(trial.gain, 0.0) / max(trial.freedom, 1.0) for trial in self.ranking]
