@@ -184,8 +184,8 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     """Measure what was found on held-out data, and say it."""
     arm, settings = asked.arm, asked.settings
     asked.tell(0.85, 'held-out gap')
-    explanation, remarks = as_bodies(chosen.explanation, arm)
-    notes = [*notes, *chosen.notes, *remarks]
+    explanation, said = as_bodies(chosen.explanation, arm)
+    notes = [*notes, *chosen.notes, *said]
     evidence = explanation.evidence
     unseen = _unseen(asked, explanation, chosen)
     measured = chosen.floor_in_words in (NOISE, ESTIMATED)
@@ -193,16 +193,18 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     rest, shares = headline(chosen.rest or explanation, unseen, settings, least)
     explanation = rest
     if chosen.rest is not None and rest.steps:
-        explanation, shares, more = _as_stated(rest, shares, unseen, arm, settings)
-        notes += more
+        explanation, shares, remarks = _as_stated(rest, shares, unseen, arm, settings)
+        notes += remarks
     found = findings(explanation, shares, arm, asked.rng)
     worse = _harmed(chosen, explanation, unseen, settings)
     data = evidence.data
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
-    left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings')]
+    more = settings.thresholds.predicted
+    usual = 1.0 if measured or found else more  # another motion makes another misfit
+    left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings', usual)]
     if unseen is not None:
-        sure, least_sure = _sure(unseen, chosen), settings.thresholds.predicted
-        left.append(_left(rest, sure, settings, 'recordings that were not used', least_sure))
+        sure = _sure(unseen, chosen)
+        left.append(_left(rest, sure, settings, 'recordings that were not used', more))
     resting: list[Excess] = []
     if settings.partner is None:
         parts = [evidence, *([] if unseen is None else [unseen])]
@@ -217,7 +219,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         [*left, *resting],
         arm,
         NOISE if measured else chosen.floor_in_words,
-        None if explanation.base is None else _as_it_is(arm, _sure(evidence, chosen), settings),
+        _as_it_is(arm, _sure(evidence, chosen), settings) if _corrected(explanation) else None,
         minor,
     )
     gap = measure_gap(explanation, unseen)
@@ -314,13 +316,20 @@ def _left(
     evidence: Evidence,
     settings: DiagnosisSettings,
     where: str,
-    more: float = 1.0,
+    more: float,
 ) -> Excess:
     if evidence.data is explanation.evidence.data:
         residual = explanation.fitted.residual
     else:
         residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
     return Excess(_excess(residual, evidence, settings) / more, f'in {where}')
+
+
+def _corrected(explanation: Explanation) -> bool:
+    """Return whether values of the description were fitted, and not only those nobody gave."""
+    base = explanation.base
+    rigid = len(explanation.given.robot.rigid_parameters)
+    return base is not None and bool(np.any(base.independent < rigid))
 
 
 def _as_it_is(arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings) -> Excess:

@@ -41,7 +41,7 @@ def gain(tau):
 
 def offset(tau):
     """Return what a sensor of the shoulder reads too much whatever its torque."""
-    return np.zeros_like(tau) + [0.0, 0.3, 0.0]
+    return np.broadcast_to([0.0, 0.3, 0.0], tau.shape)
 
 
 @pytest.mark.parametrize('friction', ['known', 'named'])

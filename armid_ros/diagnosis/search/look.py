@@ -25,6 +25,7 @@ from armid_ros.diagnosis.search.held_out import tried_beside
 from armid_ros.diagnosis.search.round import (
     beaten,
     closes,
+    Comes,
     comes,
     cost,
     likeliest,
@@ -118,7 +119,7 @@ class Look:
             if trial is not winner and not says_no_more(trial, winner, here)
         ]
         best = {trial.candidate.effect.name: trial for trial in reversed(rivals)}
-        likely = sorted(best.values(), key=lambda trial: (comes(trial, here), rarity(trial)))
+        likely = sorted(best.values(), key=lambda t: (comes(t, here) is Comes.NEVER, rarity(t)))
         whole = here.settings.thresholds.misfit_share
         least = 0.0 if surely_changed(winner, here) else whole
         return Step(

@@ -82,7 +82,7 @@ def decide(
     if strange and (not findings or open_gap):
         return Verdict('not_repeatable', _strange(strange, findings))
     rest = (
-        f'the error of {joint} is {_factor(np.sqrt(worst.ratio.max()))} times as large as '
+        f'the error of {joint} is {_larger(np.sqrt(worst.ratio.max()))} '
         f'{floor_in_words} can be {worst.where}'
     )
     if not findings:
@@ -117,7 +117,7 @@ def _consistent(
     text = (
         'The model explains the recordings once its rigid body and friction are fitted: what is '
         f'left is {floor_in_words}. As it is, the error of {robot.joints[worst]} is '
-        f'{_factor(np.sqrt(as_it_is.ratio[worst]))} times as large as that can be.'
+        f'{_larger(np.sqrt(as_it_is.ratio[worst]))} that can be.'
     )
     return ' '.join([text, *small])
 
@@ -129,11 +129,11 @@ def _unexplained(minor: Sequence[Finding]) -> str:
     return f'Nothing in the catalogue closes it. {sentence(minor[0])}'
 
 
-def _factor(ratio: float) -> str:
-    """Return a ratio with as many digits as tell it from one."""
-    if ratio >= 100.0:
-        return f'{ratio:.0f}'
-    return f'{ratio:.1f}' if ratio >= 1.05 else f'{ratio:.2f}'
+def _larger(ratio: float) -> str:
+    """Say how much larger an error is than another one."""
+    if ratio < 1.05:
+        return 'a little larger than'
+    return f'{ratio:.0f} times as large as' if ratio >= 100.0 else f'{ratio:.1f} times as large as'
 
 
 def sentence(finding: Finding) -> str:
