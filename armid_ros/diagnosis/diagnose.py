@@ -199,16 +199,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     worse = _harmed(chosen, explanation, unseen, settings)
     data = evidence.data
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
-    more = settings.thresholds.predicted
-    usual = 1.0 if measured or found else more  # another motion makes another misfit
-    left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings', usual)]
-    if unseen is not None:
-        sure = _sure(unseen, chosen)
-        left.append(_left(rest, sure, settings, 'recordings that were not used', more))
-    resting: list[Excess] = []
-    if settings.partner is None:
-        parts = [evidence, *([] if unseen is None else [unseen])]
-        resting = [held(rest.fitted.arm, part, asked.before, arm, settings) for part in parts]
+    left, resting = _excesses(asked, chosen, rest, unseen, bool(found))
     total = float(attribute(explanation, None).whole.sum())
     tried = 1 if explanation.survey is None else explanation.survey.tried
     minor = small_print(explanation.minor, max(total, 1e-300), tried, arm)
@@ -309,6 +300,26 @@ def _harmed(
     """Return the joints in which the patched model is worse than the given one."""
     measured = replace(explanation, evidence=_sure(explanation.evidence, chosen))
     return harmed(measured, None if unseen is None else _sure(unseen, chosen), settings)
+
+
+def _excesses(
+    asked: _Asked, chosen: Chosen, rest: Explanation, unseen: Evidence | None, named: bool
+) -> tuple[list[Excess], list[Excess]]:
+    """Return what is left over limits, and over friction where a joint is held."""
+    settings, evidence = asked.settings, rest.evidence
+    more = settings.thresholds.predicted
+    measured = chosen.floor_in_words in (NOISE, ESTIMATED)
+    usual = 1.0 if measured or named else more  # another motion makes another misfit
+    left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings', usual)]
+    parts = [evidence]
+    if unseen is not None:
+        sure = _sure(unseen, chosen)
+        left.append(_left(rest, sure, settings, 'recordings that were not used', more))
+        parts.append(unseen)
+    if settings.partner is not None:
+        return left, []
+    arm = rest.fitted.arm
+    return left, [held(arm, part, asked.before, asked.arm, settings) for part in parts]
 
 
 def _left(

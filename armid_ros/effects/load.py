@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import Quantity, SURELY
-from armid_ros.model import joint_axis, LINK_PARAMETERS
+from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -112,7 +112,7 @@ class Payload(_LinkBody):
         Nothing is said where values stand for others that the motion does not tell from them.
 
         """
-        axis = joint_axis(arm.robot, self.indices(arm.robot.joints)[0])[1]
+        axis = arm.robot.geometry[self.indices(arm.robot.joints)[0]].turn
         x, y, z = axis
         share = np.array([x * x, 2.0 * x * y, y * y, 2.0 * x * z, 2.0 * y * z, z * z])
         if not np.all(std[4:][share != 0.0] > 0.0) or not axis.any():

@@ -10,7 +10,7 @@ from armid_ros.model.base_parameters import (
     regroup,
     rigid_base_parameters,
 )
-from armid_ros.model.kinematics import joint_axis, LinkFrames, point_motion, points_motion
+from armid_ros.model.kinematics import LinkFrames, point_motion, points_motion
 from armid_ros.model.rigid_body import (
     gravity_sensitivity,
     inverse_dynamics,
@@ -25,7 +25,6 @@ __all__ = [
     'BaseParameters',
     'LINK_PARAMETERS',
     'LinkFrames',
-    'joint_axis',
     'gravity_composites',
     'gravity_sensitivity',
     'group_columns',

@@ -11,7 +11,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 
 def point_motion(
@@ -78,7 +77,7 @@ class _Frame:
 
     rotation: FloatArray
     origin: FloatArray
-    movers: list[int]
+    movers: tuple[int, ...]
 
     def turned(self, vectors: FloatArray) -> FloatArray:
         """Return what vectors of the link, (3,), (3, N) or (3, m, N), are in the base frame."""
@@ -130,21 +129,17 @@ class LinkFrames:
         ends = [robot.joints.index(joint) for joint in joints or robot.joints]
         frames: dict[int, _Frame] = {}
         lines, turns = np.zeros((2, robot.n_joints, 3, len(q)))
-        for link in sorted({above for end in ends for above in _ancestors(robot, end)}):
-            placement = robot.model.jointPlacements[link + 1]
-            slide, turn = joint_axis(robot, link)
-            origin = placement.translation[:, np.newaxis] + np.outer(
-                placement.rotation @ slide, q[:, link]
-            )
-            rotation = _rotations(placement.rotation, turn, q[:, link])
-            parent = int(robot.model.parents[link + 1]) - 1
-            if parent >= 0:
-                base = frames[parent]
+        for link in sorted({above for end in ends for above in robot.geometry[end].movers}):
+            joint, angles = robot.geometry[link], q[:, link]
+            origin = joint.origin[:, np.newaxis] + np.outer(joint.sliding, angles)
+            rotation = joint.turning @ [np.ones_like(angles), np.sin(angles), 1.0 - np.cos(angles)]
+            if joint.parent >= 0:
+                base = frames[joint.parent]
                 origin = base.origin + base.turned(origin)
                 rotation = base.turned(rotation)
-            frames[link] = frame = _Frame(rotation, origin, _ancestors(robot, link))
-            turns[link] = frame.turned(turn)
-            lines[link] = frame.turned(slide) + _cross(origin, turns[link])
+            frames[link] = frame = _Frame(rotation, origin, joint.movers)
+            turns[link] = frame.turned(joint.turn)
+            lines[link] = frame.turned(joint.slide) + _cross(origin, turns[link])
         return cls(robot.joints, frames, lines, turns)
 
     @classmethod
@@ -199,25 +194,3 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         result[x] = a[y] * b[z] - a[z] * b[y]
     return result
-
-
-def _ancestors(robot: Robot, link: int) -> list[int]:
-    """Return the joints that move a link, from the base on."""
-    return [int(joint) - 1 for joint in robot.model.supports[link + 1] if joint > 0]
-
-
-def joint_axis(robot: Robot, link: int) -> tuple[FloatArray, FloatArray]:
-    """Return what a joint does to its link per unit: translation and rotation, each (3,)."""
-    joint = robot.model.joints[link + 1]
-    data = joint.createData()
-    joint.calc(data, np.zeros(joint.nq))
-    motion = np.asarray(data.S).ravel()
-    return motion[:3], motion[3:]
-
-
-def _rotations(placement: FloatArray, axis: FloatArray, angles: FloatArray) -> FloatArray:
-    """Return a rotation followed by those about an axis, none where it is zero, (3, 3, N)."""
-    cross = pin.skew(axis)
-    parts = np.stack([placement, placement @ cross, placement @ cross @ cross], axis=2)
-    by = np.stack([np.ones_like(angles), np.sin(angles), 1.0 - np.cos(angles)])
-    return np.asarray(parts @ by)

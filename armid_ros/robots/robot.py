@@ -12,6 +12,7 @@ from pathlib import Path
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots.description import Description, parse_description, parse_xml
+from armid_ros.robots.joint_geometry import JointGeometry
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -127,6 +128,11 @@ class Robot:
     def description(self) -> Description:
         """Links and joints of the URDF, driven or not."""
         return parse_description(parse_xml(self.urdf, self.name), self.name)
+
+    @cached_property
+    def geometry(self) -> tuple[JointGeometry, ...]:
+        """How each joint moves its link."""
+        return tuple(JointGeometry.of(self.model, k) for k in range(self.n_joints))
 
     @property
     def gravity(self) -> FloatArray:
