@@ -77,7 +77,7 @@ def explain(
 
 
 @dataclass(frozen=True)
-class _Place:
+class Place:
     """What was taken on a way, the fit beside which it goes on, and a look at all causes there."""
 
     named: tuple[Named, ...]
@@ -86,7 +86,7 @@ class _Place:
     found: Candidates
     before: Before | None
     look: Look
-    next: dict[Hashable, _Place] = field(default_factory=dict)
+    next: dict[Hashable, Place] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Way:
         The causes.
     first : Survey or None
         What the first look at all causes showed.
-    last : _Place or None
+    last : Place or None
         Where the last look was.
     change : ndarray, shape (r,), or None
         What was added to what is free of the arm in the last fit.
@@ -109,7 +109,7 @@ class Way:
 
     taken: tuple[Taken, ...]
     first: Survey | None
-    last: _Place | None
+    last: Place | None
     change: FloatArray | None = None
 
 
@@ -155,7 +155,7 @@ class Search:
             way = self._way(first, steps, width)
         return way
 
-    def _way(self, place: _Place, steps: Sequence[Step], width: float) -> Way:
+    def _way(self, place: Place, steps: Sequence[Step], width: float) -> Way:
         """Go from a place, where a lead of less than some squares decides nothing."""
         first, taken = place.look.survey, list(steps)
         named, values = list(place.named), list(place.values)
@@ -205,7 +205,7 @@ class Search:
             others = tuple(one for one in others if one.key != taken.key)
         return found
 
-    def _after(self, place: _Place, step: Step) -> _Place:
+    def _after(self, place: Place, step: Step) -> Place:
         """Return the place behind a step."""
         candidate = step.trial.candidate
         way = candidate.key, candidate.effect.shape
@@ -227,7 +227,7 @@ class Search:
                 place.next[way] = self._fitted_place(named, values, total, change)
         return place.next[way]
 
-    def _and_named(self, place: _Place, step: Step) -> tuple[list[Named], list[FloatArray]]:
+    def _and_named(self, place: Place, step: Step) -> tuple[list[Named], list[FloatArray]]:
         one = _of(step, self.question)
         return [*place.named, one.named], [*place.values, one.values]
 
@@ -237,7 +237,7 @@ class Search:
         values: Sequence[FloatArray],
         total: float | None,
         change: FloatArray | None = None,
-    ) -> _Place:
+    ) -> Place:
         """Fit what is named, from values and a change of the body on, and look beside it."""
         question, data, sigma = self.question, self.evidence.data, self.evidence.sigma
         arm, base = question.nuisance_arm, question.nuisance_base
@@ -260,7 +260,7 @@ class Search:
         look = look_at(found.candidates, here)
         if named:
             named, values = current.named, current.values
-        return _Place(tuple(named), tuple(values), current, found, before, look)
+        return Place(tuple(named), tuple(values), current, found, before, look)
 
     def _before(self, current: Fitted) -> Before | None:
         """Return what other recordings show beside an arm: those from before, and unseen ones."""
