@@ -63,7 +63,7 @@ class Thresholds:
         tell so well: of a thousand healthy arms one is `unknown`.
     predicted : float
         Factor by which squares may be larger on motions that were not used: values that others
-        told are not exact there.
+        told are not exact there, and a misfit is another one.
     open_share : float
         Share of the squares of a joint in which a gap is open that a cause takes if it matters
         there, however little that is of the gap of the arm; and of the whole gap that a cause
