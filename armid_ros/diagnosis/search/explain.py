@@ -189,19 +189,22 @@ class Search:
         where = [
             names.index((p.name, p.joint)) for one in asked for p in one.parameters(arm.robot)
         ]
-        here = replace(place.look.here, total=None)
+        here = place.look.here
         for column in sorted(np.flatnonzero(np.isin(base.independent, where)), reverse=True):
             value = place.current.arm.theta[base.independent[column]]
             here = here.without(int(column), float(value))
+        assert way.first is not None
+        here = replace(here, total=max(way.first.total, float(np.sum(here.residual**2))))
         found: list[Taken] = []
         others = place.found.candidates
         for _ in range(min(len(asked), self.settings.thresholds.few_causes)):
-            step = look_at(others, here).step()
+            look = look_at(others, here)
+            step = look.step()
             if step is None:
                 break
             found.append(_of(step, question))
             taken = step.trial.candidate
-            here = replace(here, nuisance=here.nuisance.and_columns(taken), known=None)
+            here = replace(look.here, nuisance=here.nuisance.and_columns(taken), known=None)
             others = tuple(one for one in others if one.key != taken.key)
         return found
 
