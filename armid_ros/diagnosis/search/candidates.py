@@ -76,6 +76,13 @@ class Question:
     nuisance_prior: Prior | None = None
     since: bool = False
 
+    @property
+    def body_is_free(self) -> bool:
+        """Whether the rigid body is fitted anew, and not only friction nobody gave values of."""
+        rigid = len(self.arm.robot.rigid_parameters)
+        base = self.nuisance_base
+        return base is not None and bool(np.any(base.independent < rigid))
+
     def kinds(self, library: Sequence[Kind]) -> tuple[Kind, ...]:
         """Return what is looked for, of effects that may be named."""
         return tuple(kind.as_change() for kind in library) if self.since else tuple(library)

@@ -28,6 +28,7 @@ from armid_ros.diagnosis.search.prune import doubtful, pruned, Retrial, View
 from armid_ros.diagnosis.search.round import Before, Later, Nuisance, Round, undecided
 from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Taken, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -47,10 +48,13 @@ def explain(
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
     retrial = Retrial(question, evidence, settings)
     friction, tried = _friction(retrial, way.taken, whole)
-    found = [*way.taken, *search.in_place_of(friction, way)]
-    if len(found) > len(way.taken):
-        friction, _ = _friction(retrial, found, whole)
-    taken = [*found, *friction]
+    taken = [*way.taken, *friction]
+    instead = search.in_place_of(friction, way)
+    if instead:
+        others, _ = _friction(retrial, [*way.taken, *instead], whole)
+        fewer = len(instead) + len(_offsets(others)) < len(_offsets(friction))
+        if fewer or not question.body_is_free:
+            taken = [*way.taken, *instead, *others]
     if survey is not None:
         survey = survey.and_nuisance(tried, settings.thresholds.least_visible)
     reference = retrial.fitted((), None)
@@ -176,11 +180,12 @@ class Search:
         Return what is there in place of offsets that were free beside every cause.
 
         A gain of a joint that holds much weight is an offset and a little more. Friction is what
-        every joint has, and no offset is: what takes one has to be ahead of all causes.
+        every joint has, and no offset is: what takes one has to be ahead of all causes. A body
+        that is free hides most of them, and so has to be spared some of its offsets.
 
         """
         question, place = self.question, way.last
-        asked = [one.named.effect for one in friction if not one.named.effect.friction]
+        asked = _offsets(friction)
         if not asked or place is None or place.before is not None:
             return []
         arm, base = question.nuisance_arm, question.nuisance_base
@@ -288,6 +293,11 @@ class Search:
         pairs = zip(there.residual, there.columns, strict=True)
         left = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]
         return replace(before, later=Later.of(unseen, there.columns, left))
+
+
+def _offsets(friction: Sequence[Taken]) -> list[Effect]:
+    """Return what of friction of unknown value is none."""
+    return [one.named.effect for one in friction if not one.named.effect.friction]
 
 
 def _of(step: Step, question: Question) -> Taken:

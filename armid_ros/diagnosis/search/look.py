@@ -86,9 +86,11 @@ class Look:
         Where there are recordings from before, what was there already is no measure of a change.
 
         """
-        best = self.ranking[:_COMPARED]
-        found = [_changes([trial], self.here)[0] for trial in best]
-        return max((change.gain for change in found if change is not None), default=0.0)
+        if self.here.before is None:
+            found: list[Trial | None] = list(self.survey.ranking)
+        else:
+            found = [_changes([trial], self.here)[0] for trial in self.ranking[:_COMPARED]]
+        return max((trial.gain for trial in found if trial is not None), default=0.0)
 
     def step(self, width: float = 0.0) -> Step | None:
         """
