@@ -48,13 +48,13 @@ def explain(
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
     retrial = Retrial(question, evidence, settings)
     friction, tried = _friction(retrial, way.taken, whole)
-    taken = [*way.taken, *friction]
+    taken, minor = [*way.taken, *friction], () if last is None else last.there
     instead = search.in_place_of(friction, way)
     if instead:
         others, _ = _friction(retrial, [*way.taken, *instead], whole)
         fewer = len(instead) + len(_offsets(others)) < len(_offsets(friction))
         if fewer or not question.body_is_free:
-            taken = [*way.taken, *instead, *others]
+            taken, minor = [*way.taken, *instead, *others], ()
     if survey is not None:
         survey = survey.and_nuisance(tried, settings.thresholds.least_visible)
     reference = retrial.fitted((), None)
@@ -63,7 +63,6 @@ def explain(
     by_chance = 0.0 if last is None else last.by_chance
     fitted = widened(fitted, evidence, question.prior, by_chance)
     said = {own.effect.name for own in fitted.named}
-    minor = () if last is None else last.there
     small = tuple(trial for trial in minor if trial.candidate.effect.name not in said)
     return Explanation(
         question.arm,
