@@ -124,16 +124,16 @@ def load_misfit(path: str | Path) -> Misfit | None:
 
 def _misfit(block: Any) -> Misfit:
     try:
-        rms, torque = (block.get(key) for key in ('rms', 'torque_rms'))
+        rms, torque = _torques(block['rms']), block.get('torque_rms')
+        loud = None if torque is None else _torques(torque)
         data, error = str(block['data']), block['relative_error_percent']
-        named = _torques(rms), None if torque is None else _torques(torque)
     except (AttributeError, KeyError, TypeError) as fault:
         raise ModelError(f'misfit: {type(fault).__name__} {fault}') from fault
     if data not in _DATA:
         raise ModelError(f"misfit has data '{data}', not {' or '.join(_DATA)}")
-    if named[1] is not None and not named[1].keys() >= named[0].keys():
+    if loud is not None and not loud.keys() >= rms.keys():
         raise ModelError('misfit: torque_rms is not of the joints that rms is of')
-    return Misfit(data, named[0], finite(error, 'relative_error_percent of the misfit'), named[1])
+    return Misfit(data, rms, finite(error, 'relative_error_percent of the misfit'), loud)
 
 
 def _torques(block: Any) -> dict[str, float]:

@@ -18,6 +18,7 @@ from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.evidence import Baseline, Evidence, noise_floor, torque_rms
 from armid_ros.diagnosis.data.prepare import check_data, choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
+from armid_ros.diagnosis.search.candidates import frees_body
 from armid_ros.diagnosis.search.choice import Explainer
 from armid_ros.diagnosis.search.explanation import (
     as_bodies,
@@ -188,7 +189,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     notes = [*notes, *chosen.notes, *said]
     evidence = explanation.evidence
     unseen = _unseen(asked, explanation, chosen)
-    measured = chosen.floor_in_words in (NOISE, ESTIMATED)
+    measured = chosen.measured
     least = 0.0 if measured else settings.thresholds.headline
     rest, shares = headline(chosen.rest or explanation, unseen, settings, least)
     explanation = rest
@@ -210,7 +211,9 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         [*left, *resting],
         arm,
         NOISE if measured else chosen.floor_in_words,
-        _as_it_is(arm, _sure(evidence, chosen), settings) if _corrected(explanation) else None,
+        _as_it_is(arm, _sure(evidence, chosen), settings)
+        if frees_body(explanation.base, explanation.given)
+        else None,
         minor,
     )
     gap = measure_gap(explanation, unseen)
@@ -308,8 +311,7 @@ def _excesses(
     """Return what is left over limits, and over friction where a joint is held."""
     settings, evidence = asked.settings, rest.evidence
     more = settings.thresholds.predicted
-    measured = chosen.floor_in_words in (NOISE, ESTIMATED)
-    usual = 1.0 if measured or named else more  # another motion makes another misfit
+    usual = 1.0 if chosen.measured or named else more  # another motion makes another misfit
     left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings', usual)]
     parts = [evidence]
     if unseen is not None:
@@ -334,13 +336,6 @@ def _left(
     else:
         residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
     return Excess(_excess(residual, evidence, settings) / more, f'in {where}')
-
-
-def _corrected(explanation: Explanation) -> bool:
-    """Return whether values of the description were fitted, and not only those nobody gave."""
-    base = explanation.base
-    rigid = len(explanation.given.robot.rigid_parameters)
-    return base is not None and bool(np.any(base.independent < rigid))
 
 
 def _as_it_is(arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings) -> Excess:

@@ -79,13 +79,16 @@ class Question:
     @property
     def body_is_free(self) -> bool:
         """Whether the rigid body is fitted anew, and not only friction nobody gave values of."""
-        rigid = len(self.arm.robot.rigid_parameters)
-        base = self.nuisance_base
-        return base is not None and bool(np.any(base.independent < rigid))
+        return frees_body(self.nuisance_base, self.arm)
 
     def kinds(self, library: Sequence[Kind]) -> tuple[Kind, ...]:
         """Return what is looked for, of effects that may be named."""
         return tuple(kind.as_change() for kind in library) if self.since else tuple(library)
+
+
+def frees_body(base: BaseParameters | None, arm: ArmModel) -> bool:
+    """Return whether something of the rigid body is among parameters that are free."""
+    return base is not None and bool(np.any(base.independent < len(arm.robot.rigid_parameters)))
 
 
 def as_given(

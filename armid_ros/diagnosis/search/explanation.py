@@ -150,6 +150,11 @@ class Chosen:
     rest: Explanation | None = None
     doubt: str = ''
 
+    @property
+    def measured(self) -> bool:
+        """Whether the floor is noise, or estimated beside it, and no misfit that is known."""
+        return self.floor_in_words in (NOISE, ESTIMATED)
+
 
 def in_model_as_given(found: Explanation) -> Explanation:
     """Return what the names explain beside a rigid body that stays as it is."""

@@ -190,7 +190,8 @@ def _joint_by_joint(
             groups[trial.candidate.effect.name].setdefault(where, trial)
             if first.candidate.effect.external:
                 groups[_ANY].setdefault(where, trial)
-    able = [id(trial) for trial in passing if changed(trial, here)]
+    single = [trial for trial in passing if len(_touched(trial, here)) == 1]
+    able = [id(trial) for trial in single if changed(trial, here)]
     found = [[*group.values()] for group in groups.values()]
     found = [group for group in found if any(id(trial) in able for trial in group)]
     if not found:

@@ -247,12 +247,11 @@ class Round:
 
     def without(self, place: int, value: float) -> Round:
         """Return the same where one of the free columns is not there, and had a value."""
-        free = [column for k, column in enumerate(self.nuisance.free) if k != place]
-        kept = [k for k in range(len(self.nuisance.free)) if k != place]
-        hold, pull = self.nuisance.hold, self.nuisance.pull
-        column = self.problem.x[:, :, self.nuisance.free[place]]
+        free, hold, pull = self.nuisance.free, self.nuisance.hold, self.nuisance.pull
+        kept = [k for k in range(len(free)) if k != place]
+        column = self.problem.x[:, :, free[place]]
         problem = replace(self.problem, y=self.problem.y + value * column)
-        nuisance = Nuisance(tuple(free), hold[np.ix_(kept, kept)], pull[kept])
+        nuisance = Nuisance(tuple(free[k] for k in kept), hold[np.ix_(kept, kept)], pull[kept])
         return replace(self, problem=problem, nuisance=nuisance, known=None)
 
     def own(self, candidate: Candidate) -> FloatArray:
