@@ -93,12 +93,24 @@ class Payload(_LinkBody):
         return robot.joints[-1:]
 
     @classmethod
+    def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
+        """Return all links: any may carry something that is none of its own mass."""
+        return tuple((joint,) for joint in robot.joints)
+
+    @classmethod
     def as_change(cls) -> type[Effect]:
         """Return a load that may have been put down."""
         return PayloadChange
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether it may weigh something, not farther away than the arm is long."""
+        """
+        Return whether it may weigh something, not farther away than the arm is long.
+
+        Its mass may be what no motion tells, such as that of an inner link; its moment has to be.
+
+        """
+        if std[0] == 0.0:
+            return bool(np.any(values[1:4]))
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
         length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH
         heaviest = float(values[0] + SURELY * std[0])
@@ -147,20 +159,8 @@ class PayloadChange(Payload):
 
     quantities = tuple(replace(one, lower=-np.inf) for one in Payload.quantities)
 
-    @classmethod
-    def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all links: what is put onto one between two days is none of its own mass."""
-        return tuple((joint,) for joint in robot.joints)
-
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """
-        Return whether what was taken or put down may be called a load.
-
-        Its mass may be what no motion tells, such as that of an inner link; its moment has to be.
-
-        """
-        if std[0] == 0.0:
-            return bool(np.any(values[1:4]))
+        """Return whether what was taken or put down may be called a load."""
         return super().plausible(np.concatenate([np.abs(values[:1]), values[1:]]), std, arm)
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:

@@ -18,11 +18,12 @@ import pytest
 MASS, HEIGHT = 0.6, 0.3
 
 
-def held_by(robot):
-    """Return what a body that the last link holds adds to torques of a motion."""
+def held_by(robot, link=-1):
+    """Return what a body that a link holds, the last one, adds to torques of a motion."""
     parameters = robot.rigid_parameters.copy()
     inertia = MASS * HEIGHT**2
-    parameters[-10:] += [MASS, 0.0, 0.0, MASS * HEIGHT, inertia, 0.0, inertia, 0.0, 0.0, 0.0]
+    body = [MASS, 0.0, 0.0, MASS * HEIGHT, inertia, 0.0, inertia, 0.0, 0.0, 0.0]
+    parameters.reshape(-1, 10)[link] += body
     true = robot.with_inertias(parameters)
     return lambda motion, tau: inverse_dynamics(true, motion) - inverse_dynamics(robot, motion)
 
@@ -40,6 +41,16 @@ def test_a_payload_is_named_with_its_mass(request, arm, friction):
     assert payload.values[0] == pytest.approx(MASS, rel=0.05)
     others = {finding.name for finding in found.findings} - {'payload'}
     assert others <= {'viscous_friction', 'coulomb_friction'}
+
+
+def test_a_load_of_an_inner_link_may_be_that_link(upright):
+    """Both are the same ten values: nothing but what a user knows tells them apart."""
+    hidden = upright.recordings(held_by(upright.robot, link=1))
+    found = diagnose(upright.arm, hidden, rng=np.random.default_rng(0))
+    assert found.verdict == 'ambiguous', found.summary
+    (one,) = found.findings
+    assert {one.name, *one.ambiguous_with} == {'link_inertia', 'payload'}
+    assert one.joints == ('shoulder',)
 
 
 @pytest.mark.parametrize('arm', ['bench', 'upright'])
