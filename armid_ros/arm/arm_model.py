@@ -196,7 +196,7 @@ class ArmModel:
         for effect, values in pairs:
             if effect.changes_body:
                 robot = effect.action(values, ArmModel(robot)).robot or robot
-        bare = ArmModel(robot, quasi_static=self.quasi_static)
+        bare = replace(self, robot=robot, effects=(), values=())
         actions = [e.action(values, bare) for e, values in pairs if not e.changes_body]
         return merge_actions(robot, actions)
 
