@@ -96,7 +96,7 @@ def all_names(retrial: Any, taken: Sequence[Any], change: Any = None) -> Any:
 RULES = {
     'names that may be nothing go': Rule(('verdict.attribution.may_be_nothing',), no),
     'small names that close a gap stay': Rule(('verdict.attribution._opens',), no),
-    'names that other data deny go': Rule(('verdict.attribution.Attribution.denied',), no),
+    'names that other data deny go': Rule(('verdict.attribution.denies',), no),
     'needless names go': Rule(('search.explain.pruned',), all_names),
     'a small lead decides nothing': Rule(('search.explain.undecided',), no),
     'the simplest that closes the gap': Rule(('search.look.likeliest',), first),

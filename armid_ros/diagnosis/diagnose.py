@@ -256,14 +256,14 @@ def _as_stated(
 ) -> tuple[Explanation, Attribution, list[str]]:
     """Return names in the model as given, or beside a body common to both days, and a note."""
     as_described = in_model_as_given(rest)
-    alone = shares_of(as_described, unseen, settings)[0]
+    alone = shares_of(as_described, unseen, settings)
     names, least = range(len(as_described.steps)), settings.thresholds.headline
     if alone.share(names) >= least:
         small = smallest(as_described, alone, settings, least) if len(names) > 1 else None
         if small is None:
             return as_described, alone, []
         fewer = rest.without(small)
-        return _as_stated(fewer, shares_of(fewer, unseen, settings)[0], unseen, arm, settings)
+        return _as_stated(fewer, shares_of(fewer, unseen, settings), unseen, arm, settings)
     bodily, remarks = as_bodies(rest, arm)
     return bodily, shares, [_COMMON, *remarks]
 

@@ -2,50 +2,68 @@
 # SPDX-License-Identifier: Apache-2.0
 """What data that a name was not fitted to say of it: they show it, deny it, or are silent."""
 
-from armid_ros.diagnosis.verdict.attribution import Attribution
+from dataclasses import replace
+
+from armid_ros.diagnosis import diagnose
+from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
+from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 import numpy as np
 import pytest
 
-BLOCKS = 40
+from tests.diagnosis.test_floor import cut
 
 
-def attribution(predicted, left):
-    """Return the shares of a name that predicts some rows of what was left, block by block."""
-    taken = np.sum(left**2 - (left - predicted) ** 2, axis=1)
-    made = np.sum(predicted**2, axis=1)
-    return Attribution((0,), np.sum(left**2, axis=1), taken[np.newaxis], made[np.newaxis])
+def spring(motion, tau):
+    """Return the torque of a spring of 1.5 N m/rad in the elbow."""
+    return np.column_stack([np.zeros(len(motion.t)), 1.5 * motion.q[:, 1]])
 
 
-@pytest.fixture
-def rows():
-    """Return what a cause makes of every row, and noise, each of shape (B, 50)."""
+def evidence_of(bench, hidden):
+    """Return other recordings in the unit of their noise."""
+    data = cut(bench.recordings(hidden, seed=7))
+    sigma = tuple(noise_floor(part, bench.arm).sigma for part in data)
+    return Evidence(tuple(data), sigma, sigma)
+
+
+@pytest.fixture(scope='module')
+def sprung(bench):
+    """Return what explains recordings of an arm with a spring in its elbow."""
     rng = np.random.default_rng(0)
-    return rng.normal(size=(BLOCKS, 50)), rng.normal(size=(BLOCKS, 50))
+    found = diagnose(bench.arm, bench.recordings(spring), rng=rng).explanation
+    assert [step.trial.candidate.effect.name for step in found.steps] == ['joint_spring']
+    return found
 
 
-def test_a_cause_that_is_there_is_not_denied_and_takes_its_share(rows):
-    cause, noise = rows
-    found = attribution(cause, cause + noise)
-    assert not found.denied(0)
-    assert found.share([0]) == pytest.approx(0.5, abs=0.05)
+def with_shoulder_off(explanation):
+    """Return an explanation whose fit has changed friction of the shoulder as well."""
+    arm = explanation.fitted.arm
+    names = [(p.name, p.joint) for p in arm.parameters]
+    theta = arm.theta.copy()
+    theta[names.index(('coulomb_torque', 'shoulder'))] += 2.0
+    return replace(explanation, fitted=replace(explanation.fitted, arm=arm.with_theta(theta)))
 
 
-def test_a_cause_that_is_not_there_is_denied(rows):
-    cause, noise = rows
-    assert attribution(cause, noise).denied(0)
+def test_a_share_is_that_of_the_squares_and_lies_in_its_interval():
+    rng = np.random.default_rng(0)
+    whole = rng.uniform(1.0, 2.0, size=40)
+    taken = np.array([0.6, 0.1])[:, np.newaxis] * whole * rng.uniform(0.9, 1.1, size=(2, 40))
+    shares = Attribution((0, 1), whole, taken)
+    low, high = shares.interval([0, 1], rng)
+    assert low < shares.share([0, 1]) < high
+    assert shares.share([0, 1]) == pytest.approx(0.7, abs=0.02)
 
 
-def test_data_in_which_a_cause_does_nothing_do_not_deny_it(rows):
-    cause, noise = rows
-    assert not attribution(0.0 * cause, noise).denied(0)
-    assert not attribution(1e-4 * cause, noise).denied(0)
+def test_data_with_a_cause_show_it_and_data_without_deny_it(bench, sprung):
+    shown = attribute(sprung, evidence_of(bench, spring))
+    assert shown.denied == ()
+    assert shown.share([0]) > 0.95
+    assert attribute(sprung, evidence_of(bench, None)).denied == (0,)
 
 
-def test_data_in_which_a_cause_makes_as_much_as_noise_do_not_deny_it():
-    """A tilt makes little of a motion that hardly turns the axis that feels it."""
-    cause = np.zeros((BLOCKS, 50))
-    cause[:2, 0] = 1.3
-    left = np.zeros_like(cause)
-    left[:2, 0] = [0.5, 0.6]
-    assert not attribution(cause, left).denied(0)
-    assert attribution(10.0 * cause, left).denied(0)
+def test_a_cause_is_denied_only_where_it_acts(bench, sprung):
+    """A body that is fitted with a spring may predict another joint worse."""
+    off = with_shoulder_off(sprung)
+    shown = attribute(off, evidence_of(bench, spring))
+    assert shown.denied == ()
+    assert shown.share([0]) < 0.0
+    assert attribute(off, evidence_of(bench, None)).denied == (0,)

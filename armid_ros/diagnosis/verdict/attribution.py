@@ -12,7 +12,7 @@ those that other data do not deny, and that take enough.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
@@ -27,6 +27,7 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 
 #: Resamplings of the blocks: ends of a 95 % interval are known to a tenth of it.
 _RESAMPLINGS = 500
@@ -45,19 +46,15 @@ class Attribution:
         The gap.
     taken : ndarray, shape (K, B)
         What each name takes of it, in the order of the explanation.
-    made : ndarray, shape (K, B)
-        Squares of what each name predicts.
+    denied : tuple of int
+        Names that the data deny, the least first; see `denies`.
 
     """
 
     order: tuple[int, ...]
     whole: FloatArray
     taken: FloatArray
-    made: FloatArray
-
-    def denied(self, name: int) -> bool:
-        """Return whether data deny a name; see `denies`."""
-        return denies((self.taken[name] + self.made[name]) / 2.0, self.made[name])
+    denied: tuple[int, ...] = ()
 
     def share(self, names: Sequence[int]) -> float:
         """Return the share that some of the names take together."""
@@ -84,15 +81,11 @@ def attribute(explanation: Explanation, unseen: Evidence | None) -> Attribution:
         Data that nothing was fitted to; None predicts each part of the data from the others.
 
     """
-    order, whole, taken, made = _left_out(explanation)
-    if unseen is None:
-        return Attribution(order, whole, taken, made)
-    return _predicted(explanation, order, unseen)
+    left_out = _left_out(explanation)
+    return left_out if unseen is None else _predicted(explanation, left_out.order, unseen)
 
 
-def _left_out(
-    explanation: Explanation,
-) -> tuple[tuple[int, ...], FloatArray, FloatArray, FloatArray]:
+def _left_out(explanation: Explanation) -> Attribution:
     """Predict each part of the data from the others, name after name."""
     view = View.of(explanation.fitted, explanation.evidence)
     named = explanation.fitted.named
@@ -100,11 +93,11 @@ def _left_out(
     columns = [view.columns(k)[0] for k in range(len(named))]
     shapes = [c for k in range(len(named)) for c in view.columns(k)[1]]
     left = list(range(len(named)))
-    taken = made = np.zeros((len(named), 0))
+    taken = np.zeros((len(named), 0))
     order: list[int] = []
     whole: FloatArray | None = None
     while left:
-        best: tuple[float, int, FloatArray, FloatArray] | None = None
+        best: tuple[float, int, FloatArray] | None = None
         asked = [c for k in left for c in columns[k]]
         values = [view.value(c) for c in asked]
         problem, free, hold, pull = view.without(asked, values, shapes)
@@ -116,37 +109,53 @@ def _left_out(
         trials, power = held_out(problem, free, candidates, hold, pull, whole=False)
         whole = power if whole is None else whole
         if not taken.size:
-            taken, made = np.zeros((2, len(named), len(power)))
+            taken = np.zeros((len(named), len(power)))
         by_column = {trial.candidate.columns.start: trial for trial in trials}
         for k, candidate in zip(left, candidates, strict=True):
             trial = by_column.get(candidate.columns.start)
             if trial is not None and (best is None or trial.gain > best[0]):
-                best = trial.gain, k, trial.gains, trial.square
+                best = trial.gain, k, trial.gains
         if best is None:
             order += left
             break
-        _, k, taken[best[1]], made[best[1]] = best
+        _, k, taken[best[1]] = best
         order.append(k)
         left.remove(k)
     if whole is None:
         _, free, hold, pull = view.without((), ())
         _, whole = held_out(view.problem, free, [], hold, pull)
-    size = len(named), len(whole)
-    return tuple(order), whole, taken.reshape(size), made.reshape(size)
+    return Attribution(tuple(order), whole, taken.reshape(len(named), len(whole)))
 
 
 def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
-    """Predict other data with the first name, the first two, and so on, fitted to the data."""
+    """
+    Predict other data with the first name, the first two, and so on, fitted to the data.
+
+    A name is denied where it acts: a body that is fitted with it changes other joints as well.
+
+    """
     arms = [explanation.reference.arm, *_staircase(explanation, order)]
     left = [[part.residual(arm) for part in unseen.data] for arm in arms]
-    squares = [unseen.block_squares(rows).sum(axis=1) for rows in left]
-    taken, made = np.zeros((2, len(order), len(squares[0])))
+    squares = [unseen.block_squares(rows) for rows in left]
+    taken = np.zeros((len(order), len(squares[0])))
+    denied = []
     for position, k in enumerate(order):
-        taken[k] = squares[position] - squares[position + 1]
+        gone = squares[position] - squares[position + 1]
         steps = zip(left[position], left[position + 1], strict=True)
-        predicted = [before - after for before, after in steps]
-        made[k] = unseen.block_squares(predicted).sum(axis=1)
-    return Attribution(tuple(order), squares[0], taken, made)
+        made = unseen.block_squares([before - after for before, after in steps])
+        own = _acts(explanation, k, unseen)
+        taken[k] = gone.sum(axis=1)
+        if denies((gone + made)[:, own].sum(axis=1) / 2.0, made[:, own].sum(axis=1)):
+            denied.append(k)
+    whole = squares[0].sum(axis=1)
+    return Attribution(tuple(order), whole, taken, tuple(reversed(denied)))
+
+
+def _acts(explanation: Explanation, name: int, evidence: Evidence) -> npt.NDArray[np.bool_]:
+    """Return in which joints a name makes torque, shape (n,)."""
+    own, arm = explanation.fitted.named[name], explanation.fitted.arm
+    columns = [part.columns(arm, own.effect)[:, :, list(own.kept)] for part in evidence.data]
+    return np.asarray(np.any([np.any(block, axis=(0, 2)) for block in columns], axis=0))
 
 
 def _staircase(explanation: Explanation, order: Sequence[int]) -> list[ArmModel]:
@@ -165,8 +174,8 @@ def headline(
     what was named.
 
     """
-    shares, denied = shares_of(explanation, unseen, settings)
-    gone = denied[0] if denied else smallest(explanation, shares, settings, least)
+    shares = shares_of(explanation, unseen, settings)
+    gone = shares.denied[0] if shares.denied else smallest(explanation, shares, settings, least)
     if gone is None:
         return explanation, shares
     return headline(explanation.without(gone), unseen, settings, least)
@@ -201,16 +210,15 @@ def _opens(fewer: Explanation, explanation: Explanation, settings: DiagnosisSett
 
 def shares_of(
     explanation: Explanation, unseen: Evidence | None, settings: DiagnosisSettings
-) -> tuple[Attribution, list[int]]:
-    """Share out the gap, and return the names that other data deny, the least first."""
+) -> Attribution:
+    """Share out the gap on unseen data, or on parts left out where those hardly show a name."""
     left_out = attribute(explanation, None)
     if unseen is None:
-        return left_out, []
+        return left_out
     names = range(len(explanation.steps))
     seen = attribute(explanation, unseen)
-    denied = [k for k in reversed(seen.order) if seen.denied(k)]
     shown = seen.share(names) > settings.thresholds.headline * left_out.share(names)
-    return (seen if shown else left_out), denied
+    return seen if shown else replace(left_out, denied=seen.denied)
 
 
 def may_be_nothing(explanation: Explanation, name: int) -> bool:
