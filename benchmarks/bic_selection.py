@@ -14,8 +14,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.baseline import excited
 from armid_ros.diagnosis.data.prepare import choose_filters
-from armid_ros.diagnosis.data.rows import excited, make_problem, project
+from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.fit import fit

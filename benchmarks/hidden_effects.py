@@ -30,7 +30,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import DiagnosisSettings
-from armid_ros.diagnosis.verdict.gap import Overlay
+from armid_ros.diagnosis.verdict.finding import Overlay
 from armid_ros.effects import CATALOGUE
 from armid_ros.motion import FloatArray
 import numpy as np

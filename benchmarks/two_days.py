@@ -16,7 +16,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
-from armid_ros.diagnosis.verdict.gap import Gap
+from armid_ros.diagnosis.verdict.finding import Gap
 from armid_ros.effects import make_effect
 from armid_ros.identification import Identification, identify
 from armid_ros.motion import FloatArray

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
-from armid_ros.diagnosis.data.evidence import Baseline, Evidence, noise_floor, torque_rms
+from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
 from armid_ros.diagnosis.data.prepare import check_data, choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
 from armid_ros.diagnosis.search.candidates import frees_body
@@ -39,14 +40,13 @@ from armid_ros.diagnosis.verdict.attribution import (
 )
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import (
-    Excess,
     harmed,
     held,
     measure_gap,
     places_held,
 )
 from armid_ros.diagnosis.verdict.naming import findings, small_print
-from armid_ros.diagnosis.verdict.where import locate, Where
+from armid_ros.diagnosis.verdict.where import Excess, locate, Where
 from armid_ros.diagnosis.verdict.words import decide, not_repeating
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording

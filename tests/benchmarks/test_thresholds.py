@@ -4,7 +4,7 @@
 
 from dataclasses import fields
 
-from armid_ros.diagnosis.data import rows, trajectory
+from armid_ros.diagnosis.data import trajectory
 from armid_ros.diagnosis.search import acceptance, look, trial
 from armid_ros.diagnosis.settings import Thresholds
 import numpy as np
@@ -65,9 +65,9 @@ def test_a_number_of_a_module_is_changed_wherever_it_was_imported_and_back_again
 def test_numbers_of_modules_are_all_found_once():
     found = of_modules()
     assert len(found) == len(set(found)) > 40
-    assert {'data/rows.py BLOCKS', 'data/trajectory.py _REST_SPEED'} <= set(found)
+    assert {'data/trajectory.py BLOCKS', 'data/trajectory.py _REST_SPEED'} <= set(found)
     with changed(found, 1.3):
-        assert rows.BLOCKS == 8
+        assert trajectory.BLOCKS == 8
         assert trajectory._REST_SPEED == pytest.approx(0.026)
 
 

@@ -4,7 +4,8 @@
 
 from armid_ros.diagnosis.data.evidence import noise_floor
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
+from armid_ros.diagnosis.search.patch import Patch, patch_columns
+from armid_ros.diagnosis.search.trial import Named
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest

@@ -88,10 +88,10 @@ def test_products_of_blocks_say_what_a_refit_says(bench):
     assert trial.gain == pytest.approx(gains.sum(), rel=1e-8)
     own, beside = problem.x[:, :, :OWN], problem.x[:, :, OWN:]
     for measured, rows in zip(
-        trial.left_out(problem, own, beside), (left, left - made), strict=True
+        trial.left_out(problem.y, problem.block, own, beside), (left, left - made), strict=True
     ):
         np.testing.assert_allclose(measured, rows, atol=1e-8)
-    joints = trial.joint_gains(problem, own, beside)
+    joints = trial.joint_gains(problem.y, problem.block, own, beside)
     np.testing.assert_allclose(joints, gains.sum(axis=0), rtol=1e-8)
     np.testing.assert_allclose(power, np.bincount(owner, np.sum(left**2, axis=1)))
 

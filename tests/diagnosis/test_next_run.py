@@ -13,7 +13,7 @@ from armid_ros.diagnosis.next_run import plan
 from armid_ros.diagnosis.next_run.plan import CLEARANCE, templates
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.patch import Named
+from armid_ros.diagnosis.search.trial import Named
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (

@@ -8,7 +8,7 @@ from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.explain import nuisance_of
 from armid_ros.diagnosis.search.fit import fit, Start
-from armid_ros.diagnosis.search.patch import Named
+from armid_ros.diagnosis.search.trial import Named
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np

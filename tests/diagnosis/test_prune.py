@@ -5,8 +5,7 @@
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search import explain, prune
 from armid_ros.diagnosis.search.candidates import as_given
-from armid_ros.diagnosis.search.patch import Named
-from armid_ros.diagnosis.search.trial import Taken
+from armid_ros.diagnosis.search.trial import Named, Taken
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 import numpy as np

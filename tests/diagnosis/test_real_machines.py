@@ -4,12 +4,12 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis.data.baseline import excited
 from armid_ros.diagnosis.data.evidence import noise_floor
 from armid_ros.diagnosis.data.prepare import choose_filters
-from armid_ros.diagnosis.data.rows import excited
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.patch import Named
+from armid_ros.diagnosis.search.trial import Named
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.elastic.identification.transmission import fit_transmission
 from armid_ros.recording import read_recording

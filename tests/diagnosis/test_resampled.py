@@ -5,12 +5,12 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+from armid_ros.diagnosis.data.baseline import Prior
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import Prior
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.held_out import as_change, widened, with_model_error
-from armid_ros.diagnosis.search.patch import Named
+from armid_ros.diagnosis.search.trial import Named
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning

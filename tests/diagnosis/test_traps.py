@@ -10,8 +10,9 @@ The data and the library are the same for both; what differs is the one step tha
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis.data.baseline import excited
 from armid_ros.diagnosis.data.evidence import noise_floor
-from armid_ros.diagnosis.data.rows import excited, make_problem, project
+from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.effects import Action, CATALOGUE, Effect, Quantity

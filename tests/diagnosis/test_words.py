@@ -10,8 +10,8 @@ from armid_ros.diagnosis.search.explanation import NOISE
 from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
-from armid_ros.diagnosis.verdict.gap import Excess
 from armid_ros.diagnosis.verdict.naming import _separating, _without_later
+from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.diagnosis.verdict.words import decide, not_repeating, sentence
 from armid_ros.effects import CATALOGUE
 import numpy as np

@@ -6,7 +6,7 @@ import json
 
 from armid_ros.diagnosis.data.evidence import noise_floor
 from armid_ros.diagnosis.data.trajectory import trajectories
-from armid_ros.diagnosis.verdict.gap import Overlay
+from armid_ros.diagnosis.verdict.finding import Overlay
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning

@@ -15,8 +15,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.baseline import excited
 from armid_ros.diagnosis.data.evidence import noise_floor, NoiseFloor
-from armid_ros.diagnosis.data.rows import excited
 from armid_ros.diagnosis.data.trajectory import thinnable, trajectories, Trajectory, UNSURE
 from armid_ros.diagnosis.search.candidates import with_friction
 from armid_ros.diagnosis.search.fit import fit

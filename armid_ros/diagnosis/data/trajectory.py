@@ -10,7 +10,7 @@ columns are computed; its rows are decimated, which is where everything is compa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -42,6 +42,12 @@ _REST_SPEED, REST_TIME = 0.02, 0.2
 _REVERSAL_SPEED, _REVERSAL_NOISE = 0.004, 3.0
 #: Share of a row of which that sign may be uncertain in any case: three rows beside a reversal.
 UNSURE = 0.003
+#: Parts that data are held out in, two of each recording at the least: what one fast recording
+#: shows alone can be learned from half of it.
+PARTS = 6
+#: Blocks of each part of the data, of a second or two, which is longer than any correlation of
+#: noise; a block has this many rows at the least.
+BLOCKS, _LEAST_ROWS = 6, 8
 
 
 @dataclass(frozen=True)
@@ -240,6 +246,48 @@ def _unsure(motion: Motion, used: Conditioning, least: FloatArray) -> FloatArray
     taps = np.abs(used.taps())
     share = signal.oaconvolve(slow.astype(float), taps[:, np.newaxis], mode='same', axes=0)
     return np.asarray(np.maximum(share, 0.0))
+
+
+def block_rows(
+    data: Sequence[Trajectory],
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Return the block of every row, and the part of the data of every block."""
+    fold = fold_rows(data)
+    block = np.empty(len(fold), dtype=np.intp)
+    owner: list[int] = []
+    for k in np.unique(fold):
+        rows = np.flatnonzero(fold == k)
+        pieces = min(BLOCKS, max(2, len(rows) // _LEAST_ROWS))
+        for piece in np.array_split(rows, pieces):
+            block[piece] = len(owner)
+            owner.append(int(k))
+    return block, np.array(owner, dtype=np.intp)
+
+
+def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
+    """Return one over the noise of all rows, zero where they tell nothing, (R, n) [1/(N m)]."""
+    return np.concatenate([part.informative / s for part, s in zip(data, sigma, strict=True)])
+
+
+def weighted_rows(
+    rows: Sequence[FloatArray], data: Sequence[Trajectory], sigma: Sequence[FloatArray]
+) -> Iterator[FloatArray]:
+    """Yield rows (M, n) or (M, n, P) of each trajectory with the weights of `row_weights`."""
+    for own, part, s in zip(rows, data, sigma, strict=True):
+        weight = row_weights([part], [s])
+        yield own * (weight[:, :, np.newaxis] if own.ndim > 2 else weight)
+
+
+def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
+    """Return the part of the data of every row, a stretch of a recording."""
+    recordings = len({part.fold for part in data})
+    pieces = max(2, -(-PARTS // max(recordings, 1)))
+    rows = []
+    for part in data:
+        span = np.linspace(0, pieces, len(part.rows), endpoint=False).astype(np.intp)
+        rows.append(part.fold * pieces + span)
+    _, index = np.unique(np.concatenate(rows), return_inverse=True)
+    return np.asarray(index, dtype=np.intp)
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,9 @@ from itertools import pairwise, product
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.diagnosis.data.rows import EXCITED, excited, Prior, Problem, Projection, row_weights
-from armid_ros.diagnosis.data.trajectory import Trajectory, Workspace
+from armid_ros.diagnosis.data.baseline import EXCITED, excited, Prior
+from armid_ros.diagnosis.data.rows import Problem, Projection
+from armid_ros.diagnosis.data.trajectory import row_weights, Trajectory, Workspace
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.effects import CATALOGUE, Effect, Kind, Shape

@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.misfit import louder
-from armid_ros.diagnosis.data.evidence import Baseline, Evidence, torque_rms
+from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.evidence import Evidence, torque_rms
 from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.candidates import as_given, fitted_anew

@@ -15,7 +15,8 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.diagnosis.data.evidence import Baseline, Evidence
+from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import make_problem, Problem
 from armid_ros.diagnosis.data.trajectory import Workspace
 from armid_ros.diagnosis.search.candidates import Candidates, candidates, Question
@@ -23,10 +24,9 @@ from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import widened
 from armid_ros.diagnosis.search.look import Look, look_at
-from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.prune import doubtful, pruned, Retrial, View
 from armid_ros.diagnosis.search.round import Before, Later, Nuisance, Round, undecided
-from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Taken, Trial
+from armid_ros.diagnosis.search.trial import Candidate, Named, Step, Survey, Taken, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray

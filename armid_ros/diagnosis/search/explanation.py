@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
-from armid_ros.diagnosis.data.evidence import Baseline, Evidence
-from armid_ros.diagnosis.data.rows import Prior, weighted_rows
-from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.data.baseline import Baseline, Prior
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.trajectory import Trajectory, weighted_rows
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import as_change, widened
 from armid_ros.diagnosis.search.round import cost

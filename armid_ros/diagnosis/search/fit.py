@@ -14,9 +14,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.rows import described_precision, Prior, weighted_rows
-from armid_ros.diagnosis.data.trajectory import Trajectory
-from armid_ros.diagnosis.search.patch import Named, Patch, patch_columns
+from armid_ros.diagnosis.data.baseline import described_precision, Prior
+from armid_ros.diagnosis.data.trajectory import Trajectory, weighted_rows
+from armid_ros.diagnosis.search.patch import Patch, patch_columns
+from armid_ros.diagnosis.search.trial import Named
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.least_squares import noise_products

@@ -23,16 +23,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Baseline, Evidence
-from armid_ros.diagnosis.data.rows import (
-    fold_rows,
-    make_problem,
-    Prior,
-    Problem,
-    Products,
-    products,
-    weighted_rows,
-)
+from armid_ros.diagnosis.data.baseline import Baseline, Prior
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.rows import make_problem, Problem, Products, products
+from armid_ros.diagnosis.data.trajectory import fold_rows, weighted_rows
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.trial import Candidate, IDENTIFIABLE, Trial
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH

@@ -292,7 +292,7 @@ def _examined(
         if change is None or not acceptable(change, here):
             continue
         there.append(change)
-        takes = trial.joint_gains(here.problem, here.own(trial.candidate), here.free)
+        takes = trial.joint_gains(*here.rows_of(trial.candidate))
         matters = change.gain >= least or bool(np.any(takes > most * open_squares))
         size = _size(change, takes, here)
         if not (matters and material(size, here, 0.0)):

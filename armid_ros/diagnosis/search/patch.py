@@ -10,6 +10,7 @@ from functools import cached_property
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.search.trial import Named
 from armid_ros.effects import Effect, TorqueReading
 from armid_ros.estimate import ParameterName
 from armid_ros.model import BaseParameters
@@ -21,24 +22,6 @@ import numpy.typing as npt
 _SHAPE_STEP = 0.1
 #: Relative step of the differences by a shape.
 _STEP = 1e-3
-
-
-@dataclass(frozen=True)
-class Named:
-    """
-    An effect that was named, as it is fitted.
-
-    Attributes
-    ----------
-    effect : Effect
-        Joints and shape.
-    kept : tuple of int
-        Its parameters that are free; the others are zero.
-
-    """
-
-    effect: Effect
-    kept: tuple[int, ...]
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,8 @@ from armid_ros.diagnosis.search.acceptance import acceptable, beyond_chance, mat
 from armid_ros.diagnosis.search.candidates import Question
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.round import Nuisance, Round
-from armid_ros.diagnosis.search.trial import Candidate, Step, Taken, Trial
+from armid_ros.diagnosis.search.trial import Candidate, Named, Step, Taken, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -221,7 +220,7 @@ class Retrial:
         )
         if step.misfit_share is None:
             return beyond_chance(again.trial, here)
-        gains = again.trial.joint_gains(here.problem, here.own(again.trial.candidate), here.free)
+        gains = again.trial.joint_gains(*here.rows_of(again.trial.candidate))
         return acceptable(again.trial, here) and material(gains, here, step.misfit_share)
 
     def fitted(self, names: Sequence[Taken], change: FloatArray | None) -> Fitted:

@@ -10,16 +10,10 @@ from enum import IntEnum
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Baseline, Evidence
-from armid_ros.diagnosis.data.rows import (
-    Prior,
-    Problem,
-    Products,
-    project,
-    Projection,
-    weighted_rows,
-)
-from armid_ros.diagnosis.data.trajectory import Workspace
+from armid_ros.diagnosis.data.baseline import Baseline, Prior
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.rows import Problem, Products, project, Projection
+from armid_ros.diagnosis.data.trajectory import weighted_rows, Workspace
 from armid_ros.diagnosis.search.trial import Candidate, lead, ROUNDING, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
@@ -258,6 +252,12 @@ class Round:
         """Return the columns of a candidate, shape (R, n, p)."""
         return self.problem.x[:, :, candidate.columns]
 
+    def rows_of(
+        self, candidate: Candidate
+    ) -> tuple[FloatArray, npt.NDArray[np.intp], FloatArray, FloatArray]:
+        """Return what is to be explained, its blocks, columns of a candidate and free ones."""
+        return self.problem.y, self.problem.block, self.own(candidate), self.free
+
     def gaps(self, left: FloatArray) -> npt.NDArray[np.bool_]:
         """Return in which joints what is left (R, n) is a gap, shape (n,)."""
         rows = self.evidence.split(left, self.problem.weight)
@@ -346,7 +346,7 @@ def _usual(trial: Trial) -> bool:
 
 def closes(trial: Trial, here: Round) -> bool:
     """Return whether a cause leaves no gap of data left out."""
-    _, rest = trial.left_out(here.problem, here.own(trial.candidate), here.free)
+    _, rest = trial.left_out(*here.rows_of(trial.candidate))
     return not here.gaps(rest).any()
 
 

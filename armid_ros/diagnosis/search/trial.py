@@ -15,8 +15,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
-from armid_ros.diagnosis.data.rows import Problem
-from armid_ros.diagnosis.search.patch import Named
 from armid_ros.effects import Effect
 from armid_ros.identification.fitting.jackknife import jackknife
 from armid_ros.motion import FloatArray
@@ -29,6 +27,24 @@ from scipy import stats
 IDENTIFIABLE = 0.9
 #: Squares that differ by less than this share do so by rounding.
 ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Named:
+    """
+    An effect that was named, as it is fitted.
+
+    Attributes
+    ----------
+    effect : Effect
+        Joints and shape.
+    kept : tuple of int
+        Its parameters that are free; the others are zero.
+
+    """
+
+    effect: Effect
+    kept: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -194,7 +210,7 @@ class Trial:
         return int(np.sum(np.bincount(self.piece, self.gains) > 0.0))
 
     def left_out(
-        self, problem: Problem, own: FloatArray, free: FloatArray
+        self, y: FloatArray, block: npt.NDArray[np.intp], own: FloatArray, free: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """
         Return what is left of each part without the candidate and with it, each (R, n).
@@ -202,16 +218,18 @@ class Trial:
         Parameters are those of `joint_gains`.
 
         """
-        piece = self.piece[problem.block]
-        alone, rest = np.empty_like(problem.y), np.empty_like(problem.y)
+        piece = self.piece[block]
+        alone, rest = np.empty_like(y), np.empty_like(y)
         for part in range(len(self.held_values)):
             rows = piece == part
-            alone[rows] = problem.y[rows] - free[rows] @ self.held_alone[part]
+            alone[rows] = y[rows] - free[rows] @ self.held_alone[part]
             predicted = own[rows] @ self.held_values[part] + free[rows] @ self.held_free[part]
-            rest[rows] = problem.y[rows] - predicted
+            rest[rows] = y[rows] - predicted
         return alone, rest
 
-    def joint_gains(self, problem: Problem, own: FloatArray, free: FloatArray) -> FloatArray:
+    def joint_gains(
+        self, y: FloatArray, block: npt.NDArray[np.intp], own: FloatArray, free: FloatArray
+    ) -> FloatArray:
         """
         Return the squares that go in every joint, shape (n,).
 
@@ -219,15 +237,17 @@ class Trial:
 
         Parameters
         ----------
-        problem : Problem
-            The rows.
+        y : ndarray, shape (R, n)
+            What is to be explained, over the unit of the gap.
+        block : ndarray of int, shape (R,)
+            Block of each row.
         own : ndarray, shape (R, n, p)
             Columns of the candidate.
         free : ndarray, shape (R, n, f)
             Columns that were free.
 
         """
-        alone, rest = self.left_out(problem, own, free)
+        alone, rest = self.left_out(y, block, own, free)
         gains = np.sum(alone**2 - rest**2, axis=0)
         seen = float(gains.sum())
         return np.asarray(gains * max(self.gain / seen, 1.0) if seen > 0.0 else gains)

@@ -15,8 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.rows import weighted_rows
-from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.data.trajectory import Trajectory, weighted_rows
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.settings import DiagnosisSettings

@@ -27,10 +27,9 @@ from armid_ros.diagnosis.search.explanation import Chosen, Explanation, NOISE
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import held_out
 from armid_ros.diagnosis.search.look import look_at
-from armid_ros.diagnosis.search.patch import Named
 from armid_ros.diagnosis.search.prune import View
 from armid_ros.diagnosis.search.round import Nuisance, Round
-from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Taken, Trial
+from armid_ros.diagnosis.search.trial import Candidate, Named, Step, Survey, Taken, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack

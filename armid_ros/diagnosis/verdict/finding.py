@@ -15,10 +15,10 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import NoiseFloor
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.verdict.gap import Gap
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.estimate import ParameterName
 from armid_ros.model.spring_ties import Tie
+from armid_ros.motion import FloatArray
 
 #: Less of the gap than this is none in a sentence.
 SAID = 0.01
@@ -104,6 +104,67 @@ class Finding:
         """Return name, value and standard deviation of the parameters of one joint."""
         rows = zip(self.parameters, self.values, self.std, strict=True)
         return [row for row in rows if row[0].joint == joint]
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """
+    Torques of one trajectory, filtered alike.
+
+    Attributes
+    ----------
+    source : str
+        The recording.
+    trajectory : Trajectory
+        Its motion.
+    measured, before, after : ndarray, shape (M, n)
+        Measured torque, and what both models predict [N m].
+    sigma : ndarray, shape (n,)
+        Noise [N m].
+
+    """
+
+    source: str
+    trajectory: Trajectory
+    measured: FloatArray
+    before: FloatArray
+    after: FloatArray
+    sigma: FloatArray
+
+
+@dataclass(frozen=True)
+class Gap:
+    """
+    Errors in numbers.
+
+    Attributes
+    ----------
+    before, after, floor : ndarray, shape (n,)
+        Root mean square error of each joint without and with what was named, and the noise [N m].
+    chi2_before : ndarray, shape (n,)
+        Mean square over noise without what was named.
+    closed : float
+        Share of the excess over the noise that is gone, 0 to 1, in the joints that had a gap or
+        have one.
+    predicted : bool
+        Whether it was measured on recordings that nothing was fitted to.
+    overlays : tuple of Overlay
+        The curves.
+
+    """
+
+    before: FloatArray
+    after: FloatArray
+    floor: FloatArray
+    chi2_before: FloatArray
+    closed: float
+    predicted: bool
+    overlays: tuple[Overlay, ...]
+
+    @property
+    def data(self) -> str:
+        """Return what it was measured on, for a reader."""
+        return 'held-out' if self.predicted else 'the data it was found in'
 
 
 @dataclass(frozen=True)

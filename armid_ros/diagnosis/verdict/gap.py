@@ -16,14 +16,15 @@ stop, a brake, or a contact.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Baseline, Evidence
+from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import REST_TIME, Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.verdict.where import Where
+from armid_ros.diagnosis.verdict.finding import Gap, Overlay
+from armid_ros.diagnosis.verdict.where import Excess, Where
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -41,85 +42,6 @@ _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a
 _BESIDE = (
     'with friction, where it stands still or turns round: a stop, a brake or a contact does that'
 )
-
-
-@dataclass(frozen=True)
-class Excess:
-    """
-    What is left in the joints beyond what is no gap.
-
-    Attributes
-    ----------
-    ratio : ndarray, shape (n,)
-        Loss over the loss up to which it is no gap; above one there is something.
-    where : str
-        The data that show it, for a sentence.
-
-    """
-
-    ratio: FloatArray
-    where: str
-
-
-@dataclass(frozen=True)
-class Overlay:
-    """
-    Torques of one trajectory, filtered alike.
-
-    Attributes
-    ----------
-    source : str
-        The recording.
-    trajectory : Trajectory
-        Its motion.
-    measured, before, after : ndarray, shape (M, n)
-        Measured torque, and what both models predict [N m].
-    sigma : ndarray, shape (n,)
-        Noise [N m].
-
-    """
-
-    source: str
-    trajectory: Trajectory
-    measured: FloatArray
-    before: FloatArray
-    after: FloatArray
-    sigma: FloatArray
-
-
-@dataclass(frozen=True)
-class Gap:
-    """
-    Errors in numbers.
-
-    Attributes
-    ----------
-    before, after, floor : ndarray, shape (n,)
-        Root mean square error of each joint without and with what was named, and the noise [N m].
-    chi2_before : ndarray, shape (n,)
-        Mean square over noise without what was named.
-    closed : float
-        Share of the excess over the noise that is gone, 0 to 1, in the joints that had a gap or
-        have one.
-    predicted : bool
-        Whether it was measured on recordings that nothing was fitted to.
-    overlays : tuple of Overlay
-        The curves.
-
-    """
-
-    before: FloatArray
-    after: FloatArray
-    floor: FloatArray
-    chi2_before: FloatArray
-    closed: float
-    predicted: bool
-    overlays: tuple[Overlay, ...]
-
-    @property
-    def data(self) -> str:
-        """Return what it was measured on, for a reader."""
-        return 'held-out' if self.predicted else 'the data it was found in'
 
 
 def measure_gap(explanation: Explanation, unseen: Evidence | None) -> Gap:

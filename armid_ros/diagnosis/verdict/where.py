@@ -69,6 +69,24 @@ class Where:
     unit: str
 
 
+@dataclass(frozen=True)
+class Excess:
+    """
+    What is left in the joints beyond what is no gap.
+
+    Attributes
+    ----------
+    ratio : ndarray, shape (n,)
+        Loss over the loss up to which it is no gap; above one there is something.
+    where : str
+        The data that show it, for a sentence.
+
+    """
+
+    ratio: FloatArray
+    where: str
+
+
 def locate(
     arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], limits: FloatArray
 ) -> tuple[Where, ...]:

@@ -13,7 +13,7 @@ from armid_ros.diagnosis.data.evidence import NoiseFloor
 from armid_ros.diagnosis.search.explanation import NOISE
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
-from armid_ros.diagnosis.verdict.gap import Excess
+from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot

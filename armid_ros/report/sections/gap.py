@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.diagnosis.verdict.gap import Gap, Overlay
+from armid_ros.diagnosis.verdict.finding import Gap, Overlay
 from armid_ros.motion import FloatArray
 from armid_ros.report.bars import Bar, BarChart
 from armid_ros.report.charts import Chart, Role, Series, thinned
