@@ -17,7 +17,7 @@ from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
-from armid_ros.diagnosis.data.prepare import check_data, choose_filters, mended, prepare, Prepared
+from armid_ros.diagnosis.data.prepare import choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
 from armid_ros.diagnosis.search.candidates import frees_body
 from armid_ros.diagnosis.search.choice import Explainer
@@ -48,6 +48,7 @@ from armid_ros.diagnosis.verdict.gap import (
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.where import Excess, locate, Where
 from armid_ros.diagnosis.verdict.words import decide, not_repeating
+from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -131,7 +132,7 @@ def diagnose(
     recordings, validate, baseline, repairs = mended(recordings, validate, baseline, settings)
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
-    faults, notes = check_data(arm, recordings, used, data)
+    faults, notes = check_data(arm, recordings, used, [part.stretch for part in data])
     notes += repairs
     if faults:
         return _bad(given, data, faults, notes)

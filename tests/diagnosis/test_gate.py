@@ -6,16 +6,22 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.data.prepare import check_data, mended
+from armid_ros.diagnosis.data.prepare import mended
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify
+from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np
 import pytest
 
 from tests.diagnosis.conftest import Bench, URDF
+
+
+def stretches(recordings, used):
+    """Return recordings in rows."""
+    return [part.stretch for part in trajectories(recordings, used)]
 
 
 @pytest.mark.parametrize('stated', ['damping="0.3"', 'friction="0.5"'])
@@ -27,7 +33,7 @@ def test_friction_that_a_description_states_and_a_model_lacks_is_said(stated):
     used = conditioning(recordings, SignalSettings())
 
     def notes(arm):
-        return check_data(arm, recordings, used, trajectories(recordings, used))[1]
+        return check_data(arm, recordings, used, stretches(recordings, used))[1]
 
     (said,) = [note for note in notes(ArmModel(bench.robot)) if '<dynamics>' in note]
     assert 'elbow' in said
@@ -37,7 +43,7 @@ def test_friction_that_a_description_states_and_a_model_lacks_is_said(stated):
 
 def faults(bench, recordings):
     used = conditioning(recordings, SignalSettings())
-    return check_data(bench.arm, recordings, used, trajectories(recordings, used))[0]
+    return check_data(bench.arm, recordings, used, stretches(recordings, used))[0]
 
 
 def test_a_position_that_jumps_is_named_with_its_joint_and_time(bench):
@@ -173,7 +179,7 @@ def test_a_torque_beyond_the_limit_of_its_drive_is_said(bench):
     recordings = bench.recordings()
     used = conditioning(recordings, SignalSettings())
     strong = [replace(one, tau=9.0 * one.tau) for one in recordings]
-    notes = check_data(bench.arm, strong, used, trajectories(strong, used))[1]
+    notes = check_data(bench.arm, strong, used, stretches(strong, used))[1]
     assert any('shoulder reaches' in note and 'its limit is 50' in note for note in notes)
-    notes = check_data(bench.arm, recordings, used, trajectories(recordings, used))[1]
+    notes = check_data(bench.arm, recordings, used, stretches(recordings, used))[1]
     assert not any('its limit is' in note for note in notes)

@@ -18,6 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
 from armid_ros.effects.timing import smoothed
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.assess.data_faults import Stretch
 from armid_ros.identification.rows.period import find_period
 from armid_ros.identification.rows.signals import (
     Conditioning,
@@ -106,6 +107,11 @@ class Trajectory:
     def at_rows(self) -> Motion:
         """Return the motion at the samples that the rows sit on."""
         return self.motion.select(self.rows)
+
+    @property
+    def stretch(self) -> Stretch:
+        """Return the rows as faults of data are looked for in."""
+        return Stretch(self.source, self.at_rows.with_torque(self.torque), self.informative)
 
     @cached_property
     def period(self) -> tuple[int, slice] | None:

@@ -1,0 +1,268 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether data are at fault themselves, before any physics is blamed for what a model leaves of them.
+
+Asked are time base, units, signs, order of joints, delay and clipped readings: a fault of the data
+explains any gap. Names, signs and units are those that identification tells; see `mistakes`.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import CATALOGUE
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.assess.dead_channels import dead_channels
+from armid_ros.identification.assess.hypotheses import (
+    Exchanged,
+    Hypothesis,
+    InDegrees,
+    InUnit,
+    OtherUnit,
+    Reversed,
+)
+from armid_ros.identification.assess.mistakes import find_mistake
+from armid_ros.identification.assess.undriven import held_elsewhere
+from armid_ros.identification.rows.checks import (
+    check_motion,
+    driven_by_friction,
+    TORQUE_UNITS,
+    wrong_sign,
+)
+from armid_ros.identification.rows.feedback import laws_of_controllers
+from armid_ros.identification.rows.signals import Conditioning
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+
+#: Mistakes that are of the data and of nothing that may happen to an arm.
+_OF_DATA = Exchanged | InDegrees | InUnit | Reversed
+#: What torques are that are so many times those of the model, and how near to the factor: masses
+#: of a description are off by less.
+_UNITS = {
+    57.2958: 'torques are 57.3 times what the model takes, degrees against radians: convert them',
+    **{
+        count: f'torques are in {unit} instead of N m: convert them'
+        for unit, count in TORQUE_UNITS.items()
+    },
+}
+#: A factor of torques is that of a unit if it is within this factor of it.
+_NEAR = 1.5
+#: A torque of so many times the limit of its drive is said.
+_BEYOND = 1.5
+#: Share of samples at the very extreme of a reading, above which it is clipped.
+_CLIPPED = 0.02
+#: A step of a position at this multiple of the highest velocity is none of the arm.
+_IMPOSSIBLE = 10.0
+#: Share of steps in time that differ from the median by more than half of it.
+_UNEVEN = 0.05
+#: Jitter of stamps that blurs a torque at the end of the band by less than this share of it is
+#: harmless.
+_BLURRED = 0.1
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """
+    An unbroken stretch of a recording in rows.
+
+    Attributes
+    ----------
+    source : str
+        The recording.
+    motion : Motion
+        Filtered motion with the measured torque, M rows.
+    informative : ndarray, shape (M, n)
+        False where a joint rests or turns round.
+
+    """
+
+    source: str
+    motion: Motion
+    informative: npt.NDArray[np.bool_]
+
+    @property
+    def torque(self) -> FloatArray:
+        """Measured torque, shape (M, n) [N m]."""
+        assert self.motion.tau is not None
+        return self.motion.tau
+
+
+def check_data(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    data: Sequence[Stretch],
+) -> tuple[list[str], list[str]]:
+    """
+    Look for faults of the data.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        What they are compared with.
+    recordings : sequence of Recording
+        The data as they were recorded.
+    used : Conditioning
+        Filters.
+    data : sequence of Stretch
+        The data in rows.
+
+    Returns
+    -------
+    faults : list of str
+        What makes a diagnosis meaningless, in words, with the remedy.
+    notes : list of str
+        What a reader should know.
+
+    """
+    mistaken = _mistaken(arm, recordings, used)
+    if mistaken:
+        return mistaken, []
+    faults = [*_time_base(recordings, _band(used, data)), *_laws(arm, data)]
+    for recording in recordings:
+        motions = [part.motion for part in data if part.source == recording.source]
+        faults += [*_jumps(arm.robot, recording), *dead_channels(arm, recording, motions)]
+    faults += [] if faults else _signs(arm, recordings, data)
+    notes = [*_clipped(recordings), *_beyond_limits(arm.robot, recordings)]
+    notes += _described_friction(arm)
+    for held in held_elsewhere(arm.robot, recordings, [part.motion for part in data]):
+        (faults if held.spoils else notes).append(held.text)
+    try:
+        notes += check_motion(arm.robot, recordings, used)
+    except IdentificationError as error:
+        faults.append(str(error))
+    return faults, notes
+
+
+def _signs(arm: ArmModel, recordings: Sequence[Recording], data: Sequence[Stretch]) -> list[str]:
+    """Say whose friction drives; another machine that an arm is tied to may drive it."""
+    if any(one.partner is not None for one in recordings):
+        return []
+    motions, torques = [part.motion for part in data], [part.torque for part in data]
+    driven = driven_by_friction(arm.robot, motions, torques)
+    return [wrong_sign(driven)] if driven else []
+
+
+def _mistaken(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> list[str]:
+    """Say what every recording shows to be wrong with it: names, signs or units of joints."""
+    if any(one.partner is not None for one in recordings):
+        return []
+    said: set[tuple[str, ...]] = set()
+    for recording in recordings:
+        mistake = find_mistake(arm.body, recording, used)
+        if mistake is None:
+            return []
+        said.add(tuple(_fault(one, arm.robot) for one in mistake.hypotheses))
+    if len(said) != 1:
+        return []
+    (sentences,) = said
+    return [', or '.join(sentences)] if all(sentences) else []
+
+
+def _fault(mistake: Hypothesis, robot: Robot) -> str:
+    """Say what is wrong with data; empty if it is something that may happen to an arm."""
+    if isinstance(mistake, OtherUnit):
+        ratios = [(mistake.factor / factor, said) for factor, said in _UNITS.items()]
+        return next((said for ratio, said in ratios if 1.0 / _NEAR < ratio < _NEAR), '')
+    return mistake.sentence(robot) if isinstance(mistake, _OF_DATA) else ''
+
+
+def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:
+    """Say where positions first step faster than a joint can move."""
+    time = np.maximum(np.diff(recording.t), recording.period)[:, np.newaxis]
+    known = np.isfinite(robot.velocity_limit) & (robot.velocity_limit > 0.0)
+    limit = np.where(known, _IMPOSSIBLE * robot.velocity_limit, np.inf)
+    at = np.argwhere(np.abs(np.diff(recording.q, axis=0)) > limit * time)
+    if len(at):
+        row, joint = at[0]
+        step = recording.q[row + 1, joint] - recording.q[row, joint]
+        yield (
+            f'in {recording.source or "a recording"} the position of {robot.joints[joint]} jumps '
+            f'by {step:.3g} at {recording.t[row + 1]:.3f} s: leave out what is faulty'
+        )
+
+
+def _band(used: Conditioning, data: Sequence[Stretch]) -> float:
+    """Return up to which frequency rows hold motion [Hz]."""
+    return min(used.kept_hz, *(part.motion.band_hz for part in data))
+
+
+def _time_base(recordings: Sequence[Recording], band_hz: float) -> list[str]:
+    faults = []
+    for recording in recordings:
+        steps = np.diff(recording.t)
+        median = float(np.median(steps))
+        uneven = float(np.mean(np.abs(steps - median) > 0.5 * median))
+        jitter = float(np.sqrt(np.mean(np.minimum(np.abs(steps - median), median) ** 2)))
+        if uneven > _UNEVEN and 2.0 * np.pi * band_hz * jitter > _BLURRED:
+            faults.append(
+                f'{recording.source or "recording"}: {100 * uneven:.0f} % of the time stamps are '
+                'uneven by more than half a period; record with the stamps of the driver'
+            )
+    return faults
+
+
+def _described_friction(arm: ArmModel) -> list[str]:
+    """Say that a description states friction that the model does not have."""
+    robot = arm.robot
+    there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
+    stated = [
+        joint
+        for k, joint in enumerate(robot.joints)
+        if any(
+            getattr(robot, f'urdf_{kind.urdf_attribute}')[k] > 0.0
+            and (kind.name, joint) not in there
+            for kind in CATALOGUE.values()
+            if kind.urdf_attribute
+        )
+    ]
+    if not stated:
+        return []
+    return [
+        f'the description states friction of {", ".join(stated)} in <dynamics>, which the model '
+        'does not have: it is looked for like any other; give a model that has it'
+    ]
+
+
+def _laws(arm: ArmModel, data: Sequence[Stretch]) -> Iterator[str]:
+    for part in data:
+        for law in laws_of_controllers(arm.body, part.motion, part.informative):
+            yield f'{part.source or "recording"}: {law}'
+
+
+def _clipped(recordings: Sequence[Recording]) -> list[str]:
+    notes = []
+    for recording in recordings:
+        if recording.tau is None:
+            continue
+        for j, joint in enumerate(recording.joints):
+            reading = recording.tau[:, j]
+            top = np.abs(reading).max()
+            share = float(np.mean(np.abs(reading) >= top * (1.0 - 1e-9)))
+            if top > 0.0 and share > _CLIPPED and len(np.unique(reading)) > 10:
+                notes.append(
+                    f'{recording.source or "recording"}: {100 * share:.0f} % of the torque of '
+                    f'{joint} is at {top:.4g}, its highest value: a limit'
+                )
+    return notes
+
+
+def _beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> Iterator[str]:
+    """Say where a torque is beyond what the description lets a drive give."""
+    limit = np.where(robot.torque_limit > 0.0, robot.torque_limit, np.inf)
+    for recording in recordings:
+        if recording.tau is None:
+            continue
+        largest = np.max(np.abs(recording.tau), axis=0)
+        for j in np.flatnonzero(largest > _BEYOND * limit).tolist():
+            yield (
+                f'{recording.source or "recording"}: the torque of {robot.joints[j]} reaches '
+                f'{largest[j]:.4g}, its limit is {limit[j]:.4g}'
+            )
