@@ -10,7 +10,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, next_run
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.next_run import plan
-from armid_ros.diagnosis.next_run.plan import CLEARANCE, templates
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.trial import Named
@@ -24,6 +23,7 @@ from armid_ros.excitation import (
     random_feasible,
     trajectory_faults,
 )
+from armid_ros.excitation.templates import CLEARANCE, templates
 from armid_ros.recording import Recording
 from armid_ros.robots import collision_model, robot_from_urdf
 import numpy as np
