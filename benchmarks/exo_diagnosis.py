@@ -22,6 +22,7 @@ from armid_ros.identification.ties.recorded import (
 )
 from armid_ros.identification.ties.stiffness import identify_interaction
 from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
+from armid_ros.pair.ties.ties import diagnose_ties
 from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import load_robot
 import numpy as np
@@ -119,8 +120,9 @@ def recorded_pair(partner: Partner, straps: Straps, seed: int) -> list[Recording
 
 def _diagnosis(partner: Partner, recordings: list[Recording]) -> Diagnosis:
     arm = ArmModel(load_robot('exoskeleton_legs'))
-    settings = DiagnosisSettings(partner=partner)
-    return diagnose(arm, recordings, settings=settings, rng=np.random.default_rng(0))
+    settings = DiagnosisSettings(partner=partner, ties=diagnose_ties)
+    rng = np.random.default_rng(0)
+    return diagnose(arm, recordings, settings=settings, rng=rng)
 
 
 def _said(found: Diagnosis) -> str:

@@ -30,7 +30,6 @@ from armid_ros.diagnosis.search.explanation import (
     NOISE,
 )
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.ties.ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import (
     attribute,
     Attribution,
@@ -143,9 +142,11 @@ def diagnose(
     before = trajectories(baseline, prepared.used, arm, prepared.allowed)
     known = Baseline.of(arm, before, rng) if baseline else None
     asked = _Asked(arm, given, prepared, known, validate, settings, rng, tell)
-    tied = _tied(asked, recordings)
-    if tied is not None:
-        return _said(tied, notes, asked)
+    if settings.partner is not None and settings.ties is not None:
+        tell(0.2, f'ties to {settings.partner.source}')
+        tied: Chosen | None = settings.ties(arm, recordings, prepared, settings)
+        if tied is not None:
+            return _said(tied, notes, asked)
     written = None if misfit is None else misfit.of(arm.robot, torque_rms(prepared.data))
     covariance = None if misfit is None else misfit.covariance
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
@@ -172,14 +173,6 @@ class _Asked:
     settings: DiagnosisSettings
     rng: np.random.Generator
     tell: Progress
-
-
-def _tied(asked: _Asked, recordings: Sequence[Recording]) -> Chosen | None:
-    """Look for what ties the arm to another machine, if one is there."""
-    if asked.settings.partner is None:
-        return None
-    asked.tell(0.2, f'ties to {asked.settings.partner.source}')
-    return diagnose_ties(asked.arm, recordings, asked.prepared, asked.settings)
 
 
 def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:

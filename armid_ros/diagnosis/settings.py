@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from armid_ros.effects import CATALOGUE, Kind
 from armid_ros.effects.tied import Partner, TiedInteraction, TiedSlack
@@ -132,6 +134,10 @@ class DiagnosisSettings:
     partner : Partner or None
         Another machine that was recorded beside the arm, to which it may be tied. What holds the
         arm is then looked for between the two, and not at unknown places.
+    ties : callable or None
+        Explains a gap by ties to the partner, before anything else is asked: from an arm,
+        recordings, what was prepared of them, and these settings to what was chosen, or None. See
+        `pair.ties`.
     signals : SignalSettings
         Filters; chosen from the recordings by default.
     material : float
@@ -148,6 +154,7 @@ class DiagnosisSettings:
     )
     own: tuple[Kind, ...] = ()
     partner: Partner | None = None
+    ties: Callable[..., Any] | None = None
     signals: SignalSettings = field(default_factory=SignalSettings)
     material: float = 0.01
     everything: bool = False

@@ -23,6 +23,7 @@ from armid_ros.files import json_text
 from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.identification.parameters_file import read_misfit
+from armid_ros.pair.ties.ties import diagnose_ties
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import percent, probability, with_interval
@@ -197,6 +198,7 @@ def diagnose(
     settings = DiagnosisSettings(
         signals=filters.settings(),
         partner=beside,
+        ties=diagnose_ties,
         material=asked.material,
         everything=asked.everything,
     )
