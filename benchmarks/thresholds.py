@@ -50,7 +50,7 @@ CHANGES = (0.7, 1.3)
 
 _PACKAGE_NAME, _ROOT = 'armid_ros.diagnosis', 'armid_ros.'
 _PACKAGE = Path(armid_ros.diagnosis.__file__).parent
-#: Parts of it whose numbers decide; those of sentences, ties and the next run decide no name.
+#: Parts of it whose numbers decide; those of sentences and the next run decide no name.
 _VERDICT = ('verdict/attribution.py', 'verdict/gap.py')
 _DECIDING = ('diagnose.py', 'data', 'search', *_VERDICT)
 #: From here up to one a number is a level, of which what is beyond is changed.

@@ -31,6 +31,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         'reference/numbers.md': numbers_page(
             ROOT / 'armid_ros' / 'diagnosis',
             (ROOT / 'benchmarks' / 'thresholds.txt').read_text(encoding='utf-8'),
+            [ROOT / 'armid_ros' / 'pair' / 'ties'],
         ),
         'reference/nodes.md': nodes_page(_taken(files, reference / 'nodes.md')),
         'reference/files.md': schemas_page(_taken(files, reference / 'files.md')),

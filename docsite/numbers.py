@@ -19,7 +19,7 @@ _ENTRY = re.compile(r'^(?P<names>\w+(?:, \w+)*) : (?P<type>.+)$')
 _MEASURED = re.compile(r'^(?P<name>[\w ./]+?) +(?P<factor>\d\.\d)  (?P<score>.+)$')
 
 
-def numbers_page(package: Path, sensitivity: str) -> str:
+def numbers_page(package: Path, sensitivity: str, more: Sequence[Path] = ()) -> str:
     """
     Return the page.
 
@@ -29,6 +29,8 @@ def numbers_page(package: Path, sensitivity: str) -> str:
         Folder of the diagnosis.
     sensitivity : str
         What the benchmark of the thresholds printed.
+    more : sequence of Path
+        Folders beside it that explain gaps as well.
 
     """
     measured = {
@@ -49,7 +51,7 @@ def numbers_page(package: Path, sensitivity: str) -> str:
     ]
     others = [
         (f'`{name}`', cell(value), cell(why), f'`{path}`', *_sensitivity(measured, keys))
-        for path, name, value, why, keys in _others(package)
+        for path, name, value, why, keys in _others(package, more)
     ]
     return '\n'.join(
         [
@@ -93,13 +95,15 @@ def _sensitivity(measured: Mapping[tuple[str, str], str], keys: Sequence[str]) -
     return cells
 
 
-def _others(package: Path) -> Iterator[tuple[str, str, str, str, list[str]]]:
+def _others(package: Path, more: Sequence[Path]) -> Iterator[tuple[str, str, str, str, list[str]]]:
     """Yield files, names, values, comments and keys of numbers that are no thresholds."""
-    for path in sorted(package.rglob('*.py')):
-        place = path.relative_to(package).as_posix()
-        for name, value, why in constants(path.read_text(encoding='utf-8')):
-            yield place, name, value, why, [f'{place} {one}' for one in name.split(', ')]
-    for place, name, value, why in _borrowed(package):
+    root = package.parents[1]
+    for folder, home in ((package, package), *((one, root) for one in more)):
+        for path in sorted(folder.rglob('*.py')):
+            place = path.relative_to(home).as_posix()
+            for name, value, why in constants(path.read_text(encoding='utf-8')):
+                yield place, name, value, why, [f'{place} {one}' for one in name.split(', ')]
+    for place, name, value, why in _borrowed([package, *more], root):
         yield place, name, value, why, [name]
 
 
@@ -130,19 +134,19 @@ def constants(source: str) -> Iterator[tuple[str, str, str]]:
         yield ast.unparse(node.targets[0]).strip('()'), ast.unparse(node.value), ' '.join(above)
 
 
-def _borrowed(package: Path) -> Iterator[tuple[str, str, str, str]]:
+def _borrowed(packages: Sequence[Path], root: Path) -> Iterator[tuple[str, str, str, str]]:
     """Yield files, names, values and comments of numbers that other packages have."""
     wanted: dict[str, set[str]] = {}
-    for path in package.rglob('*.py'):
+    for path in (path for package in packages for path in package.rglob('*.py')):
         for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
             if isinstance(node, ast.ImportFrom) and node.module:
                 wanted.setdefault(node.module, set()).update(alias.name for alias in node.names)
     for module, names in sorted(wanted.items()):
-        path = package.parents[1].joinpath(*module.split('.')).with_suffix('.py')
-        if path.is_file() and package not in path.parents:
+        path = root.joinpath(*module.split('.')).with_suffix('.py')
+        if path.is_file() and not set(packages) & set(path.parents):
             for name, value, why in constants(path.read_text(encoding='utf-8')):
                 if name in names:
-                    yield path.relative_to(package.parents[1]).as_posix(), name, value, why
+                    yield path.relative_to(root).as_posix(), name, value, why
 
 
 def _is_numbers(node: ast.expr) -> bool:

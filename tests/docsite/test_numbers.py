@@ -10,6 +10,7 @@ from armid_ros.diagnosis.settings import Thresholds
 from docsite.numbers import numbers_page
 
 PACKAGE = Path(__file__).parents[2] / 'armid_ros' / 'diagnosis'
+TIES = PACKAGE.parent / 'pair' / 'ties'
 MEASURED = 'as it is        1.0  9 of 10 first\nprice           0.7  8 of 10 first\n'
 
 
@@ -20,7 +21,7 @@ def rows(page):
 
 
 def test_each_has_a_value_and_a_reason():
-    page = numbers_page(PACKAGE, MEASURED)
+    page = numbers_page(PACKAGE, MEASURED, [TIES])
     told = rows(page)
     assert {field.name for field in fields(Thresholds)} <= {row[0].strip('`') for row in told}
     assert not [row for row in told if not (row[1] and row[2])]
@@ -59,3 +60,25 @@ def test_a_number_of_another_package_is_on_the_page(tmp_path):
     page = numbers_page(tmp_path / 'whole' / 'diagnosis', '')
     assert '| `TAKEN` | 1.5 | Why. | `whole/other.py` |' in page
     assert 'LEFT' not in page
+
+
+def test_numbers_of_a_folder_beside_it_are_on_the_page(tmp_path):
+    own, more = tmp_path / 'whole' / 'diagnosis', tmp_path / 'whole' / 'pair' / 'ties'
+    for folder in (own, more):
+        folder.mkdir(parents=True)
+    (tmp_path / 'whole' / 'other.py').write_text('#: Why.\nTAKEN = 1.5\n')
+    (own / 'own.py').write_text('#: How.\nOWN = 2.0\n')
+    taken = 'from whole.diagnosis.own import OWN\nfrom whole.other import TAKEN\n'
+    (more / 'slack.py').write_text(f'{taken}#: What for.\n_LEAST = 25.0\n')
+    told = [row[:4] for row in rows(numbers_page(own, '', [more]))[-3:]]
+    assert told == [
+        ['`OWN`', '2.0', 'How.', '`own.py`'],
+        ['`_LEAST`', '25.0', 'What for.', '`whole/pair/ties/slack.py`'],
+        ['`TAKEN`', '1.5', 'Why.', '`whole/other.py`'],
+    ]
+
+
+def test_numbers_of_ties_are_on_the_page():
+    places = {(row[0], row[3]) for row in rows(numbers_page(PACKAGE, MEASURED, [TIES]))}
+    assert ('`_LEAST_GAIN`', '`armid_ros/pair/ties/ties.py`') in places
+    assert ('`LEAST_Z`', '`armid_ros/identification/ties/search.py`') in places
