@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings
+from armid_ros.diagnosis import Diagnosis
 from armid_ros.effects.tied import Partner
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.identification.ties.recorded import (
@@ -22,7 +22,7 @@ from armid_ros.identification.ties.recorded import (
 )
 from armid_ros.identification.ties.stiffness import identify_interaction
 from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
-from armid_ros.pair.ties.ties import diagnose_ties
+from armid_ros.pair.ties.diagnosis import diagnose_beside
 from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import load_robot
 import numpy as np
@@ -120,9 +120,7 @@ def recorded_pair(partner: Partner, straps: Straps, seed: int) -> list[Recording
 
 def _diagnosis(partner: Partner, recordings: list[Recording]) -> Diagnosis:
     arm = ArmModel(load_robot('exoskeleton_legs'))
-    settings = DiagnosisSettings(partner=partner, ties=diagnose_ties)
-    rng = np.random.default_rng(0)
-    return diagnose(arm, recordings, settings=settings, rng=rng)
+    return diagnose_beside(arm, recordings, partner, rng=np.random.default_rng(0))
 
 
 def _said(found: Diagnosis) -> str:

@@ -47,6 +47,7 @@ from armid_ros.diagnosis.verdict.gap import (
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.where import Excess, locate, Where
 from armid_ros.diagnosis.verdict.words import decide, not_repeating
+from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -54,6 +55,8 @@ import numpy as np
 
 #: Called with the share that is done and what is being done.
 Progress = Callable[[float, str], None]
+#: Explains a gap by ties to another machine; None where they do not.
+Explain = Callable[[ArmModel, Sequence[Recording], Prepared, DiagnosisSettings], Chosen | None]
 
 #: Said where no two equal periods measure the noise.
 _ASSUMED = (
@@ -64,6 +67,11 @@ _ASSUMED = (
 _COMMON = (
     'the baseline did not determine the model for these motions: a rigid body and friction common '
     'to both were fitted'
+)
+#: Said where a partner was set, and its ties would be left out.
+_ALONE = (
+    'the settings have a partner, and nothing explains ties to it: call diagnose_beside of '
+    'armid_ros.pair.ties.diagnosis with it'
 )
 
 
@@ -77,6 +85,7 @@ def diagnose(
     settings: DiagnosisSettings | None = None,
     rng: np.random.Generator,
     progress: Progress | None = None,
+    tied: Explain | None = None,
 ) -> Diagnosis:
     """
     Find what a model lacks.
@@ -100,6 +109,9 @@ def diagnose(
         Draws the states over which base parameters are found, and resamplings of the data.
     progress : callable, optional
         Called with the share that is done and what is being done.
+    tied : callable, optional
+        Asked before all else whether ties to the partner of the settings explain the gap; needed
+        where there is one. `diagnose_beside` of `armid_ros.pair.ties.diagnosis` gives both.
 
     Returns
     -------
@@ -110,9 +122,13 @@ def diagnose(
     ------
     IdentificationError
         If there is nothing to diagnose: no torque, no motion, too short.
+    ModelError
+        If the settings have a partner, and nothing explains ties to it.
 
     """
     settings = settings or DiagnosisSettings()
+    if settings.partner is not None and tied is None:
+        raise ModelError(_ALONE)
     tell = progress or _silent
     if settings.everything:
         result = diagnose(
@@ -124,6 +140,7 @@ def diagnose(
             settings=settings.without_small_print(),
             rng=rng,
             progress=tell,
+            tied=tied,
         )
         return _with_small_print(result, settings.thresholds.headline)
     tell(0.02, 'filtering')
@@ -142,11 +159,11 @@ def diagnose(
     before = trajectories(baseline, prepared.used, arm, prepared.allowed)
     known = Baseline.of(arm, before, rng) if baseline else None
     asked = _Asked(arm, given, prepared, known, validate, settings, rng, tell)
-    if settings.partner is not None and settings.ties is not None:
+    if settings.partner is not None and tied is not None:
         tell(0.2, f'ties to {settings.partner.source}')
-        tied: Chosen | None = settings.ties(arm, recordings, prepared, settings)
-        if tied is not None:
-            return _said(tied, notes, asked)
+        found = tied(arm, recordings, prepared, settings)
+        if found is not None:
+            return _said(found, notes, asked)
     written = None if misfit is None else misfit.of(arm.robot, torque_rms(prepared.data))
     covariance = None if misfit is None else misfit.covariance
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()

@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from armid_ros.effects import CATALOGUE, Kind
 from armid_ros.effects.tied import Partner, TiedInteraction, TiedSlack
@@ -133,11 +131,8 @@ class DiagnosisSettings:
         Effects of one's own that may be named besides.
     partner : Partner or None
         Another machine that was recorded beside the arm, to which it may be tied. What holds the
-        arm is then looked for between the two, and not at unknown places.
-    ties : callable or None
-        Explains a gap by ties to the partner, before anything else is asked: from an arm,
-        recordings, what was prepared of them, and these settings to what was chosen, or None. See
-        `pair.ties`.
+        arm is then looked for between the two, and not at unknown places. `diagnose_beside` of
+        `armid_ros.pair.ties.diagnosis` sets it.
     signals : SignalSettings
         Filters; chosen from the recordings by default.
     material : float
@@ -154,7 +149,6 @@ class DiagnosisSettings:
     )
     own: tuple[Kind, ...] = ()
     partner: Partner | None = None
-    ties: Callable[..., Any] | None = None
     signals: SignalSettings = field(default_factory=SignalSettings)
     material: float = 0.01
     everything: bool = False

@@ -13,7 +13,9 @@ LONG: set[str] = set()
 MANY = {
     'api/diagnosis.py:diagnose',  # what a user types is spelled out
     'api/identification.py:identify',
+    'diagnosis/diagnose.py:diagnose',  # what may be known of a gap is spelled out
     'nodes/lockstep.py:run_lockstep',
+    'pair/ties/diagnosis.py:diagnose_beside',
 }
 
 

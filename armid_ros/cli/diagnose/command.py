@@ -14,7 +14,6 @@ from armid_ros.cli.diagnose.files import DiagnosisCase, make_extras, write_resul
 from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
-from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, Finding
 from armid_ros.diagnosis.verdict.document import SCHEMA
 from armid_ros.effects.tied import Partner
@@ -23,7 +22,7 @@ from armid_ros.files import json_text
 from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.identification.parameters_file import read_misfit
-from armid_ros.pair.ties.ties import diagnose_ties
+from armid_ros.pair.ties.diagnosis import diagnose_beside
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import percent, probability, with_interval
@@ -197,17 +196,16 @@ def diagnose(
     beside = partner_options.open_partner(partner.partner, partner.ties, loaded, robot.gravity)
     settings = DiagnosisSettings(
         signals=filters.settings(),
-        partner=beside,
-        ties=diagnose_ties,
         material=asked.material,
         everything=asked.everything,
     )
     misfit = None if asked.model is None or data.baseline else read_misfit(asked.model, arm)
     with progress('reading') as tick:
         recordings, held_out, before = data.read(loaded, beside, partner.partner_topic)
-        result = run(
+        result = diagnose_beside(
             arm,
             recordings,
+            beside,
             validate=held_out,
             baseline=before,
             misfit=misfit,
