@@ -153,7 +153,8 @@ def diagnose(
     if faults:
         return _bad(given, data, faults, notes)
     tell(0.1, 'noise floor')
-    prepared = prepare(arm, recordings, used, data, settings, rng, bool(baseline))
+    by_misfit = bool(baseline) and tied is None
+    prepared = prepare(arm, recordings, used, data, settings, rng, by_misfit)
     if any(floor.period is None for floor in prepared.floors):
         notes.append(_ASSUMED)
     before = trajectories(baseline, prepared.used, arm, prepared.allowed)

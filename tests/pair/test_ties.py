@@ -57,6 +57,12 @@ def test_springs_are_named_where_all_effects_are_asked_for(arm, partner, togethe
     assert {tie.name for finding in found.findings for tie in finding.ties} == set(TIED)
 
 
+def test_recordings_from_before_do_not_hide_springs(arm, partner, together) -> None:
+    before = together[:1]
+    found = diagnose_beside(arm, together, partner, baseline=before, rng=np.random.default_rng(0))
+    assert {tie.name for finding in found.findings for tie in finding.ties} == set(TIED)
+
+
 def test_a_partner_to_which_nothing_explains_ties_is_refused(arm, partner, together) -> None:
     settings = DiagnosisSettings(partner=partner)
     with pytest.raises(ModelError, match='call diagnose_beside'):
