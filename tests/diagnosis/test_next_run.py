@@ -24,6 +24,7 @@ from armid_ros.excitation import (
     trajectory_faults,
 )
 from armid_ros.excitation.templates import CLEARANCE, templates
+from armid_ros.model import inverse_dynamics
 from armid_ros.recording import Recording
 from armid_ros.robots import collision_model, robot_from_urdf
 import numpy as np
@@ -38,6 +39,13 @@ OFFSET = 0.05
 def offset(motion, tau):
     """Return a constant torque of the elbow."""
     return np.tile([0.0, OFFSET], (len(motion), 1))
+
+
+def heavier(robot):
+    """Return a robot whose last link carries something."""
+    parameters = robot.rigid_parameters.copy()
+    parameters[-10:] += [0.5, 0.0, 0.0, 0.1, 0.02, 0.0, 0.02, 0.0, 0.0, 0.0]
+    return robot.with_inertias(parameters)
 
 
 @pytest.fixture(scope='module')
@@ -86,6 +94,20 @@ def test_a_provisional_name_is_held_against_the_next_best(bench):
     assert {pair.name for pair in run.separations} == {'quadratic_friction'}
     ranking = [t.candidate.effect.name for t in step.ranking]
     assert {pair.rival for pair in run.separations} <= set(ranking) - {'quadratic_friction'}
+
+
+def test_a_run_that_tells_nothing_is_none(bench):
+    """A load of a link is that link: any motion would be in vain."""
+    hidden = bench.recordings(
+        lambda motion, tau: (
+            inverse_dynamics(heavier(bench.robot), motion) - inverse_dynamics(bench.robot, motion)
+        )
+    )
+    found = diagnose(bench.arm, hidden, rng=np.random.default_rng(0))
+    (one,) = found.findings
+    assert {one.name, *one.ambiguous_with} == {'payload', 'link_inertia'}
+    with pytest.raises(TrajectoryError, match='no motion tells'):
+        next_run(found, np.random.default_rng(1))
 
 
 def test_the_arm_can_make_the_run_without_hitting_its_own_pedestal(bench, chosen):

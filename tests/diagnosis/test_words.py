@@ -152,6 +152,7 @@ def test_what_could_stand_in_another_joint_is_said_with_it(bench, rivals, said):
 def test_an_experiment_names_the_joints_of_both():
     same = _separating('payload', ['elbow'], Rival('link_inertia', ('elbow',)))
     assert same.startswith('To separate payload from link inertia of elbow: ')
+    assert same.endswith('elbow: the same motion with and without the tool.')
     other = _separating('torque_offset', ['elbow'], Rival('link_inertia', ('wrist',)))
     assert other.startswith('To separate torque offset of elbow from link inertia of wrist: ')
 

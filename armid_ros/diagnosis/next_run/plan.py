@@ -151,7 +151,8 @@ def next_run(
     Raises
     ------
     TrajectoryError
-        If the arm cannot make any of the motions; says what stands in the way.
+        If the arm cannot make any of the motions, or none tells any of the names apart; says what
+        stands in the way.
 
     """
     doubts = _doubts(diagnosis)
@@ -174,7 +175,11 @@ def next_run(
     if plain:
         best = max(plain, key=lambda run: run.worth)
         runs += _designed(diagnosis, doubts, best, collision, rng)
-    for run in _in_order(runs):
+    telling = [run for run in runs if any(one.z >= _NOTHING for one in run.separations)]
+    if runs and not telling:
+        pairs = ', '.join(f'{one.name} from {one.rival}' for one in runs[0].separations)
+        raise TrajectoryError(f'no motion tells {pairs}'.replace('_', ' '))
+    for run in _in_order(telling):
         settings = _settings(run.template)
         problem = DesignProblem.of(arm, settings, rng)
         try:

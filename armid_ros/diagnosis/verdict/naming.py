@@ -226,8 +226,17 @@ def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]
 
 
 def _separating(name: str, joints: Sequence[str], rival: Rival) -> str:
-    """Say which experiment separates a name in some joints from another one."""
-    shown = dict.fromkeys(CATALOGUE.get(one, Effect).shown_by for one in (name, rival.name))
+    """
+    Say which experiment separates a name in some joints from another one.
+
+    No motion tells what a link carries from the link: it has to be taken off.
+
+    """
+    both = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]
+    carried = [kind for kind in both if kind.comes_and_goes and kind.changes_body]
+    one_body = set(joints) == set(rival.joints) and all(kind.changes_body for kind in both)
+    kinds = carried if one_body and carried else both
+    shown = dict.fromkeys([kind.shown_by for kind in kinds] or [Effect.shown_by])
     own, other = (f' of {", ".join(where)}' if where else '' for where in (joints, rival.joints))
     own = '' if own == other else own
     names = f'{name}{own} from {rival.name}{other}'.replace('_', ' ')
