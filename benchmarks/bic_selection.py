@@ -15,6 +15,7 @@ from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import excited
+from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.data.trajectory import trajectories
@@ -58,11 +59,11 @@ def bic_selection(
     data = trajectories(recordings, used)
     base, _ = excited(arm, arm.base_parameters(rng), data)
     one = [np.ones(arm.robot.n_joints)] * len(data)
-    reference = fit(arm, (), data, one, base)
+    reference = fit(arm, (), Evidence.over_noise(data, one), base)
     told = np.concatenate([part.informative for part in data])
     left = np.concatenate(reference.residual)
     alike = [np.sqrt(np.sum(left**2, axis=0, where=told) / told.sum(axis=0))] * len(data)
-    found = candidates(reference, data, alike, settings.kinds)
+    found = candidates(reference, Evidence.over_noise(data, alike), settings.kinds)
     columns = [
         np.concatenate(c, axis=2) for c in zip(found.columns, reference.columns, strict=True)
     ]

@@ -22,7 +22,7 @@ def evidence_of(bench, hidden):
     """Return other recordings in the unit of their noise."""
     data = cut(bench.recordings(hidden, seed=7))
     sigma = tuple(noise_floor(part, bench.arm).sigma for part in data)
-    return Evidence(tuple(data), sigma, sigma)
+    return Evidence.over_noise(data, sigma)
 
 
 @pytest.fixture(scope='module')

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fit of what was named."""
 
-from armid_ros.diagnosis.data.evidence import noise_floor
+from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Patch, patch_columns
 from armid_ros.diagnosis.search.trial import Named
@@ -20,7 +20,9 @@ def test_what_does_nothing_along_the_motion_is_not_told(bench):
     strap = CATALOGUE['interface_slack'].on(bench.robot, ('elbow',))
     shape = strap.shape_values.copy()
     shape[:, -1] = 5.0
-    fitted = fit(bench.arm, [Named(strap.with_shape(shape), (0,))], data, sigma, None)
+    fitted = fit(
+        bench.arm, [Named(strap.with_shape(shape), (0,))], Evidence.over_noise(data, sigma), None
+    )
     assert np.all(np.isinf(fitted.estimate.std))
 
 

@@ -24,7 +24,7 @@ def search(bench):
     sigma = (np.full(2, TORQUE_NOISE),) * len(data)
     settings = DiagnosisSettings(library=LIBRARY)
     question = as_given(bench.arm, data, 4, LIBRARY)
-    return explain.Search(question, Evidence(data, sigma, sigma), settings)
+    return explain.Search(question, Evidence.over_noise(data, sigma), settings)
 
 
 def taken(way):
@@ -62,7 +62,7 @@ def test_a_shape_that_was_taken_is_no_cause_in_another_shape(bench):
     sigma = (np.full(2, TORQUE_NOISE),) * len(data)
     settings = DiagnosisSettings(library=('torque_ripple', 'torque_offset'))
     question = as_given(bench.arm, data, 4, settings.library)
-    way = explain.Search(question, Evidence(data, sigma, sigma), settings).forward()
+    way = explain.Search(question, Evidence.over_noise(data, sigma), settings).forward()
     assert taken(way) == [('torque_ripple', ('elbow',))]
     assert ('torque_ripple', ('elbow',)) not in [
         one.candidate.key[:2] for one in way.last.look.ranking

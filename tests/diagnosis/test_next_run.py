@@ -177,8 +177,8 @@ def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen)
     def squares(name):
         effect = CATALOGUE[name].on(bench.robot, ('elbow',))
         kept = tuple(range(len(effect.parameters(bench.robot))))
-        fitted = fit(bench.arm, [Named(effect, kept)], data, sigma, None)
-        evidence = Evidence(tuple(data), tuple(sigma), tuple(sigma))
+        evidence = Evidence.over_noise(data, sigma)
+        fitted = fit(bench.arm, [Named(effect, kept)], evidence, None)
         return float(np.sum(evidence.chi2_per_row(fitted.residual) * rows))
 
     own = squares('torque_offset')

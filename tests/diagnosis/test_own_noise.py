@@ -35,7 +35,7 @@ def tried(bench, seed, level=0.6, lost=0.0, loud=2.0):
     problem = make_problem(data, noise, [part.residual(bench.arm) for part in data], columns)
     candidate = Candidate(effect, slice(0, 1), (0,), bench.robot)
     (trial,), _ = held_out(problem, (), [candidate], np.zeros((0, 0)), np.zeros(0))
-    evidence = Evidence(data, noise, noise)
+    evidence = Evidence.over_noise(data, noise)
     nuisance = Nuisance((), np.zeros((0, 0)), np.zeros(0))
     work = Workspace(bench.arm, data)
     here = Round(evidence, work, DiagnosisSettings(), problem, nuisance, 1.0)

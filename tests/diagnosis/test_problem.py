@@ -56,10 +56,10 @@ def test_shapes_of_a_name_are_held_by_what_all_data_tell_of_them(bench):
     data = trajectories(bench.recordings(hidden), Conditioning(200.0, 10.0, 11))
     sigma = [np.full(2, 0.01)] * len(data)
     effect = CATALOGUE['stribeck_friction'].on(bench.robot, ('elbow',)).with_shape((0.2, 2.0))
-    fitted = fit(bench.arm, [Named(effect, (0,))], data, sigma, None, Start([np.array([0.2])]))
+    evidence, start = Evidence.over_noise(data, sigma), Start([np.array([0.2])])
+    fitted = fit(bench.arm, [Named(effect, (0,))], evidence, None, start)
     assert fitted.named[0].effect.shape[0] == pytest.approx(0.3, rel=0.2)
-    evidence = Evidence(tuple(data), tuple(sigma), tuple(sigma))
-    found = candidates(fitted, data, sigma, [CATALOGUE['viscous_friction']])
+    found = candidates(fitted, evidence, [CATALOGUE['viscous_friction']])
     problem, nuisance = nuisance_of(found, fitted, evidence)
     value, *shapes = np.sum(problem.x[:, :, list(nuisance.free)] ** 2, axis=(0, 1))
     assert value > 0.0

@@ -27,7 +27,7 @@ def prune_by(bench, monkeypatch):
 
     data = tuple(cut(bench.recordings(hidden)))
     sigma = (np.full(2, TORQUE_NOISE),) * len(data)
-    evidence, settings = Evidence(data, sigma, sigma), DiagnosisSettings(library=LIBRARY)
+    evidence, settings = Evidence.over_noise(data, sigma), DiagnosisSettings(library=LIBRARY)
     question = as_given(bench.arm, data, 4, LIBRARY)
     way = explain.Search(question, evidence, settings).forward()
     assert [one.named.effect.name for one in way.taken] == ['viscous_friction', 'joint_spring']

@@ -5,7 +5,7 @@
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
 from armid_ros.diagnosis.data.baseline import excited
-from armid_ros.diagnosis.data.evidence import noise_floor
+from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.fit import fit
@@ -87,9 +87,9 @@ def test_friction_of_a_tx40_goes_with_the_load_in_both_halves_of_its_recording(
         data = trajectories([recording.select(half)], used)
         base, _ = excited(arm, arm.base_parameters(np.random.default_rng(0)), data)
         rough = [noise_floor(part, arm).sigma for part in data]
-        nearer = fit(arm, (), data, rough, base).arm
+        nearer = fit(arm, (), Evidence.over_noise(data, rough), base).arm
         sigma = [noise_floor(part, nearer).sigma for part in data]
-        fitted = fit(arm, [Named(friction, (0,))], data, sigma, base)
+        fitted = fit(arm, [Named(friction, (0,))], Evidence.over_noise(data, sigma), base)
         values.append(fitted.estimate.values[0])
         std.append(fitted.estimate.std[0])
     assert np.all(np.array(values) > 4.0 * np.array(std))

@@ -25,7 +25,8 @@ def coulomb_of(bench, hide):
     data = tuple(trajectories(recordings, used, bench.arm))
     sigma = tuple(np.full(2, 0.03) for _ in data)
     named = [Named(CATALOGUE['coulomb_friction'].on(bench.robot, ('elbow',)), (0,))]
-    return fit(bench.arm, named, data, sigma, None), Evidence(data, sigma, sigma)
+    evidence = Evidence.over_noise(data, sigma)
+    return fit(bench.arm, named, evidence, None), evidence
 
 
 def on_elbow(torque):
@@ -65,8 +66,9 @@ def test_nothing_named_is_nothing_to_widen(bench):
     used = conditioning(recordings, SignalSettings())
     data = tuple(trajectories(recordings, used, bench.arm))
     sigma = tuple(np.full(2, 0.03) for _ in data)
-    fitted = fit(bench.arm, (), data, sigma, None)
-    assert widened(fitted, Evidence(data, sigma, sigma), None, 9.0) is fitted
+    evidence = Evidence.over_noise(data, sigma)
+    fitted = fit(bench.arm, (), evidence, None)
+    assert widened(fitted, evidence, None, 9.0) is fitted
 
 
 def test_a_value_that_no_data_tell_stays_untold_where_others_are_changes(bench):
@@ -89,14 +91,14 @@ def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
     recordings = bench.recordings(lambda m, tau: on_elbow(0.4 * m.q[:, 1]))
     data = tuple(trajectories(recordings, conditioning(recordings, SignalSettings()), bench.arm))
     sigma = tuple(np.full(2, 0.03) for _ in data)
-    evidence = Evidence(data, sigma, sigma)
+    evidence = Evidence.over_noise(data, sigma)
     named = [Named(CATALOGUE['joint_spring'].on(bench.robot, ('elbow',)), (0, 1))]
-    exact = fit(bench.arm, named, data, sigma, None)
+    exact = fit(bench.arm, named, evidence, None)
     values = []
     for _ in range(60):
         off = rng.multivariate_normal(np.zeros(len(own)), own)
         arm = bench.arm.with_theta(bench.arm.theta + off)
-        values.append(fit(arm, named, data, sigma, None).estimate.values[0])
+        values.append(fit(arm, named, evidence, None).estimate.values[0])
     wide = with_model_error(exact, evidence, bench.arm, own).estimate.std[0]
     noise = exact.estimate.std[0]
     assert np.std(values) > 3.0 * noise  # errors of the model are what the value follows

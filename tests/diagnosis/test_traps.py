@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
 from armid_ros.diagnosis.data.baseline import excited
-from armid_ros.diagnosis.data.evidence import noise_floor
+from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.fit import fit
@@ -45,8 +45,9 @@ def shaken(recordings, size, seed):
 def significant(arm, data, sigma, names):
     """Return the most significant of some effects by chi squared, if it is at 5 % of them all."""
     base, _ = excited(arm, arm.base_parameters(np.random.default_rng(0)), data)
-    reference = fit(arm, (), data, sigma, base)
-    found = candidates(reference, data, sigma, [CATALOGUE[name] for name in names])
+    evidence = Evidence.over_noise(data, sigma)
+    reference = fit(arm, (), evidence, base)
+    found = candidates(reference, evidence, [CATALOGUE[name] for name in names])
     pairs = zip(found.columns, reference.columns, strict=True)
     columns = [np.concatenate(pair, axis=2) for pair in pairs]
     problem = make_problem(data, sigma, reference.residual, columns)

@@ -29,7 +29,7 @@ def test_a_spring_is_in_proportion_to_position_in_the_units_of_its_joint(urdf, j
     for part, left in zip(data, residual, strict=True):
         left[:, joint] = 30.0 * part.at_rows.q[:, joint]
     noise = tuple(np.full(2, 0.1) for _ in data)
-    (found,) = locate(bench.arm, Evidence(data, noise, noise), residual, np.ones(2))
+    (found,) = locate(bench.arm, Evidence.over_noise(data, noise), residual, np.ones(2))
     assert found.joint == bench.robot.joints[joint]
     assert found.unit == units[2]
     assert found.share_of_gap == pytest.approx(1.0)

@@ -13,7 +13,7 @@ assumed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -62,6 +62,11 @@ class Evidence:
     noise: tuple[FloatArray, ...]
     varies: FloatArray | None = None
 
+    @classmethod
+    def over_noise(cls, data: Sequence[Trajectory], noise: Sequence[FloatArray]) -> Evidence:
+        """Return data in the unit of their noise, each (n,) [N m]."""
+        return cls(tuple(data), tuple(noise), tuple(noise))
+
     @cached_property
     def count(self) -> FloatArray:
         """Informative rows of each joint, shape (n,)."""
@@ -90,10 +95,14 @@ class Evidence:
             squares += np.sum(rows**2, axis=0, where=part.informative)
         return np.asarray(squares / np.maximum(self.count, 1.0))
 
+    def weighted(self, rows: Sequence[FloatArray]) -> Iterator[FloatArray]:
+        """Yield rows (M, n) or (M, n, P) of each trajectory over the unit, zero if they rest."""
+        return weighted_rows(rows, self.data, self.sigma)
+
     def block_squares(self, residual: Sequence[FloatArray]) -> FloatArray:
         """Return the squares over the unit of what is left (M, n), by block and joint, (B, n)."""
         block, _ = block_rows(self.data)
-        rows = np.concatenate(list(weighted_rows(residual, self.data, self.sigma)))
+        rows = np.concatenate(list(self.weighted(residual)))
         return np.column_stack([np.bincount(block, column) for column in rows.T**2])
 
     def split(self, weighted: FloatArray, weight: FloatArray) -> list[FloatArray]:
@@ -163,8 +172,8 @@ class Evidence:
 
 def torque_rms(data: Sequence[Trajectory]) -> FloatArray:
     """Return the root mean square torque of each joint, of rows that tell something, (n,)."""
-    unit = tuple(np.ones(part.motion.n_joints) for part in data)
-    return Evidence(tuple(data), unit, unit).torque_rms
+    unit = [np.ones(part.motion.n_joints) for part in data]
+    return Evidence.over_noise(data, unit).torque_rms
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import excited
-from armid_ros.diagnosis.data.evidence import noise_floor, NoiseFloor
+from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, NoiseFloor
 from armid_ros.diagnosis.data.trajectory import thinnable, trajectories, Trajectory, UNSURE
 from armid_ros.diagnosis.search.candidates import with_friction
 from armid_ros.diagnosis.search.fit import fit
@@ -66,6 +66,11 @@ class Prepared:
     def allowed(self) -> FloatArray:
         """What rows may be uncertain by, shape (n,); see `Trajectory`."""
         return self.data[0].allowed
+
+    @property
+    def described(self) -> Evidence:
+        """The data over their noise beside the arm as it is described."""
+        return Evidence.over_noise(self.data, self.as_described)
 
     @property
     def sigma(self) -> list[FloatArray]:
@@ -145,7 +150,7 @@ def _measured(
 ) -> Prepared:
     base, _ = excited(arm, whole, data)
     first = [noise_floor(part, arm) for part in data]
-    refit = fit(arm, (), data, [floor.sigma for floor in first], base)
+    refit = fit(arm, (), Evidence.over_noise(data, [floor.sigma for floor in first]), base)
     floors = tuple(noise_floor(part, refit.arm) for part in data)
     as_described = tuple((a if a.period else b).sigma for a, b in zip(first, floors, strict=True))
     return Prepared(used, tuple(data), base, floors, as_described)
@@ -157,7 +162,7 @@ def _noise_over_friction(
     """Return the noise of rows over dry friction as a fit tells it, shape (n,)."""
     data, sigma = prepared.data, prepared.sigma
     base, _ = excited(arm, arm.base_parameters(rng), data)
-    arm = fit(arm, (), data, sigma, base).arm
+    arm = fit(arm, (), Evidence.over_noise(data, sigma), base).arm
     friction = arm.action().dry_friction
     if friction is None:
         return np.full(arm.robot.n_joints, np.inf)

@@ -19,6 +19,7 @@ from itertools import pairwise, product
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.baseline import EXCITED, excited, Prior
+from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Problem, Projection
 from armid_ros.diagnosis.data.trajectory import row_weights, Trajectory, Workspace
 from armid_ros.diagnosis.search.fit import Fitted
@@ -230,12 +231,11 @@ class Candidates:
 
 def candidates(
     fitted: Fitted,
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
+    evidence: Evidence,
     kinds: Sequence[Kind],
 ) -> Candidates:
     """Compute the columns of every effect that was not named yet."""
-    arm, left = memoized_arm(fitted.arm), _left(fitted, data, sigma)
+    arm, left, data = memoized_arm(fitted.arm), _left(fitted, evidence), evidence.data
     taken = {(own.effect.name, own.effect.joints) for own in fitted.named}
     candidates: list[Candidate] = []
     blocks: list[list[FloatArray]] = [[] for _ in data]
@@ -254,8 +254,9 @@ def candidates(
     return Candidates(tuple(candidates), tuple(np.concatenate(block, axis=2) for block in blocks))
 
 
-def _left(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> Unexplained:
+def _left(fitted: Fitted, evidence: Evidence) -> Unexplained:
     """Return what a fitted arm leaves of the torque."""
+    data = evidence.data
     motions = [part.motion for part in data]
     arrays = (
         np.concatenate([getattr(motion, name) for motion in motions])
@@ -265,7 +266,7 @@ def _left(fitted: Fitted, data: Sequence[Trajectory], sigma: Sequence[FloatArray
         Motion(motions[0].joints, *arrays),
         np.concatenate([part.motion.q[part.rows] for part in data]),
         np.concatenate(fitted.residual),
-        row_weights(data, sigma),
+        row_weights(data, evidence.sigma),
         np.concatenate(fitted.columns),
     )
 

@@ -97,7 +97,7 @@ class Explainer:
         prepared, tell, settings = self.prepared, self.tell, self.settings
         few = settings.thresholds.few_causes
         given = as_given(self.arm, prepared.data, few, settings.library)
-        described = Evidence(prepared.data, prepared.as_described, prepared.as_described)
+        described = prepared.described
         tell(0.2, 'the model as given')
         first = explain(given, described, settings)
         nothing = np.zeros(self.arm.robot.n_joints)

@@ -246,14 +246,14 @@ class Search:
         change: FloatArray | None = None,
     ) -> Place:
         """Fit what is named, from values and a change of the body on, and look beside it."""
-        question, data, sigma = self.question, self.evidence.data, self.evidence.sigma
+        question = self.question
         arm, base = question.nuisance_arm, question.nuisance_base
         prior = question.nuisance_prior
-        current = fit(arm, named, data, sigma, base, Start(values, change), prior)
-        found = candidates(current, data, sigma, question.kinds(self.settings.kinds))
+        current = fit(arm, named, self.evidence, base, Start(values, change), prior)
+        found = candidates(current, self.evidence, question.kinds(self.settings.kinds))
         problem, nuisance = nuisance_of(found, current, self.evidence)
         before = self._before(current)
-        work = Workspace(memoized_arm(current.arm), data)
+        work = Workspace(memoized_arm(current.arm), self.evidence.data)
         here = Round(
             self.evidence,
             work,
@@ -281,8 +281,7 @@ class Search:
         there = fit(
             question.nuisance_arm,
             current.named,
-            unseen.data,
-            unseen.sigma,
+            unseen,
             question.nuisance_base,
             Start(current.values),
             prior,
@@ -324,7 +323,7 @@ def _friction(
     arm, base = question.nuisance_arm, question.nuisance_base
     assert base is not None
     named, start = [one.named for one in taken], Start([one.values for one in taken])
-    fitted = fit(arm, named, evidence.data, evidence.sigma, base, start, question.nuisance_prior)
+    fitted = fit(arm, named, evidence, base, start, question.nuisance_prior)
     view = View.of(fitted, evidence)
     where = {int(column): k for k, column in enumerate(base.independent)}
     names = [(p.name, p.joint) for p in arm.parameters]

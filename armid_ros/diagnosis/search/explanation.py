@@ -18,7 +18,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.trajectory import Trajectory, weighted_rows
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import as_change, widened
 from armid_ros.diagnosis.search.round import cost
@@ -92,8 +91,7 @@ class Explanation:
         fitted = fit(
             self.given,
             [self.fitted.named[k] for k in keep],
-            self.evidence.data,
-            self.evidence.sigma,
+            self.evidence,
             self.base,
             Start([self.fitted.values[k] for k in keep], self.fitted.change),
             self.prior,
@@ -161,12 +159,11 @@ def in_model_as_given(found: Explanation) -> Explanation:
     arm, evidence, fitted = found.given, found.evidence, found.fitted
     if found.prior is not None and found.baseline is not None:
         fitted = as_change(fitted, found.prior, found.baseline)
-    reference = fit(arm, (), evidence.data, evidence.sigma, None)
+    reference = fit(arm, (), evidence, None)
     alone = fit(
         arm,
         fitted.named,
-        evidence.data,
-        evidence.sigma,
+        evidence,
         None,
         Start(fitted.values),
         known=fitted.estimate,
@@ -204,10 +201,9 @@ def as_bodies(explanation: Explanation, arm: ArmModel) -> tuple[Explanation, tup
     if base is None or not base.rank or base.independent.min() >= rigid:
         return explanation, ()
     evidence = explanation.evidence
-    data, sigma = evidence.data, evidence.sigma
     known = len(arm.parameters)
     values = base.values(fitted.arm.theta[:known])
-    triangle, count = _triangle(explanation, values, data, sigma)
+    triangle, count = _triangle(explanation, values)
     program, _ = physical_program(arm, base, PhysicalSettings())
     for weight in _WEIGHTS:
         try:
@@ -215,7 +211,7 @@ def as_bodies(explanation: Explanation, arm: ArmModel) -> tuple[Explanation, tup
         except IdentificationError:
             continue
         changed = fitted.arm.with_theta(np.concatenate([theta, fitted.arm.theta[known:]]))
-        residual = tuple(part.residual(changed) for part in data)
+        residual = tuple(part.residual(changed) for part in evidence.data)
         bodily = replace(fitted, arm=changed, residual=residual)
         allowed = np.maximum(_ALIKE * explanation.chi2_per_row, 1.0)
         if np.all(evidence.chi2_per_row(residual) <= allowed):
@@ -226,19 +222,14 @@ def as_bodies(explanation: Explanation, arm: ArmModel) -> tuple[Explanation, tup
     )
 
 
-def _triangle(
-    explanation: Explanation,
-    values: FloatArray,
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
-) -> tuple[FloatArray, float]:
+def _triangle(explanation: Explanation, values: FloatArray) -> tuple[FloatArray, float]:
     """
     Return the triangular factor of base columns and what they are to make, and its rows.
 
     What other data tell of the body counts as rows as well.
 
     """
-    fitted, rank = explanation.fitted, len(values)
+    fitted, rank, evidence = explanation.fitted, len(values), explanation.evidence
     blocks = []
     for columns, left in zip(fitted.columns, fitted.residual, strict=True):
         own = columns[:, :, :rank]
@@ -246,11 +237,11 @@ def _triangle(
         blocks.append(np.concatenate([own, target[:, :, np.newaxis]], axis=2))
     factors = [
         scipy.linalg.qr(rows.reshape(-1, rank + 1), mode='r')[0][: rank + 1]
-        for rows in weighted_rows(blocks, data, sigma)
+        for rows in evidence.weighted(blocks)
     ]
     prior = explanation.prior
     if prior is not None:
         own, left = prior.columns, prior.residual - prior.columns @ fitted.change
         factors.append(np.column_stack([own, left + own @ values]))
     whole = scipy.linalg.qr(np.concatenate(factors), mode='r')[0][: rank + 1]
-    return np.asarray(whole), float(sum(part.informative.sum() for part in data))
+    return np.asarray(whole), float(sum(part.informative.sum() for part in evidence.data))

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import described_precision, Prior
-from armid_ros.diagnosis.data.trajectory import Trajectory, weighted_rows
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.patch import Patch, patch_columns
 from armid_ros.diagnosis.search.trial import Named
 from armid_ros.errors import ModelError
@@ -104,8 +105,7 @@ class Start:
 def fit(
     arm: ArmModel,
     named: Sequence[Named],
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
+    evidence: Evidence,
     base: BaseParameters | None,
     start: Start | None = None,
     prior: Prior | None = None,
@@ -120,10 +120,8 @@ def fit(
         The arm without the named effects.
     named : sequence of Named
         What was named.
-    data : sequence of Trajectory
-        The data.
-    sigma : sequence of ndarray, shape (n,)
-        Noise of each trajectory [N m].
+    evidence : Evidence
+        The data, and what each is weighted by.
     base : BaseParameters or None
         What is free of the arm; None keeps it as it is.
     start : Start, optional
@@ -145,7 +143,7 @@ def fit(
         pull, aim = described + prior.precision, prior.aim
     rounds = _MOST_ROUNDS if named else int(base is not None and prior is None)
     rounds = 0 if known is not None else rounds
-    state, residual, columns = _settled(state, (data, sigma), base, (pull, aim), rounds)
+    state, residual, columns = _settled(state, evidence, base, (pull, aim), rounds)
     size = 0 if base is None else base.rank
     names, numbers = state.parameters()
     estimate = known
@@ -153,7 +151,7 @@ def fit(
         covariance = np.zeros((size, size))
         if named:
             more = [] if prior is None else prior.regressions(state.change, len(numbers))
-            covariance = _covariance(columns, residual, (data, sigma), described, more)
+            covariance = _covariance(columns, residual, evidence, described, more)
         estimate = Estimate(names, numbers, covariance[size:, size:])
     whole = columns[0].shape[2]
     hold, held_to = np.zeros((whole, whole)), np.zeros(whole)
@@ -173,7 +171,7 @@ def fit(
 
 def _settled(
     state: Patch,
-    rows: tuple[Sequence[Trajectory], Sequence[FloatArray]],
+    evidence: Evidence,
     base: BaseParameters | None,
     held: tuple[FloatArray, FloatArray],
     rounds: int,
@@ -185,8 +183,8 @@ def _settled(
     ----------
     state : Patch
         Where to begin.
-    rows : tuple
-        The data, and their noise [N m].
+    evidence : Evidence
+        The data.
     base : BaseParameters or None
         What is free of the arm.
     held : tuple of ndarray
@@ -203,18 +201,18 @@ def _settled(
         Columns of all that is free, where it is.
 
     """
-    (data, sigma), (pull, aim) = rows, held
+    data, (pull, aim) = evidence.data, held
 
     def loss_of(patch: Patch, left: Sequence[FloatArray]) -> float:
         known = patch.change @ pull @ patch.change - 2.0 * aim @ patch.change
-        return _loss(left, data, sigma) + float(known)
+        return _loss(left, evidence) + float(known)
 
     residual = _residuals(state, data)
     loss = loss_of(state, residual)
     columns = [patch_columns(state, part, base) for part in data]
     for _ in range(rounds):
         moved, after, expected = state, residual, loss
-        for step in _steps(state, columns, residual, rows, (pull, aim)):
+        for step in _steps(state, columns, residual, evidence, (pull, aim)):
             trial = state.moved(step, base)
             left = _residuals(trial, data)
             if loss_of(trial, left) < loss:
@@ -236,7 +234,7 @@ def _steps(
     state: Patch,
     columns: Sequence[FloatArray],
     residual: Sequence[FloatArray],
-    rows: tuple[Sequence[Trajectory], Sequence[FloatArray]],
+    evidence: Evidence,
     held: tuple[FloatArray, FloatArray],
 ) -> Iterator[FloatArray]:
     """
@@ -247,12 +245,12 @@ def _steps(
 
     """
     pull, aim = held
-    whole = _step(columns, residual, *rows, pull, aim - pull @ state.change)
+    whole = _step(columns, residual, evidence, pull, aim - pull @ state.change)
     yield from (whole, 0.5 * whole, 0.2 * whole)
     if state.linear.all():
         return
     flat = [block * state.linear for block in columns]
-    yield _step(flat, residual, *rows, pull, aim - pull @ state.change)
+    yield _step(flat, residual, evidence, pull, aim - pull @ state.change)
 
 
 def _expected(
@@ -271,25 +269,22 @@ def _residuals(state: Patch, data: Sequence[Trajectory]) -> list[FloatArray]:
     return [part.residual(model) for part in data]
 
 
-def _loss(
-    residual: Sequence[FloatArray], data: Sequence[Trajectory], sigma: Sequence[FloatArray]
-) -> float:
-    return float(sum(np.sum(left**2) for left in weighted_rows(residual, data, sigma)))
+def _loss(residual: Sequence[FloatArray], evidence: Evidence) -> float:
+    return float(sum(np.sum(left**2) for left in evidence.weighted(residual)))
 
 
 def _step(
     columns: Sequence[FloatArray],
     residual: Sequence[FloatArray],
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
+    evidence: Evidence,
     hold: FloatArray,
     pull: FloatArray,
 ) -> FloatArray:
     """Solve with weights, the description pulling; what nothing tells gets no step."""
     size = columns[0].shape[2]
     own, aim = np.zeros((size, size)), np.zeros(size)
-    lefts = weighted_rows(residual, data, sigma)
-    for block, left in zip(weighted_rows(columns, data, sigma), lefts, strict=True):
+    lefts = evidence.weighted(residual)
+    for block, left in zip(evidence.weighted(columns), lefts, strict=True):
         flat = block.reshape(-1, size)
         own += flat.T @ flat
         aim += flat.T @ left.ravel()
@@ -305,7 +300,7 @@ def _step(
 def _covariance(
     columns: Sequence[FloatArray],
     residual: Sequence[FloatArray],
-    rows: tuple[Sequence[Trajectory], Sequence[FloatArray]],
+    evidence: Evidence,
     described: FloatArray,
     more: Sequence[Regression] = (),
 ) -> FloatArray:
@@ -316,22 +311,21 @@ def _covariance(
     ----------
     columns, residual : sequence of ndarray, each (M, n, f) and (M, n)
         Of each trajectory.
-    rows : tuple
-        The data, and their noise [N m], whose colour the residual tells.
+    evidence : Evidence
+        The data, whose colour of noise the residual tells.
     described : ndarray, shape (r, r)
         Precision of the description of the first values.
     more : sequence of Regression
         Other data, over their noise.
 
     """
-    data, sigma = rows
     size = columns[0].shape[2]
     hold = np.zeros((size, size))
     hold[: len(described), : len(described)] = described
-    lefts = weighted_rows(residual, data, sigma)
+    rows = zip(evidence.data, evidence.weighted(columns), evidence.weighted(residual), strict=True)
     problem = [
         Regression(part.at_rows.with_torque(left), block, part.informative, part.source)
-        for part, block, left in zip(data, weighted_rows(columns, data, sigma), lefts, strict=True)
+        for part, block, left in rows
     ]
     problem += more
     stacked = np.concatenate([*(part.columns.reshape(-1, size) for part in problem), _root(hold)])

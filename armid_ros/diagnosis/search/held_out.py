@@ -26,7 +26,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import make_problem, Problem, Products, products
-from armid_ros.diagnosis.data.trajectory import fold_rows, weighted_rows
+from armid_ros.diagnosis.data.trajectory import fold_rows
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.trial import Candidate, IDENTIFIABLE, Trial
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
@@ -313,12 +313,11 @@ def with_model_error(
     size = len(fitted.estimate.values)
     if not size:
         return fitted
-    data, sigma = evidence.data, evidence.sigma
     own = np.zeros((len(fitted.hold), len(fitted.hold)))
     error = np.zeros((len(own), len(covariance)))
-    torques = [part.reduce(arm.columns(part.motion)) for part in data]
-    pairs = weighted_rows(fitted.columns, data, sigma), weighted_rows(torques, data, sigma)
-    for columns, torque in zip(*pairs, strict=True):
+    torques = [part.reduce(arm.columns(part.motion)) for part in evidence.data]
+    pairs = zip(evidence.weighted(fitted.columns), evidence.weighted(torques), strict=True)
+    for columns, torque in pairs:
         x = columns.reshape(-1, len(own))
         own += x.T @ x
         error += x.T @ torque.reshape(len(x), -1)

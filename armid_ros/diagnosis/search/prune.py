@@ -229,8 +229,7 @@ class Retrial:
         return fit(
             question.arm,
             [one.named for one in names],
-            evidence.data,
-            evidence.sigma,
+            evidence,
             question.base,
             Start([one.values for one in names], change),
             question.prior,

@@ -13,7 +13,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Problem, Products, project, Projection
-from armid_ros.diagnosis.data.trajectory import weighted_rows, Workspace
+from armid_ros.diagnosis.data.trajectory import Workspace
 from armid_ros.diagnosis.search.trial import Candidate, lead, ROUNDING, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
@@ -83,8 +83,8 @@ class Later:
         cls, evidence: Evidence, columns: Sequence[FloatArray], residual: Sequence[FloatArray]
     ) -> Later:
         """Weight columns (M, n, f) and residuals (M, n) of trajectories."""
-        free = weighted_rows(columns, evidence.data, evidence.sigma)
-        left = weighted_rows(residual, evidence.data, evidence.sigma)
+        free = evidence.weighted(columns)
+        left = evidence.weighted(residual)
         return cls(
             evidence,
             tuple(rows.reshape(-1, rows.shape[2]) for rows in free),
@@ -93,10 +93,9 @@ class Later:
 
     def own(self, arm: ArmModel, candidate: Candidate) -> list[FloatArray]:
         """Return the columns of a candidate, each (S, p)."""
-        data, sigma = self.evidence.data, self.evidence.sigma
         kept = list(candidate.kept)
-        rows = [part.columns(arm, candidate.effect)[:, :, kept] for part in data]
-        return [part.reshape(-1, len(kept)) for part in weighted_rows(rows, data, sigma)]
+        rows = [part.columns(arm, candidate.effect)[:, :, kept] for part in self.evidence.data]
+        return [part.reshape(-1, len(kept)) for part in self.evidence.weighted(rows)]
 
     def and_columns(self, arm: ArmModel, candidate: Candidate) -> Later:
         """Return the same with the columns of a candidate."""

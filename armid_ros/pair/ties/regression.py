@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.trajectory import Trajectory, weighted_rows
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -162,21 +161,14 @@ def without_bias(explanation: Explanation, springs: Interaction | None) -> Expla
     """
     if springs is None:
         return explanation
-    evidence = explanation.evidence
-    fitted = _with_springs(explanation, springs, evidence.data, evidence.sigma)
-    return replace(explanation, fitted=fitted)
+    return replace(explanation, fitted=_with_springs(explanation, springs))
 
 
 def _tied_joints(arm: ArmModel) -> set[str]:
     return {joint for own in arm.effects if isinstance(own, Tied) for joint in own.joints}
 
 
-def _with_springs(
-    explanation: Explanation,
-    found: Interaction,
-    data: Sequence[Trajectory],
-    sigma: Sequence[FloatArray],
-) -> Fitted:
+def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
     """
     Return the arm with these springs, and what is free of it moved to go with them.
 
@@ -205,7 +197,7 @@ def _with_springs(
     theta[[_place(spring, fitted.arm.parameters) for spring in springs]] = stiffness
     if base is not None:
         known, rank = len(base.standard), base.rank
-        weighted = np.concatenate(list(weighted_rows(fitted.columns, data, sigma)))
+        weighted = np.concatenate(list(explanation.evidence.weighted(fitted.columns)))
         rows = weighted.reshape(-1, weighted.shape[2])
         away = rows[:, rank:][:, where] @ change
         moved = np.linalg.lstsq(rows[:, :rank], -away, rcond=None)[0]
@@ -215,7 +207,7 @@ def _with_springs(
         fitted,
         arm=patched,
         estimate=Estimate(fitted.estimate.parameters, values, covariance * np.outer(wider, wider)),
-        residual=tuple(part.residual(patched) for part in data),
+        residual=tuple(part.residual(patched) for part in explanation.evidence.data),
     )
 
 

@@ -92,7 +92,7 @@ class Ties:
         joints = self._joints()
         first = self._surely(joints)
         sigma = tuple(noise_floor(part, first.arm).sigma for part in self.evidence.data)
-        ties = replace(self, evidence=Evidence(self.evidence.data, sigma, sigma))
+        ties = replace(self, evidence=Evidence.over_noise(self.evidence.data, sigma))
         return ties, ties._damped(ties._surely(joints))
 
     def _joints(self) -> list[str]:
@@ -133,8 +133,7 @@ class Ties:
 
     def fitted(self, named: Sequence[Named], start: Sequence[FloatArray] = ()) -> Fitted:
         """Fit the arm with what is named, from values to start from."""
-        data, sigma = self.evidence.data, self.evidence.sigma
-        return fit(self.arm, named, data, sigma, self.base, Start(start))
+        return fit(self.arm, named, self.evidence, self.base, Start(start))
 
     def chi2_per_row(self, fitted: Fitted) -> FloatArray:
         """Return the loss of each joint, shape (n,)."""
@@ -248,7 +247,7 @@ def diagnose_ties(
     nothing = np.zeros(arm.robot.n_joints)
     regression = TieRegression(arm, tuple(recordings), prepared.used, settings)
     sure = cache(regression.sure)
-    evidence = Evidence(prepared.data, tuple(prepared.sigma), tuple(prepared.sigma))
+    evidence = Evidence.over_noise(prepared.data, prepared.sigma)
     start = Ties(arm, settings.partner, evidence, prepared.base, settings, sure)
     ties, fitted = start.find()
     if not fitted.named:
@@ -282,8 +281,8 @@ def _within_its_noise(
     where there is less of it, the described one would seem to be wrong.
 
     """
-    evidence = Evidence(prepared.data, prepared.as_described, prepared.as_described)
-    described = fit(arm, (), evidence.data, evidence.sigma, None)
+    evidence = prepared.described
+    described = fit(arm, (), evidence, None)
     found = Explanation(arm, None, described, described, (), None, evidence)
     if _open(found, settings):
         return None
@@ -299,8 +298,8 @@ def _as_described(found: Explanation, arm: ArmModel, settings: DiagnosisSettings
     """Return the same names in the arm as described, where that explains as much."""
     evidence = found.evidence
     own = found.fitted
-    fitted = fit(arm, own.named, evidence.data, evidence.sigma, None, Start(own.values))
-    reference = fit(arm, (), evidence.data, evidence.sigma, None)
+    fitted = fit(arm, own.named, evidence, None, Start(own.values))
+    reference = fit(arm, (), evidence, None)
     described = replace(found, base=None, fitted=fitted, reference=reference)
     limits = evidence.limits(fitted.residual, settings)
     if np.any(described.chi2_per_row > np.maximum(limits, _ALIKE * found.chi2_per_row)):
@@ -327,7 +326,7 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
     """Look at all of the library beside the ties as one cause; return what they do not beat."""
     evidence, settings = ties.evidence, ties.settings
     data, sigma = evidence.data, evidence.sigma
-    found = candidates(reference, data, sigma, settings.kinds)
+    found = candidates(reference, evidence, settings.kinds)
     rank, first = reference.columns[0].shape[2], found.columns[0].shape[2]
     stiffness = [rank + values.start for values, _ in fitted.places]
     blocks = [
