@@ -53,6 +53,8 @@ _PACKAGE = Path(armid_ros.diagnosis.__file__).parent
 #: Parts of it whose numbers decide; those of sentences and the next run decide no name.
 _VERDICT = ('verdict/attribution.py', 'verdict/gap.py')
 _DECIDING = ('diagnose.py', 'data', 'search', *_VERDICT)
+#: What decides beside it, below armid_ros: whether data are at fault.
+_BESIDE = ('identification/assess/data_faults.py',)
 #: From here up to one a number is a level, of which what is beyond is changed.
 _LEVEL = 0.9
 
@@ -62,10 +64,11 @@ Change = tuple[str, float]
 
 def of_modules() -> list[str]:
     """Return the numbers of the modules that decide, each by its file and its name."""
+    root = _PACKAGE.parent
+    own = [(_PACKAGE, path) for folder in _DECIDING for path in _files(folder)]
     return [
-        f'{path.relative_to(_PACKAGE).as_posix()} {name}'
-        for folder in _DECIDING
-        for path in _files(folder)
+        f'{path.relative_to(home).as_posix()} {name}'
+        for home, path in [*own, *((root.parent, root / place) for place in _BESIDE)]
         for names, _, _ in constants(path.read_text(encoding='utf-8'))
         for name in names.split(', ')
     ]
@@ -92,12 +95,18 @@ def scaled(value: Any, factor: float) -> Any:
     return 1.0 - (1.0 - value) * factor if _LEVEL <= value < 1.0 else value * factor
 
 
+def _module(path: str) -> str:
+    """Return the module of a file, below the diagnosis unless it names its package."""
+    name = path.removesuffix('.py').replace('/', '.')
+    return name if name.startswith(_ROOT) else f'{_PACKAGE_NAME}.{name}'
+
+
 @contextmanager
 def changed(names: Sequence[str], factor: float) -> Iterator[None]:
     """Diagnose with numbers of modules changed, wherever they were imported."""
     with ExitStack() as stack:
         for path, name in (key.split() for key in names if ' ' in key):
-            home = import_module(f'{_PACKAGE_NAME}.{path.removesuffix(".py").replace("/", ".")}')
+            home = import_module(_module(path))
             value = getattr(home, name)
             for module in [one for key, one in sys.modules.items() if key.startswith(_ROOT)]:
                 if module is home or (not name.startswith('_') and name in vars(module)):

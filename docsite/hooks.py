@@ -18,6 +18,12 @@ from docsite.numbers import numbers_page
 from docsite.schemas import schemas_page
 
 ROOT = Path(__file__).parents[1]
+#: What explains gaps, finds faults of data and plans motions for a diagnosis, below armid_ros.
+BESIDE_THE_DIAGNOSIS = (
+    'pair/ties',
+    'identification/assess/data_faults.py',
+    'excitation/templates.py',
+)
 NOTEBOOKS = ROOT / 'examples' / 'notebooks'
 
 
@@ -31,7 +37,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         'reference/numbers.md': numbers_page(
             ROOT / 'armid_ros' / 'diagnosis',
             (ROOT / 'benchmarks' / 'thresholds.txt').read_text(encoding='utf-8'),
-            [ROOT / 'armid_ros' / 'pair' / 'ties'],
+            [ROOT / 'armid_ros' / place for place in BESIDE_THE_DIAGNOSIS],
         ),
         'reference/nodes.md': nodes_page(_taken(files, reference / 'nodes.md')),
         'reference/files.md': schemas_page(_taken(files, reference / 'files.md')),

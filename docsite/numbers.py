@@ -30,7 +30,7 @@ def numbers_page(package: Path, sensitivity: str, more: Sequence[Path] = ()) -> 
     sensitivity : str
         What the benchmark of the thresholds printed.
     more : sequence of Path
-        Folders beside it that explain gaps as well.
+        Folders and modules beside it whose numbers decide as well.
 
     """
     measured = {
@@ -99,7 +99,7 @@ def _others(package: Path, more: Sequence[Path]) -> Iterator[tuple[str, str, str
     """Yield files, names, values, comments and keys of numbers that are no thresholds."""
     root = package.parents[1]
     for folder, home in ((package, package), *((one, root) for one in more)):
-        for path in sorted(folder.rglob('*.py')):
+        for path in _modules(folder):
             place = path.relative_to(home).as_posix()
             for name, value, why in constants(path.read_text(encoding='utf-8')):
                 yield place, name, value, why, [f'{place} {one}' for one in name.split(', ')]
@@ -134,16 +134,21 @@ def constants(source: str) -> Iterator[tuple[str, str, str]]:
         yield ast.unparse(node.targets[0]).strip('()'), ast.unparse(node.value), ' '.join(above)
 
 
+def _modules(place: Path) -> list[Path]:
+    """Return the modules of a folder, or the one that it is."""
+    return [place] if place.is_file() else sorted(place.rglob('*.py'))
+
+
 def _borrowed(packages: Sequence[Path], root: Path) -> Iterator[tuple[str, str, str, str]]:
     """Yield files, names, values and comments of numbers that other packages have."""
     wanted: dict[str, set[str]] = {}
-    for path in (path for package in packages for path in package.rglob('*.py')):
+    for path in (path for package in packages for path in _modules(package)):
         for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
             if isinstance(node, ast.ImportFrom) and node.module:
                 wanted.setdefault(node.module, set()).update(alias.name for alias in node.names)
     for module, names in sorted(wanted.items()):
         path = root.joinpath(*module.split('.')).with_suffix('.py')
-        if path.is_file() and not set(packages) & set(path.parents):
+        if path.is_file() and not set(packages) & {path, *path.parents}:
             for name, value, why in constants(path.read_text(encoding='utf-8')):
                 if name in names:
                     yield path.relative_to(root).as_posix(), name, value, why

@@ -27,6 +27,13 @@ def test_each_has_a_value_and_a_reason():
     assert not [row for row in told if not (row[1] and row[2])]
 
 
+def test_a_module_beside_it_is_on_the_page_whole():
+    """What says that data are at fault decides as well."""
+    faults = PACKAGE.parent / 'identification' / 'assess' / 'data_faults.py'
+    told = {row[0].strip('`') for row in rows(numbers_page(PACKAGE, MEASURED, [faults]))}
+    assert {'_NEAR', '_BEYOND', '_CLIPPED', '_IMPOSSIBLE', '_UNEVEN', '_BLURRED'} <= told
+
+
 def test_what_decides_is_few():
     assert len(fields(Thresholds)) <= 45
 

@@ -77,7 +77,7 @@ class View:
     def of(cls, fitted: Fitted, evidence: Evidence, more: Sequence[Named] = ()) -> View:
         """Make the problem of a fitted arm, and of names beside."""
         columns = [
-            np.concatenate([own, *(_columns(one, fitted.arm, part) for one in more)], axis=2)
+            np.concatenate([own, *(columns_of(one, fitted.arm, part) for one in more)], axis=2)
             for part, own in zip(evidence.data, fitted.columns, strict=True)
         ]
         problem = make_problem(evidence.data, evidence.sigma, fitted.residual, columns)
@@ -169,7 +169,8 @@ class View:
         return self.trial(candidate, span, [0.0] * len(span), others)
 
 
-def _columns(own: Named, arm: ArmModel, part: Trajectory) -> FloatArray:
+def columns_of(own: Named, arm: ArmModel, part: Trajectory) -> FloatArray:
+    """Return the columns of a name in rows, shape (M, n, p)."""
     return part.columns(arm, own.effect)[:, :, list(own.kept)]
 
 

@@ -21,7 +21,7 @@ from armid_ros.diagnosis.search.explanation import (
     in_model_as_given,
 )
 from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.prune import View
+from armid_ros.diagnosis.search.prune import columns_of, View
 from armid_ros.diagnosis.search.trial import Candidate, denies
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.fitting.identifiability import excludes_zero
@@ -154,8 +154,8 @@ def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence)
 def _acts(explanation: Explanation, name: int, evidence: Evidence) -> npt.NDArray[np.bool_]:
     """Return in which joints a name makes torque, shape (n,)."""
     own, arm = explanation.fitted.named[name], explanation.fitted.arm
-    columns = [part.columns(arm, own.effect)[:, :, list(own.kept)] for part in evidence.data]
-    return np.asarray(np.any([np.any(block, axis=(0, 2)) for block in columns], axis=0))
+    blocks = [columns_of(own, arm, part) for part in evidence.data]
+    return np.asarray(np.any([np.any(block, axis=(0, 2)) for block in blocks], axis=0))
 
 
 def _staircase(explanation: Explanation, order: Sequence[int]) -> list[ArmModel]:
