@@ -6,6 +6,7 @@ from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.search.acceptance import Rows, showing_more
 from armid_ros.effects import make_effect
 from armid_ros.identification import identify
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 import numpy as np
 import pytest
 
@@ -22,9 +23,8 @@ def asked(first, second):
     rows = [*first, *second]
     free = np.concatenate([one.free for one in rows])
     left = np.concatenate([one.residual for one in rows])
-    more, _divisions = showing_more(
-        first, second, (free.T @ free, free.T @ left), np.array([1e-9])
-    )
+    known = NormalEquations.of_rows(free, left)
+    more, _divisions = showing_more(first, second, known, np.array([1e-9]))
     return more == 0
 
 
@@ -55,7 +55,7 @@ def test_values_that_no_motion_shows_hide_no_change():
     days = [recording(rng, value) for value in values]
     wide = [Rows(one.free, np.hstack([one.own, 1e-12 * one.own]), one.residual) for one in days]
     free, left = (np.concatenate([getattr(one, n) for one in days]) for n in ('free', 'residual'))
-    known = free.T @ free, free.T @ left
+    known = NormalEquations.of_rows(free, left)
     assert showing_more(wide[:3], wide[3:], known, np.array([1e-9, 0.3])) == (0, 34)
 
 

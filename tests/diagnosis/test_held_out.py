@@ -8,6 +8,7 @@ from armid_ros.diagnosis.data.rows import Problem, products, with_candidate
 from armid_ros.diagnosis.search.held_out import held_out, tried_beside
 from armid_ros.diagnosis.search.trial import Candidate, denies, lead
 from armid_ros.effects import CATALOGUE
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 import numpy as np
 import pytest
 from scipy import stats
@@ -45,28 +46,34 @@ def group(bench, precision=(0.0, 0.0)):
 
 
 def held(rng):
-    """Return how free values are held, and to what."""
+    """Return what is known of free values."""
     root = rng.normal(size=(FREE, FREE))
-    return root @ root.T, rng.normal(size=FREE)
+    return NormalEquations(root @ root.T, rng.normal(size=FREE))
 
 
-def refitted(problem, columns, hold, pull, rows):
+def with_own(precision, prior):
+    """Return the same with values of the group ahead, known to be zero."""
+    matrix = np.zeros((OWN + FREE, OWN + FREE))
+    matrix[:OWN, :OWN], matrix[OWN:, OWN:] = np.diag(precision), prior.matrix
+    return NormalEquations(matrix, np.concatenate([np.zeros(OWN), prior.vector]))
+
+
+def refitted(problem, columns, prior, rows):
     """Fit columns to some rows by least squares."""
     x = problem.x[rows][:, :, columns].reshape(-1, len(columns))
-    return np.linalg.solve(x.T @ x + hold, x.T @ problem.y[rows].ravel() + pull)
+    return np.linalg.solve(x.T @ x + prior.matrix, x.T @ problem.y[rows].ravel() + prior.vector)
 
 
-def by_brute_force(problem, precision, hold, pull):
+def by_brute_force(problem, precision, prior):
     """Return what is left, what the group predicts of it, and the part of every row."""
     left, made = np.zeros_like(problem.y), np.zeros_like(problem.y)
     fold = FOLDS[problem.block]
     free, all_of_it = list(range(OWN, OWN + FREE)), list(range(OWN + FREE))
-    whole = np.zeros((OWN + FREE, OWN + FREE))
-    whole[:OWN, :OWN], whole[OWN:, OWN:] = np.diag(precision), hold
+    whole = with_own(precision, prior)
     for part in range(6):
         train, test = fold != part, fold == part
-        alone = refitted(problem, free, hold, pull, train)
-        both = refitted(problem, all_of_it, whole, np.concatenate([np.zeros(OWN), pull]), train)
+        alone = refitted(problem, free, prior, train)
+        both = refitted(problem, all_of_it, whole, train)
         without = problem.x[test][:, :, free] @ alone
         left[test] = problem.y[test] - without
         made[test] = problem.x[test] @ both - without
@@ -76,10 +83,10 @@ def by_brute_force(problem, precision, hold, pull):
 def test_products_of_blocks_say_what_a_refit_says(bench):
     rng = np.random.default_rng(0)
     problem, precision = make_problem(rng, (0.5, -0.3)), (3.0, 0.5)
-    hold, pull = held(rng)
-    left, made, _ = by_brute_force(problem, precision, hold, pull)
+    prior = held(rng)
+    left, made, _ = by_brute_force(problem, precision, prior)
     one, free = [group(bench, precision)], range(OWN, OWN + FREE)
-    (trial,), power = held_out(problem, free, one, hold, pull, whole=False)
+    (trial,), power = held_out(problem, free, one, prior, whole=False)
     owner = problem.block
     expected = made * left, made**2
     for measured, rows in zip((trial.cross, trial.square), expected, strict=True):
@@ -103,11 +110,11 @@ def test_what_a_group_spares_the_data_that_hold_the_rest_is_a_gain(bench):
     one, free = [group(bench)], range(OWN, OWN + FREE)
     rows = rng.normal(size=(40, FREE))
     left = rows @ np.array([1.5, -2.0, 0.0]) + rng.normal(size=40)
-    hold, pull = rows.T @ rows, rows.T @ left
-    (with_rows,), _ = held_out(problem, free, one, hold, pull)
-    (without,), _ = held_out(problem, free, one, hold, pull, whole=False)
+    prior = NormalEquations.of_rows(rows, left)
+    (with_rows,), _ = held_out(problem, free, one, prior)
+    (without,), _ = held_out(problem, free, one, prior, whole=False)
     spared = []
-    for alone, both in zip(without.held_alone, without.held_free, strict=True):
+    for alone, both in zip(without.fold_alone, without.fold_free, strict=True):
         before, after = left - rows @ alone, left - rows @ both
         spared.append(before @ before - after @ after)
     assert with_rows.gain - without.gain == pytest.approx(np.mean(spared), rel=1e-6)
@@ -119,14 +126,14 @@ def test_a_group_that_was_there_before_has_its_old_value_free_beside_it(bench):
     own, beside = problem.x[:, :, :OWN], problem.x[:, :, OWN:]
     size = OWN + FREE
     root = rng.normal(size=(size, size))
-    wide, to = root @ root.T, rng.normal(size=size)
+    wide = NormalEquations(root @ root.T, rng.normal(size=size))
     one = [group(bench, precision)]
     twice = replace(problem, x=np.concatenate([own, own, beside], axis=2))
-    (expected,), _ = held_out(twice, range(OWN, OWN + size), one, wide, to)
+    (expected,), _ = held_out(twice, range(OWN, OWN + size), one, wide)
     both = np.concatenate([own, beside], axis=2)
     of_both = products(replace(problem, x=both), range(size), ())
     known = with_candidate(of_both, problem, both, own)
-    (trial,), _ = tried_beside(known, problem, one, wide, to)
+    (trial,), _ = tried_beside(known, problem, one, wide)
     np.testing.assert_allclose(trial.values, expected.values, rtol=1e-8)
     np.testing.assert_allclose(trial.gains, expected.gains, rtol=1e-8)
 
@@ -134,13 +141,11 @@ def test_a_group_that_was_there_before_has_its_old_value_free_beside_it(bench):
 def test_values_are_those_of_least_squares_of_all_rows(bench):
     rng = np.random.default_rng(1)
     problem, precision = make_problem(rng, (0.5, -0.3)), (3.0, 0.5)
-    hold, pull = held(rng)
-    (trial,), _ = held_out(problem, range(OWN, OWN + FREE), [group(bench, precision)], hold, pull)
-    whole = np.zeros((OWN + FREE, OWN + FREE))
-    whole[:OWN, :OWN], whole[OWN:, OWN:] = np.diag(precision), hold
+    prior = held(rng)
+    (trial,), _ = held_out(problem, range(OWN, OWN + FREE), [group(bench, precision)], prior)
+    whole = with_own(precision, prior)
     every = np.ones(len(problem.block), dtype=bool)
-    columns, aim = list(range(OWN + FREE)), np.concatenate([np.zeros(OWN), pull])
-    expected = refitted(problem, columns, whole, aim, every)
+    expected = refitted(problem, list(range(OWN + FREE)), whole, every)
     np.testing.assert_allclose(trial.values, expected[:OWN], rtol=1e-8)
     assert 0.0 < trial.freedom < OWN
 
@@ -148,8 +153,8 @@ def test_values_are_those_of_least_squares_of_all_rows(bench):
 def trial_of(bench, seed, cause):
     """Return a group that is tried beside free columns that nothing holds."""
     problem = make_problem(np.random.default_rng(seed), cause)
-    nothing = np.zeros((FREE, FREE)), np.zeros(FREE)
-    (trial,), power = held_out(problem, range(OWN, OWN + FREE), [group(bench)], *nothing)
+    nothing = NormalEquations.none(FREE)
+    (trial,), power = held_out(problem, range(OWN, OWN + FREE), [group(bench)], nothing)
     return trial, power
 
 
@@ -172,8 +177,8 @@ def test_noise_is_seldom_a_cause(bench):
 def test_columns_that_free_ones_make_are_not_seen(bench):
     problem = make_problem(np.random.default_rng(2))
     problem.x[:, :, :OWN] = problem.x[:, :, OWN : 2 * OWN]
-    nothing = np.zeros((FREE, FREE)), np.zeros(FREE)
-    assert held_out(problem, range(OWN, OWN + FREE), [group(bench)], *nothing)[0] == []
+    nothing = NormalEquations.none(FREE)
+    assert held_out(problem, range(OWN, OWN + FREE), [group(bench)], nothing)[0] == []
 
 
 def test_one_cause_leads_another_by_what_it_takes_more(bench):
@@ -198,7 +203,7 @@ def test_data_deny_a_cause_that_they_do_not_follow_and_nothing_else():
 
 def test_two_blocks_that_are_alike_are_no_more_sure_than_white_noise(bench):
     problem = make_problem(np.random.default_rng(3))
-    (trial, *_), _ = held_out(problem, (), [group(bench)], np.zeros((0, 0)), np.zeros(0))
+    (trial, *_), _ = held_out(problem, (), [group(bench)], NormalEquations.none(0))
     square, cross = np.zeros((2, len(FOLDS)))
     square[:2], cross[:2] = (7.0, 6.0), (7.1, 5.9)
     alike = replace(trial, square=square, cross=cross)

@@ -13,6 +13,7 @@ from armid_ros.diagnosis.search.round import Nuisance, Round
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
 import pytest
@@ -34,9 +35,9 @@ def tried(bench, seed, level=0.6, lost=0.0, loud=2.0):
     columns = [part.columns(bench.arm, effect)[:, :, :1] for part in data]
     problem = make_problem(data, noise, [part.residual(bench.arm) for part in data], columns)
     candidate = Candidate(effect, slice(0, 1), (0,), bench.robot)
-    (trial,), _ = held_out(problem, (), [candidate], np.zeros((0, 0)), np.zeros(0))
+    (trial,), _ = held_out(problem, (), [candidate], NormalEquations.none(0))
     evidence = Evidence.over_noise(data, noise)
-    nuisance = Nuisance((), np.zeros((0, 0)), np.zeros(0))
+    nuisance = Nuisance((), NormalEquations.none(0))
     work = Workspace(bench.arm, data)
     here = Round(evidence, work, DiagnosisSettings(), problem, nuisance, 1.0)
     return trial, without_echo(trial, here)

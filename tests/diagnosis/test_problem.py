@@ -63,7 +63,7 @@ def test_shapes_of_a_name_are_held_by_what_all_data_tell_of_them(bench):
     problem, nuisance = nuisance_of(found, fitted, evidence)
     value, *shapes = np.sum(problem.x[:, :, list(nuisance.free)] ** 2, axis=(0, 1))
     assert value > 0.0
-    np.testing.assert_allclose(np.diag(nuisance.hold), [0.0, *shapes])
+    np.testing.assert_allclose(np.diag(nuisance.prior.matrix), [0.0, *shapes])
 
 
 def test_nothing_that_is_free_leaves_everything(problem):

@@ -5,7 +5,7 @@
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search import explain, prune
 from armid_ros.diagnosis.search.candidates import as_given
-from armid_ros.diagnosis.search.trial import Named, Taken
+from armid_ros.diagnosis.search.trial import Accepted, Named
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 import numpy as np
@@ -37,7 +37,7 @@ def prune_by(bench, monkeypatch):
         monkeypatch.setattr(prune.Retrial, 'needless', lambda *_: next(needless))
         step = way.taken[0].step
         more = [Named(CATALOGUE[name].on(bench.robot, ('elbow',)), (0,)) for name in also]
-        taken = [*way.taken, *(Taken(own, step, np.ones(1)) for own in more)]
+        taken = [*way.taken, *(Accepted(own, step, np.ones(1)) for own in more)]
         return prune.pruned(prune.Retrial(question, evidence, settings), taken)
 
     return pruned

@@ -21,7 +21,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.trajectory import fold_rows, Trajectory, weighted_rows
 from armid_ros.effects import Effect
 from armid_ros.effects.load import described_spread
-from armid_ros.identification.fitting.normal_equations import informative_solution
+from armid_ros.identification.fitting.normal_equations import informative_solution, NormalEquations
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
@@ -62,18 +62,13 @@ class Prior:
         return np.concatenate([rest.ravel() for rest in self.rest])
 
     @cached_property
-    def precision(self) -> FloatArray:
-        """Products of the columns, shape (r, r)."""
-        return np.asarray(self.columns.T @ self.columns)
-
-    @cached_property
-    def aim(self) -> FloatArray:
-        """Products of the columns with what is left, shape (r,)."""
-        return np.asarray(self.columns.T @ self.residual)
+    def of_change(self) -> NormalEquations:
+        """What the data tell of a change of the r values that are free."""
+        return NormalEquations.of_rows(self.columns, self.residual)
 
     def nearest(self, columns: FloatArray) -> FloatArray:
         """Return the changes of what is free that come nearest to columns (S, p), shape (r, p)."""
-        return informative_solution(self.precision, self.columns.T @ columns)
+        return informative_solution(self.of_change.matrix, self.columns.T @ columns)
 
     def recordings(self, change: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
         """Yield the columns of each recording, (S, r), and what a change leaves of it, (S,)."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.diagnosis.data.trajectory import block_rows, row_weights, Trajectory
 from armid_ros.identification.fitting.normal_equations import (
     informative_basis,
+    NormalEquations,
 )
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -96,11 +97,13 @@ class Projection:
         return np.asarray(columns.T @ columns - made.T @ made)
 
 
-def project(problem: Problem, free: Sequence[int], hold: FloatArray | None = None) -> Projection:
-    """Find what the free columns can make, as far as their precision (f, f) lets them."""
+def project(
+    problem: Problem, free: Sequence[int], prior: NormalEquations | None = None
+) -> Projection:
+    """Find what the free columns can make, as far as their prior lets them."""
     rows = problem.x[:, :, list(free)].reshape(problem.y.size, len(free))
     own = rows.T @ rows
-    return Projection(rows @ informative_basis(own if hold is None else own + hold))
+    return Projection(rows @ informative_basis(own if prior is None else own + prior.matrix))
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from armid_ros.diagnosis.search.trial import ROUNDING, Trial
 from armid_ros.identification.fitting.normal_equations import (
     independent_inverse,
     informative_basis,
+    NormalEquations,
 )
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -112,7 +113,7 @@ def without_echo(trial: Trial, here: Round) -> Trial:
     rows = np.einsum('rjp,rj->rp', echo, here.problem.weight**2)
     blocks = np.zeros((len(trial.cross), rows.shape[1]))
     np.add.at(blocks, here.problem.block, rows)
-    made = np.sum(blocks * trial.held_values[trial.piece], axis=1)
+    made = np.sum(blocks * trial.fold_values[trial.fold], axis=1)
     return replace(trial, cross=trial.cross - made)
 
 
@@ -185,17 +186,17 @@ def _showing_more(trial: Trial, here: Round) -> tuple[int, int]:
         more = later.own(here.work.arm, trial.candidate)
         second += [Rows(*rows) for rows in zip(later.free, more, later.residual, strict=True)]
     free = here.free.reshape(-1, len(nuisance.free))
-    hold, pull = nuisance.hold + free.T @ free, nuisance.pull + free.T @ here.problem.y.ravel()
+    known = nuisance.prior + NormalEquations.of_rows(free, here.problem.y.ravel())
     if later is not None:
         for columns, left in zip(later.free, later.residual, strict=True):
-            hold, pull = hold + columns.T @ columns, pull + columns.T @ left
-    return showing_more(first, second, (hold, pull), trial.candidate.precision)
+            known = known + NormalEquations.of_rows(columns, left)
+    return showing_more(first, second, known, trial.candidate.precision)
 
 
 def showing_more(
     first: Sequence[Rows],
     second: Sequence[Rows],
-    known: tuple[FloatArray, FloatArray],
+    known: NormalEquations,
     precision: FloatArray,
 ) -> tuple[int, int]:
     """
@@ -205,16 +206,15 @@ def showing_more(
     ----------
     first, second : sequence of Rows
         Recordings of the two groups.
-    known : tuple of ndarray, shapes (f, f) and (f,)
-        Products of the free columns of all of them with each other and with what is left, and of
-        whatever else holds them.
+    known : NormalEquations
+        What all of them, and whatever is known besides, tell of the free values.
     precision : ndarray, shape (p,)
         How strongly the values of the cause are held to zero.
 
     """
     rows = [*first, *second]
-    basis = informative_basis(known[0])
-    free = basis @ (basis.T @ known[1])
+    basis = informative_basis(known.matrix)
+    free = basis @ (basis.T @ known.vector)
     border = np.array([basis.T @ (one.free.T @ one.own) for one in rows])
     own = np.array([one.own.T @ one.own for one in rows])
     aim = np.array([one.own.T @ (one.residual - one.free @ free) for one in rows])

@@ -26,9 +26,10 @@ from armid_ros.diagnosis.search.held_out import widened
 from armid_ros.diagnosis.search.look import Look, look_at
 from armid_ros.diagnosis.search.prune import doubtful, pruned, Retrial, View
 from armid_ros.diagnosis.search.round import Before, Later, Nuisance, Round, undecided
-from armid_ros.diagnosis.search.trial import Candidate, Named, Step, Survey, Taken, Trial
+from armid_ros.diagnosis.search.trial import Accepted, Candidate, Named, Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -37,7 +38,7 @@ def explain(
     question: Question,
     evidence: Evidence,
     settings: DiagnosisSettings,
-    start: Sequence[Taken] = (),
+    start: Sequence[Accepted] = (),
     baseline: Baseline | None = None,
     unseen: Evidence | None = None,
 ) -> Explanation:
@@ -99,7 +100,7 @@ class Way:
 
     Attributes
     ----------
-    taken : tuple of Taken
+    taken : tuple of Accepted
         The causes.
     first : Survey or None
         What the first look at all causes showed.
@@ -110,7 +111,7 @@ class Way:
 
     """
 
-    taken: tuple[Taken, ...]
+    taken: tuple[Accepted, ...]
     first: Survey | None
     last: Place | None
     change: FloatArray | None = None
@@ -142,7 +143,7 @@ class Search:
     baseline: Baseline | None = None
     unseen: Evidence | None = None
 
-    def forward(self, start: Sequence[Taken] = ()) -> Way:
+    def forward(self, start: Sequence[Accepted] = ()) -> Way:
         """Take causes beside those to start with as long as any passes."""
         if not self.question.most:
             return Way(tuple(start), None, None)
@@ -172,9 +173,9 @@ class Search:
                 place = self._after(place, step)
                 named, values = list(place.named), list(place.values)
         rows = zip(named, taken, values, strict=True)
-        return Way(tuple(Taken(*row) for row in rows), first, place, place.current.change)
+        return Way(tuple(Accepted(*row) for row in rows), first, place, place.current.change)
 
-    def in_place_of(self, friction: Sequence[Taken], way: Way) -> list[Taken]:
+    def in_place_of(self, friction: Sequence[Accepted], way: Way) -> list[Accepted]:
         """
         Return what is there in place of offsets that were free beside every cause.
 
@@ -199,7 +200,7 @@ class Search:
             here = here.without(int(column), float(value))
         assert way.first is not None
         here = replace(here, total=max(way.first.total, float(np.sum(here.residual**2))))
-        found: list[Taken] = []
+        found: list[Accepted] = []
         others = place.found.candidates
         for _ in range(min(len(asked), self.settings.thresholds.few_causes)):
             look = look_at(others, here)
@@ -293,22 +294,22 @@ class Search:
         return replace(before, later=Later.of(unseen, there.columns, left))
 
 
-def _offsets(friction: Sequence[Taken]) -> list[Effect]:
+def _offsets(friction: Sequence[Accepted]) -> list[Effect]:
     """Return what of friction of unknown value is none."""
     return [one.named.effect for one in friction if not one.named.effect.friction]
 
 
-def _of(step: Step, question: Question) -> Taken:
+def _of(step: Step, question: Question) -> Accepted:
     """Return the name of a step, with the values that it was found with."""
     candidate = step.trial.candidate
     values = np.zeros(len(candidate.effect.parameters(question.arm.robot)))
     values[list(candidate.kept)] = step.trial.values
-    return Taken(Named(candidate.effect, candidate.kept), step, values)
+    return Accepted(Named(candidate.effect, candidate.kept), step, values)
 
 
 def _friction(
-    retrial: Retrial, taken: Sequence[Taken], whole: tuple[float | None, int]
-) -> tuple[list[Taken], list[Trial]]:
+    retrial: Retrial, taken: Sequence[Accepted], whole: tuple[float | None, int]
+) -> tuple[list[Accepted], list[Trial]]:
     """
     Return the friction of unknown value that is there, and what all of it was tried as.
 
@@ -337,7 +338,7 @@ def _friction(
     gone: list[int] = []
     tried: list[Trial] = []
     while True:
-        there: list[Taken] = []
+        there: list[Accepted] = []
         weak: list[tuple[tuple[float, float], int]] = []
         seen: list[Trial] = []
         for k, (effect, column, value) in enumerate(alive):
@@ -350,7 +351,7 @@ def _friction(
             total = again.power if whole[0] is None else whole[0]
             step = Step(again.trial, (), (again.trial,), total, whole[1], least)
             if retrial.stands(step, again):
-                there.append(Taken(Named(effect, (0,)), step, np.array([value])))
+                there.append(Accepted(Named(effect, (0,)), step, np.array([value])))
             else:
                 weak.append((doubtful(again.trial), k))
         tried = tried or seen
@@ -376,8 +377,9 @@ def nuisance_of(
     problem = make_problem(evidence.data, evidence.sigma, current.residual, columns)
     size = problem.x.shape[2]
     free = tuple(range(size - current.columns[0].shape[2], size))
-    known = np.zeros(len(free))
+    shaped = np.zeros(len(free))
     first = len(free) - len(current.estimate.values)
     shapes = [first + k for _, own in current.places for k in own]
-    known[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
-    return problem, Nuisance(free, current.hold + np.diag(known), current.pull)
+    shaped[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
+    held = NormalEquations(np.diag(shaped), np.zeros(len(shaped)))
+    return problem, Nuisance(free, current.prior + held)

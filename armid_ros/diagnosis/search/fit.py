@@ -26,6 +26,7 @@ from armid_ros.identification.fitting.normal_equations import (
     informative_basis,
     informative_solution,
     NO_COLUMN,
+    NormalEquations,
 )
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
@@ -55,8 +56,8 @@ class Fitted:
         Columns of all that was free.
     values : tuple of ndarray
         All values of each named effect.
-    hold : ndarray, shape (f, f)
-        Precision that what was free is held with, and ``pull``, shape (f,), what to, times that.
+    prior : NormalEquations
+        What is known of the steps of all that was free.
     change : ndarray, shape (r,)
         What was added to the base parameters that were free.
 
@@ -68,8 +69,7 @@ class Fitted:
     residual: tuple[FloatArray, ...]
     columns: tuple[FloatArray, ...]
     values: tuple[FloatArray, ...]
-    hold: FloatArray
-    pull: FloatArray
+    prior: NormalEquations
     change: FloatArray
 
     @property
@@ -138,12 +138,12 @@ def fit(
     if start.change is not None and base is not None:
         state = state.with_change(start.change, base)
     described = np.zeros((0, 0)) if base is None else described_precision(base, arm)
-    pull, aim = described, np.zeros(len(described))
+    held = NormalEquations(described, np.zeros(len(described)))
     if prior is not None and base is not None:
-        pull, aim = described + prior.precision, prior.aim
+        held = held + prior.of_change
     rounds = _MOST_ROUNDS if named else int(base is not None and prior is None)
     rounds = 0 if known is not None else rounds
-    state, residual, columns = _settled(state, evidence, base, (pull, aim), rounds)
+    state, residual, columns = _settled(state, evidence, base, held, rounds)
     size = 0 if base is None else base.rank
     names, numbers = state.parameters()
     estimate = known
@@ -153,9 +153,7 @@ def fit(
             more = [] if prior is None else prior.regressions(state.change, len(numbers))
             covariance = _covariance(columns, residual, evidence, described, more)
         estimate = Estimate(names, numbers, covariance[size:, size:])
-    whole = columns[0].shape[2]
-    hold, held_to = np.zeros((whole, whole)), np.zeros(whole)
-    hold[:size, :size], held_to[:size] = pull, aim - pull @ state.change
+    open_values = np.zeros(columns[0].shape[2] - size)
     return Fitted(
         state.model,
         state.named,
@@ -163,8 +161,7 @@ def fit(
         tuple(residual),
         tuple(columns),
         state.values,
-        hold,
-        held_to,
+        held.after(state.change).and_zeros(open_values),
         state.change,
     )
 
@@ -173,7 +170,7 @@ def _settled(
     state: Patch,
     evidence: Evidence,
     base: BaseParameters | None,
-    held: tuple[FloatArray, FloatArray],
+    known: NormalEquations,
     rounds: int,
 ) -> tuple[Patch, list[FloatArray], list[FloatArray]]:
     """
@@ -187,8 +184,8 @@ def _settled(
         The data.
     base : BaseParameters or None
         What is free of the arm.
-    held : tuple of ndarray
-        Precision that it is held with, and what to, times that.
+    known : NormalEquations
+        What is known of its change.
     rounds : int
         Steps at the most.
 
@@ -201,18 +198,19 @@ def _settled(
         Columns of all that is free, where it is.
 
     """
-    data, (pull, aim) = evidence.data, held
+    data = evidence.data
 
     def loss_of(patch: Patch, left: Sequence[FloatArray]) -> float:
-        known = patch.change @ pull @ patch.change - 2.0 * aim @ patch.change
-        return _loss(left, evidence) + float(known)
+        change = patch.change
+        away = change @ known.matrix @ change - 2.0 * known.vector @ change
+        return _loss(left, evidence) + float(away)
 
     residual = _residuals(state, data)
     loss = loss_of(state, residual)
     columns = [patch_columns(state, part, base) for part in data]
     for _ in range(rounds):
         moved, after, expected = state, residual, loss
-        for step in _steps(state, columns, residual, evidence, (pull, aim)):
+        for step in _steps(state, columns, residual, evidence, known):
             trial = state.moved(step, base)
             left = _residuals(trial, data)
             if loss_of(trial, left) < loss:
@@ -235,7 +233,7 @@ def _steps(
     columns: Sequence[FloatArray],
     residual: Sequence[FloatArray],
     evidence: Evidence,
-    held: tuple[FloatArray, FloatArray],
+    known: NormalEquations,
 ) -> Iterator[FloatArray]:
     """
     Yield steps of all that is free to try in turn, shape (f,).
@@ -244,13 +242,13 @@ def _steps(
     last one leaves shapes as they are.
 
     """
-    pull, aim = held
-    whole = _step(columns, residual, evidence, pull, aim - pull @ state.change)
+    known = known.after(state.change)
+    whole = _step(columns, residual, evidence, known)
     yield from (whole, 0.5 * whole, 0.2 * whole)
     if state.linear.all():
         return
     flat = [block * state.linear for block in columns]
-    yield _step(flat, residual, evidence, pull, aim - pull @ state.change)
+    yield _step(flat, residual, evidence, known)
 
 
 def _expected(
@@ -277,8 +275,7 @@ def _step(
     columns: Sequence[FloatArray],
     residual: Sequence[FloatArray],
     evidence: Evidence,
-    hold: FloatArray,
-    pull: FloatArray,
+    prior: NormalEquations,
 ) -> FloatArray:
     """Solve with weights, the description pulling; what nothing tells gets no step."""
     size = columns[0].shape[2]
@@ -288,9 +285,9 @@ def _step(
         flat = block.reshape(-1, size)
         own += flat.T @ flat
         aim += flat.T @ left.ravel()
-    known = len(pull)
-    own[:known, :known] += hold
-    aim[:known] += pull
+    known = len(prior.vector)
+    own[:known, :known] += prior.matrix
+    aim[:known] += prior.vector
     seen = np.diag(own) > NO_COLUMN * np.diag(own).max(initial=1e-300)
     step = np.zeros(size)
     step[seen] = informative_solution(own[np.ix_(seen, seen)], aim[seen])
@@ -320,15 +317,17 @@ def _covariance(
 
     """
     size = columns[0].shape[2]
-    hold = np.zeros((size, size))
-    hold[: len(described), : len(described)] = described
+    precision = np.zeros((size, size))
+    precision[: len(described), : len(described)] = described
     rows = zip(evidence.data, evidence.weighted(columns), evidence.weighted(residual), strict=True)
     problem = [
         Regression(part.at_rows.with_torque(left), block, part.informative, part.source)
         for part, block, left in rows
     ]
     problem += more
-    stacked = np.concatenate([*(part.columns.reshape(-1, size) for part in problem), _root(hold)])
+    stacked = np.concatenate(
+        [*(part.columns.reshape(-1, size) for part in problem), _root(precision)]
+    )
     names = tuple(ParameterName(str(k), '', '') for k in range(size))
     kept = group_columns(stacked, names, tolerance=1e-5).independent
     covariance = np.diag(np.full(size, np.inf))
@@ -339,7 +338,7 @@ def _covariance(
     left = np.concatenate([part.target for part in problem]) * told
     try:
         basis = informative_basis(stacked[:, kept].T @ stacked[:, kept])
-        products = noise_products(problem, left, told, basis) + hold[np.ix_(kept, kept)]
+        products = noise_products(problem, left, told, basis) + precision[np.ix_(kept, kept)]
     except (np.linalg.LinAlgError, ValueError) as error:
         raise ModelError(f'the patched model cannot be fitted: {error}') from error
     bread = basis @ basis.T

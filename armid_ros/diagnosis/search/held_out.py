@@ -25,7 +25,12 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import make_problem, Problem, Products, products
+from armid_ros.diagnosis.data.rows import (
+    make_problem,
+    Problem,
+    Products,
+    products,
+)
 from armid_ros.diagnosis.data.trajectory import fold_rows
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.trial import Candidate, IDENTIFIABLE, Trial
@@ -35,6 +40,7 @@ from armid_ros.identification.fitting.normal_equations import (
     independent_inverse,
     informative_basis,
     informative_solution,
+    NormalEquations,
     UNINFORMATIVE,
 )
 from armid_ros.motion import FloatArray
@@ -79,17 +85,15 @@ class _Fits:
     made: FloatArray
 
     @classmethod
-    def of(
-        cls, known: Products, part: npt.NDArray[np.intp], hold: FloatArray, pull: FloatArray
-    ) -> _Fits:
+    def of(cls, known: Products, part: npt.NDArray[np.intp], prior: NormalEquations) -> _Fits:
         """Fit what is free; ``part`` of each block, shape (B,)."""
         train = np.ones((int(part.max()) + 2, len(part)))
         train[part, np.arange(len(part))] = 0.0
         border = np.tensordot(train, known.border, 1)
-        aim = train @ known.aim + pull
+        aim = train @ known.aim + prior.vector
         theta, solved = np.empty_like(aim), np.empty_like(border)
         for k, own in enumerate(np.tensordot(train, known.free, 1)):
-            basis = informative_basis(own + hold)
+            basis = informative_basis(own + prior.matrix)
             theta[k], solved[k] = basis @ (basis.T @ aim[k]), basis @ (basis.T @ border[k])
         others = theta[part]
         return cls(
@@ -112,8 +116,7 @@ def held_out(
     problem: Problem,
     free: Sequence[int],
     candidates: Sequence[Candidate],
-    hold: FloatArray,
-    pull: FloatArray,
+    prior: NormalEquations,
     whole: bool = True,
 ) -> tuple[list[Trial], FloatArray]:
     """
@@ -127,12 +130,10 @@ def held_out(
         Columns that are fitted beside.
     candidates : sequence of Candidate
         What is tried.
-    hold : ndarray, shape (f, f)
-        Precision that free values are held with.
-    pull : ndarray, shape (f,)
-        What they are held to, times that.
+    prior : NormalEquations
+        What is known of the free values.
     whole : bool
-        Whether what holds the free values counts as data: what a candidate spares them there is a
+        Whether that counts as data: what a candidate spares them there is a
         gain as well.
 
     Returns
@@ -147,8 +148,7 @@ def held_out(
         products(problem, free, [one.columns for one in candidates]),
         problem,
         candidates,
-        hold,
-        pull,
+        prior,
         whole,
     )
 
@@ -157,16 +157,15 @@ def tried_beside(
     known: Products,
     problem: Problem,
     candidates: Sequence[Candidate],
-    hold: FloatArray,
-    pull: FloatArray,
+    prior: NormalEquations,
     whole: bool = True,
 ) -> tuple[list[Trial], FloatArray]:
     """Try every candidate, of which products are known; see `held_out`."""
     part = problem.fold_of_block
-    fits = _Fits.of(known, part, hold, pull)
+    fits = _Fits.of(known, part, prior)
     theta = fits.theta[part]
     power = known.power - np.sum(theta * (known.aim + fits.left), axis=1)
-    counted = (hold, pull) if whole else (np.zeros_like(hold), np.zeros_like(pull))
+    counted = prior if whole else NormalEquations.none(len(prior.vector))
     trials = [
         _tried(known, candidate, k, fits, part, counted) for k, candidate in enumerate(candidates)
     ]
@@ -179,7 +178,7 @@ def _tried(
     position: int,
     fits: _Fits,
     part: npt.NDArray[np.intp],
-    counted: tuple[FloatArray, FloatArray],
+    counted: NormalEquations,
 ) -> Trial | None:
     span, own = candidate.columns, known.own[position]
     border, solved = fits.border[:, :, span], fits.solved[:, :, span]
@@ -202,11 +201,10 @@ def _tried(
     cross = np.sum(fits.target[:, span] * v, axis=1) + np.sum(fits.left * moved, axis=1)
     square = np.sum(_times(own, v) * v, axis=1)
     square += np.sum(_times(fits.made[:, :, span], v) * moved, axis=1)
-    hold, pull = counted
     held, alone = change[:-1], fits.theta[:-1]
     share = 1.0 / (len(held) * np.maximum(np.bincount(part), 1))
-    cross += (share * np.sum(held * (pull - alone @ hold), axis=1))[part]
-    square += (share * np.sum(held * (held @ hold), axis=1))[part]
+    cross += (share * np.sum(held * (counted.vector - alone @ counted.matrix), axis=1))[part]
+    square += (share * np.sum(held * (held @ counted.matrix), axis=1))[part]
     std = np.sqrt(np.maximum(np.diagonal(inverse, axis1=1, axis2=2), 0.0))
     return Trial(
         candidate,
@@ -256,15 +254,15 @@ def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: flo
     size = len(fitted.estimate.values)
     if not size:
         return fitted
-    own, aim = _products(fitted, evidence)
-    all_own, all_aim = own.sum(axis=0) + fitted.hold, aim.sum(axis=0) + fitted.pull
-    change, std = _values(all_own, all_aim, size)
+    parts = _by_part(fitted, evidence)
+    whole = sum(parts, start=fitted.prior)
+    change, std = _values(whole, size)
     variance, freedom = np.zeros(size), 0
-    for parts in (list(zip(own, aim, strict=True)), _recordings_before(fitted, prior)):
-        if len(parts) > 1:
-            held = [_values(all_own - x, all_aim - y, size) for x, y in parts]
+    for sources in (parts, _recordings_before(fitted, prior)):
+        if len(sources) > 1:
+            held = [_values(whole - one, size) for one in sources]
             variance += jackknife(change, std, *np.array(held).transpose(1, 0, 2))
-            freedom += len(parts) - 1
+            freedom += len(sources) - 1
     few = float(stats.t.ppf(stats.norm.cdf(HALF_WIDTH), freedom) / HALF_WIDTH)
     unit = std**2
     found = few**2 * variance + max(chance - 1.0, 0.0) * unit
@@ -313,7 +311,7 @@ def with_model_error(
     size = len(fitted.estimate.values)
     if not size:
         return fitted
-    own = np.zeros((len(fitted.hold), len(fitted.hold)))
+    own = fitted.prior.matrix.copy()
     error = np.zeros((len(own), len(covariance)))
     torques = [part.reduce(arm.columns(part.motion)) for part in evidence.data]
     pairs = zip(evidence.weighted(fitted.columns), evidence.weighted(torques), strict=True)
@@ -321,7 +319,7 @@ def with_model_error(
         x = columns.reshape(-1, len(own))
         own += x.T @ x
         error += x.T @ torque.reshape(len(x), -1)
-    follows = informative_solution(own + fitted.hold, error)[-size:]
+    follows = informative_solution(own, error)[-size:]
     variance = np.einsum('kp,pq,kq->k', follows, covariance, follows)
     return _with_deviation(fitted, np.hypot(_known(fitted), np.sqrt(np.maximum(variance, 0.0))))
 
@@ -339,35 +337,28 @@ def _with_deviation(fitted: Fitted, deviation: FloatArray) -> Fitted:
     return replace(fitted, estimate=replace(fitted.estimate, covariance=covariance))
 
 
-def _products(fitted: Fitted, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
-    """Return products of columns with each other and the rest, of each part, (K, f, f), (K, f)."""
+def _by_part(fitted: Fitted, evidence: Evidence) -> list[NormalEquations]:
+    """Return what each part of the data tells of a step of all that was free."""
     problem = make_problem(evidence.data, evidence.sigma, fitted.residual, list(fitted.columns))
     fold, width = fold_rows(evidence.data), problem.x.shape[2]
-    own, aim = [], []
-    for k in range(int(fold.max()) + 1):
-        x, y = problem.x[fold == k].reshape(-1, width), problem.y[fold == k].ravel()
-        own.append(x.T @ x)
-        aim.append(x.T @ y)
-    return np.array(own), np.array(aim)
+    parts = [fold == k for k in range(int(fold.max()) + 1)]
+    rows = [(problem.x[part].reshape(-1, width), problem.y[part].ravel()) for part in parts]
+    return [NormalEquations.of_rows(*own) for own in rows]
 
 
-def _values(own: FloatArray, aim: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
-    """Return the last values that solve normal equations, and their deviations, each (p,)."""
-    basis = informative_basis(own)
-    return (basis @ (basis.T @ aim))[-size:], np.sqrt(np.sum(basis[-size:] ** 2, axis=1))
+def _values(known: NormalEquations, size: int) -> tuple[FloatArray, FloatArray]:
+    """Return the means of the last values, and their deviations, each (p,)."""
+    basis = informative_basis(known.matrix)
+    return (basis @ (basis.T @ known.vector))[-size:], np.sqrt(np.sum(basis[-size:] ** 2, axis=1))
 
 
-def _recordings_before(fitted: Fitted, prior: Prior | None) -> list[tuple[FloatArray, FloatArray]]:
-    """Return products of columns with each other and the rest, of recordings from before."""
+def _recordings_before(fitted: Fitted, prior: Prior | None) -> list[NormalEquations]:
+    """Return what each recording from before tells of a step of all that was free."""
     if prior is None:
         return []
-    products = []
-    for x, y in prior.recordings(fitted.change):
-        rank = x.shape[1]
-        own, aim = np.zeros_like(fitted.hold), np.zeros_like(fitted.pull)
-        own[:rank, :rank], aim[:rank] = x.T @ x, x.T @ y
-        products.append((own, aim))
-    return products
+    named = np.zeros(len(fitted.estimate.values))
+    recordings = prior.recordings(fitted.change)
+    return [NormalEquations.of_rows(x, y).and_zeros(named) for x, y in recordings]
 
 
 def _seen_before(fitted: Fitted, prior: Prior, baseline: Baseline) -> FloatArray:

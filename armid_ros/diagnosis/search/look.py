@@ -25,9 +25,9 @@ from armid_ros.diagnosis.search.held_out import tried_beside
 from armid_ros.diagnosis.search.round import (
     beaten,
     closes,
-    Comes,
-    comes,
     cost,
+    Frequency,
+    frequency,
     likeliest,
     rarity,
     Round,
@@ -121,7 +121,9 @@ class Look:
             if trial is not winner and not says_no_more(trial, winner, here)
         ]
         best = {trial.candidate.effect.name: trial for trial in reversed(rivals)}
-        likely = sorted(best.values(), key=lambda t: (comes(t, here) is Comes.NEVER, rarity(t)))
+        likely = sorted(
+            best.values(), key=lambda t: (frequency(t, here) is Frequency.NEVER, rarity(t))
+        )
         whole = here.settings.thresholds.misfit_share
         least = 0.0 if surely_changed(winner, here) else whole
         return Step(
@@ -138,7 +140,7 @@ def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
     """Try every cause beside what is free."""
     nuisance = here.nuisance
     known = products(here.problem, nuisance.free, [one.columns for one in candidates])
-    trials, power = tried_beside(known, here.problem, candidates, nuisance.hold, nuisance.pull)
+    trials, power = tried_beside(known, here.problem, candidates, nuisance.prior)
     left = float(power.sum())
     total = left if here.total is None else here.total
     here = replace(here, total=total, power=left, known=known)
@@ -338,9 +340,7 @@ def _alone(candidate: Candidate, own: FloatArray, here: Round) -> Trial | None:
     candidate = replace(candidate, columns=slice(0, candidate.size))
     assert here.known is not None
     known = with_candidate(here.known, here.problem, here.free, own)
-    trials, _ = tried_beside(
-        known, here.problem, [candidate], here.nuisance.hold, here.nuisance.pull
-    )
+    trials, _ = tried_beside(known, here.problem, [candidate], here.nuisance.prior)
     return trials[0] if trials else None
 
 
@@ -354,14 +354,14 @@ def _changes(trials: Sequence[Trial], here: Round) -> list[Trial | None]:
     if here.before is None:
         return list(trials)
     problem = here.problem
-    held = here.before.nuisance([one.candidate for one in trials], here.work.arm, here.nuisance)
+    held = here.before.information([one.candidate for one in trials], here.work.arm, here.nuisance)
     free = np.concatenate([*(here.own(one.candidate) for one in trials), here.free], axis=2)
     known = products(replace(problem, x=free), range(free.shape[2]), ())
     result: list[Trial | None] = []
     for trial in trials:
         candidate = replace(trial.candidate, columns=slice(0, trial.candidate.size))
         whole = with_candidate(known, problem, free, here.own(trial.candidate))
-        found, _ = tried_beside(whole, problem, [candidate], held.hold, held.pull)
+        found, _ = tried_beside(whole, problem, [candidate], held)
         result.append(replace(found[0], candidate=trial.candidate) if found else None)
     return result
 

@@ -24,8 +24,9 @@ from armid_ros.diagnosis.search.candidates import Question
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import held_out
 from armid_ros.diagnosis.search.round import Nuisance, Round
-from armid_ros.diagnosis.search.trial import Candidate, Named, Step, Taken, Trial
+from armid_ros.diagnosis.search.trial import Accepted, Candidate, Named, Step, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -99,7 +100,7 @@ class View:
 
     def without(
         self, columns: Sequence[int], values: Sequence[float], gone: Sequence[int] = ()
-    ) -> tuple[Problem, tuple[int, ...], FloatArray, FloatArray]:
+    ) -> tuple[Problem, tuple[int, ...], NormalEquations]:
         """
         Return the problem as if some columns had a value of zero.
 
@@ -117,8 +118,8 @@ class View:
         problem : Problem
         free : tuple of int
             The other columns.
-        hold, pull : ndarray
-            How these are held.
+        prior : NormalEquations
+            What is known of these.
 
         """
         size = self.problem.x.shape[2]
@@ -127,9 +128,8 @@ class View:
         x = self.problem.x
         y = self.problem.y + x[:, :, list(columns)] @ np.asarray(values, dtype=float)
         moved = replace(self.problem, x=x[:, :, [*columns, *others]], y=y)
-        hold = self.fitted.hold[np.ix_(others, others)]
         free = tuple(range(len(columns), len(columns) + len(others)))
-        return moved, free, hold, self.fitted.pull[others]
+        return moved, free, self.fitted.prior.among(others)
 
     def dropped(self, column: int, value: float) -> View:
         """Return the view as if a column had a value of zero."""
@@ -144,11 +144,11 @@ class View:
         gone: Sequence[int] = (),
     ) -> Again:
         """Judge what is there already as if it were asked for now."""
-        problem, free, hold, pull = self.without(columns, values, gone)
+        problem, free, prior = self.without(columns, values, gone)
         moved = replace(candidate, columns=slice(0, len(columns)))
-        trials, power = held_out(problem, free, [moved], hold, pull)
+        trials, power = held_out(problem, free, [moved], prior)
         trial = trials[0] if trials else None
-        return Again(trial, problem, Nuisance(free, hold, pull), float(power.sum()))
+        return Again(trial, problem, Nuisance(free, prior), float(power.sum()))
 
     def trial_of(self, name: int) -> Again:
         """Judge a name as if it were asked for now, beside the others."""
@@ -224,7 +224,7 @@ class Retrial:
         gains = again.trial.joint_gains(*here.rows_of(again.trial.candidate))
         return acceptable(again.trial, here) and material(gains, here, step.misfit_share)
 
-    def fitted(self, names: Sequence[Taken], change: FloatArray | None) -> Fitted:
+    def fitted(self, names: Sequence[Accepted], change: FloatArray | None) -> Fitted:
         """Fit all names together, from their values and a change of the body on."""
         question, evidence = self.question, self.evidence
         return fit(
@@ -236,7 +236,7 @@ class Retrial:
             question.prior,
         )
 
-    def needless(self, fitted: Fitted, names: Sequence[Taken]) -> int | None:
+    def needless(self, fitted: Fitted, names: Sequence[Accepted]) -> int | None:
         """Return the name that is likeliest to be chance beside the others; None if all stand."""
         if not names:
             return None
@@ -250,7 +250,7 @@ class Retrial:
         return max(weak)[1] if weak else None
 
     def needed_after_all(
-        self, fitted: Fitted, dropped: Sequence[Taken]
+        self, fitted: Fitted, dropped: Sequence[Accepted]
     ) -> tuple[int, FloatArray] | None:
         """Return which dropped name takes most beside those that stay, and its values."""
         if not dropped:
@@ -270,7 +270,7 @@ class Retrial:
 
 
 def pruned(
-    retrial: Retrial, taken: Sequence[Taken], change: FloatArray | None = None
+    retrial: Retrial, taken: Sequence[Accepted], change: FloatArray | None = None
 ) -> tuple[tuple[Step, ...], Fitted]:
     """
     Fit all names together, and drop those that the others make needless.
@@ -286,13 +286,13 @@ def pruned(
         The arm with these names.
 
     """
-    alive, dropped = list(taken), list[Taken]()
+    alive, dropped = list(taken), list[Accepted]()
     back: list[Step] = []
     while True:
         fitted = retrial.fitted(alive, change)
         steps, change = tuple(one.step for one in alive), fitted.change
         rows = zip(fitted.named, steps, fitted.values, strict=True)
-        alive = [Taken(*row) for row in rows]
+        alive = [Accepted(*row) for row in rows]
         needless = retrial.needless(fitted, alive)
         if needless is not None:
             gone = alive.pop(needless)

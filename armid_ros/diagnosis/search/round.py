@@ -17,6 +17,7 @@ from armid_ros.diagnosis.data.trajectory import Workspace
 from armid_ros.diagnosis.search.trial import Candidate, lead, ROUNDING, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -35,27 +36,18 @@ class Nuisance:
     ----------
     free : tuple of int
         Columns of the problem.
-    hold : ndarray, shape (f, f)
-        Precision that they are held with.
-    pull : ndarray, shape (f,)
-        What they are held to, times that.
+    prior : NormalEquations
+        What is known of their values.
 
     """
 
     free: tuple[int, ...]
-    hold: FloatArray
-    pull: FloatArray
+    prior: NormalEquations
 
     def and_columns(self, candidate: Candidate) -> Nuisance:
         """Return the same with the columns of a candidate."""
         span = range(candidate.columns.start, candidate.columns.stop)
-        size = len(self.free) + len(span)
-        hold = np.zeros((size, size))
-        hold[: len(self.free), : len(self.free)] = self.hold
-        hold[len(self.free) :, len(self.free) :] = np.diag(candidate.precision)
-        return Nuisance(
-            (*self.free, *span), hold, np.concatenate([self.pull, np.zeros(len(span))])
-        )
+        return Nuisance((*self.free, *span), self.prior.and_zeros(candidate.precision))
 
 
 @dataclass(frozen=True)
@@ -131,15 +123,10 @@ class Before:
         later = None if self.later is None else self.later.and_columns(arm, candidate)
         return replace(self, later=later)
 
-    def nuisance(
+    def information(
         self, candidates: Sequence[Candidate], arm: ArmModel, nuisance: Nuisance
-    ) -> Nuisance:
-        """
-        Return what is fitted beside a cause: also the values that some had before already.
-
-        Their columns are ahead of the others.
-
-        """
+    ) -> NormalEquations:
+        """Return what is known of the values some had before already, and of what is free."""
         own = np.concatenate(
             [
                 self.baseline.columns(arm, candidate.effect, candidate.kept)
@@ -150,14 +137,14 @@ class Before:
         precision = np.concatenate([candidate.precision for candidate in candidates])
         left = self.prior.residual - self.prior.columns @ self.change
         size, known = own.shape[1], self.prior.columns.shape[1]
-        whole = size + len(nuisance.pull)
-        hold, pull = np.zeros((whole, whole)), np.zeros(whole)
-        hold[size:, size:], pull[size:] = nuisance.hold, nuisance.pull
-        hold[:size, :size] = own.T @ own + np.diag(precision)
-        hold[:size, size : size + known] = own.T @ self.prior.columns
-        hold[size : size + known, :size] = hold[:size, size : size + known].T
-        pull[:size] = own.T @ left
-        return Nuisance((), hold, pull)
+        whole = size + len(nuisance.free)
+        matrix, vector = np.zeros((whole, whole)), np.zeros(whole)
+        matrix[size:, size:], vector[size:] = nuisance.prior.matrix, nuisance.prior.vector
+        matrix[:size, :size] = own.T @ own + np.diag(precision)
+        matrix[:size, size : size + known] = own.T @ self.prior.columns
+        matrix[size : size + known, :size] = matrix[:size, size : size + known].T
+        vector[:size] = own.T @ left
+        return NormalEquations(matrix, vector)
 
 
 @dataclass(frozen=True)
@@ -227,7 +214,7 @@ class Round:
     @cached_property
     def projection(self) -> Projection:
         """What these leave of others."""
-        return project(self.problem, self.nuisance.free, self.nuisance.hold)
+        return project(self.problem, self.nuisance.free, self.nuisance.prior)
 
     @cached_property
     def residual(self) -> FloatArray:
@@ -240,11 +227,11 @@ class Round:
 
     def without(self, place: int, value: float) -> Round:
         """Return the same where one of the free columns is not there, and had a value."""
-        free, hold, pull = self.nuisance.free, self.nuisance.hold, self.nuisance.pull
+        free = self.nuisance.free
         kept = [k for k in range(len(free)) if k != place]
         column = self.problem.x[:, :, free[place]]
         problem = replace(self.problem, y=self.problem.y + value * column)
-        nuisance = Nuisance(tuple(free[k] for k in kept), hold[np.ix_(kept, kept)], pull[kept])
+        nuisance = Nuisance(tuple(free[k] for k in kept), self.nuisance.prior.among(kept))
         return replace(self, problem=problem, nuisance=nuisance, known=None)
 
     def own(self, candidate: Candidate) -> FloatArray:
@@ -283,35 +270,37 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
     squares, z = lead(first, other)
     if squares <= here.width:
         return False
-    often = comes(other, here) is Comes.OFTEN and not other.candidate.effect.external
-    if comes(first, here) > Comes.OFTEN and often:
+    often = frequency(other, here) is Frequency.OFTEN and not other.candidate.effect.external
+    if frequency(first, here) > Frequency.OFTEN and often:
         return squares > thresholds.far * first.gain
     if squares <= thresholds.tie * here.currency * 0.5 and squares <= thresholds.far * first.gain:
         return False
     return z >= thresholds.rival_z or squares > thresholds.far * first.gain
 
 
-class Comes(IntEnum):
+class Frequency(IntEnum):
     """How seldom a cause comes between two days."""
 
     OFTEN, SELDOM, NEVER = range(3)
 
 
-def comes(trial: Trial, here: Round) -> Comes:
+def frequency(trial: Trial, here: Round) -> Frequency:
     """Return how seldom a cause comes: a link never changes, an inner one hardly has a load."""
     effect = trial.candidate.effect
     if here.since and effect.corrects:
-        return Comes.NEVER
+        return Frequency.NEVER
     seldom = here.since and effect.changes_body and not _usual(trial)
-    return Comes.SELDOM if seldom else Comes.OFTEN
+    return Frequency.SELDOM if seldom else Frequency.OFTEN
 
 
 def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
     """Return causes, best first: before one that never happens what happens and says the same."""
     first, *others = passing
-    if comes(first, here) is Comes.NEVER:
+    if frequency(first, here) is Frequency.NEVER:
         for other in others:
-            happens = comes(other, here) < Comes.NEVER and not other.candidate.effect.external
+            happens = (
+                frequency(other, here) < Frequency.NEVER and not other.candidate.effect.external
+            )
             if happens and not beaten(other, first, here) and contains(first, other, here):
                 return [other, first, *(trial for trial in others if trial is not other)]
     return list(passing)
@@ -327,9 +316,9 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -
     before what never or seldom does.
 
     """
-    of_arm = [comes(trial, here) for trial in tied if not trial.candidate.effect.external]
-    least = min(of_arm, default=Comes.NEVER)
-    tied = [trial for trial in tied if comes(trial, here) <= least]
+    of_arm = [frequency(trial, here) for trial in tied if not trial.candidate.effect.external]
+    least = min(of_arm, default=Frequency.NEVER)
+    tied = [trial for trial in tied if frequency(trial, here) <= least]
     if len(tied) == 1:
         return tied[0]
     able = [trial for trial in tied if closing[id(trial)]]

@@ -136,11 +136,11 @@ class Trial:
         Share of the columns that the free ones cannot make.
     cross, square : ndarray, shape (B,)
         x'r and x'x of every block.
-    held_values, held_std : ndarray, shape (K, p)
+    fold_values, fold_std : ndarray, shape (K, p)
         Values without each part, and their deviations as far as white noise goes.
-    held_free : ndarray, shape (K, f)
-        The free values without each part, changed by the candidate, and ``held_alone`` without it.
-    piece : ndarray of int, shape (B,)
+    fold_free : ndarray, shape (K, f)
+        The free values without each part, changed by the candidate, and ``fold_alone`` without it.
+    fold : ndarray of int, shape (B,)
         The part that each block is left out with.
 
     """
@@ -152,11 +152,11 @@ class Trial:
     visible: float
     cross: FloatArray
     square: FloatArray
-    held_values: FloatArray
-    held_std: FloatArray
-    held_free: FloatArray
-    held_alone: FloatArray
-    piece: npt.NDArray[np.intp]
+    fold_values: FloatArray
+    fold_std: FloatArray
+    fold_free: FloatArray
+    fold_alone: FloatArray
+    fold: npt.NDArray[np.intp]
 
     @property
     def freedom(self) -> float:
@@ -166,7 +166,7 @@ class Trial:
     @cached_property
     def deviation(self) -> FloatArray:
         """Deviations of the values, with those of noise of any colour, shape (p,)."""
-        coloured = jackknife(self.values, self.std, self.held_values, self.held_std)
+        coloured = jackknife(self.values, self.std, self.fold_values, self.fold_std)
         return np.asarray(np.sqrt(self.std**2 + coloured))
 
     @property
@@ -207,7 +207,7 @@ class Trial:
     @property
     def replicated(self) -> int:
         """Parts of the data that lose squares."""
-        return int(np.sum(np.bincount(self.piece, self.gains) > 0.0))
+        return int(np.sum(np.bincount(self.fold, self.gains) > 0.0))
 
     def left_out(
         self, y: FloatArray, block: npt.NDArray[np.intp], own: FloatArray, free: FloatArray
@@ -218,12 +218,12 @@ class Trial:
         Parameters are those of `joint_gains`.
 
         """
-        piece = self.piece[block]
+        fold = self.fold[block]
         alone, rest = np.empty_like(y), np.empty_like(y)
-        for part in range(len(self.held_values)):
-            rows = piece == part
-            alone[rows] = y[rows] - free[rows] @ self.held_alone[part]
-            predicted = own[rows] @ self.held_values[part] + free[rows] @ self.held_free[part]
+        for part in range(len(self.fold_values)):
+            rows = fold == part
+            alone[rows] = y[rows] - free[rows] @ self.fold_alone[part]
+            predicted = own[rows] @ self.fold_values[part] + free[rows] @ self.fold_free[part]
             rest[rows] = y[rows] - predicted
         return alone, rest
 
@@ -292,7 +292,7 @@ class Step:
     misfit_share: float | None
 
 
-class Taken(NamedTuple):
+class Accepted(NamedTuple):
     """A name with its step, and the values of all its parameters."""
 
     named: Named

@@ -100,13 +100,13 @@ def _left_out(explanation: Explanation) -> Attribution:
         best: tuple[float, int, FloatArray] | None = None
         asked = [c for k in left for c in columns[k]]
         values = [view.value(c) for c in asked]
-        problem, free, hold, pull = view.without(asked, values, shapes)
+        problem, free, prior = view.without(asked, values, shapes)
         start, candidates = 0, []
         for k in left:
             span = slice(start, start + len(columns[k]))
             candidates.append(Candidate(named[k].effect, span, named[k].kept, arm.robot))
             start = span.stop
-        trials, power = held_out(problem, free, candidates, hold, pull, whole=False)
+        trials, power = held_out(problem, free, candidates, prior, whole=False)
         whole = power if whole is None else whole
         if not taken.size:
             taken = np.zeros((len(named), len(power)))
@@ -122,8 +122,8 @@ def _left_out(explanation: Explanation) -> Attribution:
         order.append(k)
         left.remove(k)
     if whole is None:
-        _, free, hold, pull = view.without((), ())
-        _, whole = held_out(view.problem, free, [], hold, pull)
+        _, free, prior = view.without((), ())
+        _, whole = held_out(view.problem, free, [], prior)
     return Attribution(tuple(order), whole, taken.reshape(len(named), len(whole)))
 
 

@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -15,6 +18,58 @@ UNINFORMATIVE = 1e-10
 _DEPENDENT = 1e-6
 #: Squares of a column that are this share of those of the largest one are rounding.
 NO_COLUMN = 1e-20
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """
+    What is known of values: a normal distribution in information form.
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (f, f)
+        Inverse of the covariance; singular where some values are free.
+    vector : ndarray, shape (f,)
+        Matrix times mean.
+
+    """
+
+    matrix: FloatArray
+    vector: FloatArray
+
+    @classmethod
+    def none(cls, size: int) -> NormalEquations:
+        """Return that nothing is known of so many values."""
+        return cls(np.zeros((size, size)), np.zeros(size))
+
+    @classmethod
+    def of_rows(cls, x: FloatArray, y: FloatArray) -> NormalEquations:
+        """Return what rows over their noise tell, x (S, f) and y (S,)."""
+        return cls(x.T @ x, x.T @ y)
+
+    def among(self, kept: Sequence[int]) -> NormalEquations:
+        """Return what is known of some of the values, the others being zero."""
+        index = list(kept)
+        return NormalEquations(self.matrix[np.ix_(index, index)], self.vector[index])
+
+    def and_zeros(self, more: FloatArray) -> NormalEquations:
+        """Return the same with more values behind, known to be zero with a precision (p,)."""
+        size, whole = len(self.vector), len(self.vector) + len(more)
+        matrix, vector = np.diag(np.concatenate([np.zeros(size), more])), np.zeros(whole)
+        matrix[:size, :size], vector[:size] = self.matrix, self.vector
+        return NormalEquations(matrix, vector)
+
+    def after(self, change: FloatArray) -> NormalEquations:
+        """Return what is known of what is still to be added to values (f,)."""
+        return replace(self, vector=self.vector - self.matrix @ change)
+
+    def __add__(self, other: NormalEquations) -> NormalEquations:
+        """Return what two independent sources tell together."""
+        return NormalEquations(self.matrix + other.matrix, self.vector + other.vector)
+
+    def __sub__(self, other: NormalEquations) -> NormalEquations:
+        """Return what is known without one of the sources."""
+        return NormalEquations(self.matrix - other.matrix, self.vector - other.vector)
 
 
 def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) -> FloatArray:

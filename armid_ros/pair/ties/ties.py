@@ -29,7 +29,7 @@ from armid_ros.diagnosis.search.held_out import held_out
 from armid_ros.diagnosis.search.look import look_at
 from armid_ros.diagnosis.search.prune import View
 from armid_ros.diagnosis.search.round import Nuisance, Round
-from armid_ros.diagnosis.search.trial import Candidate, Named, Step, Survey, Taken, Trial
+from armid_ros.diagnosis.search.trial import Accepted, Candidate, Named, Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
 from armid_ros.identification.ties.search import LEAST_Z
@@ -257,7 +257,7 @@ def diagnose_ties(
         most = settings.thresholds.many_causes
         question = Question(arm, prepared.base, arm, prepared.base, (), most)
         rows = zip(fitted.named, found.steps, fitted.values, strict=True)
-        known = [Taken(*row) for row in rows]
+        known = [Accepted(*row) for row in rows]
         more = explain(question, found.evidence, settings, known)
         fitted = ties.surely(more.fitted.named)
         if not any(isinstance(own.effect, Tied) for own in fitted.named):
@@ -344,8 +344,8 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
     each = len(whole.quantities)
     kept = tuple(range(0, each * len(whole.joints), each))
     candidate = Candidate(whole, span, kept, ties.arm.robot)
-    nuisance = Nuisance(free, reference.hold, reference.pull)
-    trials, power = held_out(problem, free, [candidate], nuisance.hold, nuisance.pull)
+    nuisance = Nuisance(free, reference.prior)
+    trials, power = held_out(problem, free, [candidate], nuisance.prior)
     work = Workspace(memoized_arm(reference.arm), data)
     here = Round(evidence, work, settings, problem, nuisance, float(power.sum()))
     look = look_at(found.candidates, here)
