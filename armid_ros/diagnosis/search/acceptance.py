@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which candidates may be named: beyond chance, possible, material, not made of noise, and changed.
+Which candidates may be named: significant, possible, material, not made of noise, and changed.
 
-What a model gets wrong of one motion is another thing than what it gets wrong of the next, and of
-hundreds of causes some lie along the difference of two days. Where nothing happened the recordings
-of both days are exchangeable: divided into two groups in another way they show as much of a cause.
-It has changed between the days if no other division shows more of it, or of many divisions hardly
-one: a permutation test, which needs no distribution of the misfit.
+The misfit of a model differs from motion to motion, and of hundreds of candidates some resemble
+the difference of two days. Where nothing happened the recordings of both days are exchangeable:
+divided into two groups in another way they show as much of a candidate. A candidate has changed
+between the days if no other division shows more of it, or of many divisions hardly one: a
+permutation test, which needs no distribution of the misfit.
 
 """
 
@@ -30,23 +30,23 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Divisions that are tried; those that exchange fewest recordings first.
+#: Most divisions that are tried; those that exchange fewest recordings first.
 _DIVISIONS = 200
 
 
 def acceptable(trial: Trial, here: Round) -> bool:
-    """Return whether a cause is there beyond chance, pays for its freedom, and is possible."""
+    """Return whether a candidate is significant and possible, and its share exceeds its price."""
     return beyond_chance(trial, here) and worth(trial, here) > 0.0
 
 
 def beyond_chance(trial: Trial, here: Round) -> bool:
-    """Return whether a cause is there beyond chance, and is possible."""
+    """Return whether a candidate is possible, and significant over all that were tried."""
     surely = trial.p * here.tried <= here.settings.thresholds.error_rate
     return surely and possible(trial, here)
 
 
 def possible(trial: Trial, here: Round) -> bool:
-    """Return whether the values are what could be called by the name."""
+    """Return whether the values are physically possible, and plausible for such an effect."""
     effect, arm, kept = trial.candidate.effect, here.work.arm, list(trial.candidate.kept)
     if not inside(trial, here).all():
         return False
@@ -56,7 +56,7 @@ def possible(trial: Trial, here: Round) -> bool:
 
 
 def inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
-    """Return which values are physically possible, or differ from that by noise, shape (p,)."""
+    """Return which values are within their bounds, or beyond them by noise at most, shape (p,)."""
     kept = list(trial.candidate.kept)
     lower, upper = (bound[kept] for bound in room(trial.candidate.effect, here.work.arm))
     slack = here.settings.thresholds.surely * trial.deviation
@@ -64,7 +64,7 @@ def inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
 
 
 def material(gains: FloatArray, here: Round, misfit_share: float) -> bool:
-    """Return whether a cause that takes these squares of the joints takes as much as matters."""
+    """Return whether gains (n,) are material, and such a share of the misfit, in any joint."""
     return bool(np.any(gains >= here.evidence.least_squares(here.settings, misfit_share)))
 
 
@@ -72,8 +72,9 @@ def made_of_noise(trial: Trial, here: Round) -> bool:
     """
     Return whether a candidate explains noise of positions with that noise.
 
-    What positions have beyond the motion is in the accelerations that the model takes, and so in
-    what is left, and in columns that are derived from them.
+    Noise of positions beyond the band of the motion enters the accelerations that the model is
+    given, and so the residual, and columns that are derived from accelerations. Columns without it
+    gain little in that case.
 
     """
     effect, kept, work = trial.candidate.effect, trial.candidate.kept, here.work
@@ -86,8 +87,8 @@ def explains_itself(trial: Trial, here: Round) -> bool:
     """
     Return whether a candidate leaves less than the noise of the torque that makes its columns.
 
-    Where most of a torque is what the model lacks, any function of the measured one explains that,
-    its noise included.
+    Where the model lacks most of a torque, any function of the measured torque explains the
+    residual, noise included.
 
     """
     own = here.projection.rest(here.own(trial.candidate))
@@ -98,11 +99,11 @@ def explains_itself(trial: Trial, here: Round) -> bool:
 
 def without_echo(trial: Trial, here: Round) -> Trial:
     """
-    Return a trial without what noise of the torque makes of it; itself if that is nothing.
+    Return a trial without the gain that is due to noise of the torque; itself if that is nothing.
 
-    Columns that are made of the measured torque follow its noise, which is in what is left as
-    well. A function g of a signal goes with the noise of that signal, of variance s^2, as s^2 g'
-    (Stein, Estimation of the mean of a multivariate normal distribution, 1981).
+    Columns that are made of the measured torque correlate with its noise, which is in the residual
+    as well. The covariance of a function g of a signal and the noise of that signal, of variance
+    s^2, is s^2 E[g'] (Stein, Estimation of the mean of a multivariate normal distribution, 1981).
 
     """
     if not trial.candidate.effect.reads_torque:
@@ -118,7 +119,7 @@ def without_echo(trial: Trial, here: Round) -> Trial:
 
 
 def _taken(columns: FloatArray, here: Round) -> float:
-    """Return the squares that weighted columns (R, n, p) take of what is left."""
+    """Return the squares of the residual that weighted columns (R, n, p) explain in sample."""
     flat = columns.reshape(-1, columns.shape[2])
     own, aim = here.projection.products(flat), flat.T @ here.residual.ravel()
     values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
@@ -128,16 +129,16 @@ def _taken(columns: FloatArray, here: Round) -> float:
 @dataclass(frozen=True)
 class Rows:
     """
-    Rows of one recording, over the unit of the gap.
+    Rows of one recording, weighted by the unit of the gap.
 
     Attributes
     ----------
     free : ndarray, shape (S, f)
-        Columns of what is fitted beside a cause.
+        Nuisance columns.
     own : ndarray, shape (S, p)
-        Columns of the cause.
+        Columns of the candidate.
     residual : ndarray, shape (S,)
-        What is left of the torque.
+        Residual.
 
     """
 
@@ -147,7 +148,13 @@ class Rows:
 
 
 def changed(trial: Trial, here: Round) -> bool:
-    """Return whether hardly a division of the recordings shows more of a cause than the days."""
+    """
+    Return whether a candidate has changed since the baseline; true where there is none.
+
+    Either no other division of the recordings shows more of it, or the p-value of the permutation
+    test is within its level.
+
+    """
     if here.before is None:
         return True
     more, divisions = _showing_more(trial, here)
@@ -155,19 +162,24 @@ def changed(trial: Trial, here: Round) -> bool:
 
 
 def surely_changed(trial: Trial, here: Round) -> bool:
-    """Return whether so many divisions show less of a cause that a misfit hides no change."""
+    """
+    Return whether the permutation test is significant: such a change may be below the misfit.
+
+    It cannot be where there are too few divisions.
+
+    """
     if here.before is None or not _seldom(0, _count_divisions(here), here):
         return False
     return _seldom(*_showing_more(trial, here), here)
 
 
 def _seldom(more: int, divisions: int, here: Round) -> bool:
-    """Return whether chance makes the days stand out as they do in few cases of a hundred."""
+    """Return whether the p-value of the permutation test is within its level."""
     return more + 1 <= here.settings.thresholds.exchanged * (divisions + 1)
 
 
 def _count_divisions(here: Round) -> int:
-    """Return how many other divisions of the recordings are tried."""
+    """Return the number of other divisions of the recordings that are tried."""
     assert here.before is not None
     later = here.before.later
     first = len({part.fold for part in here.before.prior.data})
@@ -178,7 +190,7 @@ def _count_divisions(here: Round) -> int:
 
 
 def _showing_more(trial: Trial, here: Round) -> tuple[int, int]:
-    """Return how many divisions show more of a cause than the days do, and of how many."""
+    """Return how many other divisions show more of a candidate than the days, and of how many."""
     assert here.before is not None
     first, second = _before(trial, here), _today(trial, here)
     nuisance, later = here.nuisance, here.before.later
@@ -200,16 +212,16 @@ def showing_more(
     precision: FloatArray,
 ) -> tuple[int, int]:
     """
-    Return how many other divisions of recordings differ by more than two groups, and of how many.
+    Return how many other divisions show a larger change than two groups do, and of how many.
 
     Parameters
     ----------
     first, second : sequence of Rows
         Recordings of the two groups.
     known : NormalEquations
-        What all of them, and whatever is known besides, tell of the free values.
+        Of the nuisance parameters: all of these recordings, and their prior.
     precision : ndarray, shape (p,)
-        How strongly the values of the cause are held to zero.
+        Prior precision of the values of the candidate, about zero.
 
     """
     rows = [*first, *second]
@@ -221,7 +233,7 @@ def showing_more(
     squares = np.diag(own.sum(axis=0)) + precision  # a planar arm shows some values of a body only
 
     def explained(members: npt.NDArray[np.bool_]) -> float:
-        """Return the squares that go if a cause has one value in all and one more in some."""
+        """Return the squares that values common to all, and a change in some, explain."""
         both = np.concatenate([border.sum(axis=0), border[members].sum(axis=0)], axis=1)
         part = own[members].sum(axis=0)
         products = np.block([[own.sum(axis=0), part], [part, part]]) - both.T @ both
@@ -236,7 +248,7 @@ def showing_more(
 
 
 def _divisions(days: npt.NDArray[np.bool_]) -> Iterator[npt.NDArray[np.bool_]]:
-    """Yield other divisions into groups of the same sizes, but for the exchange of all."""
+    """Yield other divisions into groups of the same sizes, but for the exchange of both groups."""
     before, today = np.flatnonzero(~days), np.flatnonzero(days)
     pairs = (
         (out, into)
@@ -252,7 +264,7 @@ def _divisions(days: npt.NDArray[np.bool_]) -> Iterator[npt.NDArray[np.bool_]]:
 
 
 def _before(trial: Trial, here: Round) -> list[Rows]:
-    """Return the recordings from before, in which what was named since does nothing."""
+    """Return the recordings of the baseline; columns of what was named since are zero in them."""
     assert here.before is not None
     prior, change = here.before.prior, here.before.change
     candidate = trial.candidate
@@ -267,7 +279,7 @@ def _before(trial: Trial, here: Round) -> list[Rows]:
 
 
 def _today(trial: Trial, here: Round) -> list[Rows]:
-    """Return the recordings in which a cause is looked for."""
+    """Return the recordings in question."""
     data = here.evidence.data
     fold = np.concatenate([np.full(len(part.rows), part.fold) for part in data])
     result = []

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What is asked of an arm: what of it is free beside every cause, and which causes there may be.
+What is asked of an arm: which nuisance parameters it has, and which candidates are tried.
 
 Candidates are every effect of the catalogue, per joint, pair or whole arm. An effect with shape
 parameters is a family of candidates on a grid, of which the best is refined later by variable
-projection (Golub and Pereyra 1973): values are fitted at each shape. The columns of all joints are
-computed at once and shared out.
+projection (Golub and Pereyra 1973): values are fitted at each shape. The columns of an effect are
+computed for all joints at once and divided among its candidates.
 
 """
 
@@ -36,9 +36,9 @@ from scipy import optimize
 
 #: Most combinations of shape values that a search starts from.
 _MOST_SHAPES = 12
-#: How far from a peak of a spectrum its side lobes are looked at, and how sharp it is [1/rev].
+#: Distance from a peak of a spectrum at which its side lobes may be, and its half width [1/rev].
 _LOBES, _PEAK = 3.0, 0.2
-#: Rounds of a refinement, and evaluations of each shape.
+#: Rounds of a refinement, and most evaluations of one line search.
 _ROUNDS, _EVALUATIONS = 2, 9
 
 
@@ -52,17 +52,17 @@ class Question:
     arm : ArmModel
         The arm as given.
     base : BaseParameters or None
-        What of it is free.
+        Base parameters of it that are fitted; None where it stays as given.
     nuisance_arm : ArmModel
-        The arm with the friction of joints that nobody gave values of.
+        The arm with friction and offsets also in joints for which none are given.
     nuisance_base : BaseParameters or None
-        What of that is free.
+        Base parameters of that which are fitted jointly with every candidate.
     unknown : tuple of Effect
-        That friction, joint by joint.
+        The friction and offsets that were added, joint by joint.
     most : int
-        Causes that are looked for.
+        Most causes that are accepted.
     prior, nuisance_prior : Prior or None
-        What other data tell of what is free.
+        Information of the baseline about ``base`` and ``nuisance_base``.
     since : bool
         Whether what has changed is asked, and not what was always there.
 
@@ -80,23 +80,23 @@ class Question:
 
     @property
     def body_is_free(self) -> bool:
-        """Whether the rigid body is fitted anew, and not only friction nobody gave values of."""
+        """Whether the rigid body is fitted anew, and not only effects without given values."""
         return frees_body(self.nuisance_base, self.arm)
 
     def kinds(self, library: Sequence[Kind]) -> tuple[Kind, ...]:
-        """Return what is looked for, of effects that may be named."""
+        """Return the effects to look for, of those that may be named."""
         return tuple(kind.as_change() for kind in library) if self.since else tuple(library)
 
 
 def frees_body(base: BaseParameters | None, arm: ArmModel) -> bool:
-    """Return whether something of the rigid body is among parameters that are free."""
+    """Return whether any parameter of the rigid body is among those that are fitted."""
     return base is not None and bool(np.any(base.independent < len(arm.robot.rigid_parameters)))
 
 
 def as_given(
     arm: ArmModel, data: Sequence[Trajectory], most: int, library: Sequence[str]
 ) -> Question:
-    """Ask what a model lacks whose values are right, as far as it has any."""
+    """Ask what a model lacks whose given values are right."""
     nuisance_arm, unknown = with_friction(arm, library)
     return Question(
         arm,
@@ -117,7 +117,7 @@ def fitted_anew(
     held: Sequence[int] = (),
 ) -> Question:
     """
-    Ask what a model lacks of which only the structure counts.
+    Ask what a model lacks of which only the structure is believed: all values are fitted anew.
 
     Parameters
     ----------
@@ -126,13 +126,13 @@ def fitted_anew(
     data : sequence of Trajectory
         The data.
     most : int
-        Causes that are looked for.
+        Most causes that are accepted.
     library : sequence of str
         Names that may be given.
     rng : numpy.random.Generator
-        Draws states.
+        Draws the states from which base parameters are found.
     held : sequence of int
-        Parameters of the arm that stay as they are, so that a change of them is a cause.
+        Parameters of the arm that stay as they are, so that a change of them is a candidate.
 
     """
     nuisance_arm, unknown = with_friction(arm, library)
@@ -144,7 +144,7 @@ def fitted_anew(
 
 
 def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
-    """Return an arm with what every joint may be taken to have, and what was added."""
+    """Return an arm with all effects that any joint may be taken to have, and those added."""
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     added: list[Effect] = []
     fuller = arm
@@ -157,7 +157,7 @@ def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tupl
 
 
 def _without_values(arm: ArmModel, data: Sequence[Trajectory]) -> BaseParameters | None:
-    """Return the parameters of effects that have no value yet, as far as data tell them."""
+    """Return the effect parameters with a value of zero, as far as the data determine them."""
     rigid = len(arm.robot.rigid_parameters)
     names, theta = arm.parameters, arm.theta
     free = np.array([k for k in range(rigid, len(names)) if theta[k] == 0.0], dtype=np.intp)
@@ -171,7 +171,7 @@ def _without_values(arm: ArmModel, data: Sequence[Trajectory]) -> BaseParameters
 def candidate_effects(
     robot: Robot, kinds: Sequence[Kind]
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield effects whose columns are computed together, with the candidates they belong to."""
+    """Yield effects whose columns are computed at once, and the single ones they consist of."""
     for kind in with_exact_vector(kinds):
         try:
             places = kind.places(robot)
@@ -189,7 +189,7 @@ def candidate_effects(
 def shaped(
     effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield an effect and its candidates with every shape that a search starts from."""
+    """Yield an effect and its single ones with every shape from which a search starts."""
     if not effect.shapes:
         yield effect, members
         return
@@ -219,7 +219,7 @@ class Candidates:
     Attributes
     ----------
     candidates : tuple of Candidate
-        What may be named.
+        The candidates.
     columns : tuple of ndarray, each (M, n, C)
         Columns of all candidates, per trajectory, filtered and decimated.
 
@@ -255,7 +255,7 @@ def candidates(
 
 
 def _left(fitted: Fitted, evidence: Evidence) -> Unexplained:
-    """Return what a fitted arm leaves of the torque."""
+    """Return the residual of a fitted arm, with its motion, weights and nuisance columns."""
     data = evidence.data
     motions = [part.motion for part in data]
     arrays = (
@@ -281,7 +281,7 @@ def refine(
     """
     Refine the shape of a candidate by variable projection; return it with its columns.
 
-    What is left has nothing in it that the free columns could make.
+    The nuisance columns are projected out of the residual ``left`` already.
 
     """
     effect, kept = candidate.effect, candidate.kept
@@ -294,11 +294,11 @@ def refine(
             try:
                 columns = work.columns(effect.with_shape(shape), kept)
             except ModelError:
-                return 0.0  # not possible: takes nothing
+                return 0.0  # not possible: no gain
             weighted = (columns * problem.weight[:, :, np.newaxis]).reshape(-1, len(kept))
             own, aim = projection.products(weighted), weighted.T @ left.ravel()
             values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
-            if len(kept) == 1:  # what is not possible is no gain
+            if len(kept) == 1:  # an impossible value is no gain
                 values = np.clip(values, lower, upper)
             cache[key] = float(2.0 * values @ aim - values @ own @ values), columns
         return cache[key][0]
@@ -315,7 +315,7 @@ def refine(
 def _line_search(
     gain: Callable[[FloatArray], float], shape: FloatArray, index: int, kind: Shape
 ) -> FloatArray:
-    """Search one shape around where it is, over its logarithm if positive (Brent 1973)."""
+    """Search one shape near its present value, over its logarithm if positive (Brent 1973)."""
     value = float(shape[index])
     positive = kind.lower > 0.0 and value > 0.0 and kind.near is None and kind.unit != '1/rev'
 

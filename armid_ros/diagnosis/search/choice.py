@@ -4,8 +4,8 @@
 Which explanation is given: of the model as given, or of a body that is fitted anew.
 
 A fit of the whole body has fifty values, and explains a little more of anything. It is the rival
-of last resort: a few causes in the model as given go before it where they explain as much, and
-where there are recordings from before, no cause is named that a body common to both days explains.
+of last resort: a few causes in the model as given are preferred where they explain as much. With a
+baseline, nothing is named that a body common to both days explains.
 
 """
 
@@ -41,9 +41,9 @@ import numpy as np
 Progress = Callable[[float, str], None]
 OWN_MISFIT = 'the misfit that the model had before'
 WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
-#: Data are recorded as often as others if their period is not longer by this factor.
+#: Data are sampled as often as others if their sampling period is not longer by this factor.
 _AS_OFTEN = 1.2
-#: Said where a model stands for the day on which nothing was wrong.
+#: Note where a model without a covariance takes the place of a baseline.
 _AS_EXACT = (
     'values of the model are taken as exact, as identification.json is not beside it: what they '
     'are off by is not in the intervals'
@@ -53,7 +53,7 @@ _AS_EXACT = (
 @dataclass(frozen=True)
 class Explainer:
     """
-    Explains the gap of an arm by what a library has.
+    Explains the gap of an arm by effects of a library.
 
     Attributes
     ----------
@@ -62,19 +62,19 @@ class Explainer:
     prepared : Prepared
         The data.
     baseline : Baseline or None
-        Recordings in which nothing was wrong.
+        Recordings from when nothing was wrong.
     rng : numpy.random.Generator
-        Draws states.
+        Draws the states from which base parameters are found.
     tell : callable
         Called with the share that is done and what is being done.
     settings : DiagnosisSettings
         Library and thresholds.
     written : ndarray, shape (n,), or None
-        Misfit that the model is known to have, where there are no recordings of it [N m].
+        Misfit that the model is known to have, where there is no baseline [N m].
     unseen : sequence of Trajectory
-        More data of the same day, which nothing is fitted to.
+        Further data of the day in question, which nothing is fitted to.
     covariance : ndarray, shape (P, P), or None
-        Of the parameters of the model, where there are no recordings of it.
+        Of the parameters of the model, where there is no baseline.
 
     """
 
@@ -89,7 +89,7 @@ class Explainer:
     covariance: FloatArray | None = None
 
     def chosen(self) -> Chosen:
-        """Explain the gap."""
+        """Return the explanation that is given of the gap."""
         if self.baseline is not None:
             return self._since(self.baseline)
         if self.written is not None:
@@ -122,13 +122,13 @@ class Explainer:
 
     def _beside(self, misfit: FloatArray) -> Chosen:
         """
-        Explain what is beyond a misfit that is known in numbers alone.
+        Explain what exceeds a misfit of which only the size is known.
 
-        Another motion makes another misfit, and without the recordings nobody can say what it is
-        like: a model that leaves no more than it may of motions that were not used has nothing
-        named. Nor can anybody say whether a body common to both would do. A body that is fitted
-        anew stays the rival of last resort. It hides loads: where they take most of the gap of a
-        model that was right when it was identified, they have changed, and not all links.
+        Another motion makes another misfit, and without the recordings its form is unknown: where
+        the residual is within what a model may leave of motions that were not used, nothing is
+        named. Nor is it known whether a body common to both days explains the gap. A body that is
+        fitted anew stays the rival of last resort. It hides loads: where they take most of the gap
+        of a model that was right when it was identified, they have changed, and not all links.
 
         """
         prepared, settings, noise = self.prepared, self.settings, self.prepared.as_described
@@ -155,10 +155,10 @@ class Explainer:
 
     def _anew(self, sigma: tuple[FloatArray, ...]) -> Explanation:
         """
-        Explain the data beside a rigid body and known effects that are fitted anew.
+        Explain the data jointly with a rigid body and known effects that are fitted anew.
 
-        A described value may be off by a share of it. One that is fitted to more than that has
-        changed, and is asked about as a cause.
+        A described value may be off by a share of itself. One whose fit is farther off has
+        changed: it is held, so that its change is a candidate.
 
         """
         arm, data, settings = self.arm, self.prepared.data, self.settings
@@ -209,9 +209,9 @@ class Explainer:
 
 def _told_by(baseline: Baseline, prepared: Prepared, misfit: FloatArray) -> tuple[FloatArray, ...]:
     """
-    Return the noise of data: where it is assumed, no more than the baseline left, each (n,).
+    Return the noise of data: where assumed, at most the misfit of the baseline, each (n,).
 
-    That has its noise in it, of data that were recorded as often.
+    The misfit contains the noise of data that were sampled as often.
 
     """
     usual = np.median([part.period_recorded for part in baseline.data])
@@ -226,7 +226,7 @@ def _told_by(baseline: Baseline, prepared: Prepared, misfit: FloatArray) -> tupl
 
 
 def _doubt(baseline: Baseline) -> str:
-    """Say that a model is poor on the day on which nothing was wrong."""
+    """Say that the model is poor on the baseline itself, or nothing if it is not."""
     error = 100.0 * baseline.error
     if error <= LIMITS.poor:
         return ''
@@ -243,7 +243,7 @@ def _most(steps: Sequence[Step], settings: DiagnosisSettings) -> bool:
 
 
 def _beside_a_correction(first: Explanation) -> bool:
-    """Return whether one of several causes corrects the description, or another body may."""
+    """Return whether one of several causes, or a rival body, may correct the description."""
     return len(first.steps) > 1 and any(_may_correct(step) for step in first.steps)
 
 
@@ -254,11 +254,12 @@ def _may_correct(step: Step) -> bool:
 
 def _stands(first: Explanation, anew: Explanation) -> bool:
     """
-    Return whether causes are causes beside a full correction of the description as well.
+    Return whether causes remain causes jointly with a full correction of the description.
 
-    Where one is not that a fitted body shows, or more than one that it hides, corrections among
-    them, and that explains the data, the description is off in more than one of its values. One
-    body that has changed is in any correction, and effects that nobody gave values of are.
+    The description is off in more than one of its values if that correction explains the data and
+    either leaves out a cause that it does not hide, or hides more than one, a correction among
+    them counted. One body that has changed is part of any correction, and so are effects without
+    given values.
 
     """
     assert anew.survey is not None
@@ -277,7 +278,7 @@ def _stands(first: Explanation, anew: Explanation) -> bool:
 
 
 def _is_correction(trial: Trial, arm: ArmModel) -> bool:
-    """Return whether a cause says that the description is wrong."""
+    """Return whether the values of a cause say that the description is wrong."""
     effect = trial.candidate.effect
     values, std = np.zeros((2, len(effect.parameters(arm.robot))))
     kept = list(trial.candidate.kept)
@@ -286,7 +287,7 @@ def _is_correction(trial: Trial, arm: ArmModel) -> bool:
 
 
 def _left_by(explanation: Explanation) -> FloatArray:
-    """Return the root mean square that an explanation leaves of each joint, (n,) [N m]."""
+    """Return the root mean square residual of an explanation, of each joint, (n,) [N m]."""
     return np.sqrt(explanation.evidence.power(explanation.fitted.residual))
 
 
@@ -294,9 +295,9 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
     """
     Return whether causes in the model as given explain as much as a body fitted anew.
 
-    Where that leaves noise, they have to leave as little; a noise that is assumed excuses nothing
-    that it does not leave. Where it leaves a gap itself, it has to take more beside them than its
-    values cost.
+    Where the body leaves noise, the causes have to leave as little; an assumed noise excuses no
+    residual that the body does not leave. Where the body leaves a gap itself, it is preferred only
+    if it takes more in addition to the causes than its values cost.
 
     """
     evidence = first.evidence

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-One explanation of a gap: causes taken one after the other, in an arm as given or fitted anew.
+One explanation of a gap: causes accepted one after the other, in an arm as given or fitted anew.
 
-The cause that takes most of the held-out squares is taken first, and the rest is asked again.
-Friction and offsets that nobody gave values of are fitted beside every cause, and those that
-matter are named in the end.
+The candidate with the largest held-out gain is accepted first, and the search is repeated on what
+it leaves. Friction and offsets without given values are nuisance parameters of every candidate,
+and those that matter are named in the end.
 
 """
 
@@ -42,7 +42,7 @@ def explain(
     baseline: Baseline | None = None,
     unseen: Evidence | None = None,
 ) -> Explanation:
-    """Take causes as long as any passes, then name the friction that matters, and prune."""
+    """Accept causes as long as any passes, then name the friction that matters, and prune."""
     search = Search(question, evidence, settings, baseline, unseen)
     way = search.forward(start)
     survey, last = way.first, None if way.last is None else way.last.look.survey
@@ -82,7 +82,7 @@ def explain(
 
 @dataclass(frozen=True)
 class Place:
-    """What was taken on a way, the fit beside which it goes on, and a look at all causes there."""
+    """A node of the search: the accepted causes, the fit with them, and a look at all others."""
 
     named: tuple[Named, ...]
     values: tuple[FloatArray, ...]
@@ -96,18 +96,18 @@ class Place:
 @dataclass(frozen=True)
 class Way:
     """
-    Causes in the order in which they were taken.
+    Causes in the order in which they were accepted.
 
     Attributes
     ----------
     taken : tuple of Accepted
         The causes.
     first : Survey or None
-        What the first look at all causes showed.
+        What the first look at all candidates showed.
     last : Place or None
-        Where the last look was.
+        The node of the last look.
     change : ndarray, shape (r,), or None
-        What was added to what is free of the arm in the last fit.
+        Change of the base parameters of the arm in the last fit.
 
     """
 
@@ -131,9 +131,9 @@ class Search:
     settings : DiagnosisSettings
         Library and thresholds.
     baseline : Baseline or None
-        Recordings in which nothing was wrong.
+        Recordings from when nothing was wrong.
     unseen : Evidence or None
-        More data of the same day, which nothing is fitted to.
+        Further data of the day in question, which nothing is fitted to.
 
     """
 
@@ -144,7 +144,7 @@ class Search:
     unseen: Evidence | None = None
 
     def forward(self, start: Sequence[Accepted] = ()) -> Way:
-        """Take causes beside those to start with as long as any passes."""
+        """Accept causes in addition to those to start with as long as any passes."""
         if not self.question.most:
             return Way(tuple(start), None, None)
         steps = [one.step for one in start]
@@ -160,7 +160,7 @@ class Search:
         return way
 
     def _way(self, place: Place, steps: Sequence[Step], width: float) -> Way:
-        """Go from a place, where a lead of less than some squares decides nothing."""
+        """Accept causes from a node on; a lead of less than ``width`` squares decides nothing."""
         first, taken = place.look.survey, list(steps)
         named, values = list(place.named), list(place.values)
         for left in range(self.question.most, 0, -1):
@@ -177,11 +177,12 @@ class Search:
 
     def in_place_of(self, friction: Sequence[Accepted], way: Way) -> list[Accepted]:
         """
-        Return what is there in place of offsets that were free beside every cause.
+        Return the causes that win where the named offsets are no longer nuisance parameters.
 
-        A gain of a joint that holds much weight is an offset and a little more. Friction is what
-        every joint has, and no offset is: what takes one has to be ahead of all causes. A body
-        that is free hides most of them, and so has to be spared some of its offsets.
+        A gain of a joint that holds much weight is an offset and a little more. Every joint has
+        friction, but not every joint has an offset: what takes the place of one has to win among
+        all candidates. A free body hides most of these: where it is free, the causes are used only
+        if they make more offsets needless than they are themselves.
 
         """
         question, place = self.question, way.last
@@ -214,7 +215,7 @@ class Search:
         return found
 
     def _after(self, place: Place, step: Step) -> Place:
-        """Return the place behind a step."""
+        """Return the node after a step."""
         candidate = step.trial.candidate
         way = candidate.key, candidate.effect.shape
         if way not in place.next:
@@ -246,7 +247,7 @@ class Search:
         total: float | None,
         change: FloatArray | None = None,
     ) -> Place:
-        """Fit what is named, from values and a change of the body on, and look beside it."""
+        """Fit what is named, from values and a change of the body on, and try all candidates."""
         question = self.question
         arm, base = question.nuisance_arm, question.nuisance_base
         prior = question.nuisance_prior
@@ -271,7 +272,7 @@ class Search:
         return Place(tuple(named), tuple(values), current, found, before, look)
 
     def _before(self, current: Fitted) -> Before | None:
-        """Return what other recordings show beside an arm: those from before, and unseen ones."""
+        """Return the baseline and unseen recordings, with their residuals of a fitted arm."""
         question, unseen = self.question, self.unseen
         prior = question.nuisance_prior
         if self.baseline is None or prior is None:
@@ -295,12 +296,12 @@ class Search:
 
 
 def _offsets(friction: Sequence[Accepted]) -> list[Effect]:
-    """Return what of friction of unknown value is none."""
+    """Return those of the effects without given values that are no friction."""
     return [one.named.effect for one in friction if not one.named.effect.friction]
 
 
 def _of(step: Step, question: Question) -> Accepted:
-    """Return the name of a step, with the values that it was found with."""
+    """Return a step as an accepted effect, with the values of its trial."""
     candidate = step.trial.candidate
     values = np.zeros(len(candidate.effect.parameters(question.arm.robot)))
     values[list(candidate.kept)] = step.trial.values
@@ -311,11 +312,12 @@ def _friction(
     retrial: Retrial, taken: Sequence[Accepted], whole: tuple[float | None, int]
 ) -> tuple[list[Accepted], list[Trial]]:
     """
-    Return the friction of unknown value that is there, and what all of it was tried as.
+    Return the friction and offsets without given values that stand, and the first trials of all.
 
-    All of it was free beside every cause. What is likeliest to be chance goes first, as what is
-    needless bends what the others take, until all that is left is there beyond it, however little
-    that takes: the values of causes lean on what is left out. What has changed has to matter, too.
+    All of them were nuisance parameters of every candidate. The one that is likeliest to be chance
+    is dropped first, as a needless one distorts the values of the others, until all that remain
+    are significant, however small their gain: what is left out biases the values of causes. Where
+    a change is asked, they have to be material as well.
 
     """
     question, evidence = retrial.question, retrial.evidence
@@ -366,10 +368,10 @@ def nuisance_of(
     found: Candidates, current: Fitted, evidence: Evidence
 ) -> tuple[Problem, Nuisance]:
     """
-    Return the problem of all candidates, and what is free beside each, whose columns come last.
+    Return the problem of all candidates, and its nuisance parameters, whose columns come last.
 
-    Shapes of names are held by what all data tell of them: a part alone may tell next to nothing
-    of where a strap is fixed, and predict the others by that.
+    The prior of the shapes of names is as precise as all data determine them: one fold alone may
+    hardly determine where a strap is fixed, and would predict the others by that.
 
     """
     pairs = zip(found.columns, current.columns, strict=True)

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-An explanation of a gap: the names, the fitted arm, and what they leave.
+An explanation of a gap: the names, the fitted arm, and its residual.
 
-A fit of base parameters leaves standard ones that no body may have. What the data tell stays: of
-all links that are bodies and fit as well, those nearest to the description are taken, so that the
-arm can be simulated.
+A fit of base parameters gives standard parameters that no body may have. What the data determine
+stays: of all physically consistent links that fit as well, those nearest to the description are
+used, so that the arm can be simulated.
 
 """
 
@@ -31,27 +31,27 @@ import numpy as np
 import scipy.linalg
 
 NOISE, ESTIMATED = 'noise', 'an estimate of the misfit that such a model has'
-#: Weights of the description that are tried, the heaviest that costs nothing is taken.
+#: Weights of the description that are tried; the largest that fits as well is used.
 _WEIGHTS = (1e-3, 1e-5, 1e-7)
-#: Bodies that leave this much of what the fit leaves explain as much.
+#: Physically consistent links fit as well if they leave at most this many times the squares.
 _ALIKE = 1.05
 
 
 @dataclass(frozen=True)
 class Explanation:
     """
-    What a search came to.
+    The result of a search.
 
     Attributes
     ----------
     given : ArmModel
         The arm as given.
     base : BaseParameters or None
-        What was free of it; None where nothing was.
+        Base parameters of it that were fitted; None where it stayed as given.
     fitted : Fitted
-        The arm with all that was named.
+        The arm with all named effects.
     reference : Fitted
-        The same without.
+        The same without them.
     steps : tuple of Step
         The names, in the order of those in ``fitted``.
     survey : Survey or None
@@ -59,13 +59,13 @@ class Explanation:
     evidence : Evidence
         The data.
     minor : tuple of Trial
-        Causes of the last look that are there beyond chance and do not matter.
+        Candidates of the last look that are significant and do not matter, for the small print.
     prior : Prior or None
-        What other data tell of what was free.
+        Information of the baseline about ``base``.
     by_chance : float
-        Squares that a value of any cause takes of what the names leave.
+        Mean gain per value, over all candidates, on the residual that the names leave.
     baseline : Baseline or None
-        Recordings since which the names have changed.
+        Recordings from before the named effects changed.
 
     """
 
@@ -105,7 +105,7 @@ class Explanation:
         return replace(self, fitted=self.reference, steps=(), minor=(*small, *self.minor))
 
     def forgetting(self) -> Explanation:
-        """Return the same with arms that do not hold what they have computed."""
+        """Return the explanation with arms that do not cache what they have computed."""
         return replace(
             self,
             given=plain_arm(self.given),
@@ -115,7 +115,7 @@ class Explanation:
 
     @property
     def chi2_per_row(self) -> FloatArray:
-        """Loss of each joint with the patched arm, shape (n,)."""
+        """Mean weighted square of the residual of the patched model, shape (n,)."""
         return self.evidence.chi2_per_row(self.fitted.residual)
 
 
@@ -129,13 +129,14 @@ class Chosen:
     explanation : Explanation
         The explanation.
     misfit : ndarray, shape (n,)
-        Misfit that the gap is measured beside; zero where noise is all [N m].
+        Misfit that the unit of the gap contains; zero where that is noise alone [N m].
     floor_in_words : str
         What the floor of the gap is.
     notes : tuple of str
         What a reader should know.
     rest : Explanation or None
-        The same names beside a body that is common to both days, which tells what they leave.
+        The same names fitted jointly with a body common to both days: its residual is what they
+        leave.
     doubt : str
         Why the model itself may be wrong, a sentence; empty if it need not be.
 
@@ -150,12 +151,12 @@ class Chosen:
 
     @property
     def measured(self) -> bool:
-        """Whether the floor is noise, or estimated beside it, and no misfit that is known."""
+        """Whether the floor is noise or an estimated misfit, and no misfit that is known."""
         return self.floor_in_words in (NOISE, ESTIMATED)
 
 
 def in_model_as_given(found: Explanation) -> Explanation:
-    """Return what the names explain beside a rigid body that stays as it is."""
+    """Return what the names explain while the rigid body stays as it is."""
     arm, evidence, fitted = found.given, found.evidence, found.fitted
     if found.prior is not None and found.baseline is not None:
         fitted = as_change(fitted, found.prior, found.baseline)
@@ -172,21 +173,21 @@ def in_model_as_given(found: Explanation) -> Explanation:
 
 
 def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
-    """Return whether what an explanation leaves is no gap in any joint."""
+    """Return whether the residual of an explanation is no gap in any joint."""
     evidence = explanation.evidence
     limits = evidence.limits(explanation.fitted.residual, settings)
     return bool(np.all(explanation.chi2_per_row <= limits))
 
 
 def freedom(explanation: Explanation, settings: DiagnosisSettings) -> float:
-    """Return how many values were chosen, those of the rigid body included."""
+    """Return the number of fitted values, counted as in `cost`, and those of the rigid body."""
     body = 0 if explanation.base is None else explanation.base.rank
     return body + sum(cost(step.trial, settings) for step in explanation.steps)
 
 
 def as_bodies(explanation: Explanation, arm: ArmModel) -> tuple[Explanation, tuple[str, ...]]:
     """
-    Return an explanation whose links are bodies, if some explain the data as well, and a note.
+    Return an explanation with physically consistent links, if any fit as well, and a note.
 
     Parameters
     ----------
@@ -224,9 +225,9 @@ def as_bodies(explanation: Explanation, arm: ArmModel) -> tuple[Explanation, tup
 
 def _triangle(explanation: Explanation, values: FloatArray) -> tuple[FloatArray, float]:
     """
-    Return the triangular factor of base columns and what they are to make, and its rows.
+    Return the triangular factor of the base columns and their target, and the number of rows.
 
-    What other data tell of the body counts as rows as well.
+    Rows of the baseline are part of the factor.
 
     """
     fitted, rank, evidence = explanation.fitted, len(values), explanation.evidence

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The joint fit of a patched arm: rigid body, known effects, and what was named, shapes included.
+The joint fit of a patched model: rigid body, known effects and named effects, with their shapes.
 
-Gauss-Newton on the filtered residual, as encoder offsets, delays and elasticities are linear to
-the first order only. Values stay within what is physically possible.
+Gauss-Newton steps on the filtered residual, as encoder offsets, delays and elasticities are linear
+to the first order only. Values stay within their physical bounds.
 
 """
 
@@ -33,7 +33,7 @@ from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Steps of Gauss and Newton; shapes are near already.
+#: Most Gauss-Newton steps; shapes are near already.
 _MOST_ROUNDS = 4
 
 
@@ -47,19 +47,19 @@ class Fitted:
     arm : ArmModel
         The arm; the named effects are its last ones.
     named : tuple of Named
-        With their shapes as fitted.
+        The named effects, with their fitted shapes.
     estimate : Estimate
         Of the parameters of the named effects, shapes included.
     residual : tuple of ndarray, each (M, n)
-        What is left, per trajectory [N m].
+        Residual of each trajectory [N m].
     columns : tuple of ndarray, each (M, n, f)
-        Columns of all that was free.
+        Jacobian columns of all fitted parameters.
     values : tuple of ndarray
         All values of each named effect.
     prior : NormalEquations
-        What is known of the steps of all that was free.
+        Prior of a further step of all fitted parameters.
     change : ndarray, shape (r,)
-        What was added to the base parameters that were free.
+        Change of the fitted base parameters from the given ones.
 
     """
 
@@ -74,7 +74,7 @@ class Fitted:
 
     @property
     def places(self) -> tuple[tuple[range, range], ...]:
-        """Where the values of each name are in the estimate, and where its shapes are."""
+        """Positions in the estimate of the values of each name, and of its shapes."""
         places, start = [], 0
         for own in self.named:
             shapes = start + len(own.kept)
@@ -94,7 +94,7 @@ class Start:
     values : sequence of ndarray
         Values of the named effects; zero if there are none.
     change : ndarray, shape (r,), or None
-        What is added to the base parameters.
+        Change of the base parameters.
 
     """
 
@@ -112,24 +112,24 @@ def fit(
     known: Estimate | None = None,
 ) -> Fitted:
     """
-    Fit what is free.
+    Fit base parameters and named effects jointly.
 
     Parameters
     ----------
     arm : ArmModel
         The arm without the named effects.
     named : sequence of Named
-        What was named.
+        The named effects.
     evidence : Evidence
-        The data, and what each is weighted by.
+        The data, and the unit that each is weighted by.
     base : BaseParameters or None
-        What is free of the arm; None keeps it as it is.
+        Base parameters of the arm that are fitted; None keeps it as it is.
     start : Start, optional
         Where to begin; at the arm as it is by default.
     prior : Prior, optional
-        What other data tell of what is free of the arm.
+        Information of other data about the base parameters.
     known : Estimate, optional
-        Of the named effects, whose values and shapes stay as they are.
+        Of the named effects; where it is given no step is taken.
 
     """
     start = start or Start()
@@ -174,7 +174,7 @@ def _settled(
     rounds: int,
 ) -> tuple[Patch, list[FloatArray], list[FloatArray]]:
     """
-    Take steps of Gauss and Newton until one changes nothing, or the data do what it expects.
+    Take Gauss-Newton steps until one changes nothing, or the loss is what the Jacobian predicts.
 
     Parameters
     ----------
@@ -183,19 +183,19 @@ def _settled(
     evidence : Evidence
         The data.
     base : BaseParameters or None
-        What is free of the arm.
+        Base parameters of the arm that are fitted.
     known : NormalEquations
-        What is known of its change.
+        Prior of their change.
     rounds : int
-        Steps at the most.
+        Most steps.
 
     Returns
     -------
     state : Patch
     residual : list of ndarray, each (M, n)
-        What it leaves [N m].
+        Its residual [N m].
     columns : list of ndarray, each (M, n, f)
-        Columns of all that is free, where it is.
+        Jacobian columns of all fitted parameters, at this state.
 
     """
     data = evidence.data
@@ -236,10 +236,10 @@ def _steps(
     known: NormalEquations,
 ) -> Iterator[FloatArray]:
     """
-    Yield steps of all that is free to try in turn, shape (f,).
+    Yield steps of all fitted parameters to try in turn, shape (f,).
 
-    Where a shape and its value say nearly the same, both want to go far, and a shape may not: the
-    last one leaves shapes as they are.
+    Where the columns of a shape and its value are nearly collinear, both steps are large, which a
+    shape does not allow: the last step leaves shapes as they are.
 
     """
     known = known.after(state.change)
@@ -254,7 +254,7 @@ def _steps(
 def _expected(
     residual: Sequence[FloatArray], columns: Sequence[FloatArray], step: FloatArray
 ) -> list[FloatArray]:
-    """Return what a step would leave if torques were linear in all that is free."""
+    """Return the residual after a step if torques were linear in all fitted parameters."""
     size = len(step)
     return [
         left - (block.reshape(-1, size) @ step).reshape(left.shape)
@@ -277,7 +277,7 @@ def _step(
     evidence: Evidence,
     prior: NormalEquations,
 ) -> FloatArray:
-    """Solve with weights, the description pulling; what nothing tells gets no step."""
+    """Return the weighted least-squares step under a prior; zero where it is not identifiable."""
     size = columns[0].shape[2]
     own, aim = np.zeros((size, size)), np.zeros(size)
     lefts = evidence.weighted(residual)
@@ -302,18 +302,18 @@ def _covariance(
     more: Sequence[Regression] = (),
 ) -> FloatArray:
     """
-    Return the covariance, shape (f, f); infinite where others make it.
+    Return the covariance under coloured noise, (f, f); infinite where other columns make one.
 
     Parameters
     ----------
     columns, residual : sequence of ndarray, each (M, n, f) and (M, n)
         Of each trajectory.
     evidence : Evidence
-        The data, whose colour of noise the residual tells.
+        The data; the residual shows the colour of their noise.
     described : ndarray, shape (r, r)
-        Precision of the description of the first values.
+        Precision of the first values by the description.
     more : sequence of Regression
-        Other data, over their noise.
+        Other data, weighted.
 
     """
     size = columns[0].shape[2]

@@ -3,17 +3,17 @@
 """
 What every candidate explains of data that its values were not fitted to, and how sure values are.
 
-All that is free is fitted together with a candidate to all parts of the data but one, and both
-predict the part that was left out. What the candidate adds to that prediction, x, is compared with
-what is left without it, r: the squares that go are 2 x'r - x'x, and the slope of r on x is one for
-a cause and zero for what follows noise. Both are known block by block, so that their intervals
-hold whatever the colour of the residual. All of it is algebra on products of columns, a small
-matrix for each block.
+The nuisance parameters are fitted to all folds but one, without a candidate and jointly with it,
+and both fits predict the fold that was left out. What the candidate adds to that prediction, x, is
+compared with the residual without it, r: the squares fall by 2 x'r - x'x, and the slope of r on x
+is one for a cause and zero for what follows noise. Both are known block by block, so that their
+intervals hold whatever the colour of the residual. All of it is algebra on products of columns, a
+small matrix for each block.
 
-What a model gets wrong of a motion is no noise. A value follows it, and another motion would give
-another value, whichever of the two days it is from: values are as sure as they agree from part to
-part of the data. And what a model gets wrong of all motions lies along a cause by chance, as it
-does along the other causes that were tried.
+The misfit of a model is no noise. A value follows the misfit, and another motion, of either day,
+would give another value: values are as sure as they agree from fold to fold. And a misfit common
+to all motions correlates with a cause by chance, as it does with the other candidates that were
+tried.
 
 """
 
@@ -48,31 +48,31 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-#: Squares over noise of columns that are rounding, whatever the units.
+#: Weighted squares of columns that are rounding, whatever the units.
 _NOTHING = 1e-100
 
 
 @dataclass(frozen=True)
 class _Fits:
     """
-    What is free, fitted to all blocks but those of each part, and last to all of them.
+    Nuisance parameters, fitted to all folds but each in turn, and last to all of them.
 
     Attributes
     ----------
     train : ndarray, shape (K + 1, B)
-        One for the blocks that each fit is of.
+        One for the blocks that each fit uses, zero for those left out.
     theta : ndarray, shape (K + 1, f)
         Values.
     border : ndarray, shape (K + 1, f, C)
-        Of the free columns with those of the candidates, and ``solved`` what is free makes of
-        them.
+        Products of the nuisance columns with those of the candidates, and ``solved`` the
+        coefficients of the regression of the latter on the former.
     left : ndarray, shape (B, f)
-        Of the free columns with what the fit to the other parts leaves.
+        Products of the nuisance columns with the residual of the fit to the other folds.
     target : ndarray, shape (B, C)
-        Of the columns of the candidates with the same.
+        Products of the columns of the candidates with the same.
     made : ndarray, shape (B, f, C)
-        Of the free columns with twice those of the candidates, less what the other parts make of
-        these.
+        Products of the nuisance columns with twice those of the candidates, less what the
+        regression on the other folds predicts of these.
 
     """
 
@@ -86,7 +86,7 @@ class _Fits:
 
     @classmethod
     def of(cls, known: Products, part: npt.NDArray[np.intp], prior: NormalEquations) -> _Fits:
-        """Fit what is free; ``part`` of each block, shape (B,)."""
+        """Fit the nuisance parameters; ``part`` is the fold of each block, shape (B,)."""
         train = np.ones((int(part.max()) + 2, len(part)))
         train[part, np.arange(len(part))] = 0.0
         border = np.tensordot(train, known.border, 1)
@@ -120,26 +120,26 @@ def held_out(
     whole: bool = True,
 ) -> tuple[list[Trial], FloatArray]:
     """
-    Try every candidate beside what is free.
+    Try every candidate jointly with the nuisance parameters.
 
     Parameters
     ----------
     problem : Problem
         Rows; columns of the candidates come first.
     free : sequence of int
-        Columns that are fitted beside.
+        Nuisance columns.
     candidates : sequence of Candidate
-        What is tried.
+        The candidates.
     prior : NormalEquations
-        What is known of the free values.
+        Prior of the nuisance parameters.
     whole : bool
-        Whether that counts as data: what a candidate spares them there is a
-        gain as well.
+        Whether the prior counts as data: a better agreement of the nuisance parameters with it is
+        a gain of the candidate as well.
 
     Returns
     -------
     trials : list of Trial
-        In the order of the candidates; those of which nothing is visible are left out.
+        In the order of the candidates, without those of which nothing is visible.
     power : ndarray, shape (B,)
         Held-out squares without any of them.
 
@@ -160,7 +160,7 @@ def tried_beside(
     prior: NormalEquations,
     whole: bool = True,
 ) -> tuple[list[Trial], FloatArray]:
-    """Try every candidate, of which products are known; see `held_out`."""
+    """Try every candidate, from the products of all columns; see `held_out`."""
     part = problem.fold_of_block
     fits = _Fits.of(known, part, prior)
     theta = fits.theta[part]
@@ -225,18 +225,18 @@ def _tried(
 def _held(
     rest: FloatArray, aim: FloatArray, whole: FloatArray, candidate: Candidate
 ) -> tuple[FloatArray, FloatArray]:
-    """Return inverses (K, p, p) and values (K, p) that are held to what may be expected."""
+    """Return inverses (K, p, p) and values (K, p) under the prior of a candidate."""
     inverse = independent_inverse(rest + np.diag(candidate.precision), np.diag(whole))
     return inverse, _times(inverse, aim)
 
 
 def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: float) -> Fitted:
     """
-    Widen deviations to what the values vary by when parts of the data are left out (jackknife).
+    Widen standard deviations to the spread of values when folds are left out (jackknife).
 
-    Few parts tell a spread badly: deviations are such that twice them has 95 % of Student's
-    distribution. None is less than noise as large as the unit makes: where that is a misfit, names
-    may have taken a part of it.
+    Few folds determine a spread badly: deviations are such that twice them has 95 % of Student's
+    distribution. None is less than for noise as large as the unit: where that is a misfit, names
+    may have absorbed a part of it.
 
     Parameters
     ----------
@@ -245,9 +245,10 @@ def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: flo
     evidence : Evidence
         The data.
     prior : Prior or None
-        What other data tell of what is free.
+        Information of the baseline about the base parameters; each of its recordings is left out
+        as well.
     chance : float
-        Squares over the unit that a value of any cause takes of what the names leave; noise alone
+        Mean gain per value, over all candidates, on the residual that the names leave; noise alone
         gives one.
 
     """
@@ -271,17 +272,17 @@ def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: flo
 
 def as_change(fitted: Fitted, prior: Prior, baseline: Baseline) -> Fitted:
     """
-    Widen deviations by what the model had wrong along each name before.
+    Widen standard deviations by the value that each name seems to have had in the baseline.
 
-    The values are those of now, of which a part may have been there. That something has changed is
-    another question, which the recordings of both days answer.
+    The values are those of now, of which a part may have been there before. That something has
+    changed is another question, which the recordings of both days answer.
 
     Parameters
     ----------
     fitted : Fitted
         The arm with all names.
     prior : Prior
-        What recordings from before tell of what is free.
+        Information of the baseline about the base parameters.
     baseline : Baseline
         Those recordings.
 
@@ -294,7 +295,7 @@ def with_model_error(
     fitted: Fitted, evidence: Evidence, arm: ArmModel, covariance: FloatArray
 ) -> Fitted:
     """
-    Widen deviations by what the parameters of a model are off by, which names make up for.
+    Widen standard deviations by the errors of a model's parameters, as they propagate to names.
 
     Parameters
     ----------
@@ -325,20 +326,20 @@ def with_model_error(
 
 
 def _known(fitted: Fitted) -> FloatArray:
-    """Return the deviations that are known, zero where none is, shape (p,)."""
+    """Return the standard deviations, zero where one is infinite, shape (p,)."""
     std = fitted.estimate.std
     return np.where(np.isfinite(std), std, 0.0)
 
 
 def _with_deviation(fitted: Fitted, deviation: FloatArray) -> Fitted:
-    """Return the same with deviations of the values (p,) that are no less than before."""
+    """Return the fit with standard deviations of values (p,), none less than before."""
     factor = np.maximum(deviation / np.maximum(fitted.estimate.std, 1e-300), 1.0)
     covariance = fitted.estimate.covariance * np.outer(factor, factor)
     return replace(fitted, estimate=replace(fitted.estimate, covariance=covariance))
 
 
 def _by_part(fitted: Fitted, evidence: Evidence) -> list[NormalEquations]:
-    """Return what each part of the data tells of a step of all that was free."""
+    """Return the normal equations of each fold for a step of all fitted parameters."""
     problem = make_problem(evidence.data, evidence.sigma, fitted.residual, list(fitted.columns))
     fold, width = fold_rows(evidence.data), problem.x.shape[2]
     parts = [fold == k for k in range(int(fold.max()) + 1)]
@@ -347,13 +348,18 @@ def _by_part(fitted: Fitted, evidence: Evidence) -> list[NormalEquations]:
 
 
 def _values(known: NormalEquations, size: int) -> tuple[FloatArray, FloatArray]:
-    """Return the means of the last values, and their deviations, each (p,)."""
+    """Return the posterior means of the last values, and their standard deviations, each (p,)."""
     basis = informative_basis(known.matrix)
     return (basis @ (basis.T @ known.vector))[-size:], np.sqrt(np.sum(basis[-size:] ** 2, axis=1))
 
 
 def _recordings_before(fitted: Fitted, prior: Prior | None) -> list[NormalEquations]:
-    """Return what each recording from before tells of a step of all that was free."""
+    """
+    Return the normal equations of each baseline recording for a step of all fitted parameters.
+
+    None without a baseline.
+
+    """
     if prior is None:
         return []
     named = np.zeros(len(fitted.estimate.values))
@@ -363,9 +369,10 @@ def _recordings_before(fitted: Fitted, prior: Prior | None) -> list[NormalEquati
 
 def _seen_before(fitted: Fitted, prior: Prior, baseline: Baseline) -> FloatArray:
     """
-    Return the values that names seem to have had before, what is free fitted beside them, (p,).
+    Return the values that names seem to have had in the baseline, (p,).
 
-    None is taken to have been larger than it is now; what shapes were is not asked.
+    Base parameters are fitted jointly. No value is expected to be larger than now: its present
+    size is the standard deviation of its prior, about zero. Shapes are as now.
 
     """
     result = np.zeros(len(fitted.estimate.values))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""One round of the search: every cause alone beside what is free, and the one that is taken."""
+"""One round of the search: a trial of every candidate, and the choice of the one to accept."""
 
 from __future__ import annotations
 
@@ -39,36 +39,37 @@ from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Trial
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Best candidates that are looked at row by row; shapes of this many are refined, of those that
-#: have this share of the best worth.
+#: Best candidates that are examined row by row; most of them whose shapes are refined, and the
+#: share of the best worth that these have to have.
 _LOOKED_AT, _REFINED, _PROMISING = 30, 6, 0.4
-#: Causes that are compared with each other beside what each of them was before.
+#: Most candidates that are compared jointly with the baseline values of all of them.
 _COMPARED = 8
-#: Rivals that are listed for a name: the likeliest, each name once; more than two help nobody.
+#: Most rivals that are listed for a name, the likeliest and each name once: more than two help
+#: nobody.
 _RIVALS = 2
-#: What stands for a cause of any name.
+#: Stands for an effect of any name.
 _ANY = ''
-#: Causes in the small print.
+#: Most causes in the small print.
 _SMALL_PRINT = 5
 
 
 @dataclass(frozen=True)
 class Look:
     """
-    A look at all causes beside what is free, from which one may be taken.
+    Trials of all candidates jointly with the nuisance parameters; one may be accepted.
 
     Attributes
     ----------
     survey : Survey
         All candidates.
     passing : tuple of Trial
-        The causes that could be taken, best first.
+        Those that may be accepted, best first.
     closing : dict of int to bool
         Whether each of them, by its id, leaves no gap.
     ranking : tuple of Trial
         The best candidates, one per name and joints, best first.
     here : Round
-        What it knows; columns of refined shapes are behind the others.
+        The round that was searched; columns of refined shapes come after all others.
 
     """
 
@@ -81,9 +82,10 @@ class Look:
     @property
     def width(self) -> float:
         """
-        Squares that any cause takes of what is left: a lead of less decides nothing.
+        Largest gain of any candidate of this look: a lead of less decides nothing.
 
-        Where there are recordings from before, what was there already is no measure of a change.
+        With a baseline it is the largest gain of a change, as what was there already is no measure
+        of one.
 
         """
         if self.here.before is None:
@@ -94,10 +96,10 @@ class Look:
 
     def step(self, width: float = 0.0) -> Step | None:
         """
-        Return the cause that takes most of what is left, of those that have changed.
+        Return the step that accepts the best candidate that has changed; None if none passes.
 
-        What takes as much stays a rival of it, whether other recordings show it as well or not.
-        A lead of less than `width` squares decides nothing. None if nothing passes.
+        A candidate that gains as much stays a rival of it, whether the permutation test says that
+        it has changed or not. A lead of less than `width` squares decides nothing.
 
         """
         here = self.here.within(width)
@@ -137,7 +139,7 @@ class Look:
 
 
 def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
-    """Try every cause beside what is free."""
+    """Try every candidate jointly with the nuisance parameters."""
     nuisance = here.nuisance
     known = products(here.problem, nuisance.free, [one.columns for one in candidates])
     trials, power = tried_beside(known, here.problem, candidates, nuisance.prior)
@@ -162,7 +164,7 @@ def _best_per_key(trials: Sequence[Trial], here: Round) -> list[Trial]:
 
 
 def _part(candidate: Candidate, possible: Sequence[int], first: int) -> Candidate:
-    """Return a candidate with some of its values only, whose columns are elsewhere."""
+    """Return a candidate with some of its values only, whose columns start at another place."""
     return replace(
         candidate,
         columns=slice(first, first + len(possible)),
@@ -174,12 +176,12 @@ def _joint_by_joint(
     passing: Sequence[Trial], ranking: Sequence[Trial], here: Round
 ) -> list[Trial]:
     """
-    Return what joints have, each for itself, if together it beats the cause that takes most.
+    Return candidates of single joints that together beat the best one, if it acts on several.
 
-    They are simpler and take more. Friction of three joints is one cause each, and a person who
-    pulls at all of them takes more than any. Joints have the same cause, or beside one from
-    outside, which can be like any, each its own. The best that has changed is ahead; empty if
-    there is none.
+    They are simpler and gain more. Friction of three joints is one candidate each, and a person
+    who pulls at all of them gains more than any. The joints have the same effect, or, where the
+    best is from outside the arm and can imitate any, each its own. The best that has changed comes
+    first; empty if there is none.
 
     """
     first = passing[0]
@@ -208,7 +210,7 @@ def _joint_by_joint(
 
 
 def _touched(trial: Trial, here: Round) -> tuple[int, ...]:
-    """Return the joints whose torque a cause changes."""
+    """Return the joints whose torque a candidate changes."""
     return tuple(np.flatnonzero(np.any(here.own(trial.candidate), axis=(0, 2))).tolist())
 
 
@@ -227,7 +229,7 @@ def _survey(
 
 
 def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial], Round]:
-    """Refine the shapes of the best candidates; return them in order, and their columns too."""
+    """Refine shapes of the best candidates; return the ranking and a round with their columns."""
     problem = here.problem
     best = max((worth(t, here) for t in ranking if not t.candidate.effect.external), default=0.0)
     refined: list[Trial] = []
@@ -273,12 +275,11 @@ def _examined(
     ranking: Sequence[Trial], here: Round
 ) -> tuple[list[Trial], list[Trial], dict[int, bool]]:
     """
-    Return the ranking, what is there beyond chance, and whether each that matters leaves no gap.
+    Return the ranking, the significant trials, and whether each that matters leaves no gap.
 
-    Where there are recordings from before, what has to be beyond chance and to matter is the
-    change: the values that a cause had in those already are free beside it. Causes are compared
-    beside all such values of one another, since each may have been there before whichever of them
-    changed.
+    With a baseline it is the change that has to be significant and to matter: the values that a
+    candidate had then are nuisance parameters. Candidates are compared jointly with such values of
+    all of them, since each may have been there before whichever of them changed.
 
     """
     assert here.total is not None
@@ -312,16 +313,16 @@ def _examined(
 
 
 def _open_squares(here: Round) -> FloatArray:
-    """Return the squares of every joint in which a gap is open; infinite where none is, (n,)."""
+    """Return the squares of every joint that has a gap; infinite where there is none, (n,)."""
     return np.where(here.gaps(here.residual), np.sum(here.residual**2, axis=0), np.inf)
 
 
 def _compared(trials: Sequence[Trial], here: Round) -> list[Trial]:
     """
-    Return the changes of causes beside what each of them was before, on the scale of the gap.
+    Return the changes of candidates, jointly with all baseline values, on the scale of the gap.
 
-    What the recordings from before leave open hides a part of any change. The one that takes most
-    is given what it takes alone, and the others in proportion.
+    The uncertainty of their values in the baseline hides a part of any change. The one with the
+    largest gain is given the gain of its trial without such values, and the others in proportion.
 
     """
     if here.before is None or len(trials) < 2:
@@ -336,7 +337,7 @@ def _compared(trials: Sequence[Trial], here: Round) -> list[Trial]:
 
 
 def _alone(candidate: Candidate, own: FloatArray, here: Round) -> Trial | None:
-    """Try a candidate with weighted columns beside what is free."""
+    """Try one candidate with weighted columns; None where nothing of it is visible."""
     candidate = replace(candidate, columns=slice(0, candidate.size))
     assert here.known is not None
     known = with_candidate(here.known, here.problem, here.free, own)
@@ -346,9 +347,9 @@ def _alone(candidate: Candidate, own: FloatArray, here: Round) -> Trial | None:
 
 def _changes(trials: Sequence[Trial], here: Round) -> list[Trial | None]:
     """
-    Return the changes of causes since the recordings from before; None where nothing is visible.
+    Return the trials of changes since the baseline; None where nothing is visible.
 
-    The values that all of them had before are free beside each.
+    The values that all of these candidates had in the baseline are nuisance parameters of each.
 
     """
     if here.before is None:
@@ -368,9 +369,9 @@ def _changes(trials: Sequence[Trial], here: Round) -> list[Trial | None]:
 
 def _size(change: Trial, takes: FloatArray, here: Round) -> FloatArray:
     """
-    Return the squares that a change makes in every joint, and no more than the cause takes, (n,).
+    Return the squares of the torque of a change, at most the candidate's gain, by joint, (n,).
 
-    What the change takes beside the values from before is less where these are hardly known.
+    The gain of a change jointly with the baseline values is less where these are hardly known.
 
     """
     if here.before is None:
@@ -380,7 +381,7 @@ def _size(change: Trial, takes: FloatArray, here: Round) -> FloatArray:
 
 
 def _passing(ranking: Sequence[Trial], closing: dict[int, bool], here: Round) -> list[Trial]:
-    """Return the causes that could be taken, best first."""
+    """Return the candidates that may be accepted, best first."""
     result: list[Trial] = []
     for trial in ranking:
         if id(trial) not in closing or made_of_noise(trial, here):

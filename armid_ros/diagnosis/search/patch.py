@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm with what was named, as a point that a fit moves through."""
+"""An arm with the named effects, as the point at which a fit has arrived."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
-#: Largest relative step of a shape in a round: the search has refined it already.
+#: Largest relative change of a shape in one step: the search has refined it already.
 _SHAPE_STEP = 0.1
-#: Relative step of the differences by a shape.
+#: Relative step of finite differences with respect to a shape.
 _STEP = 1e-3
 
 
 @dataclass(frozen=True)
 class Patch:
     """
-    An arm, what was named, and the values so far.
+    An arm, the named effects, and the present values.
 
     Attributes
     ----------
     arm : ArmModel
-        The arm without what was named, its own parameters as they are by now.
+        The arm without the named effects, with the present values of its own parameters.
     named : tuple of Named
-        Effects, with their shapes by now.
+        Effects, with their present shapes.
     values : tuple of ndarray
         All parameters of each effect.
     change : ndarray, shape (r,)
-        What was added to the base parameters that are free.
+        Change of the fitted base parameters from the given ones.
 
     """
 
@@ -49,20 +49,20 @@ class Patch:
 
     @cached_property
     def model(self) -> ArmModel:
-        """Return the arm with what was named."""
+        """Return the arm with the named effects."""
         model = self.arm
         for own, values in zip(self.named, self.values, strict=True):
             model = with_named(model, own.effect, values)
         return model
 
     def with_change(self, change: FloatArray, base: BaseParameters) -> Patch:
-        """Return the state with more added to the base parameters, shape (r,)."""
+        """Return the patch after a further change of the base parameters, shape (r,)."""
         theta = self.arm.theta
         arm = self.arm.with_theta(base.lift(base.values(theta) + change, theta))
         return Patch(arm, self.named, self.values, self.change + change)
 
     def moved(self, change: FloatArray, base: BaseParameters | None) -> Patch:
-        """Return the state after a step of all that is free, within bounds."""
+        """Return the patch after a step of all fitted parameters, within bounds."""
         start = len(self.change)
         body = self if base is None else self.with_change(change[:start], base)
         arm = body.arm
@@ -87,14 +87,14 @@ class Patch:
 
     @property
     def linear(self) -> npt.NDArray[np.bool_]:
-        """Which of all that is free is no shape, (f,)."""
+        """Which of the fitted parameters are no shapes, (f,)."""
         own = [np.ones(len(self.change), dtype=bool)]
         for named in self.named:
             own += [np.ones(len(named.kept), dtype=bool), np.zeros(len(named.effect.shape), bool)]
         return np.concatenate(own)
 
     def parameters(self) -> tuple[tuple[ParameterName, ...], FloatArray]:
-        """Name the free parameters of the named effects, shapes behind quantities."""
+        """Name the fitted parameters of the named effects, shapes behind quantities."""
         names: list[ParameterName] = []
         numbers: list[float] = []
         for own, values in zip(self.named, self.values, strict=True):
@@ -107,7 +107,7 @@ class Patch:
 
 
 def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
-    """Return by how much values may change that the arm has already in part, each (P,)."""
+    """Return the bounds of values, less what the arm has of the effect already, each (P,)."""
     lower, upper = effect.bounds()
     there = _there(arm, effect)
     if there is None:
@@ -118,7 +118,7 @@ def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
 
 
 def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
-    """Return an arm with an effect; what it has of the same changes instead."""
+    """Return an arm with an effect, whose values are added to those it has of it already."""
     there = _there(arm, effect)
     if there is None:
         return arm.with_effect(effect, values)
@@ -129,7 +129,7 @@ def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
 
 
 def _there(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return where an arm has the values of an effect already; None if it has not all of them."""
+    """Return where an arm has the parameters of an effect already; None if it lacks any."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
         if isinstance(effect, type(own)) and not own.shapes and not own.points:
@@ -140,7 +140,7 @@ def _there(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
 
 
 def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return bounds of a shape and steps for differences, per value."""
+    """Return lower and upper bounds of a shape and steps for finite differences, per value."""
     owners = len(effect.owners)
     low = np.tile([s.lower for s in effect.shapes], owners)
     high = np.tile([s.upper for s in effect.shapes], owners)
@@ -149,7 +149,7 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def patch_columns(state: Patch, part: Trajectory, base: BaseParameters | None) -> FloatArray:
-    """Return the columns of base parameters, values and shapes in rows, shape (M, n, f)."""
+    """Return the Jacobian of base parameters, values and shapes in rows, shape (M, n, f)."""
     model, motion = memoized_arm(state.model), part.motion
     blocks = [np.empty((len(part.rows), motion.n_joints, 0))]
     if base is not None:
@@ -166,7 +166,7 @@ def patch_columns(state: Patch, part: Trajectory, base: BaseParameters | None) -
 def _base_columns(
     state: Patch, model: ArmModel, motion: Motion, base: BaseParameters
 ) -> FloatArray:
-    """Return the columns of what is free of the arm, shape (N, n, r)."""
+    """Return the columns of the base parameters, shape (N, n, r)."""
     own = [model.columns_of(effect, motion) for effect in state.arm.effects]
     rigid = len(state.arm.robot.rigid_parameters)
     if base.rank and base.independent.min() >= rigid:
@@ -175,7 +175,7 @@ def _base_columns(
 
 
 def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray:
-    """Return the columns of the shape of one of a model's effects, by differences, (N, n, S)."""
+    """Return the columns of the shape of a model's effect by finite differences, (N, n, S)."""
     effect = model.effects[position]
     low, high, step = _shape_bounds(effect)
     shape = np.array(effect.shape)

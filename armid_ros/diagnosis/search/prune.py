@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which of the causes that were taken one after the other stand beside each other.
+Which of the causes that were accepted one after the other stand jointly.
 
-A fitted arm is a linear problem, in which every name can be asked for again.
+A fitted arm is a linear problem, in which every name can be tried again.
 
 """
 
@@ -33,7 +33,7 @@ import numpy as np
 
 class Again(NamedTuple):
     """
-    What is there already, judged as if it were asked for now.
+    Trial of a fitted effect, as if it were a candidate now.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Again(NamedTuple):
     problem : Problem
         The problem, its columns first.
     nuisance : Nuisance
-        What is fitted beside it.
+        All that is fitted jointly with it.
     power : float
         Held-out squares without it.
 
@@ -57,16 +57,16 @@ class Again(NamedTuple):
 @dataclass(frozen=True)
 class View:
     """
-    A fitted arm as a linear problem, from which names and free values can be taken away again.
+    A fitted arm as a linear problem, from which names and nuisance columns can be removed again.
 
     Attributes
     ----------
     problem : Problem
-        All columns that were free, those of the base parameters first, and those of ``more``.
+        All Jacobian columns of the fit, those of the base parameters first, and those of ``more``.
     fitted : Fitted
         The arm.
     more : tuple of Named
-        Names that were not fitted, at values of zero.
+        Effects that were not fitted, at values of zero.
 
     """
 
@@ -76,7 +76,7 @@ class View:
 
     @classmethod
     def of(cls, fitted: Fitted, evidence: Evidence, more: Sequence[Named] = ()) -> View:
-        """Make the problem of a fitted arm, and of names beside."""
+        """Make the problem of a fitted arm, and of further effects."""
         columns = [
             np.concatenate([own, *(columns_of(one, fitted.arm, part) for one in more)], axis=2)
             for part, own in zip(evidence.data, fitted.columns, strict=True)
@@ -95,7 +95,7 @@ class View:
         return tuple(self.first + k for k in values), tuple(self.first + k for k in shapes)
 
     def value(self, column: int) -> float:
-        """Return the value of a column of a name."""
+        """Return the fitted value of a column of a name."""
         return float(self.fitted.estimate.values[column - self.first])
 
     def without(
@@ -107,19 +107,19 @@ class View:
         Parameters
         ----------
         columns : sequence of int
-            Columns to be put first, and their values given back to the residual.
+            Columns to be put first; the torque of their values is added to the residual.
         values : sequence of float
             Their values.
         gone : sequence of int
-            Columns that are not there at all; their values were zero.
+            Columns that are removed; their values were zero.
 
         Returns
         -------
         problem : Problem
         free : tuple of int
-            The other columns.
+            All other columns, as nuisance columns.
         prior : NormalEquations
-            What is known of these.
+            Prior of these.
 
         """
         size = self.problem.x.shape[2]
@@ -143,7 +143,7 @@ class View:
         values: Sequence[float],
         gone: Sequence[int] = (),
     ) -> Again:
-        """Judge what is there already as if it were asked for now."""
+        """Try fitted columns as if they belonged to a candidate now."""
         problem, free, prior = self.without(columns, values, gone)
         moved = replace(candidate, columns=slice(0, len(columns)))
         trials, power = held_out(problem, free, [moved], prior)
@@ -151,7 +151,7 @@ class View:
         return Again(trial, problem, Nuisance(free, prior), float(power.sum()))
 
     def trial_of(self, name: int) -> Again:
-        """Judge a name as if it were asked for now, beside the others."""
+        """Try a name as if it were a candidate now, jointly with the others."""
         own = self.fitted.named[name]
         columns, shapes = self.columns(name)
         span = slice(0, len(columns))
@@ -159,7 +159,7 @@ class View:
         return self.trial(candidate, columns, [self.value(c) for c in columns], shapes)
 
     def trial_of_more(self, name: int) -> Again:
-        """Judge a name that was not fitted beside those that were."""
+        """Try an effect that was not fitted jointly with those that were."""
         first = int(self.fitted.columns[0].shape[2])
         start = first + sum(len(one.kept) for one in self.more[:name])
         own = self.more[name]
@@ -175,14 +175,14 @@ def columns_of(own: Named, arm: ArmModel, part: Trajectory) -> FloatArray:
 
 
 def doubtful(trial: Trial | None) -> tuple[float, float]:
-    """Return an order of causes: likelier to be chance, and taking less; None is not seen."""
+    """Return a sort key: larger for likelier chance, then for less gain; largest for None."""
     return (np.inf, np.inf) if trial is None else (trial.p, -trial.gain)
 
 
 @dataclass(frozen=True)
 class Retrial:
     """
-    Asks for each of several causes again, beside the others, as it was asked for when taken.
+    Tries each accepted cause again, jointly with the others, under the conditions of its step.
 
     Attributes
     ----------
@@ -201,11 +201,11 @@ class Retrial:
 
     @cached_property
     def work(self) -> Workspace:
-        """What columns of other shapes are computed from."""
+        """Arm and data that columns of other shapes are computed from."""
         return Workspace(memoized_arm(self.question.arm), self.evidence.data)
 
     def stands(self, step: Step, again: Again) -> bool:
-        """Return whether a cause is there, and matters if it has to."""
+        """Return whether a cause is significant, and material where it has to be."""
         if again.trial is None:
             return False
         here = Round(
@@ -225,7 +225,7 @@ class Retrial:
         return acceptable(again.trial, here) and material(gains, here, step.misfit_share)
 
     def fitted(self, names: Sequence[Accepted], change: FloatArray | None) -> Fitted:
-        """Fit all names together, from their values and a change of the body on."""
+        """Fit all names jointly, from their values and a change of the base parameters on."""
         question, evidence = self.question, self.evidence
         return fit(
             question.arm,
@@ -237,7 +237,7 @@ class Retrial:
         )
 
     def needless(self, fitted: Fitted, names: Sequence[Accepted]) -> int | None:
-        """Return the name that is likeliest to be chance beside the others; None if all stand."""
+        """Return the name that is likeliest to be chance given the others; None if all stand."""
         if not names:
             return None
         view = View.of(fitted, self.evidence)
@@ -252,7 +252,7 @@ class Retrial:
     def needed_after_all(
         self, fitted: Fitted, dropped: Sequence[Accepted]
     ) -> tuple[int, FloatArray] | None:
-        """Return which dropped name takes most beside those that stay, and its values."""
+        """Return the dropped name that gains most given those that stay, and its values."""
         if not dropped:
             return None
         view = View.of(fitted, self.evidence, [one.named for one in dropped])
@@ -273,10 +273,10 @@ def pruned(
     retrial: Retrial, taken: Sequence[Accepted], change: FloatArray | None = None
 ) -> tuple[tuple[Step, ...], Fitted]:
     """
-    Fit all names together, and drop those that the others make needless.
+    Fit all names jointly, and drop those that the others make needless.
 
-    What made a name needless may be dropped after it: each is asked once more beside those that
-    stay.
+    A name that made another one needless may be dropped after it: each dropped name is tried once
+    more jointly with those that stay.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A round of the search: what it knows, what a cause is worth in it, and which one is taken."""
+"""A round of the search: its data, what a candidate is worth in it, and which one is preferred."""
 
 from __future__ import annotations
 
@@ -22,22 +22,24 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Places in the catalogue that an effect is behind where it is seldom: a delay of one joint, which
-#: is a lag as a rule, and a lag of the whole arm, which is a delay.
+#: Places in the catalogue that an effect is set back where it is seldom: a delay of one joint,
+#: which is a lag as a rule, and a lag of the whole arm, which is a delay.
 _ELSEWHERE = 1.5
 
 
 @dataclass(frozen=True)
 class Nuisance:
     """
-    What is fitted beside every cause.
+    Nuisance parameters: what is fitted jointly with every candidate.
+
+    These are base parameters, friction and offsets without given values, and accepted effects.
 
     Attributes
     ----------
     free : tuple of int
-        Columns of the problem.
+        Their columns of the problem.
     prior : NormalEquations
-        What is known of their values.
+        Their prior.
 
     """
 
@@ -45,7 +47,7 @@ class Nuisance:
     prior: NormalEquations
 
     def and_columns(self, candidate: Candidate) -> Nuisance:
-        """Return the same with the columns of a candidate."""
+        """Return the nuisance parameters and those of a candidate."""
         span = range(candidate.columns.start, candidate.columns.stop)
         return Nuisance((*self.free, *span), self.prior.and_zeros(candidate.precision))
 
@@ -53,16 +55,16 @@ class Nuisance:
 @dataclass(frozen=True)
 class Later:
     """
-    Recordings of the day in question that nothing is fitted to, over the unit of the gap.
+    Weighted recordings of the day in question that nothing is fitted to.
 
     Attributes
     ----------
     evidence : Evidence
         The recordings.
     free : tuple of ndarray, each (S, f)
-        Columns of what is fitted beside every cause, of each recording.
+        Nuisance columns of each trajectory.
     residual : tuple of ndarray, each (S,)
-        What is left of it.
+        Residual of each trajectory.
 
     """
 
@@ -84,13 +86,13 @@ class Later:
         )
 
     def own(self, arm: ArmModel, candidate: Candidate) -> list[FloatArray]:
-        """Return the columns of a candidate, each (S, p)."""
+        """Return the weighted columns of a candidate, each (S, p)."""
         kept = list(candidate.kept)
         rows = [part.columns(arm, candidate.effect)[:, :, kept] for part in self.evidence.data]
         return [part.reshape(-1, len(kept)) for part in self.evidence.weighted(rows)]
 
     def and_columns(self, arm: ArmModel, candidate: Candidate) -> Later:
-        """Return the same with the columns of a candidate."""
+        """Return the same with a candidate among the nuisance parameters."""
         pairs = zip(self.free, self.own(arm, candidate), strict=True)
         return replace(self, free=tuple(np.concatenate(pair, axis=1) for pair in pairs))
 
@@ -98,16 +100,16 @@ class Later:
 @dataclass(frozen=True)
 class Before:
     """
-    Recordings in which nothing was wrong, beside an arm of which something is free.
+    The baseline under a fitted arm, and further recordings of the day in question.
 
     Attributes
     ----------
     baseline : Baseline
-        The recordings.
+        Recordings from when nothing was wrong.
     prior : Prior
-        What they tell of what is free.
+        Their information about the base parameters.
     change : ndarray, shape (r,)
-        What was added to that.
+        Change of the base parameters in the fit.
     later : Later or None
         Recordings of the day in question that nothing is fitted to.
 
@@ -119,14 +121,14 @@ class Before:
     later: Later | None = None
 
     def and_columns(self, arm: ArmModel, candidate: Candidate) -> Before:
-        """Return the same where a candidate is fitted beside every cause."""
+        """Return the same with a candidate among the nuisance parameters."""
         later = None if self.later is None else self.later.and_columns(arm, candidate)
         return replace(self, later=later)
 
     def information(
         self, candidates: Sequence[Candidate], arm: ArmModel, nuisance: Nuisance
     ) -> NormalEquations:
-        """Return what is known of the values some had before already, and of what is free."""
+        """Return the prior of the baseline values of candidates and of the nuisance parameters."""
         own = np.concatenate(
             [
                 self.baseline.columns(arm, candidate.effect, candidate.kept)
@@ -150,34 +152,34 @@ class Before:
 @dataclass(frozen=True)
 class Round:
     """
-    What a round of the search needs to know.
+    The state of a round of the search.
 
     Attributes
     ----------
     evidence : Evidence
         The data.
     work : Workspace
-        What columns of other shapes are computed from.
+        Arm and data that columns of other shapes are computed from.
     settings : DiagnosisSettings
         Library and thresholds.
     problem : Problem
-        All columns over the unit, those of the candidates first.
+        All weighted columns, those of the candidates first.
     nuisance : Nuisance
-        What is fitted beside every cause.
+        Nuisance parameters of every candidate.
     total : float or None
         Held-out squares that shares are of; those of this round if None.
     power : float
-        Held-out squares of this round.
+        Held-out squares of this round without any candidate.
     since : bool
         Whether what has changed is asked, and not what was always there.
     tried : int
         Candidates that were tried, every shape for itself.
     before : Before or None
-        Recordings in which nothing was wrong.
+        Recordings from when nothing was wrong.
     width : float
-        Squares that any cause takes of what nothing explains: a lead of less decides nothing.
+        Largest gain of any candidate on what nothing explains: a lead of less decides nothing.
     known : Products or None
-        Of what is free, which all that is tried in the round stands beside.
+        Products of the nuisance columns, common to all trials of the round.
 
     """
 
@@ -197,10 +199,11 @@ class Round:
     @property
     def currency(self) -> float:
         """
-        Squares that a cause pays for its values with.
+        Squares of which each value of a candidate costs a share.
 
-        Those that are left where a change is asked: a small one counts beside any large one. Where
-        the description may be off in everything, those of the whole gap.
+        Where a change is asked, those that are left in this round: a small change counts whatever
+        larger one was named. Where the description may be off in everything, those of the whole
+        gap.
 
         """
         assert self.total is not None
@@ -208,25 +211,25 @@ class Round:
 
     @cached_property
     def free(self) -> FloatArray:
-        """Columns that are fitted beside every cause, shape (R, n, f)."""
+        """Nuisance columns, shape (R, n, f)."""
         return self.problem.x[:, :, list(self.nuisance.free)]
 
     @cached_property
     def projection(self) -> Projection:
-        """What these leave of others."""
+        """Projection that removes the nuisance columns, as far as their prior lets them act."""
         return project(self.problem, self.nuisance.free, self.nuisance.prior)
 
     @cached_property
     def residual(self) -> FloatArray:
-        """What these leave of the residual, shape (R, n)."""
+        """Residual without its projection on the nuisance columns, shape (R, n)."""
         return self.projection.rest(self.problem.y)
 
     def within(self, width: float) -> Round:
-        """Return the same where a lead of less than some squares decides nothing."""
+        """Return the round in which a lead of less than ``width`` squares decides nothing."""
         return self if width == self.width else replace(self, width=width)
 
     def without(self, place: int, value: float) -> Round:
-        """Return the same where one of the free columns is not there, and had a value."""
+        """Return the round without a nuisance column; its torque is added to the residual."""
         free = self.nuisance.free
         kept = [k for k in range(len(free)) if k != place]
         column = self.problem.x[:, :, free[place]]
@@ -241,23 +244,23 @@ class Round:
     def rows_of(
         self, candidate: Candidate
     ) -> tuple[FloatArray, npt.NDArray[np.intp], FloatArray, FloatArray]:
-        """Return what is to be explained, its blocks, columns of a candidate and free ones."""
+        """Return residual, blocks, columns of a candidate and nuisance columns of all rows."""
         return self.problem.y, self.problem.block, self.own(candidate), self.free
 
     def gaps(self, left: FloatArray) -> npt.NDArray[np.bool_]:
-        """Return in which joints what is left (R, n) is a gap, shape (n,)."""
+        """Return in which joints a residual (R, n) is a gap, shape (n,)."""
         rows = self.evidence.split(left, self.problem.weight)
         return self.problem.chi2_per_row(left) > self.evidence.limits(rows, self.settings)
 
 
 def worth(trial: Trial, here: Round) -> float:
-    """Return the share of what is left that a trial takes, its freedom paid for."""
+    """Return the share of a trial less the price of its values."""
     price = here.settings.thresholds.price * cost(trial, here.settings)
     return trial.gain / here.currency - price
 
 
 def cost(trial: Trial, settings: DiagnosisSettings) -> float:
-    """Return how many values and shapes the data chose, those of what is outlandish more."""
+    """Return the number of values and shapes that the data choose, more for external effects."""
     effect = trial.candidate.effect
     shapes = len(effect.shapes) / max(len(effect.separate), 1)
     outside = settings.thresholds.outside if effect.external else 0.0
@@ -279,13 +282,13 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
 
 
 class Frequency(IntEnum):
-    """How seldom a cause comes between two days."""
+    """How seldom an effect changes between two days."""
 
     OFTEN, SELDOM, NEVER = range(3)
 
 
 def frequency(trial: Trial, here: Round) -> Frequency:
-    """Return how seldom a cause comes: a link never changes, an inner one hardly has a load."""
+    """Return how seldom a cause changes: a link never does, an inner one hardly has a load."""
     effect = trial.candidate.effect
     if here.since and effect.corrects:
         return Frequency.NEVER
@@ -294,7 +297,7 @@ def frequency(trial: Trial, here: Round) -> Frequency:
 
 
 def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
-    """Return causes, best first: before one that never happens what happens and says the same."""
+    """Return trials, best first, but one that never changes behind an equivalent one that may."""
     first, *others = passing
     if frequency(first, here) is Frequency.NEVER:
         for other in others:
@@ -308,12 +311,12 @@ def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
 
 def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -> Trial:
     """
-    Return the simplest of the causes that leave no gap, or the best where each leaves one.
+    Return the simplest of the tied causes that leave no gap, or the best where each leaves one.
 
     Of several that are as good it is the commonest.
 
-    One cause that explains everything goes before two that do it together, and what happens goes
-    before what never or seldom does.
+    One cause that explains everything is preferred to two that do it together, and one that
+    changes often to one that never or seldom does.
 
     """
     of_arm = [frequency(trial, here) for trial in tied if not trial.candidate.effect.external]
@@ -333,16 +336,16 @@ def _usual(trial: Trial) -> bool:
 
 
 def closes(trial: Trial, here: Round) -> bool:
-    """Return whether a cause leaves no gap of data left out."""
+    """Return whether the held-out residual with a candidate has no gap."""
     _, rest = trial.left_out(*here.rows_of(trial.candidate))
     return not here.gaps(rest).any()
 
 
 def simplest(tied: Sequence[Trial], here: Round) -> Trial:
     """
-    Return the cause with the least freedom.
+    Return the cause of least cost.
 
-    Of causes as free as each other the one that takes more, and of those that take the same the
+    Of causes of equal cost it is the one that gains more, and of those that gain the same the
     first in the catalogue, which goes from the common to the rare.
 
     """
@@ -354,14 +357,14 @@ def simplest(tied: Sequence[Trial], here: Round) -> Trial:
 
 
 def undecided(first: Trial, ranking: Sequence[Trial], here: Round) -> bool:
-    """Tell whether a cause was taken for a lead over a likelier one that decides nothing."""
+    """Return whether a cause was accepted for a lead over a likelier one that decides nothing."""
     close = [t for t in ranking if t.gain > 0.0 and 0.0 <= first.gain - t.gain <= here.width]
     own = round(cost(first, here.settings)), rarity(first)
     return any((round(cost(t, here.settings)), rarity(t)) < own for t in close)
 
 
 def rarity(trial: Trial) -> float:
-    """Return the position in the catalogue, which goes from the common to the rare."""
+    """Return the place in the catalogue, from common to rare; behind it in an unusual place."""
     names, name = list(CATALOGUE), trial.candidate.effect.said_as
     place = names.index(name) if name in CATALOGUE else len(names)
     return place + (0.0 if _usual(trial) else _ELSEWHERE)
@@ -369,10 +372,11 @@ def rarity(trial: Trial) -> float:
 
 def contains(big: Trial, small: Trial, here: Round) -> bool:
     """
-    Return whether a cause says the same, or is freer and can make what another one makes.
+    Return whether a cause has more freedom than another and reproduces its torque.
 
-    A cause of the whole arm that looks like one of a joint is another cause: a base that leans,
-    and the zero of the first encoder of an arm that moves in a plane.
+    Where a change is asked, a cause that does not come and go also contains an equal one that
+    does. A cause of the whole arm that resembles one of a joint is another cause: a tilted base,
+    and the zero of the first encoder of a planar arm.
 
     """
     if not big.candidate.effect.joints and small.candidate.effect.joints:
@@ -393,13 +397,13 @@ def contains(big: Trial, small: Trial, here: Round) -> bool:
 
 
 def _same_body(one: Trial, other: Trial) -> bool:
-    """Return whether two causes are the body of one link in other words."""
+    """Return whether two causes add to the same inertial parameters of a link."""
     added = [trial.candidate.effect.adds_to(trial.candidate.robot) for trial in (one, other)]
     return bool(added[0]) and added[0] == added[1]
 
 
 def says_no_more(big: Trial, small: Trial, here: Round) -> bool:
-    """Return whether a cause contains another one and, its freedom paid for, explains no more."""
+    """Return whether a cause contains another one and is not worth significantly more."""
     if not contains(big, small, here):
         return False
     thresholds = here.settings.thresholds

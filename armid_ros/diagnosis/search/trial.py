@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A candidate, how it predicts what it was not fitted to, and how it was accepted.
+A candidate, its trial on held-out data, and how it was accepted.
 
-A candidate is an effect on certain joints with one shape. A trial is what it explains of data that
-its values were not fitted to; see `held_out`.
+A candidate is an effect on certain joints with one shape. Its trial is what it explains of data
+that its values were not fitted to; see `held_out`.
 
 """
 
@@ -23,23 +23,23 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-#: Resolution of a value that the data determine: it is a half or less in a pair that they do not.
+#: Least resolution of an identifiable value: two that data do not separate have a half or less.
 IDENTIFIABLE = 0.9
-#: Squares that differ by less than this share do so by rounding.
+#: Relative difference of squares below which it is rounding.
 ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
 class Named:
     """
-    An effect that was named, as it is fitted.
+    A named effect, as it is fitted.
 
     Attributes
     ----------
     effect : Effect
         Joints and shape.
     kept : tuple of int
-        Its parameters that are free; the others are zero.
+        Its parameters that are fitted; the others are zero.
 
     """
 
@@ -63,7 +63,8 @@ class Candidate:
     robot : Robot
         What the effect acts on.
     found : tuple of ndarray, each (P,), or None
-        Values that data tell, and their deviations: one may limit what is expected of the others.
+        Estimates of its values and their standard deviations: one value may limit the prior of
+        others.
 
     """
 
@@ -75,11 +76,11 @@ class Candidate:
 
     @cached_property
     def precision(self) -> FloatArray:
-        """How strongly the values are held to what may be expected of them, shape (p,)."""
+        """Prior precision of the values, about zero, shape (p,)."""
         return self.effect.spread(self.robot, self.found)[list(self.kept)] ** -2.0
 
     def as_found(self, values: FloatArray, std: FloatArray) -> Candidate:
-        """Return the same where data tell its values and their deviations, each (p,)."""
+        """Return the candidate with estimates of its values and their deviations, each (p,)."""
         size = len(self.effect.parameters(self.robot))
         whole, deviation = np.zeros(size), np.full(size, np.inf)
         whole[list(self.kept)], deviation[list(self.kept)] = values, std
@@ -98,16 +99,16 @@ class Candidate:
 
 def denies(cross: FloatArray, square: FloatArray) -> bool:
     """
-    Return whether data deny a cause: no more follows it than noise would.
+    Return whether data deny a cause: they follow it no more than noise would.
 
-    The slope of what is left on what the cause predicts is one for a cause, zero for none. Data
-    in which it does nothing do not deny it: the deviation of the slope is what blocks differ by,
-    and no less than white noise makes.
+    The slope of the residual on the prediction of the cause is one for a cause, zero for none.
+    Data in which it does nothing do not deny it: the standard deviation of the slope comes from
+    the scatter between blocks, and is no less than for white noise.
 
     Parameters
     ----------
     cross, square : ndarray, shape (B,)
-        x'r and x'x of every block, of what is predicted (x) and what is left (r).
+        x'r and x'x of every block, of the prediction x and the residual r.
 
     """
     made = float(square.sum())
@@ -121,27 +122,28 @@ def denies(cross: FloatArray, square: FloatArray) -> bool:
 @dataclass(frozen=True)
 class Trial:
     """
-    A candidate and how it predicts what it was not fitted to.
+    The held-out result of a candidate.
 
     Attributes
     ----------
     candidate : Candidate
         The candidate.
     values, std : ndarray, shape (p,)
-        Its values fitted to all of the data, and their deviations as far as white noise goes.
+        Its values fitted to all of the data, and their standard deviations for white noise.
     resolution : ndarray, shape (p,)
         Diagonal of the resolution matrix: one where the data determine a value, zero where only
-        what is expected of it does (Menke, Geophysical Data Analysis, 1989).
+        the prior does (Menke, Geophysical Data Analysis, 1989).
     visible : float
-        Share of the columns that the free ones cannot make.
+        Share of the length of its columns that the nuisance columns cannot reproduce.
     cross, square : ndarray, shape (B,)
-        x'r and x'x of every block.
+        x'r and x'x of every block; see `held_out`.
     fold_values, fold_std : ndarray, shape (K, p)
-        Values without each part, and their deviations as far as white noise goes.
+        Values fitted without each fold, and their standard deviations for white noise.
     fold_free : ndarray, shape (K, f)
-        The free values without each part, changed by the candidate, and ``fold_alone`` without it.
+        Nuisance parameters fitted without each fold, jointly with the candidate, and
+        ``fold_alone`` without it.
     fold : ndarray of int, shape (B,)
-        The part that each block is left out with.
+        Fold of each block.
 
     """
 
@@ -160,37 +162,37 @@ class Trial:
 
     @property
     def freedom(self) -> float:
-        """Values that the data choose; those held by what is expected of them count in part."""
+        """Number of values that the data determine; those that the prior holds count in part."""
         return float(self.resolution.sum())
 
     @cached_property
     def deviation(self) -> FloatArray:
-        """Deviations of the values, with those of noise of any colour, shape (p,)."""
+        """Standard deviations of the values, for noise of any colour (jackknife), shape (p,)."""
         coloured = jackknife(self.values, self.std, self.fold_values, self.fold_std)
         return np.asarray(np.sqrt(self.std**2 + coloured))
 
     @property
     def gains(self) -> FloatArray:
-        """Squares that go in every block, shape (B,)."""
+        """Reduction of the held-out squares of every block, shape (B,)."""
         return np.asarray(2.0 * self.cross - self.square)
 
     @cached_property
     def gain(self) -> float:
-        """Squares over noise that go in all of the data."""
+        """Reduction of the weighted held-out squares of all data."""
         return float(self.gains.sum())
 
     @cached_property
     def slope(self) -> float:
-        """Slope of what is left on what is predicted: one for a cause, zero for noise."""
+        """Slope of the residual on the prediction: one for a cause, zero for noise."""
         return float(self.cross.sum() / max(float(self.square.sum()), 1e-300))
 
     @cached_property
     def z(self) -> float:
         """
-        Return the slope over its deviation.
+        Return the slope over its standard deviation.
 
-        That is what blocks differ by, and no less than white noise makes: a cause that acts in two
-        blocks may do so alike by chance.
+        The latter comes from the scatter between blocks, and is no less than for white noise: a
+        cause that acts in two blocks may act alike in both by chance.
 
         """
         scatter = self.cross - self.slope * self.square
@@ -206,14 +208,14 @@ class Trial:
 
     @property
     def replicated(self) -> int:
-        """Parts of the data that lose squares."""
+        """Number of folds with a gain."""
         return int(np.sum(np.bincount(self.fold, self.gains) > 0.0))
 
     def left_out(
         self, y: FloatArray, block: npt.NDArray[np.intp], own: FloatArray, free: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """
-        Return what is left of each part without the candidate and with it, each (R, n).
+        Return the held-out residual without the candidate and with it, each (R, n).
 
         Parameters are those of `joint_gains`.
 
@@ -231,20 +233,21 @@ class Trial:
         self, y: FloatArray, block: npt.NDArray[np.intp], own: FloatArray, free: FloatArray
     ) -> FloatArray:
         """
-        Return the squares that go in every joint, shape (n,).
+        Return the gain in every joint, shape (n,).
 
-        What the candidate spares the data that hold the free values is shared among the joints.
+        A gain by better agreement of the nuisance parameters with their prior is divided among the
+        joints.
 
         Parameters
         ----------
         y : ndarray, shape (R, n)
-            What is to be explained, over the unit of the gap.
+            Residual to be explained, over the unit of the gap.
         block : ndarray of int, shape (R,)
             Block of each row.
         own : ndarray, shape (R, n, p)
             Columns of the candidate.
         free : ndarray, shape (R, n, f)
-            Columns that were free.
+            Nuisance columns.
 
         """
         alone, rest = self.left_out(y, block, own, free)
@@ -254,7 +257,7 @@ class Trial:
 
 
 def lead(first: Trial, other: Trial) -> tuple[float, float]:
-    """Return by how many squares one trial is ahead of another, and that over its deviation."""
+    """Return the lead in gain of one trial over another, and that over its standard deviation."""
     difference = first.gains - other.gains
     spread = float(difference.std(ddof=1)) * np.sqrt(len(difference))
     return float(difference.sum()), float(difference.sum()) / max(spread, 1e-300)
@@ -278,9 +281,9 @@ class Step:
     tried : int
         Candidates that were tried, every shape for itself.
     misfit_share : float
-        Share of the misfit that it has to take: nothing where so many divisions of the recordings
-        show less of it that a misfit does not hide it. None for friction that nobody gave values
-        of, which only has to be there.
+        Share of the misfit that it has to take: zero where the permutation test is significant, so
+        that a misfit does not hide the change. None for friction and offsets without given values,
+        which only have to be significant.
 
     """
 
@@ -293,7 +296,7 @@ class Step:
 
 
 class Accepted(NamedTuple):
-    """A name with its step, and the values of all its parameters."""
+    """A named effect with its step, and the values of all its parameters."""
 
     named: Named
     step: Step
@@ -310,7 +313,7 @@ class Survey:
     ranking : tuple of Trial
         All visible candidates in their best shape, best first.
     hidden : frozenset of str
-        Names of which what is free leaves nothing to be seen.
+        Names of effects of which no candidate is visible beyond the nuisance columns.
     total : float
         Held-out squares that shares are of.
     tried : int
@@ -318,9 +321,9 @@ class Survey:
     unseen : tuple of (str, tuple of str)
         Names and joints of the candidates that are not visible.
     there : tuple of Trial
-        Candidates that are there beyond chance, best first.
+        Candidates that are significant, best first.
     nuisance : tuple of Trial
-        Friction of unknown value, which is fitted beside all of them.
+        Friction and offsets without given values, which are fitted jointly with all candidates.
 
     """
 
@@ -333,7 +336,7 @@ class Survey:
     nuisance: tuple[Trial, ...] = ()
 
     def and_nuisance(self, trials: Sequence[Trial], least_visible: float) -> Survey:
-        """Return the survey with what is fitted beside all candidates."""
+        """Return the survey with trials of nuisance parameters."""
         seen = tuple(trial for trial in trials if trial.visible >= least_visible)
         effects = [trial.candidate.effect for trial in seen]
         keys = {trial.candidate.key[:2] for trial in seen}
@@ -346,6 +349,6 @@ class Survey:
 
     @property
     def by_chance(self) -> float:
-        """Squares that a value of a cause takes in the mean."""
+        """Mean gain per value over all visible candidates."""
         each = [max(trial.gain, 0.0) / max(trial.freedom, 1.0) for trial in self.ranking]
         return float(np.mean(each)) if each else 0.0
