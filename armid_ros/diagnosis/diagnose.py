@@ -206,7 +206,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     rest, shares = headline(chosen.rest or explanation, unseen, settings, least)
     explanation = rest
     if chosen.rest is not None and rest.steps:
-        explanation, shares, remarks = _as_stated(rest, shares, unseen, arm, settings)
+        rest, explanation, shares, remarks = _as_stated(rest, shares, unseen, arm, settings)
         notes += remarks
     found = findings(explanation, shares, arm, asked.rng)
     worse = _harmed(chosen, explanation, unseen, settings)
@@ -265,19 +265,26 @@ def _as_stated(
     unseen: Evidence | None,
     arm: ArmModel,
     settings: DiagnosisSettings,
-) -> tuple[Explanation, Attribution, list[str]]:
-    """Return names in the model as given, or beside a body common to both days, and a note."""
+) -> tuple[Explanation, Explanation, Attribution, list[str]]:
+    """
+    Return the names that stay, in the model as given or with a body common to both days.
+
+    Values that may all be zero in the model as given are no names.
+
+    """
+    if not rest.steps:
+        return rest, rest, shares, []
     as_described = in_model_as_given(rest)
     alone = shares_of(as_described, unseen, settings)
     names, least = range(len(as_described.steps)), settings.thresholds.headline
     if alone.share(names) >= least:
-        small = smallest(as_described, alone, settings, least) if len(names) > 1 else None
+        small = smallest(as_described, alone, settings, least)
         if small is None:
-            return as_described, alone, []
+            return rest, as_described, alone, []
         fewer = rest.without(small)
         return _as_stated(fewer, shares_of(fewer, unseen, settings), unseen, arm, settings)
     bodily, remarks = as_bodies(rest, arm)
-    return bodily, shares, [_COMMON, *remarks]
+    return rest, bodily, shares, [_COMMON, *remarks]
 
 
 def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence | None:

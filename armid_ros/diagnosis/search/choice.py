@@ -133,6 +133,7 @@ class Explainer:
         """
         prepared, settings, noise = self.prepared, self.settings, self.prepared.as_described
         self.tell(0.2, 'what has changed')
+        misfit = np.hypot(misfit, self._parameter_error())
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
         most = 2 * settings.thresholds.few_causes
         given = as_given(self.arm, prepared.data, most, settings.library)
@@ -152,6 +153,19 @@ class Explainer:
         loads = [step for step in found.steps if step.trial.candidate.effect.changes_body]
         stays = _most(loads, settings) or _as_good(found, anew, settings)
         return Chosen(found if stays else anew, misfit, WRITTEN_MISFIT, notes)
+
+    def _parameter_error(self) -> FloatArray:
+        """Return the deviation of the predicted torque for that of the parameters, (n,) [N m]."""
+        data, covariance = self.prepared.data, self.covariance
+        if covariance is None:
+            return np.zeros(self.arm.robot.n_joints)
+        columns = [part.reduce(self.arm.columns(part.motion)) for part in data]
+        variance = [np.einsum('mnp,pq,mnq->mn', x, covariance, x, optimize=True) for x in columns]
+        unit = [np.ones(self.arm.robot.n_joints)] * len(data)
+        power = Evidence.over_noise(data, unit).power(
+            [np.sqrt(np.maximum(v, 0.0)) for v in variance]
+        )
+        return np.sqrt(power)
 
     def _anew(self, sigma: tuple[FloatArray, ...]) -> Explanation:
         """
@@ -209,19 +223,16 @@ class Explainer:
 
 def _told_by(baseline: Baseline, prepared: Prepared, misfit: FloatArray) -> tuple[FloatArray, ...]:
     """
-    Return the noise of data: where assumed, at most the misfit of the baseline, each (n,).
+    Return the noise of data, at most the misfit of the baseline, each (n,).
 
-    The misfit contains the noise of data that were sampled as often.
+    The misfit contains the noise of data that were sampled as often. What periods differ by is
+    more where something happens in one of them, which is a gap.
 
     """
     usual = np.median([part.period_recorded for part in baseline.data])
     return tuple(
-        np.minimum(one, misfit)
-        if floor.period is None and part.period_recorded < _AS_OFTEN * usual
-        else one
-        for one, floor, part in zip(
-            prepared.as_described, prepared.floors, prepared.data, strict=True
-        )
+        np.minimum(one, misfit) if part.period_recorded < _AS_OFTEN * usual else one
+        for one, part in zip(prepared.as_described, prepared.data, strict=True)
     )
 
 

@@ -58,7 +58,6 @@ def explain(
             taken, minor = [*way.taken, *instead, *others], ()
     if survey is not None:
         survey = survey.and_nuisance(tried, settings.thresholds.least_visible)
-    reference = retrial.fitted((), None)
     change = way.change if question.nuisance_arm is question.arm else None
     steps, fitted = pruned(retrial, taken, change)
     by_chance = 0.0 if last is None else last.by_chance
@@ -69,7 +68,7 @@ def explain(
         question.arm,
         question.base,
         fitted,
-        reference,
+        retrial.reference,
         steps,
         survey,
         evidence,

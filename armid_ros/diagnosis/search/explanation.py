@@ -245,4 +245,5 @@ def _triangle(explanation: Explanation, values: FloatArray) -> tuple[FloatArray,
         own, left = prior.columns, prior.residual - prior.columns @ fitted.change
         factors.append(np.column_stack([own, left + own @ values]))
     whole = scipy.linalg.qr(np.concatenate(factors), mode='r')[0][: rank + 1]
-    return np.asarray(whole), float(sum(part.informative.sum() for part in evidence.data))
+    parts = [*evidence.data, *(() if prior is None else prior.data)]
+    return np.asarray(whole), float(sum(part.informative.sum() for part in parts))

@@ -204,8 +204,27 @@ class Retrial:
         """Arm and data that columns of other shapes are computed from."""
         return Workspace(memoized_arm(self.question.arm), self.evidence.data)
 
+    @cached_property
+    def reference(self) -> Fitted:
+        """The arm with nothing named."""
+        return self.fitted((), None)
+
+    @cached_property
+    def gap(self) -> float:
+        """Held-out squares with nothing named."""
+        view = View.of(self.reference, self.evidence)
+        problem, free, prior = view.without((), ())
+        _, power = held_out(problem, free, [], prior)
+        return float(power.sum())
+
     def stands(self, step: Step, again: Again) -> bool:
-        """Return whether a cause is significant, and material where it has to be."""
+        """
+        Return whether a cause is significant, and material where it has to be.
+
+        Offsets that a fold alone does not determine make the held-out squares of the first look
+        larger than the gap is without them.
+
+        """
         if again.trial is None:
             return False
         here = Round(
@@ -214,7 +233,7 @@ class Retrial:
             self.settings,
             again.problem,
             again.nuisance,
-            step.total,
+            min(step.total, self.gap),
             step.tried,
             power=again.power,
             since=self.question.since,

@@ -13,7 +13,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Problem, Products, project, Projection
-from armid_ros.diagnosis.data.trajectory import Workspace
+from armid_ros.diagnosis.data.trajectory import Trajectory, Workspace
 from armid_ros.diagnosis.search.trial import Candidate, lead, ROUNDING, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
@@ -62,9 +62,9 @@ class Later:
     evidence : Evidence
         The recordings.
     free : tuple of ndarray, each (S, f)
-        Nuisance columns of each trajectory.
+        Nuisance columns of each recording.
     residual : tuple of ndarray, each (S,)
-        Residual of each trajectory.
+        Residual of each recording.
 
     """
 
@@ -77,24 +77,34 @@ class Later:
         cls, evidence: Evidence, columns: Sequence[FloatArray], residual: Sequence[FloatArray]
     ) -> Later:
         """Weight columns (M, n, f) and residuals (M, n) of trajectories."""
-        free = evidence.weighted(columns)
-        left = evidence.weighted(residual)
+        free = [rows.reshape(-1, rows.shape[2]) for rows in evidence.weighted(columns)]
+        left = [rows.ravel() for rows in evidence.weighted(residual)]
         return cls(
-            evidence,
-            tuple(rows.reshape(-1, rows.shape[2]) for rows in free),
-            tuple(rows.ravel() for rows in left),
+            evidence, _by_recording(evidence.data, free), _by_recording(evidence.data, left)
         )
 
     def own(self, arm: ArmModel, candidate: Candidate) -> list[FloatArray]:
         """Return the weighted columns of a candidate, each (S, p)."""
         kept = list(candidate.kept)
         rows = [part.columns(arm, candidate.effect)[:, :, kept] for part in self.evidence.data]
-        return [part.reshape(-1, len(kept)) for part in self.evidence.weighted(rows)]
+        flat = [part.reshape(-1, len(kept)) for part in self.evidence.weighted(rows)]
+        return list(_by_recording(self.evidence.data, flat))
 
     def and_columns(self, arm: ArmModel, candidate: Candidate) -> Later:
         """Return the same with a candidate among the nuisance parameters."""
         pairs = zip(self.free, self.own(arm, candidate), strict=True)
         return replace(self, free=tuple(np.concatenate(pair, axis=1) for pair in pairs))
+
+
+def _by_recording(
+    data: Sequence[Trajectory], rows: Sequence[FloatArray]
+) -> tuple[FloatArray, ...]:
+    """Return rows of trajectories, those of one recording together."""
+    folds = [part.fold for part in data]
+    return tuple(
+        np.concatenate([own for own, fold in zip(rows, folds, strict=True) if fold == one])
+        for one in sorted(set(folds))
+    )
 
 
 @dataclass(frozen=True)

@@ -139,7 +139,7 @@ class GapOverlay(Section):
         j, shown = self.joint, self.overlay
         unit = torque_unit(self.robot, j)
         told = np.flatnonzero(shown.trajectory.informative[:, j])
-        moving = slice(told[0], told[-1] + 1)
+        moving = slice(told[0], told[-1] + 1) if len(told) else slice(None)
         measured, before, after = (
             x[moving, j] for x in (shown.measured, shown.before, shown.after)
         )
