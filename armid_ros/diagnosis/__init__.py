@@ -3,8 +3,8 @@
 """
 Diagnosis: where model and measurement disagree, and which effect is missing.
 
-``diagnose`` looks, ``diagnosis_document`` writes down what it found, ``next_run`` says what to run
-to tell two names apart.
+``diagnose`` names the missing effects, ``diagnosis_document`` returns the result as a document,
+``next_run`` plans the motion that separates two names.
 
 """
 

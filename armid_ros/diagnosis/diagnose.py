@@ -3,8 +3,8 @@
 """
 The diagnosis: from recordings and a model to a verdict.
 
-The model is tried as it is, with single causes added (what is wrong with the description shows
-there), and with its rigid body and known effects fitted anew, where only the structure counts.
+The model is tried as given, with single causes added (which shows errors of the description), and
+with its rigid body and known effects fitted anew, where only its structure counts.
 
 """
 
@@ -55,20 +55,20 @@ import numpy as np
 
 #: Called with the share that is done and what is being done.
 Progress = Callable[[float, str], None]
-#: Explains a gap by ties to another machine; None where they do not.
+#: Explains a gap by ties to another machine; returns None where they do not.
 Explain = Callable[[ArmModel, Sequence[Recording], Prepared, DiagnosisSettings], Chosen | None]
 
-#: Said where no two equal periods measure the noise.
+#: Note where no two equal periods measure the noise.
 _ASSUMED = (
     'nothing repeats in some recordings: their noise is assumed from what rows differ by from '
     'their neighbours; two equal periods would measure it'
 )
-#: Said where only a body that is common to both days shows what a cause does.
+#: Note where a cause shows only jointly with a rigid body that is common to both days.
 _COMMON = (
     'the baseline did not determine the model for these motions: a rigid body and friction common '
     'to both were fitted'
 )
-#: Said where a partner was set, and its ties would be left out.
+#: Error where a partner was set and its ties would be left out.
 _ALONE = (
     'the settings have a partner, and nothing explains ties to it: call diagnose_beside of '
     'armid_ros.pair.ties.diagnosis with it'
@@ -93,16 +93,16 @@ def diagnose(
     Parameters
     ----------
     arm : ArmModel
-        The model as it is believed to be: rigid body, gravity, known effects with values.
+        The given model: rigid body, gravity, known effects with values.
     recordings : sequence of Recording
-        Data with torques; several motions are best.
+        The recordings in question, with torques; several motions are best.
     validate : sequence of Recording
-        Data that are only predicted.
+        Recordings that are predicted and not fitted.
     baseline : sequence of Recording
-        Data from when nothing was wrong, such as those the model was identified from: what it
-        leaves of them is its own misfit, and what is asked is what has changed since.
+        Recordings from when nothing was wrong, such as those the model was identified from: their
+        residual is the model's own misfit, and the diagnosis asks what has changed since.
     misfit : Misfit, optional
-        What the model left when it was identified, where there is no baseline to measure it.
+        Misfit of the model when it was identified, where there is no baseline to measure it.
     settings : DiagnosisSettings, optional
         Library and thresholds.
     rng : numpy.random.Generator
@@ -110,8 +110,9 @@ def diagnose(
     progress : callable, optional
         Called with the share that is done and what is being done.
     tied : callable, optional
-        Asked before all else whether ties to the partner of the settings explain the gap; needed
-        where there is one. `diagnose_beside` of `armid_ros.pair.ties.diagnosis` gives both.
+        Explains the gap by ties to the partner of the settings, before anything else is tried;
+        needed if there is a partner. `diagnose_beside` of `armid_ros.pair.ties.diagnosis` gives
+        both.
 
     Returns
     -------
@@ -173,7 +174,7 @@ def diagnose(
 
 
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
-    """Return a result in which all was named, with names of a small share in the small print."""
+    """Return a result in which all was named, with findings of small share in the small print."""
     large = tuple(one for one in result.findings if one.share >= least)
     small = tuple(one for one in result.findings if one.share < least)
     return replace(result, findings=large, minor=(*small, *result.minor))
@@ -181,7 +182,7 @@ def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
 
 @dataclass(frozen=True)
 class _Asked:
-    """What was asked: see the parameters of `diagnose`; `arm` is the one given, memoized."""
+    """The parameters of `diagnose`; `given` is its arm, `arm` the same memoized."""
 
     arm: ArmModel
     given: ArmModel
@@ -194,7 +195,7 @@ class _Asked:
 
 
 def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
-    """Measure what was found on held-out data, and say it."""
+    """Return the diagnosis of an explanation, measured on held-out data."""
     arm, settings = asked.arm, asked.settings
     asked.tell(0.85, 'held-out gap')
     explanation, said = as_bodies(chosen.explanation, arm)
@@ -267,9 +268,10 @@ def _as_stated(
     settings: DiagnosisSettings,
 ) -> tuple[Explanation, Explanation, Attribution, list[str]]:
     """
-    Return the names that stay, in the model as given or with a body common to both days.
+    Return the names that stay, their explanation in the model as given, its shares, and notes.
 
-    Values that may all be zero in the model as given are no names.
+    Values that may all be zero in the model as given are no names. Where names explain too little
+    there, the explanation keeps the rigid body common to both days.
 
     """
     if not rest.steps:
@@ -288,7 +290,7 @@ def _as_stated(
 
 
 def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence | None:
-    """Return recordings that are only predicted, in the unit of the gap."""
+    """Return the recordings to validate, which are only predicted, in the unit of the gap."""
     if not asked.validate:
         return None
     prepared = asked.prepared
@@ -299,7 +301,7 @@ def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence
 
 
 def _where(explanation: Explanation, limits: FloatArray, named: bool) -> tuple[Where, ...]:
-    """Say where the gap is; where something is named, small gaps count as well."""
+    """Locate the gap; if something is named and no loss exceeds its limit, any excess counts."""
     arm, evidence = explanation.given, explanation.evidence
     residual = explanation.reference.residual
     places = locate(arm, evidence, residual, limits)
@@ -307,7 +309,7 @@ def _where(explanation: Explanation, limits: FloatArray, named: bool) -> tuple[W
 
 
 def _sure(evidence: Evidence, chosen: Chosen) -> Evidence:
-    """Return data in a unit that is measured: a misfit that is but estimated excuses nothing."""
+    """Return data in units of noise if the misfit is only estimated, which excuses nothing."""
     if chosen.floor_in_words != ESTIMATED:
         return evidence
     return replace(evidence, sigma=evidence.noise)
@@ -327,10 +329,10 @@ def _harmed(
 def _excesses(
     asked: _Asked, chosen: Chosen, rest: Explanation, unseen: Evidence | None, named: bool
 ) -> tuple[list[Excess], list[Excess]]:
-    """Return what is left over limits, and over friction where a joint is held."""
+    """Return losses over their limits, and residuals over friction where a joint is held."""
     settings, evidence = asked.settings, rest.evidence
     more = settings.thresholds.predicted
-    usual = 1.0 if chosen.measured or named else more  # another motion makes another misfit
+    usual = 1.0 if chosen.measured or named else more  # a misfit varies from motion to motion
     left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings', usual)]
     parts = [evidence]
     if unseen is not None:
@@ -365,7 +367,7 @@ def _as_it_is(arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings) ->
 def _excess(
     residual: Sequence[FloatArray], evidence: Evidence, settings: DiagnosisSettings
 ) -> FloatArray:
-    """Return the loss of each joint over that up to which it is no gap, shape (n,)."""
+    """Return the loss of each joint over its limit, up to which it is no gap, shape (n,)."""
     return evidence.chi2_per_row(residual) / evidence.limits(residual, settings)
 
 
@@ -398,4 +400,4 @@ def _bad(
 
 
 def _silent(share: float, what: str) -> None:
-    """Tell nobody."""
+    """Report no progress."""

@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What is known of an arm before its recordings are looked at: from others, and from its description.
+Prior knowledge of an arm: from recordings of a baseline, and from its description.
 
-The misfit is what a model leaves of recordings in which nothing was wrong: no real arm is as its
-model to the noise. What is left of recordings that it was identified from is smaller than of
-others, so each of them is predicted with parameters that the others have. What others do not tell
-stays as it is in the model, as far as a description can be believed: a joint may have been moved
-in one recording alone.
+The misfit is the residual that a model leaves of recordings in which nothing was wrong: no real
+arm agrees with its model to within the noise. The residual of recordings that a model was
+identified from is smaller than that of others, so each fold is also predicted with parameters
+fitted to the other folds. Parameters that those do not determine stay as in the model, as far as
+a description can be believed: a joint may have been moved in one recording alone.
 
 """
 
@@ -27,23 +27,23 @@ from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Free columns of which the others leave less than this share of their length are grouped.
+#: A column of which the other free columns leave less than this share of its length is grouped.
 EXCITED = 1e-4
 
 
 @dataclass(frozen=True)
 class Prior:
     """
-    What other data tell of base parameters.
+    Prior of base parameters, given by the rows of other data.
 
     Attributes
     ----------
     data : tuple of Trajectory
-        Those data.
+        The other data.
     rows : tuple of ndarray, each (M, n, r)
-        Their columns over the unit of the gap.
+        Their columns of the base parameters, weighted.
     rest : tuple of ndarray, each (M, n)
-        What the arm leaves of them, over the unit.
+        The residual that the arm leaves of them, weighted.
 
     """
 
@@ -53,32 +53,32 @@ class Prior:
 
     @cached_property
     def columns(self) -> FloatArray:
-        """Return a row for every joint and sample, shape (S, r)."""
+        """Return the weighted columns, a row for every joint and row of data, shape (S, r)."""
         return np.concatenate([rows.reshape(-1, rows.shape[2]) for rows in self.rows])
 
     @cached_property
     def residual(self) -> FloatArray:
-        """Return what is left in these rows, shape (S,)."""
+        """Return the weighted residual in these rows, shape (S,)."""
         return np.concatenate([rest.ravel() for rest in self.rest])
 
     @cached_property
     def of_change(self) -> NormalEquations:
-        """What the data tell of a change of the r values that are free."""
+        """Normal equations of a change of the r base parameters."""
         return NormalEquations.of_rows(self.columns, self.residual)
 
     def nearest(self, columns: FloatArray) -> FloatArray:
-        """Return the changes of what is free that come nearest to columns (S, p), shape (r, p)."""
+        """Return the changes of base parameters that fit columns (S, p) best, shape (r, p)."""
         return informative_solution(self.of_change.matrix, self.columns.T @ columns)
 
     def recordings(self, change: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Yield the columns of each recording, (S, r), and what a change leaves of it, (S,)."""
+        """Yield the columns of each recording, (S, r), and its residual after a change, (S,)."""
         for fold in sorted({part.fold for part in self.data}):
             own = [k for k, part in enumerate(self.data) if part.fold == fold]
             rows = np.concatenate([self.rows[k].reshape(-1, len(change)) for k in own])
             yield rows, np.concatenate([self.rest[k].ravel() for k in own]) - rows @ change
 
     def regressions(self, change: FloatArray, named: int) -> list[Regression]:
-        """Return the data as a problem in which so many more columns do not act."""
+        """Return the data as regressions in which the columns of `named` more values are zero."""
         return [
             Regression(
                 part.at_rows.with_torque(rest - rows @ change),
@@ -93,7 +93,7 @@ class Prior:
 def excited(
     arm: ArmModel, theory: BaseParameters, data: Sequence[Trajectory]
 ) -> tuple[BaseParameters, list[FloatArray]]:
-    """Return what the motion can tell of rigid body and known effects, and its columns."""
+    """Return the base parameters that the motion excites, and their columns in rows."""
     columns = [part.reduce(arm.columns(part.motion)[:, :, theory.independent]) for part in data]
     stacked = np.concatenate([block.reshape(-1, theory.rank) for block in columns])
     names = tuple(theory.standard[column] for column in theory.independent)
@@ -111,10 +111,11 @@ def excited(
 
 def described_precision(base: BaseParameters, arm: ArmModel) -> FloatArray:
     """
-    Return how strongly the description holds the base parameters, as a precision (r, r).
+    Return the precision of the base parameters in the description, shape (r, r).
 
-    It is believed to a factor or so: data decide whatever they tell, and what they tell hardly
-    stays where it predicts other motions well. A value of zero of an effect is no description.
+    The description is believed to a factor or so: data decide what they determine, and what they
+    hardly determine stays where it predicts other motions well. A value of zero of an effect is
+    no description.
 
     """
     size = len(arm.robot.rigid_parameters)
@@ -141,12 +142,13 @@ class Baseline:
     data : tuple of Trajectory
         The recordings.
     residual : tuple of ndarray, each (M, n)
-        What the model leaves of them [N m].
+        Residual of the model [N m].
     misfit : ndarray, shape (n,)
-        Root mean square that it leaves of recordings it was not identified from [N m].
+        Geometric mean of the root mean square residuals of the model as given, and of folds
+        predicted from the other folds [N m].
     varies : ndarray, shape (n,)
-        Squares that it leaves of the recording it predicts worst, over those of all: another
-        motion makes another misfit.
+        Mean square residual of the fold that is predicted worst, over that of all folds: the
+        misfit varies from motion to motion.
 
     """
 
@@ -164,7 +166,7 @@ class Baseline:
         informative = np.concatenate([part.informative for part in data])
         left = np.concatenate(residual)
         w = np.concatenate(columns)
-        informative[:, ~informative.any(axis=0)] = True  # of a joint that never moved, all of it
+        informative[:, ~informative.any(axis=0)] = True  # of a joint that never moved, all rows
         scale = np.sqrt(np.mean(left**2, axis=0, where=informative))
         weight = informative / np.maximum(scale, 1e-12)
         rows = w * weight[:, :, np.newaxis]
@@ -177,7 +179,7 @@ class Baseline:
         for k in folds:
             others = np.linalg.lstsq(sum(own) - own[k] + held, sum(to) - to[k], rcond=1e-10)[0]
             left[fold == k] += w[fold == k] @ (whole - others)
-        others = np.sqrt(np.mean(left**2, axis=0, where=informative))
+        predicted = np.sqrt(np.mean(left**2, axis=0, where=informative))
         counts = np.array([informative[fold == k].sum(axis=0) for k in folds])
         sums = np.array(
             [np.sum(left[fold == k] ** 2, axis=0, where=informative[fold == k]) for k in folds]
@@ -186,22 +188,22 @@ class Baseline:
         return cls(
             tuple(data),
             tuple(residual),
-            np.sqrt(scale * others),
-            worst / np.maximum(others**2, 1e-300),
+            np.sqrt(scale * predicted),
+            worst / np.maximum(predicted**2, 1e-300),
         )
 
     @property
     def error(self) -> float:
-        """Share of the torque that the model leaves, of all joints together."""
+        """Norm of the residual of the model over that of the torque, all joints together."""
         left = np.concatenate([rows.ravel() for rows in self.residual])
         torque = np.concatenate([part.torque.ravel() for part in self.data])
         return float(np.linalg.norm(left) / max(float(np.linalg.norm(torque)), 1e-300))
 
     def prior(self, arm: ArmModel, base: BaseParameters) -> Prior:
         """
-        Return what these recordings tell of what is free of an arm.
+        Return these recordings as a prior of the base parameters of an arm.
 
-        It is the arm whose misfit was measured, or has more effects that are zero.
+        It is the arm whose misfit was measured, or that with more effects whose values are zero.
 
         """
         rows = [
@@ -210,7 +212,7 @@ class Baseline:
         return Prior(self.data, self._weighted(rows), self._weighted(self.residual))
 
     def columns(self, arm: ArmModel, effect: Effect, kept: Sequence[int]) -> FloatArray:
-        """Return the columns of an effect over the misfit, one row a row and joint, (S, p)."""
+        """Return the columns of an effect over the misfit, one row per row and joint, (S, p)."""
         rows = [part.columns(arm, effect)[:, :, list(kept)] for part in self.data]
         return np.concatenate([part.reshape(-1, len(kept)) for part in self._weighted(rows)])
 

@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The data in the unit that a gap is measured in: their noise, or the model's own misfit.
+The data in the unit of the gap: their noise, or the model's own misfit.
 
-Noise is what two equal periods of one trajectory differ by. The difference is taken of what a
-model leaves over, evaluated in each period with its own measured positions: noise of the encoders
-is inside as it goes through the model, and whatever depends on the motion alone cancels. Where
-nothing repeats the noise is assumed, from how rows differ from their neighbours, and said to be
-assumed.
+The noise is measured by the difference of two equal periods of one trajectory. The difference is
+taken of the residual of a model, evaluated in each period at its own measured positions: it
+includes the noise of the encoders as it propagates through the model, and whatever depends on the
+motion alone cancels. Where nothing repeats, the noise is assumed, from how rows differ from their
+neighbours, and reported as assumed.
 
 """
 
@@ -26,34 +26,35 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal, stats
 
-#: Rows apart that what is left may be alike.
+#: Largest lag at which residuals may be correlated [rows].
 _LAGS = 20
-#: Fewer rows than this are not enough to leave any out.
+#: Where fewer informative rows than this remain, all rows are used.
 _FEW = 20
-#: Noise of torques is coloured: white noise that bends rows as much is smaller by up to this
-#: factor in 95 % of the joints of 48 recordings of which two periods tell the noise.
+#: Noise of torques is coloured: white noise with the same second differences is smaller by up to
+#: this factor in 95 % of the joints of 48 recordings of which two periods measure the noise.
 _COLOUR = 1.4
-#: What people, loose parts and machines nearby do is slow; noise of torques is as strong in the
-#: band above, and noise of positions stronger [Hz]. Window of the spectra [s].
+#: What people, loose parts and machines nearby do is slow, below the first frequency; in the band
+#: above, noise of torques is as strong, and noise of positions stronger [Hz]. Window of the
+#: spectra [s].
 _SLOW_HZ, _FAST_HZ, _WINDOW = 4.0, (6.0, 12.0), 2.5
 
 
 @dataclass(frozen=True)
 class Evidence:
     """
-    Data with the unit that a gap is measured in.
+    Data with the unit of the gap.
 
     Attributes
     ----------
     data : tuple of Trajectory
         The data.
     sigma : tuple of ndarray, each (n,)
-        The unit of each trajectory: its noise, or the model's own misfit where that is more
+        The unit of each trajectory: its noise, or the model's own misfit where that is larger
         [N m].
     noise : tuple of ndarray, each (n,)
-        Its noise [N m].
+        The noise of each trajectory [N m].
     varies : ndarray, shape (n,), or None
-        By how much the squares of a misfit vary from motion to motion; None: as a rule.
+        Factor by which the squares of the misfit vary from motion to motion; None counts as one.
 
     """
 
@@ -69,7 +70,7 @@ class Evidence:
 
     @cached_property
     def count(self) -> FloatArray:
-        """Informative rows of each joint, shape (n,)."""
+        """Number of informative rows of each joint, shape (n,)."""
         parts = [part.informative.sum(axis=0) for part in self.data]
         return np.asarray(np.sum(parts, axis=0, dtype=float))
 
@@ -85,28 +86,28 @@ class Evidence:
         return np.asarray(np.mean([one**2 for one in self.noise], axis=0) / sigma)
 
     def chi2_per_row(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the mean square over the unit of each joint, shape (n,)."""
-        return self.power([left / s for left, s in zip(residual, self.sigma, strict=True)])
+        """Return the loss of each joint, the mean square of its weighted residual, shape (n,)."""
+        return self.power([rows / s for rows, s in zip(residual, self.sigma, strict=True)])
 
     def power(self, torque: Sequence[FloatArray]) -> FloatArray:
-        """Return the mean square of torques in rows (M, n), of each joint, shape (n,)."""
+        """Return the mean square of torques (M, n), of informative rows of each joint, (n,)."""
         squares = np.zeros_like(self.count)
         for part, rows in zip(self.data, torque, strict=True):
             squares += np.sum(rows**2, axis=0, where=part.informative)
         return np.asarray(squares / np.maximum(self.count, 1.0))
 
     def weighted(self, rows: Sequence[FloatArray]) -> Iterator[FloatArray]:
-        """Yield rows (M, n) or (M, n, P) of each trajectory over the unit, zero if they rest."""
+        """Yield weighted rows (M, n) or (M, n, P) of each trajectory, zero if uninformative."""
         return weighted_rows(rows, self.data, self.sigma)
 
     def block_squares(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the squares over the unit of what is left (M, n), by block and joint, (B, n)."""
+        """Return the squares of the weighted residual (M, n) by block and joint, (B, n)."""
         block, _ = block_rows(self.data)
         rows = np.concatenate(list(self.weighted(residual)))
         return np.column_stack([np.bincount(block, column) for column in rows.T**2])
 
     def split(self, weighted: FloatArray, weight: FloatArray) -> list[FloatArray]:
-        """Return weighted rows (R, n) of all trajectories one by one, without their weights."""
+        """Return weighted rows (R, n) without their weights, split by trajectory."""
         rows = np.where(weight > 0.0, weighted / np.where(weight > 0.0, weight, 1.0), 0.0)
         cuts = np.cumsum([len(part.rows) for part in self.data])[:-1]
         return np.split(rows, cuts)
@@ -118,12 +119,12 @@ class Evidence:
 
     def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
         """
-        Return the loss of each joint up to which what is left is no gap, shape (n,).
+        Return the loss of each joint up to which its residual is no gap, shape (n,).
 
-        Two periods determine their noise as well as so many independent rows do, and so do the
-        rows that are compared with it: the ratio of the two has Fisher's distribution. Where the
-        unit is a misfit, another motion makes another one, and noise that nothing repeated tells
-        is no surer than that. And what is left may not matter.
+        Noise measured by two periods has as many degrees of freedom as there are independent
+        rows, and so have the rows that are compared with it: the ratio of the two has Fisher's
+        distribution. A misfit varies from motion to motion, and noise that is assumed is no more
+        certain than that. A loss that does not matter to the user is added.
 
         """
         thresholds = settings.thresholds
@@ -136,20 +137,20 @@ class Evidence:
         return np.asarray(np.maximum(noise, misfit) + self.matters(settings))
 
     def as_good(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the loss of each joint up to which another motion is predicted as well, (n,)."""
+        """Return the loss of each joint within which a misfit varies between motions, (n,)."""
         varies = np.ones_like(self.count) if self.varies is None else self.varies
         return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
 
     def matters(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the loss of each joint that matters to the user, shape (n,)."""
+        """Return the loss of each joint from which a cause is material to the user, (n,)."""
         sigma = np.mean([own**2 for own in self.sigma], axis=0)
         return np.asarray((settings.material * self.torque_rms) ** 2 / sigma)
 
     def _lasting(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return for how many rows what is left lasts, as squares go, shape (n,)."""
+        """Return how many rows of the squared residual make one independent row, shape (n,)."""
         products = np.zeros((_LAGS + 1, len(self.count)))
-        for part, left in zip(self.data, residual, strict=True):
-            rows = np.where(part.informative, left, 0.0)
+        for part, own in zip(self.data, residual, strict=True):
+            rows = np.where(part.informative, own, 0.0)
             for lag in range(min(_LAGS + 1, len(rows))):
                 products[lag] += np.sum(rows[lag:] * rows[: len(rows) - lag], axis=0)
         correlation = products[1:] / np.maximum(products[0], 1e-300)
@@ -157,9 +158,9 @@ class Evidence:
 
     def least_squares(self, settings: DiagnosisSettings, misfit_share: float) -> FloatArray:
         """
-        Return the squares over the unit that a cause takes of a joint if it matters, (n,).
+        Return the weighted squares that a material cause removes from each joint, at least, (n,).
 
-        It takes no less than a share of the misfit.
+        They are no less than a share of the squared misfit.
 
         """
         wanted = (settings.material * self.torque_rms) ** 2
@@ -171,7 +172,7 @@ class Evidence:
 
 
 def torque_rms(data: Sequence[Trajectory]) -> FloatArray:
-    """Return the root mean square torque of each joint, of rows that tell something, (n,)."""
+    """Return the root mean square torque of each joint over its informative rows, (n,) [N m]."""
     unit = [np.ones(part.motion.n_joints) for part in data]
     return Evidence.over_noise(data, unit).torque_rms
 
@@ -190,10 +191,10 @@ class NoiseFloor:
     structure : ndarray, shape (n,)
         Power of the difference of two periods at low frequency over that at high frequency.
     slow : ndarray, shape (n,)
-        Deviation that one period has at low frequency [N m]; zero where nothing repeats.
+        Standard deviation of one period at low frequency [N m]; zero where nothing repeats.
     growth : ndarray, shape (n,)
-        Power per bin of that difference in the upper third of what rows keep, over that in the
-        lower one: noise of positions grows with frequency on its way through the model.
+        Power per bin of that difference in the upper third of the band that rows keep, over that
+        in the lower third: the model amplifies noise of positions with frequency.
 
     """
 
@@ -206,22 +207,22 @@ class NoiseFloor:
 
 def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     """
-    Measure the noise of a trajectory beside a model.
+    Measure the noise of a trajectory in the residual of a model.
 
     Parameters
     ----------
     trajectory : Trajectory
         The data.
     arm : ArmModel
-        A model with parameters near to those of the data; what it lacks cancels.
+        A model with parameters near to those of the data; effects that it lacks cancel.
 
     """
     motion = trajectory.motion
     assert motion.tau is not None
-    left = motion.tau - arm.torque(motion)
+    residual = motion.tau - arm.torque(motion)
     taps = trajectory.used.taps()
     half = (len(taps) - 1) // 2
-    smooth = signal.fftconvolve(left, taps[:, np.newaxis], mode='same', axes=0)
+    smooth = signal.fftconvolve(residual, taps[:, np.newaxis], mode='same', axes=0)
     found = trajectory.period
     least = _least(trajectory, arm)
     if found is None:
@@ -237,7 +238,7 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
         rest, used = _difference(trajectory, smooth, rows, lag, joint)
         freedom = max(1.0, used.sum() - 4.0)
         sigma[joint] = np.sqrt(np.sum(rest[used] ** 2) / freedom / 2.0)
-        rest, used = _difference(trajectory, left, first, lag, joint)
+        rest, used = _difference(trajectory, residual, first, lag, joint)
         spectrum = _spectrum(np.where(used, rest, 0.0), trajectory.used.rate_hz)
         structure[joint] = _over(spectrum, (0.0, _SLOW_HZ), _FAST_HZ)
         slow[joint] = _deviation(spectrum) * np.sqrt(len(used) / max(2.0 * used.sum(), 1.0))
@@ -252,9 +253,9 @@ def _difference(
     trajectory: Trajectory, left: FloatArray, first: npt.NDArray[np.intp], lag: int, joint: int
 ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     """
-    Return what samples of two periods differ by in one joint, and where that tells something.
+    Return the difference of two periods in one joint, and at which samples it is informative.
 
-    What drifts with time, by itself or in proportion to the velocity, is taken out: it is an
+    A drift with time, by itself or in proportion to the velocity, is regressed out: it is an
     effect of its own.
 
     """
@@ -273,7 +274,7 @@ def _difference(
 def _between_rows(
     trajectory: Trajectory, samples: npt.NDArray[np.intp], joint: int
 ) -> npt.NDArray[np.bool_]:
-    """Return whether the nearest rows of a joint tell something, shape (K,)."""
+    """Return whether the row of a joint that is next to each sample is informative, (K,)."""
     nearest = np.clip(np.searchsorted(trajectory.rows, samples), 0, len(trajectory.rows) - 1)
     return np.asarray(trajectory.informative[nearest, joint])
 
@@ -286,7 +287,7 @@ def _spectrum(difference: FloatArray, rate: float) -> tuple[FloatArray, FloatArr
 
 
 def _deviation(spectrum: tuple[FloatArray, FloatArray]) -> float:
-    """Return the deviation at low frequency."""
+    """Return the standard deviation at low frequency."""
     frequency, power = spectrum
     low = frequency < _SLOW_HZ
     return float(np.sqrt(np.sum(power[low]) * frequency[1]))
@@ -297,7 +298,7 @@ def _over(
     band: tuple[float, float],
     other: tuple[float, float],
 ) -> float:
-    """Return the power per bin of one band over that of another; 1 where there are no bins."""
+    """Return the power per bin of one band over that of another; 1 if either has too few bins."""
     frequency, power = spectrum
     upper, lower = (power[(frequency > low) & (frequency < high)] for low, high in (band, other))
     if not len(upper) or len(lower) < 3:
@@ -307,10 +308,10 @@ def _over(
 
 def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     """
-    Return at most what rows bend by from one to the next, as noise of the band that they keep.
+    Return an upper estimate of the noise from second differences of rows, shape (n,) [N m].
 
-    What a model lacks is slower than rows. Friction that it lacks jumps where a joint turns round;
-    rows beside those do not count.
+    The noise is taken as white in the band that rows keep. What a model lacks changes little from
+    row to row. Friction that it lacks jumps at reversals; rows next to those do not count.
 
     """
     rows, informative = smooth[trajectory.rows], trajectory.informative
@@ -324,7 +325,7 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
 
 
 def _least(trajectory: Trajectory, arm: ArmModel) -> FloatArray:
-    """Return what no torque is better known than, shape (n,) [N m]."""
+    """Return the smallest noise that a torque is given, shape (n,) [N m]."""
     assert trajectory.motion.tau is not None
     size = np.sqrt(np.mean(trajectory.motion.tau**2, axis=0))
     least = np.maximum(TORQUE_RESOLUTION * np.maximum(size, 1e-2 * size.max()), 1e-12)

@@ -24,22 +24,23 @@ from armid_ros.recording import given_twice, Recording
 import numpy as np
 
 #: A diagnosis keeps six times the band of the motion where an identification keeps ten: what is
-#: beyond is mostly noise, which a gap has to stand out of.
+#: beyond is mostly noise, which a gap has to stand out from.
 _BANDS = 6.0
-#: Where noise of positions makes the upper third of that this many times as noisy as the lower
-#: one, in any joint, the upper third is cut off: there is less in it than it hides.
+#: Where noise of positions makes the upper third of that band this many times as noisy as the
+#: lower third, in any joint, the upper third is cut off: it hides more than it shows.
 _GROWTH = 4.0
-#: Wider rows hide more of the motion beside reversals: at least this share of it has to stay.
+#: With a narrower band, rows are wider and fewer of them informative next to reversals: at least
+#: this share of those has to stay.
 _MOVING = 0.7
-#: Beside a partner, noise of angles is all there is: the pass band is so much wider than where the
-#: motion sinks into it, or a fit takes inertia away to get rid of the noise of accelerations.
+#: With a partner, noise of angles dominates. The pass band is wider by this factor than where the
+#: motion falls below it; else a fit reduces inertias to get rid of the noise of accelerations.
 _NARROW = 1.25
 
 
 @dataclass(frozen=True)
 class Prepared:
     """
-    What is looked at.
+    Filtered data with their noise.
 
     Attributes
     ----------
@@ -48,11 +49,11 @@ class Prepared:
     data : tuple of Trajectory
         Stretches of the recordings in rows.
     base : BaseParameters
-        What the motion excites of the arm.
+        Base parameters of the arm that the motion excites.
     floors : tuple of NoiseFloor
-        Noise of each trajectory beside the arm that is fitted to it.
+        Noise of each trajectory in the residual of the arm as fitted to the data.
     as_described : tuple of ndarray, shape (n,)
-        Noise beside the arm as it is described [N m].
+        Noise in the residual of the arm as described; as in `floors` where nothing repeats [N m].
 
     """
 
@@ -64,12 +65,12 @@ class Prepared:
 
     @property
     def allowed(self) -> FloatArray:
-        """What rows may be uncertain by, shape (n,); see `Trajectory`."""
+        """Largest uncertain share of an informative row, shape (n,); see `Trajectory`."""
         return self.data[0].allowed
 
     @property
     def described(self) -> Evidence:
-        """The data over their noise beside the arm as it is described."""
+        """The data in units of their noise in the residual of the arm as described."""
         return Evidence.over_noise(self.data, self.as_described)
 
     @property
@@ -88,7 +89,7 @@ def choose_filters(
     """
     Return the filters of an identification, narrowed to what a diagnosis needs.
 
-    What noise of positions does is seen best where nothing is wrong.
+    The effect of noise of positions is best seen in a baseline, where nothing is wrong.
 
     """
     used = conditioning([*recordings, *baseline], settings.signals)
@@ -115,10 +116,11 @@ def prepare(
     misfit: bool = False,
 ) -> Prepared:
     """
-    Measure the noise of data, and once more without the upper third of the band if it is it.
+    Measure the noise of data, and again without the upper third of the band if noise fills that.
 
-    Rows beside reversals count as far as noise covers their friction; where the unit is a misfit,
-    they do not: dry friction is what a model gets wrong most, and otherwise in every motion.
+    Rows next to reversals are informative as far as noise exceeds the error of their friction.
+    Where the unit is a misfit they are not: dry friction is what a model gets wrong most, and
+    differently in every motion.
 
     """
     whole = arm.base_parameters(rng)
@@ -141,7 +143,7 @@ def prepare(
 
 
 def _informative_share(data: Sequence[Trajectory]) -> FloatArray:
-    """Return in what share of the rows each joint moves, shape (n,)."""
+    """Return the share of the rows of each joint that are informative, shape (n,)."""
     return np.asarray(np.concatenate([part.informative for part in data]).mean(axis=0))
 
 
@@ -159,7 +161,7 @@ def _measured(
 def _noise_over_friction(
     arm: ArmModel, prepared: Prepared, rng: np.random.Generator
 ) -> FloatArray:
-    """Return the noise of rows over dry friction as a fit tells it, shape (n,)."""
+    """Return the noise of rows over the fitted dry friction, both root mean square, (n,)."""
     data, sigma = prepared.data, prepared.sigma
     base, _ = excited(arm, arm.base_parameters(rng), data)
     arm = fit(arm, (), Evidence.over_noise(data, sigma), base).arm
@@ -178,7 +180,7 @@ def mended(
     baseline: Sequence[Recording],
     settings: DiagnosisSettings,
 ) -> tuple[list[Recording], list[Recording], list[Recording], list[str]]:
-    """Return recordings without damaged samples, and what reading and mending did to them."""
+    """Return recordings without damaged samples, and notes of what was damaged and mended."""
     notes: list[str] = []
     whole: list[list[Recording]] = []
     for part in (recordings, validate, baseline):

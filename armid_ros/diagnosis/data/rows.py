@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The linear problem of a diagnosis: weighted rows, in parts that are held out, in blocks."""
+"""The linear problem of a diagnosis: weighted rows, divided into folds and blocks."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ class Problem:
     Attributes
     ----------
     x : ndarray, shape (R, n, P)
-        Columns over noise; zero where a row is not informative.
+        Weighted columns; zero where a row is not informative.
     y : ndarray, shape (R, n)
-        Residual of the model over noise.
+        Weighted residual of the model.
     weight : ndarray, shape (R, n)
-        One over the noise, zero where a row is not informative [1/(N m)].
+        One over the unit of the gap, zero where a row is not informative [1/(N m)].
     block : ndarray of int, shape (R,)
-        Stretch of the data that a row belongs to; longer than any correlation.
+        Block of each row, a stretch of the data longer than any correlation.
     fold_of_block : ndarray of int, shape (B,)
-        Part of the data that a block belongs to.
+        Fold of each block.
 
     """
 
@@ -45,7 +45,7 @@ class Problem:
 
     @property
     def used(self) -> npt.NDArray[np.bool_]:
-        """Which entries count, shape (R, n)."""
+        """Which entries are informative, shape (R, n)."""
         return np.asarray(self.weight > 0.0)
 
     def chi2_per_row(self, residual: FloatArray) -> FloatArray:
@@ -53,7 +53,7 @@ class Problem:
         return np.asarray(np.sum(residual**2, axis=0) / np.maximum(self.used.sum(axis=0), 1))
 
     def with_columns(self, columns: FloatArray) -> Problem:
-        """Return the problem with more columns (R, n, p), not weighted yet, after the others."""
+        """Return the problem with more columns (R, n, p), not yet weighted, after its own."""
         more = columns * self.weight[:, :, np.newaxis]
         return replace(self, x=np.concatenate([self.x, more], axis=2))
 
@@ -75,24 +75,24 @@ def make_problem(
 @dataclass(frozen=True)
 class Projection:
     """
-    What free columns leave of others; they are fitted to all folds together.
+    Regression on the nuisance columns, fitted to all folds together.
 
     Attributes
     ----------
     basis : ndarray, shape (R n, f)
-        Basis of what the free columns make; orthonormal where nothing holds them.
+        Basis B of the nuisance columns, B B' y being the fit to y; orthonormal without a prior.
 
     """
 
     basis: FloatArray
 
     def rest(self, values: FloatArray) -> FloatArray:
-        """Return what is left of weighted rows (R, n) or (R, n, p)."""
+        """Return the residual of weighted rows (R, n) or (R, n, p)."""
         flat = values.reshape(len(self.basis), -1)
         return np.asarray((flat - self.basis @ (self.basis.T @ flat)).reshape(values.shape))
 
     def products(self, columns: FloatArray) -> FloatArray:
-        """Return products, shape (p, p), of what is left of weighted columns (R n, p)."""
+        """Return the products of weighted columns (R n, p) with their residuals, shape (p, p)."""
         made = self.basis.T @ columns
         return np.asarray(columns.T @ columns - made.T @ made)
 
@@ -100,7 +100,7 @@ class Projection:
 def project(
     problem: Problem, free: Sequence[int], prior: NormalEquations | None = None
 ) -> Projection:
-    """Find what the free columns can make, as far as their prior lets them."""
+    """Return the regression on the nuisance columns `free`, with a prior of their values."""
     rows = problem.x[:, :, list(free)].reshape(problem.y.size, len(free))
     own = rows.T @ rows
     return Projection(rows @ informative_basis(own if prior is None else own + prior.matrix))
@@ -114,17 +114,17 @@ class Products:
     Attributes
     ----------
     free : ndarray, shape (B, f, f)
-        Of the free columns with each other.
+        Of the nuisance columns with each other.
     aim : ndarray, shape (B, f)
-        Of the free columns with the residual.
+        Of the nuisance columns with the residual.
     border : ndarray, shape (B, f, C)
-        Of the free columns with those of the candidates.
+        Of the nuisance columns with those of the candidates.
     target : ndarray, shape (B, C)
         Of the columns of the candidates with the residual.
     own : tuple of ndarray, each (B, p, p)
         Of the columns of each candidate with each other.
     power : ndarray, shape (B,)
-        Squares of the residual.
+        Sum of squares of the residual.
 
     """
 
@@ -137,7 +137,7 @@ class Products:
 
 
 def products(problem: Problem, free: Sequence[int], spans: Sequence[slice]) -> Products:
-    """Multiply columns; those of the candidates, a span each, are the first of the problem."""
+    """Return the products of a problem whose first columns are the candidates', a span each."""
     chosen = list(free)
     size = max((span.stop for span in spans), default=0)
     blocks = int(problem.block.max()) + 1
@@ -167,18 +167,18 @@ def with_candidate(
     known: Products, problem: Problem, free: FloatArray, own: FloatArray
 ) -> Products:
     """
-    Return the products of one candidate beside what is free.
+    Return the products of one candidate and the nuisance columns.
 
     Parameters
     ----------
     known : Products
-        Of what is free.
+        Of the nuisance columns.
     problem : Problem
         The rows.
     free : ndarray, shape (R, n, f)
-        Columns that are free.
+        Weighted nuisance columns.
     own : ndarray, shape (R, n, p)
-        Columns of the candidate.
+        Weighted columns of the candidate.
 
     """
     blocks, size = len(known.power), own.shape[2]

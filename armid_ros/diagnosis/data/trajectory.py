@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What recordings show beside a model: torques and columns, filtered alike and decimated.
+Recordings as rows: measured torques and columns of a model, filtered alike and decimated.
 
-A trajectory is one unbroken stretch of a recording. Its motion stays at the full rate, where
-columns are computed; its rows are decimated, which is where everything is compared.
+A trajectory is one unbroken stretch of a recording. Its motion stays at a higher rate, at which
+columns are computed; torques and columns are compared in rows, which are decimated.
 
 """
 
@@ -38,16 +38,17 @@ from scipy import signal
 _OVERSAMPLING = 8
 #: A joint slower than this share of its top speed for this long [s] is at rest.
 _REST_SPEED, REST_TIME = 0.02, 0.2
-#: Below this share of the top speed, or so many deviations of its noise, the sign of a velocity is
-#: uncertain, and so is dry friction.
+#: Below this share of the top speed, or so many standard deviations of its noise, the sign of a
+#: velocity is uncertain, and with it dry friction.
 _REVERSAL_SPEED, _REVERSAL_NOISE = 0.004, 3.0
-#: Share of a row of which that sign may be uncertain in any case: three rows beside a reversal.
+#: Share of a row in which that sign may be uncertain in any case; in three rows next to a reversal
+#: the share is larger.
 UNSURE = 0.003
-#: Parts that data are held out in, two of each recording at the least: what one fast recording
-#: shows alone can be learned from half of it.
+#: Folds of the data at the least, and two of each recording: what one fast recording alone shows
+#: can be learned from half of it.
 PARTS = 6
-#: Blocks of each part of the data, of a second or two, which is longer than any correlation of
-#: noise; a block has this many rows at the least.
+#: Blocks of each fold, of a second or two, which is longer than any correlation of noise; a block
+#: has this many rows at the least.
 BLOCKS, _LEAST_ROWS = 6, 8
 
 
@@ -61,21 +62,21 @@ class Trajectory:
     source : str
         The recording.
     fold : int
-        Which part of the data it belongs to when parts are held out.
+        Number of the recording; `fold_rows` divides each recording into folds.
     motion : Motion
         Filtered motion with the measured torque, N samples.
     used : Conditioning
-        From motion to rows.
+        Filter and decimation from the motion to rows.
     rows : ndarray of int, shape (M,)
-        Samples of the motion that the rows sit on.
+        Samples of the motion at which the rows are.
     unsure : ndarray, shape (M, n)
-        Share of each row of which the sign of the velocity is uncertain; infinite at rest.
+        Share of each row in which the sign of the velocity is uncertain; infinite at rest.
     allowed : ndarray, shape (n,)
-        The largest such share of a row that tells something.
+        The largest such share of an informative row.
     period_recorded : float
         Time between its samples as they were recorded [s].
     sensors : SensorNoise or None
-        What their noise does beside another machine; None where there is none.
+        Effect of sensor noise on an arm tied to another machine; None where there is none.
 
     """
 
@@ -91,7 +92,7 @@ class Trajectory:
 
     @cached_property
     def informative(self) -> npt.NDArray[np.bool_]:
-        """Return False where a joint rests or turns round: its friction is unknown, (M, n)."""
+        """Return False where a joint rests or reverses: its friction is unknown, shape (M, n)."""
         return np.asarray(self.unsure <= self.allowed)
 
     def reduce(self, values: FloatArray) -> FloatArray:
@@ -100,17 +101,17 @@ class Trajectory:
 
     @cached_property
     def smooth(self) -> Trajectory:
-        """Return the same with positions that have nothing beyond the band of the motion."""
+        """Return the trajectory with positions limited to the band of the motion."""
         return replace(self, motion=smoothed(self.motion))
 
     @cached_property
     def at_rows(self) -> Motion:
-        """Return the motion at the samples that the rows sit on."""
+        """Return the motion at the samples of the rows."""
         return self.motion.select(self.rows)
 
     @property
     def stretch(self) -> Stretch:
-        """Return the rows as faults of data are looked for in."""
+        """Return the rows in the form in which faults of data are looked for."""
         return Stretch(self.source, self.at_rows.with_torque(self.torque), self.informative)
 
     @cached_property
@@ -125,7 +126,7 @@ class Trajectory:
         return self.reduce(self.motion.tau)
 
     def with_torque_moved(self, by: FloatArray) -> Trajectory:
-        """Return the same where more torque was measured, by as much all the time, (n,) [N m]."""
+        """Return the trajectory with a constant (n,) [N m] added to the measured torque."""
         assert self.motion.tau is not None
         return replace(self, motion=self.motion.with_torque(self.motion.tau + by))
 
@@ -155,10 +156,10 @@ def trajectories(
     """
     Cut recordings into unbroken stretches, conditioned alike.
 
-    Rows may be uncertain by as much as is allowed, (n,); see `Trajectory`.
+    The largest uncertain share of an informative row is `allowed`, (n,); see `Trajectory`.
 
-    Where another machine was recorded beside the arm, what noise of the angles does to it is
-    measured as well.
+    Where another machine was recorded beside the arm, the effect of the noise of angles on the
+    tied arm is included.
 
     Raises
     ------
@@ -187,10 +188,10 @@ def trajectories(
 
 def thinnable(used: Conditioning) -> Conditioning:
     """
-    Return a conditioning of which the motion can be thinned out as far as columns allow.
+    Return a conditioning whose motion can be thinned out as far as columns allow.
 
-    They are computed at a rate that divides that of the recording and of which rows are a whole
-    part: at most an eighth more rows are kept.
+    The rate of columns divides that of the recording and is a multiple of that of rows: at most an
+    eighth more rows are kept.
 
     """
     widest = _widest(used)
@@ -199,9 +200,9 @@ def thinnable(used: Conditioning) -> Conditioning:
 
 def _widest(used: Conditioning) -> int:
     """
-    Return by how much a motion may be thinned out before columns are made of it.
+    Return the largest factor by which a motion may be thinned out before columns are computed.
 
-    Columns go with squares of velocities, which reach to twice the cut-off: half of the rate has
+    Columns contain squares of velocities, which reach to twice the cut-off: half of the rate has
     to be more than that.
 
     """
@@ -210,7 +211,7 @@ def _widest(used: Conditioning) -> int:
 
 
 def _thin(used: Conditioning) -> int:
-    """Return by how much a motion is thinned out before columns are made of it."""
+    """Return the factor by which a motion is thinned out before columns are computed."""
     return max(d for d in range(1, _widest(used) + 1) if used.decimation % d == 0)
 
 
@@ -245,7 +246,7 @@ def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
 
 
 def _unsure(motion: Motion, used: Conditioning, least: FloatArray) -> FloatArray:
-    """Return of what share of filtered samples the sign of the velocity is uncertain, (N, n)."""
+    """Return the share of each filtered sample with an uncertain sign of velocity, (N, n)."""
     speed = np.abs(motion.dq)
     slow = speed < np.maximum(_REVERSAL_SPEED * speed.max(axis=0), least)
     slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
@@ -257,7 +258,7 @@ def _unsure(motion: Motion, used: Conditioning, least: FloatArray) -> FloatArray
 def block_rows(
     data: Sequence[Trajectory],
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Return the block of every row, and the part of the data of every block."""
+    """Return the block of every row, and the fold of every block."""
     fold = fold_rows(data)
     block = np.empty(len(fold), dtype=np.intp)
     owner: list[int] = []
@@ -271,21 +272,21 @@ def block_rows(
 
 
 def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
-    """Return one over the noise of all rows, zero where they tell nothing, (R, n) [1/(N m)]."""
+    """Return one over sigma of all rows, zero where uninformative, (R, n) [1/(N m)]."""
     return np.concatenate([part.informative / s for part, s in zip(data, sigma, strict=True)])
 
 
 def weighted_rows(
     rows: Sequence[FloatArray], data: Sequence[Trajectory], sigma: Sequence[FloatArray]
 ) -> Iterator[FloatArray]:
-    """Yield rows (M, n) or (M, n, P) of each trajectory with the weights of `row_weights`."""
+    """Yield rows (M, n) or (M, n, P) of each trajectory, times the weights of `row_weights`."""
     for own, part, s in zip(rows, data, sigma, strict=True):
         weight = row_weights([part], [s])
         yield own * (weight[:, :, np.newaxis] if own.ndim > 2 else weight)
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
-    """Return the part of the data of every row, a stretch of a recording."""
+    """Return the fold of every row, a stretch of a recording."""
     recordings = len({part.fold for part in data})
     pieces = max(2, -(-PARTS // max(recordings, 1)))
     rows = []
@@ -298,7 +299,7 @@ def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
 
 @dataclass(frozen=True)
 class Workspace:
-    """The data and the arm that columns are computed for, when shapes are refined."""
+    """The data and the arm for which columns are computed when shapes are refined."""
 
     arm: ArmModel
     data: tuple[Trajectory, ...]
@@ -309,7 +310,7 @@ class Workspace:
         return np.asarray(np.concatenate(blocks)[:, :, list(kept)])
 
     def smooth_columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
-        """Return what they would be without the noise that positions have beyond the motion."""
+        """Return the columns without the noise of positions beyond the band of the motion."""
         smooth = tuple(part.smooth for part in self.data)
         return replace(self, data=smooth).columns(effect, kept)
 
@@ -317,9 +318,10 @@ class Workspace:
         self, effect: Effect, kept: Sequence[int], noise: Sequence[FloatArray]
     ) -> FloatArray:
         """
-        Return what columns of an effect times noise of the torque are in the mean, (R, n, p).
+        Return the mean of the columns of an effect times the noise of the torque, (R, n, p).
 
-        Columns where the torque is one deviation of each trajectory, (n,) [N m], higher and lower.
+        It comes from the columns with a torque that is one standard deviation of each trajectory,
+        (n,) [N m], higher and lower.
 
         """
         blocks = []

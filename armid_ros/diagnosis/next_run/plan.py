@@ -3,13 +3,13 @@
 """
 The next run: of many motions that the arm can make, the one that separates names best.
 
-T-optimality (Atkinson and Fedorov 1975): with the named effect in the arm, a motion is worth what
-the rival, with everything that is free fitted to it, cannot explain of its torque, over the unit
-of the gap.
+T-optimality (Atkinson and Fedorov 1975): with the named effect in the arm, a motion is worth the
+squares of the torque, over the unit of the gap, that the rival, fitted jointly with the nuisance
+parameters, cannot explain.
 
 Each motion shows something else: slow and fast motion of all joints, motion of single joints,
 reversals so small that dry friction does not break away, shaking; and the same with a known
-payload, which alone tells a gain of the drives from the masses.
+payload, which alone separates a gain of the drives from the masses.
 
 """
 
@@ -38,16 +38,16 @@ import numpy as np
 
 #: The file that a run is written to.
 EXPERIMENT_FILE = 'experiment.yaml'
-#: Names are told apart beyond doubt at this many standard deviations: no payload is asked for
+#: Names are separated beyond doubt at this many standard deviations: no payload is asked for
 #: where a motion alone does it, and no motion is designed where a template does.
 _SURE = 5.0
 #: ... and not at all below this many.
 _NOTHING = 1.0
-#: Deviations beyond which more of them say nothing more: noise is not known so well.
+#: Standard deviations above which their number means nothing: noise is not known so well.
 _CERTAIN = 30.0
-#: Pairs of names that a sentence has.
+#: Pairs of names in a sentence.
 _SAID = 3
-#: Rivals of a provisional name that has none: the next best of its ranking.
+#: A provisional name without rivals is separated from so many of the next best of its ranking.
 _RUNNERS_UP = 3
 #: A search for a better motion than the templates: few steps, as each costs as much as a template.
 _STARTS, _CANDIDATES, _ITERATIONS = 1, 4, 25
@@ -65,9 +65,9 @@ class NextRun:
     template : str
         What kind of motion it is, in words.
     load : Load or None
-        What is to be fixed to the last link in a second run of the same motion; None: one run.
+        Load to be fixed to the last link in a second run of the same motion; None: one run.
     separations : tuple of Separation
-        How far it tells each pair of names apart.
+        How far it separates each pair of names.
 
     """
 
@@ -78,12 +78,12 @@ class NextRun:
 
     @property
     def expected_z(self) -> float:
-        """Return the standard deviations between the two names that are nearest to each other."""
+        """Return the standard deviations between the two names that are separated least."""
         return min(pair.z for pair in self.separations)
 
     @property
     def sentence(self) -> str:
-        """Return what to do and what it would show, the least sure first, for a person."""
+        """Return what to do and what it would show, in words, the least separated pair first."""
         separated = sorted((s for s in self.separations if s.z >= _NOTHING), key=lambda one: one.z)
         alike = [one for one in self.separations if one.z < _NOTHING]
         parts = [
@@ -121,7 +121,7 @@ class NextRun:
 
 
 def _many(deviations: float) -> str:
-    """Return a number of deviations as far as it says anything."""
+    """Return a number of deviations in words, up to the largest that noise is known well for."""
     return f'{deviations:.0f}' if deviations < _CERTAIN else f'more than {_CERTAIN:.0f}'
 
 
@@ -132,12 +132,12 @@ def next_run(
     collision: CollisionModel | None = None,
 ) -> NextRun | None:
     """
-    Choose a motion that tells a doubtful name from its rivals.
+    Choose a motion that separates names in doubt from their rivals.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        What was found.
+        The names and their rivals.
     rng : numpy.random.Generator
         Draws the motions.
     collision : CollisionModel, optional
@@ -146,13 +146,13 @@ def next_run(
     Returns
     -------
     NextRun or None
-        None if no name is in doubt, or the arm is tied to a machine whose motion nobody plans.
+        None if no name is in doubt, or the arm is tied to a machine whose motion is not planned.
 
     Raises
     ------
     TrajectoryError
-        If the arm cannot make any of the motions, or none tells any of the names apart; says what
-        stands in the way.
+        If the arm cannot make any of the motions, or none separates any of the names; says what
+        prevents it.
 
     """
     doubts = _doubts(diagnosis)
@@ -193,7 +193,7 @@ def next_run(
 
 @dataclass(frozen=True)
 class _Run:
-    """A motion and what it would show."""
+    """A motion and the separations that it would show."""
 
     template: Template
     trajectory: FourierTrajectory
@@ -202,12 +202,12 @@ class _Run:
 
     @property
     def worth(self) -> float:
-        """All pairs count, and one that no motion separates does not decide."""
+        """Sum of log(1 + D_T): all pairs count; one that no motion separates decides nothing."""
         return float(sum(np.log1p(pair.power) for pair in self.separations))
 
 
 def _in_order(runs: Sequence[_Run]) -> list[_Run]:
-    """Return runs, best first; with a payload only where that tells apart what no motion does."""
+    """Return runs, best first; those with a payload last if a motion alone separates as much."""
     most = np.max([[pair.z for pair in run.separations] for run in runs], axis=0, initial=0.0)
     wanted = np.where(most < _NOTHING, 0.0, np.minimum(most, _SURE))
     plain = [run for run in runs if not run.template.loaded]
@@ -227,7 +227,7 @@ def _run(
 
 
 def _doubts(diagnosis: Diagnosis) -> tuple[Doubt, ...]:
-    """Return the names that may be others: with rivals, or provisional."""
+    """Return pairs of a name and a rival, or a runner-up where the name is provisional."""
     explanation = diagnosis.explanation
     if explanation is None:
         return ()
@@ -254,7 +254,7 @@ def _designed(
     collision: CollisionModel | None,
     rng: np.random.Generator,
 ) -> list[_Run]:
-    """Return a motion like the best template, made for the nearest of the pairs in doubt."""
+    """Return a motion like the best template, designed for the pair that is separated least."""
     doubtful = [k for k, pair in enumerate(best.separations) if _NOTHING <= pair.z < _SURE]
     if not doubtful:
         return []

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How far a motion tells two names apart.
+How far a motion separates two names.
 
     D_T = min over the rival's values of |f_A - f_B|^2 / sigma^2
 
-with f_A the torque of the arm as it was patched and f_B that of the rival, all that is free being
-fitted with it. The square root is the number of standard deviations between the two.
+with f_A the torque of the patched model and f_B that of the model with the rival, fitted jointly
+with the nuisance parameters. The square root is the number of standard deviations between the two.
 
 """
 
@@ -27,33 +27,33 @@ from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
 
-#: Samples per second at which a motion is looked at [Hz]; its noise is that of the rows.
+#: Samples per second at which a motion is evaluated [Hz]; its noise is that of the rows.
 _RATE = 50.0
 #: Periods that are recorded.
 _PERIODS = 2
-#: A joint slower than this share of its top speed tells nothing: its dry friction is undetermined.
+#: A joint slower than this share of its top speed is not informative: dry friction is arbitrary.
 _SLOW = 0.02
 #: Shapes of a rival that are tried.
 _MOST_SHAPES = 12
-#: Share of the torque that a joint can give, or gives, that a known payload takes.
+#: Torque of a known payload over the torque that a joint can give, or gives in the motion.
 _LOAD = 0.15
-#: A frame nearer than this to the last joint is at it [m].
+#: A frame nearer than this to the last joint counts as at it [m].
 _NEAR = 0.01
-#: Directions of columns shorter than this share of the longest are made of others.
+#: Singular values of columns below this share of the largest count as zero.
 _DEPENDENT = 1e-7
 
 
 @dataclass(frozen=True)
 class Doubt:
     """
-    A name and one that is possible in its place.
+    A name and a rival.
 
     Attributes
     ----------
     named : Named
-        What was named, as it was fitted.
+        The named effect, as fitted.
     rival : Effect
-        The other one.
+        The rival.
 
     """
 
@@ -62,13 +62,13 @@ class Doubt:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Return the joints that either acts on; none if one of them acts on the whole arm."""
+        """Return the joints on which either acts; none if one of them acts on the whole arm."""
         if not self.named.effect.joints or not self.rival.joints:
             return ()
         return tuple(dict.fromkeys((*self.named.effect.joints, *self.rival.joints)))
 
     def models(self, diagnosis: Diagnosis) -> tuple[ArmModel, ArmModel]:
-        """Return the patched arm, and the same with the rival in place of the name."""
+        """Return the patched model, and the same with the rival in place of the name."""
         arm, own = diagnosis.arm, self.named.effect
         kept = [k for k, effect in enumerate(arm.effects) if effect != own]
         effects = tuple(arm.effects[k] for k in kept)
@@ -80,12 +80,12 @@ class Doubt:
 @dataclass(frozen=True)
 class Separation:
     """
-    How far a motion tells a name from a rival.
+    How far a motion separates a name from a rival.
 
     Attributes
     ----------
     name, rival : str
-        The two.
+        The two effects.
     power : float
         D_T of the run.
 
@@ -105,18 +105,18 @@ class Separation:
         diagnosis: Diagnosis, doubt: Doubt, trajectory: FourierTrajectory, load: Load | None = None
     ) -> Separation:
         """
-        Predict what a run separates.
+        Predict how far a run separates two names.
 
         Parameters
         ----------
         diagnosis : Diagnosis
-            Gives the arm, what is free of it, and the unit of its gap.
+            Gives the arm, its nuisance parameters, and the unit of its gap.
         doubt : Doubt
             The two names.
         trajectory : FourierTrajectory
             The motion; two periods of it are recorded.
         load : Load, optional
-            What the arm carries in a second run.
+            Load that the arm carries in a second run.
 
         """
         motion = trajectory.motion(np.arange(_PERIODS * trajectory.period * _RATE) / _RATE)
@@ -160,7 +160,7 @@ class Load:
 
     @staticmethod
     def along(arm: ArmModel, trajectory: FourierTrajectory) -> Load:
-        """Return a load that takes a fair share of the torque of some joint along a motion."""
+        """Return a load of which no joint takes more than `_LOAD` of its torque along a motion."""
         motion = trajectory.one_period(int(trajectory.period * _RATE))
         frame = _tip(arm.robot)
         unit = np.abs(arm.rigid_columns(motion)[:, :, -10:] @ _point(arm.robot, frame)).max(axis=0)
@@ -184,7 +184,7 @@ def _tip(robot: Robot) -> str:
 
 
 def _point(robot: Robot, frame: str) -> FloatArray:
-    """Return the ten parameters of 1 kg at a frame; at the link's middle if that is the joint."""
+    """Return the ten parameters of 1 kg at a frame, or the centre of mass if that is the joint."""
     place = robot.model.frames[robot.model.getFrameId(frame)].placement.translation
     if np.linalg.norm(place) < _NEAR:
         place = robot.model.inertias[robot.model.njoints - 1].lever
@@ -194,10 +194,10 @@ def _point(robot: Robot, frame: str) -> FloatArray:
 
 def _weight(diagnosis: Diagnosis, motion: Motion) -> FloatArray:
     """
-    Return the square root of the rows that a sample stands for over their unit, shape (N, n).
+    Return the square root of the rows per sample, over the unit of the gap, shape (N, n).
 
-    Noise that is white over the rows has their rate in it: more samples tell no more. Where the
-    unit is a misfit it is so in the next run.
+    The noise is white over rows: a higher rate of samples adds no information. A unit that is a
+    misfit is taken to be the same in the next run.
 
     """
     assert diagnosis.explanation is not None
@@ -209,7 +209,7 @@ def _weight(diagnosis: Diagnosis, motion: Motion) -> FloatArray:
 
 
 def _stack(columns: list[FloatArray], weight: FloatArray) -> FloatArray:
-    """Return columns of one run or two (N, n, p) over noise, shape (rows, p)."""
+    """Return columns of one run or two (N, n, p), weighted and stacked, shape (rows, p)."""
     blocks = [block * weight[:, :, np.newaxis] for block in columns]
     return np.concatenate(
         [block.reshape(block.shape[0] * block.shape[1], block.shape[2]) for block in blocks]
@@ -217,7 +217,7 @@ def _stack(columns: list[FloatArray], weight: FloatArray) -> FloatArray:
 
 
 def _free(diagnosis: Diagnosis, arm: ArmModel, named: Effect, motion: Motion) -> FloatArray:
-    """Return the columns of all that is fitted whichever name is right, shape (N, n, f)."""
+    """Return the nuisance columns, fitted whichever name is right, shape (N, n, f)."""
     assert diagnosis.explanation is not None
     found = [own.effect for own in diagnosis.explanation.fitted.named]
     effects = arm.effects if diagnosis.refitted else found
@@ -228,7 +228,7 @@ def _free(diagnosis: Diagnosis, arm: ArmModel, named: Effect, motion: Motion) ->
 
 
 def _basis(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of columns (R, p), each of the same worth."""
+    """Return an orthonormal basis of columns (R, p), which are scaled to equal length first."""
     length = np.linalg.norm(columns, axis=0)
     columns = columns[:, length > 0.0] / length[length > 0.0]
     if not columns.shape[1]:
@@ -238,7 +238,7 @@ def _basis(columns: FloatArray) -> FloatArray:
 
 
 def _shapes(rival: Effect, motion: Motion, arm: ArmModel) -> Iterator[Effect]:
-    """Yield the rival with the shape it was found with and others it might have."""
+    """Yield the rival with the shape it was found with, and with others of its grid."""
     yield rival
     if not rival.shapes:
         return

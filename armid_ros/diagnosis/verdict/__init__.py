@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From an explanation to shares, a word, a sentence and a document."""
+"""From an explanation to shares of the gap, a verdict, a sentence and a document."""

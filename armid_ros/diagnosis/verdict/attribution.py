@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How much of the gap each cause takes, on data that nothing was fitted to, and which are said first.
+The share of the gap that each cause explains of held-out data, and which causes are the headline.
 
-The gap is the squares of what the model leaves, over the unit of each joint. Causes share it in
-the order in which they take most of it; intervals are those of resampled blocks. The headline has
-those that other data do not deny, and that take enough.
+The gap is the sum of squares of the weighted residual of the model. Causes are added one by one,
+the one with the largest gain first; intervals come from resampled blocks (bootstrap). The headline
+has the causes that held-out data do not deny, and whose share is large enough.
 
 """
 
@@ -29,25 +29,25 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Resamplings of the blocks: ends of a 95 % interval are known to a tenth of it.
+#: Resamplings of the blocks: the ends of a 95 % interval are accurate to a tenth of it.
 _RESAMPLINGS = 500
 
 
 @dataclass(frozen=True)
 class Attribution:
     """
-    Squares of the gap, block by block.
+    The gap and the gains of the names, block by block.
 
     Attributes
     ----------
     order : tuple of int
-        The names of the explanation, in the order in which they take most.
+        The names of the explanation in the order in which they are added, largest gain first.
     whole : ndarray, shape (B,)
-        The gap.
+        The gap: held-out squares without any name.
     taken : ndarray, shape (K, B)
-        What each name takes of it, in the order of the explanation.
+        Gain of each name, in the order of the explanation.
     denied : tuple of int
-        Names that the data deny, the least first; see `denies`.
+        Names that the held-out data deny, last of the order first; see `denies`.
 
     """
 
@@ -57,7 +57,7 @@ class Attribution:
     denied: tuple[int, ...] = ()
 
     def share(self, names: Sequence[int]) -> float:
-        """Return the share that some of the names take together."""
+        """Return the share of the gap that some of the names explain together."""
         return float(self.taken[list(names)].sum() / max(float(self.whole.sum()), 1e-300))
 
     def interval(self, names: Sequence[int], rng: np.random.Generator) -> tuple[float, float]:
@@ -71,14 +71,14 @@ class Attribution:
 
 def attribute(explanation: Explanation, unseen: Evidence | None) -> Attribution:
     """
-    Share out the gap.
+    Return the gain of each name.
 
     Parameters
     ----------
     explanation : Explanation
-        What was found.
+        The names, fitted.
     unseen : Evidence or None
-        Data that nothing was fitted to; None predicts each part of the data from the others.
+        Held-out data; None predicts each fold of the data from the others.
 
     """
     left_out = _left_out(explanation)
@@ -86,7 +86,7 @@ def attribute(explanation: Explanation, unseen: Evidence | None) -> Attribution:
 
 
 def _left_out(explanation: Explanation) -> Attribution:
-    """Predict each part of the data from the others, name after name."""
+    """Predict each fold from the others, adding the name with the largest gain at a time."""
     view = View.of(explanation.fitted, explanation.evidence)
     named = explanation.fitted.named
     arm = explanation.reference.arm
@@ -129,30 +129,31 @@ def _left_out(explanation: Explanation) -> Attribution:
 
 def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
     """
-    Predict other data with the first name, the first two, and so on, fitted to the data.
+    Predict held-out data with the first name, the first two, and so on, fitted to the data.
 
-    A name is denied where it acts: a body that is fitted with it changes other joints as well.
+    Only joints in which a name acts can deny it: a body that is fitted jointly with it changes
+    other joints as well.
 
     """
     arms = [explanation.reference.arm, *_staircase(explanation, order)]
-    left = [[part.residual(arm) for part in unseen.data] for arm in arms]
-    squares = [unseen.block_squares(rows) for rows in left]
+    residuals = [[part.residual(arm) for part in unseen.data] for arm in arms]
+    squares = [unseen.block_squares(rows) for rows in residuals]
     taken = np.zeros((len(order), len(squares[0])))
     denied = []
     for position, k in enumerate(order):
-        gone = squares[position] - squares[position + 1]
-        steps = zip(left[position], left[position + 1], strict=True)
+        gain = squares[position] - squares[position + 1]
+        steps = zip(residuals[position], residuals[position + 1], strict=True)
         made = unseen.block_squares([before - after for before, after in steps])
         own = _acts(explanation, k, unseen)
-        taken[k] = gone.sum(axis=1)
-        if denies((gone + made)[:, own].sum(axis=1) / 2.0, made[:, own].sum(axis=1)):
+        taken[k] = gain.sum(axis=1)
+        if denies((gain + made)[:, own].sum(axis=1) / 2.0, made[:, own].sum(axis=1)):
             denied.append(k)
     whole = squares[0].sum(axis=1)
     return Attribution(tuple(order), whole, taken, tuple(reversed(denied)))
 
 
 def _acts(explanation: Explanation, name: int, evidence: Evidence) -> npt.NDArray[np.bool_]:
-    """Return in which joints a name makes torque, shape (n,)."""
+    """Return in which joints a name acts, shape (n,)."""
     own, arm = explanation.fitted.named[name], explanation.fitted.arm
     blocks = [columns_of(own, arm, part) for part in evidence.data]
     return np.asarray(np.any([np.any(block, axis=(0, 2)) for block in blocks], axis=0))
@@ -168,10 +169,10 @@ def headline(
     explanation: Explanation, unseen: Evidence | None, settings: DiagnosisSettings, least: float
 ) -> tuple[Explanation, Attribution]:
     """
-    Drop names that other data deny, leave small ones to the small print, share out the gap.
+    Move names that held-out data deny, and small ones, out of the headline; return the shares.
 
-    The gap is shared out on those data, or on the data left out one by one where those hardly show
-    what was named.
+    Shares are of the held-out data, or of folds of the fitted data if the former hardly show what
+    was named.
 
     """
     shares = shares_of(explanation, unseen, settings)
@@ -185,10 +186,10 @@ def smallest(
     explanation: Explanation, shares: Attribution, settings: DiagnosisSettings, least: float
 ) -> int | None:
     """
-    Return the name that takes least, if it is small print; None if every name is a headline.
+    Return the name of the smallest share that is small print; None if all are headline.
 
-    A name is small print whose values may all be zero, or that takes less than a share and leaves
-    no gap open where it is missing.
+    A name is small print if all of its values may be zero, or if its share is below `least` and no
+    gap opens without it.
 
     """
     for k in sorted(range(len(explanation.steps)), key=lambda k: shares.share([k])):
@@ -201,7 +202,7 @@ def smallest(
 
 
 def _opens(fewer: Explanation, explanation: Explanation, settings: DiagnosisSettings) -> bool:
-    """Return whether a gap is open in a joint without a name, and closed with it."""
+    """Return whether some joint has a gap without a name (`fewer`), and none with it."""
     if explanation.prior is not None:
         fewer, explanation = in_model_as_given(fewer), in_model_as_given(explanation)
     limits = explanation.evidence.limits(explanation.fitted.residual, settings)
@@ -211,7 +212,7 @@ def _opens(fewer: Explanation, explanation: Explanation, settings: DiagnosisSett
 def shares_of(
     explanation: Explanation, unseen: Evidence | None, settings: DiagnosisSettings
 ) -> Attribution:
-    """Share out the gap on unseen data, or on parts left out where those hardly show a name."""
+    """Return shares of held-out data, or of folds where held-out data hardly show the names."""
     left_out = attribute(explanation, None)
     if unseen is None:
         return left_out
@@ -223,10 +224,11 @@ def shares_of(
 
 def may_be_nothing(explanation: Explanation, name: int) -> bool:
     """
-    Return whether the 95 % interval of every value of a name holds zero.
+    Return whether the 95 % interval of every value of a name contains zero.
 
-    Shapes are none of them: they say how it acts, and not whether. Values are asked at the shapes
-    that were found, as a drift may be slow and large or fast and small and still be there.
+    Shapes do not count: they say how a cause acts, and not whether. The intervals are conditional
+    on the shapes that were found: a drift may be slow and large or fast and small, and there in
+    either case.
 
     """
     fitted = explanation.fitted

@@ -3,7 +3,7 @@
 """
 diagnosis.json, schema armid/diagnosis/1.
 
-It holds from which size on the data would show an effect, too: what silence about it is worth.
+It also holds the smallest detectable size of each effect: what it is worth that none is named.
 
 """
 
@@ -26,8 +26,8 @@ import numpy as np
 SCHEMA = 'armid/diagnosis/1'
 #: Candidates that are listed.
 _MOST_CANDIDATES = 20
-#: Standard deviations of a value from which on it shows. On a two-link arm, effects of one to four
-#: times the size that follows were named, of half of it none.
+#: Standard deviations of a value from which on it is detectable. On a two-link arm, effects of one
+#: to four times the resulting size were named, of half of it none.
 _SHOWS = 5.0
 
 
@@ -38,7 +38,7 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
     Parameters
     ----------
     diagnosis : Diagnosis
-        What was found.
+        The diagnosis.
     model : str
         File of the patched model, as seen from the document.
 
@@ -83,7 +83,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
 
 
 def _ties(finding: Finding) -> dict[str, Any]:
-    """Return where a finding ends at another machine, and the intervals of its stiffnesses."""
+    """Return the ties of a finding to another machine, with the intervals of their stiffness."""
     if not finding.ties:
         return {}
     rows = []
@@ -144,7 +144,7 @@ def _filters(diagnosis: Diagnosis) -> dict[str, float] | None:
 
 
 def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return what was looked at first, in the order in which it was decided."""
+    """Return the best candidates of the first look, in the order of their ranking."""
     explanation = diagnosis.explanation
     survey = None if explanation is None else explanation.survey
     if survey is None:
@@ -169,7 +169,7 @@ def _candidate(trial: Trial, total: float, tried: int) -> dict[str, Any]:
 
 
 def _detectable(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return from which size on the data would show each effect; null where at no size."""
+    """Return the smallest detectable size of each effect; null where no size is detectable."""
     return [
         {
             'name': row.name,
@@ -190,7 +190,7 @@ def _finite(value: float) -> float | None:
 @dataclass(frozen=True)
 class Detectable:
     """
-    How large an effect has to be.
+    Smallest detectable size of an effect.
 
     Attributes
     ----------
@@ -199,11 +199,11 @@ class Detectable:
     joints : tuple of str
         Where; none for the whole arm.
     parameter : ParameterName or None
-        What is meant by its size; None where no size shows.
+        Parameter whose size it is; None where no size is detectable.
     size : float
-        Smallest size that shows, the others of its parameters being fitted too; inf if none does.
+        Smallest detectable size, its other parameters being fitted jointly; inf if there is none.
     visible : float
-        Share of its torque that the free parameters cannot make.
+        Share of its torque that the nuisance parameters cannot reproduce.
 
     """
 
@@ -215,7 +215,7 @@ class Detectable:
 
 
 def smallest_size(trial: Trial) -> tuple[int, float]:
-    """Return the first parameter of a candidate that is identifiable, and from which size on."""
+    """Return the first identifiable parameter of a candidate, and its smallest detectable size."""
     rows = zip(trial.candidate.kept, trial.std, trial.resolution, strict=True)
     for index, std, resolution in rows:
         if resolution > IDENTIFIABLE:
@@ -224,7 +224,7 @@ def smallest_size(trial: Trial) -> tuple[int, float]:
 
 
 def detectable(explanation: Explanation | None, robot: Robot) -> tuple[Detectable, ...]:
-    """Return the sizes of all effects on all joints, in the order of the catalogue."""
+    """Return the detectable sizes of all effects on all joints, in the order of the catalogue."""
     survey = None if explanation is None else explanation.survey
     if survey is None:
         return ()

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What a diagnosis came to, and causes as they are said.
+The result of a diagnosis, and causes as they are reported.
 
-A cause has its name, joints, values, share of the gap, and what else it may be.
+A cause has its name, joints, values, share of the gap, and rivals.
 
 """
 
@@ -20,13 +20,13 @@ from armid_ros.estimate import ParameterName
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 
-#: Less of the gap than this is none in a sentence.
+#: Smallest share of the gap that a sentence gives as a number.
 SAID = 0.01
 
 
 @dataclass(frozen=True)
 class Rival:
-    """A name that the data do not exclude in the place of another, and the joints it is on."""
+    """A name that the data do not exclude in place of another, and its joints."""
 
     name: str
     joints: tuple[str, ...]
@@ -46,31 +46,31 @@ class Finding:
     parameters : tuple of ParameterName
         Its parameters, shapes included.
     values, std : tuple of float
-        Their values and standard deviations; nan where the data do not tell.
+        Their values and standard deviations; nan where the data do not determine them.
     share : float
-        Share of the held-out gap that it takes, 0 to 1.
+        Share of the held-out gap that it explains, 0 to 1.
     share_interval : tuple of float
         Its 95 % interval.
     p : float
-        Probability of such a gain if it did nothing, over all that was tried.
+        Probability of such a gain by chance, corrected for all candidates that were tried.
     rivals : tuple of Rival
-        What the data do not exclude in its place, the likeliest first.
+        Names that the data do not exclude in its place, the likeliest first.
     experiment : str
-        What would separate them; empty if there is nothing to separate.
+        The experiment that would separate them; empty if there are no rivals.
     gain : float
-        Squares over the unit of the gap that it takes, held out.
+        Reduction of the held-out squares.
     sign : str
         What a positive value means, where the name does not say it.
     ties : tuple of Tie
-        Where it holds the arm, in the order of its joints, if it ends at another machine.
+        Where it holds the arm, in the order of its joints, if it is tied to another machine.
     weighs : bool
-        Whether its first value is a weight that says what it is.
+        Whether it is described by a mass, its first value.
     together : tuple of str
-        Names that are one cause with it, of which its share is: a gravity of another direction and
-        another size.
+        Names that are one cause with it and have the share in common: a gravity of another
+        direction and another size.
     of_joint : tuple of (str, float)
-        The joint in which it takes most of what the other names leave, and that share, where it
-        takes next to nothing of the whole gap; empty where it does.
+        Where its share of the whole gap is next to nothing, the joint in which it explains most of
+        what the other names leave, and that share; empty otherwise.
 
     """
 
@@ -97,7 +97,7 @@ class Finding:
         return tuple(rival.name for rival in self.rivals)
 
     def place_of(self, joint: str) -> str:
-        """Return where a joint's parameters act: at a segment that is tied, or the joint."""
+        """Return where the parameters of a joint act: its tied segment, or the joint itself."""
         return next((tie.name for tie in self.ties if tie.joint == joint), joint)
 
     def values_of(self, joint: str) -> list[tuple[ParameterName, float, float]]:
@@ -118,9 +118,9 @@ class Overlay:
     trajectory : Trajectory
         Its motion.
     measured, before, after : ndarray, shape (M, n)
-        Measured torque, and what both models predict [N m].
+        Measured torque, and predictions of the model without and with the names [N m].
     sigma : ndarray, shape (n,)
-        Noise [N m].
+        Unit of the gap [N m].
 
     """
 
@@ -135,21 +135,22 @@ class Overlay:
 @dataclass(frozen=True)
 class Gap:
     """
-    Errors in numbers.
+    The gap in numbers.
 
     Attributes
     ----------
     before, after, floor : ndarray, shape (n,)
-        Root mean square error of each joint without and with what was named, and the noise [N m].
+        Root mean square residual of each joint without and with the names, and root mean square
+        unit of the gap [N m].
     chi2_before : ndarray, shape (n,)
-        Mean square over noise without what was named.
+        Mean square of the weighted residual without the names.
     closed : float
-        Share of the excess over the noise that is gone, 0 to 1, in the joints that had a gap or
-        have one.
+        Share of the excess over the floor that the names explain, 0 to 1, in joints that had a
+        gap.
     predicted : bool
-        Whether it was measured on recordings that nothing was fitted to.
+        Whether it was measured on held-out recordings.
     overlays : tuple of Overlay
-        The curves.
+        Torques of each trajectory.
 
     """
 
@@ -163,14 +164,14 @@ class Gap:
 
     @property
     def data(self) -> str:
-        """Return what it was measured on, for a reader."""
+        """Return the data that it was measured on, in words."""
         return 'held-out' if self.predicted else 'the data it was found in'
 
 
 @dataclass(frozen=True)
 class Diagnosis:
     """
-    What a diagnosis came to.
+    Result of a diagnosis.
 
     Attributes
     ----------
@@ -179,34 +180,34 @@ class Diagnosis:
     summary : str
         The same in a sentence or two.
     findings : tuple of Finding
-        The headline: what was named, with share, parameters, rivals and the experiment that would
+        The headline: named effects with share, parameters, rivals and the experiment that would
         separate them.
     minor : tuple of Finding
-        What is statistically there and does not matter.
+        The small print: causes that are significant and do not matter.
     where : tuple of Where
-        Where the gap was before anything was named, or is where nothing was.
+        Where the model without the names has a gap.
     left : tuple of Where
-        Where what remains lives.
+        Where the model with the names still has a gap.
     gap : Gap or None
-        Errors before and after beside the floor; None where the data are bad.
+        Residuals before and after, and the floor; None where the data are bad.
     explanation : Explanation or None
-        How it was found.
+        The names with their fits and trials; None where the data are bad.
     arm : ArmModel
-        The patched model; as given where nothing was named or a patch would harm.
+        The patched model; the given one where nothing was named or a patch would harm.
     data : tuple of Trajectory
-        What was looked at.
+        The recordings in question.
     floors : tuple of NoiseFloor
         Noise of each trajectory.
     not_visible : tuple of str
         Names of the catalogue that these data cannot show.
     refitted : bool
-        Whether the rigid body and known effects were fitted anew.
+        Whether parameters of the given model were fitted anew.
     notes : tuple of str
         What a reader should know.
     baseline : str
-        What the floor of the gap is: the noise, the model's own misfit, or an estimate of it.
+        The floor of the gap in words: the noise, the model's own misfit, or an estimate of it.
     harmful : bool
-        Whether the model is not patched, as what was named would make it worse in some joint.
+        Whether the model is not patched, as the names would make it worse in some joint.
 
     """
 
@@ -228,5 +229,5 @@ class Diagnosis:
     harmful: bool = False
 
     def __repr__(self) -> str:
-        """Return the verdict and what was said."""
+        """Return the verdict and its sentence."""
         return f'Diagnosis: {self.verdict}. {self.summary}'

@@ -3,13 +3,13 @@
 """
 The gap between model and measurement, before and after, and what holds a joint that is at rest.
 
-No patch makes a model worse: in no joint, on the data it was found in or on others, may the
-patched model leave more than the given one beyond what blocks of the data differ by, unless what
-is left is no gap.
+No patch makes a model worse: in no joint, in the data it was found in or in others, may the
+residual of the patched model exceed that of the given one by more than blocks of the data differ,
+unless it is no gap.
 
-Dry friction holds a joint that stands still or turns round with any torque up to its own, so that
-such rows tell nothing of a model, and with no more than that. What is left beyond comes from a
-stop, a brake, or a contact.
+Dry friction holds a joint at rest or in a reversal with any torque up to its own, so that such
+rows do not determine a model, and with no more than that. A residual beyond it comes from a stop,
+a brake, or a contact.
 
 """
 
@@ -30,14 +30,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
-#: A joint has a gap where the squares beyond the floor are this many times the floor.
+#: A joint has a gap where its squares exceed the floor by this share of it.
 _A_GAP = 0.2
-#: Share of the squares of a joint that nobody would call worse.
+#: Increase of the squares of a joint, as a share, that does not count as worse.
 _SLIGHTLY = 0.05
-#: Dry friction by which a joint at rest may be held: twice that of motion until it breaks away,
-#: and once what a model has of it in a direction of its own choice.
+#: Multiple of dry friction by which a joint at rest may be held: twice that of motion until it
+#: breaks away, and once that of the model, whose direction is arbitrary at rest.
 _HELD = 3.0
-#: Where it is, for a table, and the end of a sentence.
+#: Words for a joint that is held, for a table, and for the end of a sentence.
 _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
 _BESIDE = (
     'with friction, where it stands still or turns round: a stop, a brake or a contact does that'
@@ -46,14 +46,14 @@ _BESIDE = (
 
 def measure_gap(explanation: Explanation, unseen: Evidence | None) -> Gap:
     """
-    Measure the gap on data that are only predicted, else on the data themselves.
+    Measure the gap on held-out data, or on the fitted data if there are none.
 
     Parameters
     ----------
     explanation : Explanation
-        What was found.
+        The names, fitted.
     unseen : Evidence or None
-        Data that nothing was fitted to; their unit is what a perfect model would leave.
+        Held-out data; their unit is the residual of a perfect model.
 
     """
     before, after = explanation.reference.arm, explanation.fitted.arm
@@ -120,19 +120,19 @@ def held(
     settings: DiagnosisSettings,
 ) -> Excess:
     """
-    Return what acts on joints that stand still or turn round, beyond friction.
+    Return by how much joints at rest or in a reversal are held by more than friction.
 
     Parameters
     ----------
     arm : ArmModel
-        The patched arm.
+        The patched model.
     evidence : Evidence
         The data.
     before : Baseline or None
-        Recordings in which nothing was wrong, of the arm as given: what held it then, such as a
-        brake, does still.
+        Recordings from when nothing was wrong, of the given model: what held a joint then, such as
+        a brake, still does.
     given : ArmModel
-        That arm.
+        The given model.
     settings : DiagnosisSettings
         Thresholds.
 
@@ -148,7 +148,7 @@ def held(
 
 
 def places_held(arm: ArmModel, left: Sequence[Excess]) -> tuple[Where, ...]:
-    """Say which joints are held, the worst first."""
+    """Return the joints that are held, the worst first."""
     excess = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in left)], axis=0)
     beyond = np.where(excess > 1.0, excess, 0.0)
     order = np.argsort(-beyond)[: np.count_nonzero(beyond)]
@@ -163,12 +163,13 @@ def standing(
     arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], surely: float
 ) -> FloatArray:
     """
-    Return by how much what is left of rows that tell nothing is beyond friction, squared, (n,).
+    Return the ratio of the residual to friction at rest and in reversals, squared, (n,).
 
-    Noise and misfit counted in; a joint that turns round accelerates most, and what a model gets
-    wrong grows with the torque that it predicts. What a filter of positions makes of a jerk is as
-    much below as above in the mean of its own time, and what lasts shorter than a rest does may be
-    chance. Noise is so many deviations. Zero where it is not, and where no dry friction is known.
+    So many units of noise and misfit (`surely`) are added to friction, in proportion to the torque
+    that the model predicts: a joint accelerates most in a reversal, and the error of a model grows
+    with its torque. The residual is averaged over the time of the filter of positions, over which
+    its response to a jerk cancels, and over no less than a rest lasts, as what is shorter may be
+    chance. Zero where friction is not exceeded, and where no dry friction is known.
 
     """
     friction = arm.action().dry_friction
@@ -178,13 +179,13 @@ def standing(
     squares, time = np.zeros((2, joints))
     usual = np.maximum(evidence.torque_rms, 1e-300)
     for part, left, sigma in zip(evidence.data, residual, evidence.sigma, strict=True):
-        held = _HELD * friction.largest(arm.load(part.at_rows))
+        most = _HELD * friction.largest(arm.load(part.at_rows))
         louder = np.maximum(np.abs(part.torque - left) / usual, 1.0)
         period = float(part.t[1] - part.t[0])
         shortest = max(REST_TIME, 1.0 / part.used.cutoff_hz)
         lasting = uniform_filter1d(left, max(round(shortest / period), 1), axis=0)
-        beyond = (lasting / (held + surely * sigma * louder)) ** 2
-        more = ~part.informative & (held > 0.0) & (beyond > 1.0)
+        beyond = (lasting / (most + surely * sigma * louder)) ** 2
+        more = ~part.informative & (most > 0.0) & (beyond > 1.0)
         time += period * more.sum(axis=0)
         squares += period * np.sum(beyond, axis=0, where=more)
     return np.where(time > REST_TIME, squares / np.maximum(time, 1e-300), 0.0)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From the candidates of an explanation to the names of the catalogue, and their values."""
+"""From the names of an explanation to effects of the catalogue, and their values."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Slope from which on a value of a translation goes along one that no data tell.
+#: Slope above which a translated value depends on one that the data do not determine.
 _ALONG = 1e-6
 
 
 @dataclass(frozen=True)
 class _Said:
-    """One name of an explanation, in the words of the catalogue."""
+    """One name of an explanation as an effect of the catalogue."""
 
     effect: Effect
     parameters: tuple[ParameterName, ...]
@@ -39,7 +39,7 @@ def findings(
     arm: ArmModel,
     rng: np.random.Generator,
 ) -> tuple[Finding, ...]:
-    """Say what was found: effects of one name together, those that take most of the gap first."""
+    """Return the findings: effects of one name together, the largest share of the gap first."""
     said = _in_words(explanation, arm)
     taken = _without_later(explanation.steps)
     merged: dict[str, list[int]] = {}
@@ -85,7 +85,7 @@ def findings(
 
 
 def _of_joint(explanation: Explanation, names: Sequence[int], share: float) -> tuple[str, float]:
-    """Return where names of a small share take most of what the others leave, and how much."""
+    """Return the joint in which names of small share explain most of the rest, and how much."""
     others = [k for k in range(len(explanation.steps)) if k not in names]
     if share >= SAID or not others:
         return '', 0.0
@@ -98,7 +98,7 @@ def _of_joint(explanation: Explanation, names: Sequence[int], share: float) -> t
 def small_print(
     trials: Sequence[Trial], total: float, tried: int, arm: ArmModel
 ) -> tuple[Finding, ...]:
-    """Say what is statistically there and does not matter."""
+    """Return findings of causes that are significant and do not matter."""
     result = []
     for trial in trials:
         effect, kept = trial.candidate.effect, list(trial.candidate.kept)
@@ -151,7 +151,7 @@ def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Said]]:
 def _translated(
     effect: Effect, values: FloatArray, covariance: FloatArray, arm: ArmModel
 ) -> list[_Said]:
-    """Return an effect in other words, deviations by the slopes of the translation."""
+    """Translate an effect into others of the catalogue, deviations by linear propagation."""
     parts = []
     known = np.isfinite(np.diag(covariance))
     inside = np.where(np.outer(known, known), covariance, 0.0)
@@ -174,7 +174,7 @@ def _translated(
 
 
 def _determined(part: _Said) -> bool:
-    """Return whether any value is three deviations from zero, and of a size worth mentioning."""
+    """Return whether any value is three deviations from zero, and larger than is negligible."""
     typical = [q.typical[0] if q.typical else 0.0 for q in part.effect.quantities]
     size = np.abs(part.values)
     return bool(np.any((size > 3.0 * part.std) & (size > np.array(typical))))
@@ -187,9 +187,9 @@ def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
 
 def _without_later(steps: Sequence[Step]) -> list[Step]:
     """
-    Return steps without rivals that stand in for another name, which was taken later.
+    Return steps without rivals that are a name accepted later, or a rival of one.
 
-    What they take is what that name takes, and was open when the first one was asked for.
+    They explain what that name explains, which nothing explained yet in the earlier step.
 
     """
     result: list[Step] = []
@@ -202,7 +202,7 @@ def _without_later(steps: Sequence[Step]) -> list[Step]:
 
 
 def _rivals(steps: Sequence[Step], named: set[str], arm: ArmModel) -> tuple[Rival, ...]:
-    """Return the other names that are possible, the likeliest first, and where."""
+    """Return the rivals of a name, the largest gain first, with their joints."""
     best: dict[str, list[Trial]] = {}
     for step in steps:
         here: dict[str, Trial] = {}
@@ -218,7 +218,7 @@ def _rivals(steps: Sequence[Step], named: set[str], arm: ArmModel) -> tuple[Riva
 
 
 def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]:
-    """Return the joints of several effects of a name, in order but for those of pairs."""
+    """Return the joints of effects of one name, in the order of the arm unless any is a pair."""
     joints = [joint for group in groups for joint in group]
     if any(len(group) > 1 for group in groups):
         return tuple(dict.fromkeys(joints))
@@ -227,9 +227,9 @@ def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]
 
 def _separating(name: str, joints: Sequence[str], rival: Rival) -> str:
     """
-    Say which experiment separates a name in some joints from another one.
+    Say which experiment separates a name in some joints from a rival.
 
-    No motion tells what a link carries from the link: it has to be taken off.
+    No motion separates a payload from the link that carries it: it has to be taken off.
 
     """
     both = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where a residual lives: in which joint, and over which quantity it is not flat."""
+"""Where a residual is large: in which joint, and with which quantity it varies."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
-#: Bins of a signal that says where the gap is.
+#: Bins of a quantity over which the residual is averaged.
 _BINS = 16
-#: An axis is worth a word if its bins hold this share of the residual's power.
+#: A quantity is named if the means of its bins hold this share of the residual's power.
 _TELLING = 0.15
 
 
 @dataclass(frozen=True)
 class Axis:
     """
-    The mean residual over one quantity.
+    The mean residual as a function of one quantity.
 
     Attributes
     ----------
     name, unit : str
         The quantity.
     centres, means : ndarray, shape (B,)
-        Middle of each bin, and the mean residual in it [N m or N].
+        Mean of the quantity in each bin, and of the residual [N m or N].
     share : float
         Share of the residual's power that the means hold.
 
@@ -45,7 +45,7 @@ class Axis:
 @dataclass(frozen=True)
 class Where:
     """
-    What is left of one joint.
+    The residual of one joint.
 
     Attributes
     ----------
@@ -54,9 +54,9 @@ class Where:
     share_of_gap : float
         Its share of the excess of all joints, 0 to 1.
     signature : str
-        In words, over which quantity the residual changes.
+        In words, the quantity with which the residual varies.
     axes : tuple of Axis
-        All quantities, the telling ones first.
+        All quantities, the largest share first.
     unit : str
         Of the residual.
 
@@ -72,12 +72,12 @@ class Where:
 @dataclass(frozen=True)
 class Excess:
     """
-    What is left in the joints beyond what is no gap.
+    Losses of the joints over their limits.
 
     Attributes
     ----------
     ratio : ndarray, shape (n,)
-        Loss over the loss up to which it is no gap; above one there is something.
+        Loss over the loss up to which there is no gap; above one there is a gap.
     where : str
         The data that show it, for a sentence.
 
@@ -91,7 +91,7 @@ def locate(
     arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], limits: FloatArray
 ) -> tuple[Where, ...]:
     """
-    Describe the residual of every joint that is beyond its noise, the worst first.
+    Describe the residual of every joint that has a gap, the worst first.
 
     Parameters
     ----------
@@ -100,9 +100,9 @@ def locate(
     evidence : Evidence
         Motion, and the unit of the gap.
     residual : sequence of ndarray, shape (M, n)
-        What is left [N m or N].
+        Residual of each trajectory [N m or N].
     limits : ndarray, shape (n,)
-        Joints below this loss have no gap.
+        Loss of each joint up to which it has no gap.
 
     """
     losses = evidence.chi2_per_row(residual)

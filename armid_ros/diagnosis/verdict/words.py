@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From what was found to a word and a sentence that the evidence bears out."""
+"""From findings to a verdict: a word and a sentence that the evidence supports."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ import numpy as np
 Word = Literal[
     'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
 ]
-#: Recordings whose periods differ slowly, each a little, tell as well if they are so many.
+#: From so many recordings on, slow differences of periods that are small in each are tested in
+#: their mean.
 _SEVERAL = 3
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
@@ -56,22 +57,22 @@ def decide(
     minor: Sequence[Finding] = (),
 ) -> Verdict:
     """
-    Decide what may be said.
+    Decide the verdict.
 
     Parameters
     ----------
     findings : sequence of Finding
-        What was named.
+        The headline.
     strange : sequence of str
-        Joints that did not do the same in equal periods; see `not_repeating`.
+        Joints that do not repeat in equal periods; see `not_repeating`.
     left : sequence of Excess
-        What the patched model leaves, of each set of data.
+        Losses of the model with the names over their limits, for each set of data.
     arm : ArmModel
         Gives the joints.
     floor_in_words : str
-        What was there before, or noise.
+        The floor of the gap: noise, or a misfit.
     as_it_is : Excess or None
-        What the model leaves as it is, where its body and known effects were fitted anew.
+        The same of the given model, where its body and known effects were fitted anew.
     minor : sequence of Finding
         The small print, the most important first.
 
@@ -106,7 +107,7 @@ def decide(
 def _consistent(
     floor_in_words: str, as_it_is: Excess | None, minor: Sequence[Finding], robot: Robot
 ) -> str:
-    """Say what a model explains, what has to be fitted anew for that, and what is too small."""
+    """Say that a model explains the data, what is fitted anew for that, and what is too small."""
     small = [sentence(one) for one in minor[:1] if one.share >= SAID]
     if as_it_is is None or as_it_is.ratio.max() <= 1.0:
         text = f'The model explains the recordings: what is left is {floor_in_words}'
@@ -137,7 +138,7 @@ def _larger(ratio: float) -> str:
 
 
 def sentence(finding: Finding) -> str:
-    """Say what a cause is and how much it explains, as a person would."""
+    """Say in a sentence what a cause is and how much it explains."""
     joint, share = finding.of_joint
     if joint:
         taken = f'{100.0 * share:.0f} % of what the rest leaves in {joint}'
@@ -146,7 +147,7 @@ def sentence(finding: Finding) -> str:
 
 
 def _sentences(findings: Sequence[Finding]) -> str:
-    """Say what was named; names that are one cause in one sentence."""
+    """Say in sentences what was named; names that are one cause share one."""
     said: list[str] = []
     done: set[str] = set()
     for one in findings:
@@ -190,7 +191,7 @@ def _subject(finding: Finding) -> str:
 
 
 def _values(finding: Finding) -> Iterator[str]:
-    """Yield the values of a cause, with a name where it is another one than before."""
+    """Yield the values of a cause, with the name where it differs from that of the one before."""
     before = ''
     for p, value, std in zip(finding.parameters, finding.values, finding.std, strict=True):
         name = '' if p.name == before else f'{p.name.replace("_", " ")} '
@@ -207,13 +208,13 @@ def _weight(finding: Finding) -> str:
 
 
 def _put_down(finding: Finding) -> str:
-    """Return that a payload is less than nothing, if it is."""
+    """Say that a payload was put down if its mass is negative; else return nothing."""
     mass, std = _mass(finding)
     return ' that was put down' if mass < -HALF_WIDTH * std else ''
 
 
 def _mass(finding: Finding) -> tuple[float, float]:
-    """Return the mass of a payload and its deviation [kg], zero where no data tell it."""
+    """Return the mass of a payload and its deviation [kg], zero where it is not determined."""
     rows = zip(finding.parameters, finding.values, finding.std, strict=True)
     return next(((value, std) for p, value, std in rows if p.unit == 'kg'), (0.0, 0.0))
 
@@ -229,7 +230,7 @@ def not_repeating(
     floors: Sequence[NoiseFloor], arm: ArmModel, thresholds: Thresholds, least: FloatArray
 ) -> list[str]:
     """
-    Return the joints that did not do the same in equal periods, by as much as matters.
+    Return the joints that differ between equal periods, slowly and by as much as matters.
 
     Parameters
     ----------
@@ -238,7 +239,7 @@ def not_repeating(
     arm : ArmModel
         Gives the joints.
     thresholds : Thresholds
-        How much slower than noise what does not repeat is.
+        From which power at low frequency, over that at high frequency, periods do not repeat.
     least : ndarray, shape (n,)
         Torque of each joint that matters [N m].
 
@@ -278,17 +279,17 @@ def _tie(finding: Finding, joint: str, segment: str) -> str:
 
 
 def _others(finding: Finding) -> str:
-    """Return what could stand in the place of a name, with joints where any are others."""
-    there = any(set(rival.joints) != set(finding.joints) for rival in finding.rivals)
+    """Return the rivals of a name in words, with their joints if any rival has other joints."""
+    elsewhere = any(set(rival.joints) != set(finding.joints) for rival in finding.rivals)
     return ' or '.join(
         rival.name.replace('_', ' ')
-        + (f' of {", ".join(rival.joints)}' if there and rival.joints else '')
+        + (f' of {", ".join(rival.joints)}' if elsewhere and rival.joints else '')
         for rival in finding.rivals
     )
 
 
 def _as_sure(value: float, std: float) -> str:
-    """Return a value to the second digit of its 95 % interval, and that."""
+    """Return a value and the half-width of its 95 % interval, to two digits of the latter."""
     wide = HALF_WIDTH * std
     if not 0.0 < wide < np.inf:
         return f'{value:.4g}'

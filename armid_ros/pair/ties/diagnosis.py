@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The diagnosis of an arm beside which another machine may have been recorded."""
+"""The diagnosis of an arm that may have been recorded with another machine."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ def diagnose_beside(
     progress: Progress | None = None,
 ) -> Diagnosis:
     """
-    Find what a model lacks, ties to another machine before all else.
+    Find what a model lacks, ties to another machine first.
 
     Parameters
     ----------
     arm : ArmModel
-        The model as it is believed to be.
+        The given model.
     recordings : sequence of Recording
-        Data with torques, and with the motion of the partner beside them.
+        The recordings in question, with torques and the motion of the partner.
     partner : Partner or None
-        What the arm may be tied to, and where; None diagnoses the arm by itself.
+        The machine to which the arm may be tied, and where; None diagnoses the arm by itself.
     validate : sequence of Recording
-        Data that are only predicted, with the motion of the partner.
+        Recordings that are predicted and not fitted, with the motion of the partner.
     baseline : sequence of Recording
-        Data from when nothing was wrong.
+        Recordings from when nothing was wrong.
     misfit : Misfit, optional
-        What the model left when it was identified, where there is no baseline to measure it.
+        Misfit of the model when it was identified, where there is no baseline to measure it.
     settings : DiagnosisSettings, optional
-        Library and thresholds; its partner is replaced by the one given.
+        Library and thresholds; its partner is replaced by `partner`.
     rng : numpy.random.Generator
         Draws the states over which base parameters are found, and resamplings of the data.
     progress : callable, optional

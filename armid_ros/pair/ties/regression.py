@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Ties of a diagnosis as ``armid exo`` looks at them, who knows what noisy angles do to springs.
+Ties of a diagnosis, identified as by ``armid exo``, which models the noise of angles.
 
-A search compares least squares of all causes. Springs are too soft by a little in them, and soft
-ones beside stiff ones are missed: noise of angles is alike in all joints, which least squares
-joint by joint do not know.
+A search compares causes by least squares. Those make springs slightly too soft, and miss soft ones
+next to stiff ones: noise of angles is correlated between the torques of all joints, which least
+squares joint by joint ignore.
 
 """
 
@@ -31,24 +31,24 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
 
-#: A tie so many standard deviations above zero may well be there.
+#: A tie so many standard deviations above zero is not excluded.
 _DOUBTFUL = 1.0
-#: Squares over noise that each inertia has to take for its description to be wrong: one by chance,
-#: two where filters make neighbours alike.
+#: Squares over noise that each fitted inertia has to explain for the description to be wrong: one
+#: by chance, two where filters correlate neighbouring rows.
 _TOLD = 5.0
 
 
 @dataclass(frozen=True)
 class TieRegression:
     """
-    Recordings of an arm and of a machine beside it, as a regression of the ties.
+    Recordings of an arm and of another machine, as a regression of the ties.
 
     Attributes
     ----------
     arm : ArmModel
         The arm as described.
     recordings : tuple of Recording
-        With what was beside it.
+        Of the arm, with the motion of the other machine.
     used : Conditioning
         Filters of the data.
     settings : DiagnosisSettings
@@ -63,12 +63,12 @@ class TieRegression:
 
     def sure(self, slack: float) -> frozenset[str]:
         """
-        Return joints with ties surely there, if ties and inertias leave nothing but noise.
+        Return the joints with significant ties, if ties and inertias leave nothing but noise.
 
         Parameters
         ----------
         slack : float
-            Way that all ties give before they pull [m].
+            Slack of all ties, the elongation beyond which they pull [m].
 
         """
         try:
@@ -84,10 +84,10 @@ class TieRegression:
 
     def springs(self, explanation: Explanation, inertias: Inertias) -> Interaction | None:
         """
-        Identify springs that were named, if all ties among the names are such and data tell them.
+        Identify the named springs; None unless all named ties are springs that data determine.
 
-        Ties that may well be there are identified beside them: a strap too weak to be named pulls
-        all the same, and would be taken for a part of those that are. All else stays as fitted.
+        Ties that are not excluded are identified jointly with them: a strap too weak to be named
+        pulls all the same, and would be attributed to the named ones. All else stays as fitted.
 
         """
         ties = [own.effect for own in explanation.fitted.named if isinstance(own.effect, Tied)]
@@ -115,7 +115,7 @@ class TieRegression:
     def _problem(
         self, bare: ArmModel, inertias: Inertias, slack: float = 0.0
     ) -> InteractionProblem:
-        """Set up the regression of all ties, beside what a bare arm has but its body."""
+        """Set up the regression of all ties, with the effects of a bare arm subtracted."""
 
         def rest(motion: Motion) -> FloatArray:
             return np.asarray(bare.torque(motion) - inverse_dynamics(bare.robot, motion))
@@ -148,15 +148,15 @@ def rightly_described(known: Interaction | None, free: Interaction | None) -> bo
 
 def without_bias(explanation: Explanation, springs: Interaction | None) -> Explanation:
     """
-    Return an explanation whose springs are without what noisy angles take away from them.
+    Return an explanation without the bias of its springs by noisy angles.
 
     Parameters
     ----------
     explanation : Explanation
-        What was found.
+        The names, fitted.
     springs : Interaction or None
-        Its springs as `TieRegression.springs` finds them, inertias free as in the explanation;
-        None leaves it as it is.
+        Its springs as identified by `TieRegression.springs`, with inertias fitted or known as in
+        the explanation; None returns it unchanged.
 
     """
     if springs is None:
@@ -170,10 +170,10 @@ def _tied_joints(arm: ArmModel) -> set[str]:
 
 def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
     """
-    Return the arm with these springs, and what is free of it moved to go with them.
+    Return the fitted arm with these springs, its base parameters refitted to them.
 
-    Other names that were fitted at the same time may make springs less sure: deviations are the
-    larger ones then.
+    Names other than ties that were fitted jointly may make springs less certain: deviations are
+    the larger ones then.
 
     """
     fitted, base = explanation.fitted, explanation.base
@@ -212,5 +212,5 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
 
 
 def _place(wanted: ParameterName, names: Sequence[ParameterName]) -> int:
-    """Return where a parameter is, whatever its unit."""
+    """Return the position of a parameter among names, whatever its unit."""
     return [(name.name, name.joint) for name in names].index((wanted.name, wanted.joint))

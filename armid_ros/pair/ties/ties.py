@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What an arm lacks that is tied to a machine that moved beside it: the ties first, then the rest.
+What an arm lacks that is tied to another moving machine: the ties first, then other causes.
 
-Where the two may be tied is known, so all ties are fitted at once, beside everything that is free:
-one by one they imitate each other and half of the catalogue. Those that are surely there stay, and
-only what they leave is looked at further.
+The places of possible ties are known, so all ties are fitted at once, jointly with the nuisance
+parameters: one by one they imitate each other and half of the catalogue. Significant ties stay,
+and only the residual that they leave is searched for other causes.
 
 """
 
@@ -40,33 +40,35 @@ from armid_ros.recording import Recording
 import numpy as np
 from scipy import optimize
 
-#: Squares over noise that slack has to take: z > 5.
+#: Reduction of squares over noise that slack has to bring: z > 5.
 _LEAST_GAIN = 25.0
-#: Evaluations of a common slack around the best of those that are tried.
+#: Evaluations of a common slack around the best one of its grid.
 _EVALUATIONS = 10
-#: Losses of two explanations that are as good as each other where masses are known or fitted.
+#: Ratio of losses up to which an explanation with masses as described is as good as with fitted
+#: ones.
 _ALIKE = 1.05
 
 
 @dataclass(frozen=True)
 class Ties:
     """
-    Ties to a machine that moved beside an arm, as they are fitted to data.
+    Ties of an arm to another moving machine, fitted to data.
 
     Attributes
     ----------
     arm : ArmModel
-        The arm without them.
+        The arm without ties.
     partner : Partner
-        Where there may be any.
+        Where there may be ties.
     evidence : Evidence
         The data, and their noise.
     base : BaseParameters or None
-        What of the arm is fitted with them; None takes it as described.
+        Base parameters that are fitted jointly; None keeps the arm as described.
     settings : DiagnosisSettings
         Thresholds.
     sure : callable
-        Tells joints whose ties are surely there with a slack [m], whatever least squares say.
+        Returns the joints whose ties are significant with a slack [m], whatever least squares
+        say.
 
     """
 
@@ -79,14 +81,15 @@ class Ties:
 
     def find(self) -> tuple[Ties, Fitted]:
         """
-        Fit all ties, and keep those that are surely there, with slack and damping if they have.
+        Fit all ties, and keep the significant ones, with slack and damping if significant.
 
         Returns
         -------
         ties : Ties
-            With the noise beside the arm as it is tied: what noisy angles do to springs is in it.
+            With the noise in the residual of the tied arm, which includes the effect of noisy
+            angles on springs.
         fitted : Fitted
-            The arm with what was found; with nothing named where there is nothing.
+            The arm with these ties; nothing is named if there are none.
 
         """
         joints = self._joints()
@@ -96,13 +99,13 @@ class Ties:
         return ties, ties._damped(ties._surely(joints))
 
     def _joints(self) -> list[str]:
-        """Return the joints with a tie that the arm does not have already."""
+        """Return the joints with a possible tie that the arm does not have already."""
         names = TiedInteraction.name, TiedSlack.name
-        there = [joint for own in self.arm.effects if own.name in names for joint in own.joints]
-        return [tie.joint for tie in self.partner.ties if tie.joint not in there]
+        tied = [joint for own in self.arm.effects if own.name in names for joint in own.joints]
+        return [tie.joint for tie in self.partner.ties if tie.joint not in tied]
 
     def _surely(self, joints: Sequence[str]) -> Fitted:
-        """Return the ties that are surely there, with slack where that surely is."""
+        """Return the arm with its significant ties, with slack where that is significant."""
         if not joints:
             return self.fitted(())
         taut = self.surely([self._plain(joint) for joint in joints])
@@ -132,7 +135,7 @@ class Ties:
         return found if gain > _LEAST_GAIN * noise else taut
 
     def fitted(self, named: Sequence[Named], start: Sequence[FloatArray] = ()) -> Fitted:
-        """Fit the arm with what is named, from values to start from."""
+        """Fit the arm with named effects, from start values."""
         return fit(self.arm, named, self.evidence, self.base, Start(start))
 
     def chi2_per_row(self, fitted: Fitted) -> FloatArray:
@@ -140,7 +143,7 @@ class Ties:
         return self.evidence.chi2_per_row(fitted.residual)
 
     def surely(self, named: Sequence[Named]) -> Fitted:
-        """Fit, and take ties away, the weakest first, until all are surely there."""
+        """Fit, and remove ties, the weakest first, until all are significant."""
         kept, sure = list(named), self.sure(0.0)
         while True:
             fitted = self.fitted(kept)
@@ -169,7 +172,7 @@ class Ties:
         return [np.array([max(k, 0.0), *np.zeros(size - 1)]) for k, size in rows]
 
     def _common_slack(self, joints: Sequence[str]) -> tuple[float, FloatArray, FloatArray]:
-        """Return the slack of all straps that takes most; stiffnesses and how sure they are."""
+        """Return the common slack of all straps that explains most; stiffnesses, and their z."""
         reference, arm = self.fitted(()), memoized_arm(self.arm)
         data, sigma = self.evidence.data, self.evidence.sigma
         problem = make_problem(data, sigma, reference.residual, list(reference.columns))
@@ -201,7 +204,7 @@ class Ties:
         return slack, *solved(slack)[1:]
 
     def _damped(self, fitted: Fitted) -> Fitted:
-        """Return springs with dampers, where something is left that those surely take."""
+        """Return springs, with dampers where a gap is left and they are significant."""
         limits = self.evidence.limits(fitted.residual, self.settings)
         if np.all(self.chi2_per_row(fitted) < limits):
             return fitted
@@ -222,7 +225,7 @@ class Ties:
 
 
 def _certainty(fitted: Fitted, *, last: bool = False) -> list[float]:
-    """Return the first or the last value of each name over its standard deviation."""
+    """Return the z of the first or the last value of each name; zero where it is not known."""
     if not fitted.named:
         return []
     ends = [shapes.stop - 1 if last else values.start for values, shapes in fitted.places]
@@ -234,13 +237,13 @@ def diagnose_ties(
     arm: ArmModel, recordings: Sequence[Recording], prepared: Prepared, settings: DiagnosisSettings
 ) -> Chosen | None:
     """
-    Explain a gap by ties to a machine beside the arm, and by what is named in what they leave.
+    Explain a gap by ties to another machine, and by causes of the residual that they leave.
 
     Returns
     -------
     Chosen or None
-        With the ties as its first names, or the arm as given if that is within its noise; None if
-        there is no tie, and something else.
+        With the ties as its first names, or the given arm if it leaves no more than noise; None if
+        there is no tie, and still a gap.
 
     """
     assert settings.partner is not None
@@ -275,10 +278,10 @@ def _within_its_noise(
     arm: ArmModel, prepared: Prepared, settings: DiagnosisSettings
 ) -> Chosen | None:
     """
-    Return the arm as described, if it leaves no more than the noise beside itself.
+    Return the arm as described, if it leaves no more than the noise of its own residual.
 
-    A fit takes inertias away to get rid of the noise of accelerations; beside the fitted arm,
-    where there is less of it, the described one would seem to be wrong.
+    A fit reduces inertias to get rid of the noise of accelerations; compared with the smaller
+    noise in the residual of the fitted arm, the described one would seem to be wrong.
 
     """
     evidence = prepared.described
@@ -308,7 +311,7 @@ def _as_described(found: Explanation, arm: ArmModel, settings: DiagnosisSettings
 
 
 def _explanation(ties: Ties, fitted: Fitted) -> Explanation:
-    """Return what was fitted as steps, each tie judged beside the others, and its rivals."""
+    """Return the explanation with a step for each tie, tried jointly with the others."""
     reference = ties.fitted(())
     survey, rivals = _rivals(ties, reference, fitted)
     view = View.of(fitted, ties.evidence)
@@ -323,7 +326,7 @@ def _explanation(ties: Ties, fitted: Fitted) -> Explanation:
 
 
 def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tuple[Trial, ...]]:
-    """Look at all of the library beside the ties as one cause; return what they do not beat."""
+    """Try the library against all ties as one candidate; return the survey, and its rivals."""
     evidence, settings = ties.evidence, ties.settings
     data, sigma = evidence.data, evidence.sigma
     found = candidates(reference, evidence, settings.kinds)
@@ -358,7 +361,7 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
 
 
 def _with_names_of(found: Explanation, fitted: Fitted) -> Explanation:
-    """Return an explanation with the names that a last fit kept."""
+    """Return an explanation with only the names that a last fit kept."""
     kept = {(own.effect.name, own.effect.joints) for own in fitted.named}
     pairs = zip(found.fitted.named, found.steps, strict=True)
     steps = tuple(s for own, s in pairs if (own.effect.name, own.effect.joints) in kept)
